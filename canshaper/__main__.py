@@ -1,0 +1,5 @@
+"""``python -m canshaper``."""
+
+from canshaper.cli.app import main
+
+main()

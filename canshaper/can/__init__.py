@@ -1,0 +1,1 @@
+"""Signals on CAN: DBC binding, codecs and buses."""

@@ -1,0 +1,137 @@
+"""Codecs of one lever, one valve and the status messages. Decode and encode through cantools."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from bitstruct import Error as BitstructError
+from cantools.database import DecodeError
+from cantools.database.can import Message
+
+from canshaper.can.frame import Frame
+from canshaper.can.signals import FieldSet, VelocitySignal
+from canshaper.shaping.states import Reason, State
+
+
+class WrongLengthError(Exception):
+    """A frame is shorter or longer than its message in the DBC."""
+
+
+class LeverCodec:
+    """Joystick message to raw values and switches."""
+
+    def __init__(self, message: Message, velocities: list[VelocitySignal]) -> None:
+        self._message = message
+        self._velocities = velocities
+
+    def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
+        """Decode one frame.
+
+        Returns:
+            (raw values of all signals, command or fault of every velocity signal).
+
+        Raises:
+            WrongLengthError: the length is not that of the message. cantools would read a longer
+                frame without a word.
+        """
+        if len(data) != self._message.length:
+            raise WrongLengthError
+        try:
+            raw = self._message.decode(data, decode_choices=False, scaling=False)
+        except (DecodeError, BitstructError):
+            raise WrongLengthError from None
+        values: dict[str, Any] = raw  # type: ignore[assignment]  # plain numbers: no choices asked
+        return values, {v.name: v.command(values[v.name]) for v in self._velocities}
+
+
+class Sender:
+    """A message we send: its place on the bus and its fields."""
+
+    def __init__(self, bus: str, message: Message) -> None:
+        self._bus = bus
+        self._id = message.frame_id
+        self._extended = message.is_extended_frame
+        self.fields = FieldSet(message)
+
+    def frame(self, raw: dict[str, int]) -> Frame:
+        """Frame with these raw values."""
+        return Frame(self._bus, self._id, self._extended, self.fields.encode(raw))
+
+
+class ValveCodec:
+    """Grid steps of an axis to the valve's frame."""
+
+    def __init__(self, sender: Sender, signal: str, alive_counter: str | None) -> None:
+        self._sender = sender
+        self._signal = signal
+        self._alive = alive_counter
+        message = sender.fields.message
+        definition = next(s for s in message.signals if s.name == signal)
+        counter = next((s for s in message.signals if s.name == alive_counter), None)
+        self._counter_range = 1 << counter.length if counter else 1
+        self._count = 0
+        self._zero = round(-definition.offset / definition.scale)
+        self._sign = 1 if definition.scale > 0 else -1
+        self.steps = valve_steps(definition.maximum or 0.0, abs(definition.scale))
+
+    def frame(self, steps: int) -> Frame:
+        """Next frame, with the alive counter counted up."""
+        if not -self.steps <= steps <= self.steps:
+            raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
+        raw = {self._signal: self._zero + self._sign * steps}
+        if self._alive is not None:
+            self._count = (self._count + 1) % self._counter_range
+            raw[self._alive] = self._count
+        return self._sender.frame(raw)
+
+    def velocity_steps(self, raw: int) -> int:
+        """Grid steps for a raw value of the signal."""
+        return self._sign * (raw - self._zero)
+
+
+def valve_steps(full: float, scale: float) -> int:
+    """Raw steps from zero to full command; rounded down so that full is never passed."""
+    return int(full / scale + 1e-6)
+
+
+@dataclass(frozen=True, slots=True)
+class AxisStatusCodec:
+    """Status message of an axis."""
+
+    sender: Sender
+    SIGNALS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway")
+
+    def frame(
+        self, state: State, reason: Reason, command: float, sent: float, sway_deg: float
+    ) -> Frame:
+        """Status frame; command and sent in [-1, 1]."""
+        fields = self.sender.fields
+        return self.sender.frame(
+            {
+                "State": int(state),
+                "Reason": int(reason),
+                "RawCommand": fields.raw("RawCommand", 100.0 * command),
+                "ShapedCommand": fields.raw("ShapedCommand", 100.0 * sent),
+                "PredictedSway": fields.raw("PredictedSway", sway_deg),
+            }
+        )
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceStatusCodec:
+    """Status message of the whole service: counters that stop at their largest value."""
+
+    sender: Sender
+    SIGNALS = (
+        "LastFault",
+        "MissedDeadlines",
+        "WrongLength",
+        "UnknownId",
+        "ErrorFrames",
+        "InvalidSignals",
+        "SendFailures",
+    )
+
+    def frame(self, values: dict[str, int]) -> Frame:
+        """Status frame from the counters by signal name."""
+        fields = self.sender.fields
+        return self.sender.frame({name: fields.raw(name, values[name]) for name in self.SIGNALS})

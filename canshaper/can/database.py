@@ -1,0 +1,74 @@
+"""DBC files of a deployment: loading them, finding messages, problems with file and line."""
+
+import logging
+import re
+from dataclasses import dataclass
+from pathlib import Path
+
+import cantools
+from cantools.database.can import Database, Message
+
+from canshaper.config.source import Problem
+
+
+@dataclass(frozen=True)
+class DbcFile:
+    """A loaded DBC file."""
+
+    path: Path
+    database: Database
+
+    def problem(self, message: Message, text: str) -> Problem:
+        """A problem of this file at the line where the message is defined."""
+        number = message.frame_id | (0x80000000 if message.is_extended_frame else 0)
+        start = re.compile(rf"\s*BO_\s+{number}\s")
+        lines = self.path.read_text(encoding="cp1252").splitlines()
+        line = next((i for i, row in enumerate(lines, 1) if start.match(row)), None)
+        return Problem(str(self.path), line, message.name, text)
+
+
+def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
+    """Load a DBC file strictly; instead of a file its problems, where it is none."""
+    # cantools only logs that of two messages with one id the first is lost; found below.
+    logging.getLogger("cantools").setLevel(logging.ERROR)
+    try:
+        database = cantools.database.load_file(str(path), database_format="dbc")
+    except OSError as error:
+        return None, [Problem(str(path), None, "", error.strerror or str(error))]
+    except Exception as error:  # whatever a broken file makes the parser raise
+        text = str(error) or type(error).__name__
+        at = re.search(r"at line (\d+)", text)
+        line = int(at.group(1)) if at else None
+        return None, [Problem(str(path), line, "", f"not a DBC file that can be used: {text}")]
+    assert isinstance(database, Database)
+    loaded = DbcFile(path, database)
+    problems = []
+    seen: dict[tuple[int, bool], str] = {}
+    for message in database.messages:
+        key = (message.frame_id, message.is_extended_frame)
+        if key in seen:
+            text = f"has the id {message.frame_id:#x} of {seen[key]}"
+            problems.append(loaded.problem(message, text))
+        seen[key] = message.name
+    return loaded, problems
+
+
+class Messages:
+    """Messages of several DBC files by name."""
+
+    def __init__(self, files: list[DbcFile]) -> None:
+        self._by_name: dict[str, list[tuple[DbcFile, Message]]] = {}
+        for file in files:
+            for message in file.database.messages:
+                self._by_name.setdefault(message.name, []).append((file, message))
+
+    def find(self, name: str) -> tuple[DbcFile, Message] | str:
+        """The message and its file, or why there is none."""
+        found = self._by_name.get(name, [])
+        if not found:
+            names = ", ".join(sorted(self._by_name)) or "none, no DBC file could be loaded"
+            return f"found {name!r}, messages of the DBC files are {names}"
+        if len(found) > 1:
+            files = ", ".join(str(f.path) for f, _ in found)
+            return f"{name!r} is in more than one DBC file: {files}"
+        return found[0]

@@ -1,0 +1,40 @@
+"""The ``canshaper`` command. Each verb imports what it needs when it is called."""
+
+import typer
+
+from canshaper import __version__
+from canshaper.cli import check, config_schema, run
+
+app = typer.Typer(
+    help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+    rich_markup_mode=None,
+)
+
+
+def _version(value: bool) -> None:
+    if value:
+        typer.echo(f"canshaper {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _main(
+    version: bool = typer.Option(
+        False, "--version", callback=_version, is_eager=True, help="Show the version and exit."
+    ),
+) -> None:
+    """Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN."""
+
+
+app.command("run")(run.run)
+app.command("check")(check.check)
+app.command("config-schema")(config_schema.config_schema)
+
+
+def main() -> None:
+    """Entry point of the command."""
+    app(prog_name="canshaper")

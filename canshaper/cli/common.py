@@ -1,0 +1,68 @@
+"""What several verbs share: deployments by name, bus options, errors for people."""
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import typer
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.config.source import DeploymentError, Problem
+
+EXIT_BAD_DEPLOYMENT = 2
+
+FILE = typer.Argument(..., help="Deployment file (YAML), or the name of a shipped one.")
+INTERFACE = typer.Option(None, "--interface", help="python-can interface instead of the file's.")
+CHANNEL = typer.Option(
+    None,
+    "--channel",
+    help="Channel instead of the file's; with several buses NAME=CHANNEL, once for each.",
+)
+
+
+def data_directory() -> Path:
+    """Directory that holds ``config`` and ``dbc``: in the installed package, or the checkout."""
+    package = Path(__file__).resolve().parent.parent
+    inside = package / "data"
+    return inside if inside.is_dir() else package.parent
+
+
+def deployment_path(name: str) -> Path:
+    """Path of a deployment: a file that is there, else a shipped one of that name."""
+    path = Path(name)
+    if path.exists():
+        return path
+    shipped = data_directory() / "config" / path.name
+    return shipped if shipped.exists() and path.parent in (Path(), Path("config")) else path
+
+
+def loader(
+    file: str, interface: str | None = None, channels: list[str] | None = None
+) -> Callable[[], Deployment]:
+    """A function that loads the deployment with the bus options of the command line put in."""
+    path = deployment_path(file)
+
+    def load() -> Deployment:
+        deployment = load_deployment(path)
+        if not interface and not channels:
+            return deployment
+        buses = dict(deployment.config.buses)
+        for item in channels or []:
+            name, _, channel = item.rpartition("=")
+            if not name and len(buses) == 1:
+                name = next(iter(buses))
+            if name not in buses:
+                text = f"found {item!r}, allowed is NAME=CHANNEL with a bus of {', '.join(buses)}"
+                raise DeploymentError([Problem("command line", None, "--channel", text)])
+            buses[name] = buses[name].model_copy(update={"channel": channel})
+        if interface:
+            buses = {n: b.model_copy(update={"interface": interface}) for n, b in buses.items()}
+        return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
+
+    return load
+
+
+def fail(error: Exception) -> typer.Exit:
+    """Print an error as it is and give the exit of a bad deployment."""
+    typer.echo(str(error), err=True)
+    return typer.Exit(EXIT_BAD_DEPLOYMENT)

@@ -1,0 +1,300 @@
+"""What a pair of drives shows: swing, speed of response and feel of each axis, raw and shaped."""
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from canshaper.report.recording import AxisTrace, Recording
+from canshaper.report.strokes import (
+    RESIDUAL_DWELL_S,
+    Stroke,
+    aligned,
+    find_strokes,
+    residual_windows,
+)
+
+__all__ = [
+    "RESIDUAL_DWELL_S",
+    "AxisComparison",
+    "AxisMetrics",
+    "axis_metrics",
+    "compare",
+    "report_dict",
+]
+
+REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
+LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
+STOPPED = 0.05  # of full speed: the deadband of a common proportional valve
+MIN_RAW_DEG = 0.05  # five steps of the sway signal: a reduction of less is a quotient of noise
+
+_DIGITS = {"_deg": 2, "_s": 2, "_pct": 1}  # resolution of the sway frame, of the sampling, of both
+_DIGITS_FRACTION = 3  # fractions of full command and speed: a step of the command frame is 0.004
+
+
+@dataclass(frozen=True)
+class AxisMetrics:
+    """Measures of one axis over one drive; ``Stroke`` defines press, plateau, release, rest.
+
+    Attributes:
+        peak_deg: largest |sway| in the plane of the axis over the whole drive, degrees.
+        rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
+            lost sample gets no extra weight), degrees.
+        residual_deg: largest |sway| later than ``RESIDUAL_DWELL_S`` after the release of the axis,
+            until any stick is moved; only after strokes during which no other axis was moved.
+            Swing still left from before the press is in it.
+        cross_residual_deg: the same windows, the sway of the other planes.
+        time_to_95_s: from the press to the tip speed reaching 95 % of the asked speed, while the
+            stick is held at its plateau. A speed that falls below 90 % again while held was only
+            passed through: the last reaching counts. Worst over the strokes that reach it.
+        run_on_s: from the release to the tip speed falling below 5 % of full speed and staying
+            there for the rest. Worst over the strokes of this axis alone; a rest that ends
+            before counts with the time it lasted (a lower bound).
+        run_on_travel: integral of the speed in the direction of the stroke from the release to the
+            end of the rest, full speed x s. Largest over the strokes of this axis alone.
+        dip: largest fall of the sent command below its running maximum since the press, while the
+            stick is held at its plateau, less what the stick itself fell by; fraction of full
+            command.
+        re_rise: largest rise of |sent| above its running minimum since the release, within the
+            rest, fraction of full command.
+
+    A measure is None where the drive holds nothing it could be taken from.
+    """
+
+    peak_deg: float | None
+    rms_deg: float | None
+    residual_deg: float | None
+    cross_residual_deg: float | None
+    time_to_95_s: float | None
+    run_on_s: float | None
+    run_on_travel: float | None
+    dip: float | None
+    re_rise: float | None
+
+
+@dataclass(frozen=True)
+class AxisComparison:
+    """One axis in both drives; reductions are 100 (1 - shaped / raw) percent.
+
+    A reduction is None for an axis without sway, where either measure is None, and where the raw
+    swing stays below ``MIN_RAW_DEG``. It is negative where shaping made the swing larger.
+    """
+
+    raw: AxisMetrics
+    shaped: AxisMetrics
+    peak_reduction_pct: float | None
+    rms_reduction_pct: float | None
+    residual_reduction_pct: float | None
+    cross_residual_reduction_pct: float | None
+
+
+def axis_metrics(recording: Recording, axis: str) -> AxisMetrics:
+    """Measure one axis of a drive.
+
+    Raises:
+        KeyError: the drive has no such axis.
+        ValueError: the recording is malformed (see ``find_strokes``).
+    """
+    return _measure(recording, find_strokes(recording)[axis], axis)
+
+
+def compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
+    """Measure both drives of one operator script, axis by axis, over the span both cover.
+
+    Raises:
+        ValueError: the drives have different axes, no samples, or are malformed.
+    """
+    return _compare(*aligned(raw, shaped))
+
+
+def report_dict(
+    raw: Recording,
+    shaped: Recording,
+    *,
+    transport: str,
+    missed_deadlines: int | None,
+    facts: Mapping[str, object] | None = None,
+) -> dict[str, Any]:
+    """Return the comparison as a dictionary ready for JSON.
+
+    Per axis: the reductions, ``time_to_95_s`` and ``run_on_s`` of the shaped drive, and all
+    measures of both under ``raw`` and ``shaped``. Degrees and seconds are rounded to 0.01, percent
+    to 0.1, fractions to 0.001. What does not exist or is not finite is None.
+
+    Args:
+        raw: drive with the filters off.
+        shaped: the same operator script with the filters on.
+        transport: the bus the drives went over.
+        missed_deadlines: ticks of the control loop that came late; None when not counted.
+        facts: anything else for the top of the report (JSON types).
+
+    Raises:
+        ValueError: as ``compare``, or a fact has the name of an entry of the report.
+    """
+    raw, shaped = aligned(raw, shaped)
+    report: dict[str, Any] = {
+        "transport": transport,
+        "missed_deadlines": missed_deadlines,
+        "duration_s": round(min(raw.t_s[-1], shaped.t_s[-1]), 2),
+        "axes": {name: _axis_dict(axis) for name, axis in _compare(raw, shaped).items()},
+    }
+    taken = report.keys() & (facts or {}).keys()
+    if taken:
+        raise ValueError(f"facts may not replace {sorted(taken)} of the report")
+    return report | {name: _finite(fact) for name, fact in (facts or {}).items()}
+
+
+def _compare(raw: Recording, shaped: Recording) -> dict[str, AxisComparison]:
+    raw_strokes, shaped_strokes = find_strokes(raw), find_strokes(shaped)
+    comparison = {}
+    for axis in raw.axes:
+        off = _measure(raw, raw_strokes[axis], axis)
+        on = _measure(shaped, shaped_strokes[axis], axis)
+        comparison[axis] = AxisComparison(
+            raw=off,
+            shaped=on,
+            peak_reduction_pct=_reduction_pct(off.peak_deg, on.peak_deg),
+            rms_reduction_pct=_reduction_pct(off.rms_deg, on.rms_deg),
+            residual_reduction_pct=_reduction_pct(off.residual_deg, on.residual_deg),
+            cross_residual_reduction_pct=_reduction_pct(
+                off.cross_residual_deg, on.cross_residual_deg
+            ),
+        )
+    return comparison
+
+
+def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetrics:
+    t_s, trace = recording.t_s, recording.axes[axis]
+    sway = trace.sway_deg
+    windows = residual_windows(recording, strokes)
+    crossing = [
+        other.sway_deg
+        for name, other in recording.axes.items()
+        if sway is not None and name != axis and other.sway_deg is not None
+    ]
+    rests = [stroke for stroke in strokes if len(stroke.rest) > 1]
+    alone = [stroke for stroke in rests if stroke.alone]
+    return AxisMetrics(
+        peak_deg=None if sway is None else _largest(map(abs, sway)),
+        rms_deg=None if sway is None else _rms(t_s, sway),
+        residual_deg=None
+        if sway is None
+        else _largest(abs(sway[k]) for window in windows for k in window),
+        cross_residual_deg=_largest(
+            abs(other[k]) for other in crossing for window in windows for k in window
+        ),
+        time_to_95_s=_largest(_time_to_95_s(t_s, trace, stroke) for stroke in strokes),
+        run_on_s=_largest(_run_on_s(t_s, trace, stroke) for stroke in alone),
+        run_on_travel=_largest(_run_on_travel(t_s, trace, stroke) for stroke in alone),
+        dip=_largest(_dip(trace, stroke) for stroke in strokes),
+        re_rise=_largest(_re_rise(trace, stroke) for stroke in rests),
+    )
+
+
+def _largest(values: Iterable[float | None]) -> float | None:
+    return max((value for value in values if value is not None), default=None)
+
+
+def _rms(t_s: list[float], values: list[float]) -> float | None:
+    if len(t_s) < 2:
+        return None
+    area = _integral(t_s, [value * value for value in values], range(len(t_s)))
+    return math.sqrt(area / (t_s[-1] - t_s[0]))
+
+
+def _integral(t_s: list[float], values: list[float], window: range) -> float:
+    """Integrate over the samples of the window by trapezoids."""
+    return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
+
+
+def _crossing_s(t_s: list[float], values: list[float], k: int, level: float) -> float:
+    """Time at which the straight line from sample k to k + 1 passes the level."""
+    share = (level - values[k]) / (values[k + 1] - values[k])
+    return t_s[k] + share * (t_s[k + 1] - t_s[k])
+
+
+def _time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
+    speed = [stroke.direction * value for value in trace.speed]
+    held = range(stroke.press, stroke.plateau[1] + 1)
+    lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
+    start = lost[-1] if lost else stroke.press
+    wanted = REACHED * stroke.level
+    reached = next((k for k in range(start, held.stop) if speed[k] >= wanted), None)
+    if reached is None:
+        return None
+    if reached == stroke.press:
+        return 0.0
+    return _crossing_s(t_s, speed, reached - 1, wanted) - t_s[stroke.press]
+
+
+def _run_on_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
+    speed = [abs(value) for value in trace.speed]
+    release, last = stroke.rest[0], stroke.rest[-1]
+    moving = next((k for k in reversed(stroke.rest) if speed[k] >= STOPPED), None)
+    if moving is None:
+        return 0.0
+    stop_s = t_s[last] if moving == last else _crossing_s(t_s, speed, moving, STOPPED)
+    return stop_s - t_s[release]
+
+
+def _run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
+    return stroke.direction * _integral(t_s, trace.speed, stroke.rest)
+
+
+def _dip(trace: AxisTrace, stroke: Stroke) -> float:
+    first, last = stroke.plateau
+    sent_max, asked_max, dip = -math.inf, 0.0, 0.0
+    for k in range(stroke.press, last + 1):
+        sent, asked = stroke.direction * trace.sent[k], abs(trace.stick[k])
+        sent_max, asked_max = max(sent_max, sent), max(asked_max, asked)
+        if k >= first:
+            dip = max(dip, (sent_max - sent) - (asked_max - asked))
+    return dip
+
+
+def _re_rise(trace: AxisTrace, stroke: Stroke) -> float:
+    lowest, rise = math.inf, 0.0
+    for k in stroke.rest:
+        sent = abs(trace.sent[k])
+        lowest = min(lowest, sent)
+        rise = max(rise, sent - lowest)
+    return rise
+
+
+def _reduction_pct(raw: float | None, shaped: float | None) -> float | None:
+    if raw is None or shaped is None or raw < MIN_RAW_DEG:
+        return None
+    return 100.0 * (1.0 - shaped / raw)
+
+
+def _axis_dict(axis: AxisComparison) -> dict[str, Any]:
+    def rounded(values: Mapping[str, float | None]) -> dict[str, float | None]:
+        return {name: _round(name, value) for name, value in values.items()}
+
+    raw, shaped = rounded(asdict(axis.raw)), rounded(asdict(axis.shaped))
+    reductions = {name: value for name, value in vars(axis).items() if name.endswith("_pct")}
+    return {
+        **rounded(reductions),
+        "time_to_95_s": shaped["time_to_95_s"],
+        "run_on_s": shaped["run_on_s"],
+        "raw": raw,
+        "shaped": shaped,
+    }
+
+
+def _round(name: str, value: float | None) -> float | None:
+    if value is None or not math.isfinite(value):
+        return None
+    digits = next((d for unit, d in _DIGITS.items() if name.endswith(unit)), _DIGITS_FRACTION)
+    return round(value, digits) + 0.0  # turns -0.0 into 0.0
+
+
+def _finite(fact: object) -> object:
+    """Return the fact with numbers that JSON cannot carry replaced by None."""
+    if isinstance(fact, float):
+        return fact if math.isfinite(fact) else None
+    if isinstance(fact, Mapping):
+        return {str(name): _finite(value) for name, value in fact.items()}
+    if isinstance(fact, list | tuple):
+        return [_finite(value) for value in fact]
+    return fact

@@ -1,0 +1,193 @@
+"""Strokes of the stick in a recorded drive, and the rests after them in which swing is judged."""
+
+import math
+import statistics
+from dataclasses import dataclass
+
+from canshaper.report.recording import AxisTrace, Recording
+
+NEUTRAL_BAND = 0.02  # stick: two steps of a joystick frame of 1/125 and a little, never a command
+PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far
+RESIDUAL_DWELL_S = 2.5  # the slowest shapers have stopped the crane by then (stop 2.4 s)
+RESIDUAL_WINDOW_MIN_S = 1.0  # half a period of a 1 m tool: a shorter look may fall on a zero
+_ROUNDING_S = 1e-6  # a time base that was shifted must not lose the sample on the edge
+
+
+@dataclass(frozen=True)
+class Stroke:
+    """One deflection of one stick; indices are samples of the recording.
+
+    Attributes:
+        axis: name of the axis.
+        direction: +1.0 or -1.0.
+        press: first sample outside the neutral band.
+        release: first sample back in neutral or on the other side; None when the drive ends first.
+        level: asked speed, median of |stick| over the plateau, fraction of full speed.
+        plateau: first and last sample of the longest run of |stick| above ``PLATEAU`` of the
+            largest deflection of the stroke.
+        alone: no other stick left neutral between press and release.
+        rest: samples from the release until any stick is pressed, or another one released;
+            empty for a reversal and for a stroke without release.
+    """
+
+    axis: str
+    direction: float
+    press: int
+    release: int | None
+    level: float
+    plateau: tuple[int, int]
+    alone: bool
+    rest: range
+
+
+def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
+    """Segment every stick of the drive into strokes, in order of time.
+
+    Raises:
+        ValueError: lists of different length, time not increasing, or a value that is no number.
+    """
+    _check(recording)
+    spans = {name: _spans(trace.stick) for name, trace in recording.axes.items()}
+    return {
+        name: [_stroke(recording, spans, name, span) for span in own] for name, own in spans.items()
+    }
+
+
+def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]:
+    """Rests in which the residual swing of these strokes (of one axis) shows.
+
+    A window holds the samples from ``RESIDUAL_DWELL_S`` after the release until a stick is moved.
+    Strokes during which another axis was moved have none, nor have rests that leave less than
+    ``RESIDUAL_WINDOW_MIN_S``.
+    """
+    windows = []
+    t_s = recording.t_s
+    for stroke in strokes:
+        if not stroke.alone or not stroke.rest:
+            continue
+        begin_s = t_s[stroke.rest.start] + RESIDUAL_DWELL_S - _ROUNDING_S
+        start = next((k for k in stroke.rest if t_s[k] >= begin_s), stroke.rest.stop)
+        window = range(start, stroke.rest.stop)
+        if window and t_s[window[-1]] - t_s[start] >= RESIDUAL_WINDOW_MIN_S - _ROUNDING_S:
+            windows.append(window)
+    return windows
+
+
+def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
+    """Cut two drives of the same script to the span both cover, and give them one time base.
+
+    The first press of any stick is put at the same time in both (good to one sample); without a
+    press in both, the starts are. A drive that was recorded longer is thus not judged on more rest.
+
+    Raises:
+        ValueError: the drives have different axes or no samples, or one is malformed.
+    """
+    if raw.axes.keys() != shaped.axes.keys():
+        raise ValueError(f"the drives have different axes: {[*raw.axes]} and {[*shaped.axes]}")
+    anchors = [_first_press_s(raw), _first_press_s(shaped)]
+    if not raw.t_s or not shaped.t_s:
+        raise ValueError("a drive without samples cannot be compared")
+    at_raw_s, at_shaped_s = anchors
+    if at_raw_s is None or at_shaped_s is None:
+        at_raw_s, at_shaped_s = raw.t_s[0], shaped.t_s[0]
+    lead_s = min(at_raw_s - raw.t_s[0], at_shaped_s - shaped.t_s[0])
+    tail_s = min(raw.t_s[-1] - at_raw_s, shaped.t_s[-1] - at_shaped_s)
+    return (
+        _cut(raw, at_raw_s - lead_s, at_raw_s + tail_s),
+        _cut(shaped, at_shaped_s - lead_s, at_shaped_s + tail_s),
+    )
+
+
+def _check(recording: Recording) -> None:
+    if any(not b > a for a, b in zip(recording.t_s, recording.t_s[1:], strict=False)):
+        raise ValueError("the time of a recording must increase")
+    for name, trace in recording.axes.items():
+        sway = {} if trace.sway_deg is None else {"sway_deg": trace.sway_deg}
+        lists = {"stick": trace.stick, "sent": trace.sent, "speed": trace.speed, **sway}
+        for signal, values in lists.items():
+            if len(values) != len(recording.t_s):
+                raise ValueError(
+                    f"{name}.{signal} has {len(values)} samples, the time base {len(recording.t_s)}"
+                )
+            if not all(map(math.isfinite, values)):
+                raise ValueError(f"{name}.{signal} holds a value that is no finite number")
+
+
+def _side(stick: float) -> int:
+    """Return 0 in neutral, else the sign of the deflection."""
+    return 0 if abs(stick) <= NEUTRAL_BAND else (1 if stick > 0 else -1)
+
+
+def _spans(stick: list[float]) -> list[tuple[int, int]]:
+    """Return runs of samples on one side of neutral, as (first, one past the last)."""
+    spans = []
+    start = 0
+    for k in range(1, len(stick) + 1):
+        if k == len(stick) or _side(stick[k]) != _side(stick[start]):
+            if _side(stick[start]):
+                spans.append((start, k))
+            start = k
+    return spans
+
+
+def _stroke(
+    recording: Recording,
+    spans: dict[str, list[tuple[int, int]]],
+    axis: str,
+    span: tuple[int, int],
+) -> Stroke:
+    stick = recording.axes[axis].stick
+    press, end = span
+    others = [other for name, own in spans.items() if name != axis for other in own]
+    rest_end = min(
+        [first for own in spans.values() for first, _ in own if first >= end]
+        + [past for _, past in others if past > end]
+        + [len(stick)]
+    )
+    first, last = _plateau(recording.t_s, stick, span)
+    return Stroke(
+        axis=axis,
+        direction=float(_side(stick[press])),
+        press=press,
+        release=end if end < len(stick) else None,
+        level=statistics.median(abs(v) for v in stick[first : last + 1]),
+        plateau=(first, last),
+        alone=all(past <= press or begin >= end for begin, past in others),
+        rest=range(end, rest_end),
+    )
+
+
+def _plateau(t_s: list[float], stick: list[float], span: tuple[int, int]) -> tuple[int, int]:
+    held = PLATEAU * max(abs(stick[k]) for k in range(*span))
+    runs: list[tuple[int, int]] = []
+    for k in range(*span):
+        if abs(stick[k]) < held:
+            continue
+        if runs and runs[-1][1] == k - 1:
+            runs[-1] = (runs[-1][0], k)
+        else:
+            runs.append((k, k))
+    return max(runs, key=lambda run: t_s[run[1]] - t_s[run[0]])
+
+
+def _first_press_s(recording: Recording) -> float | None:
+    presses = [own[0].press for own in find_strokes(recording).values() if own]
+    return recording.t_s[min(presses)] if presses else None
+
+
+def _cut(recording: Recording, begin_s: float, end_s: float) -> Recording:
+    """Return the samples from ``begin_s`` to ``end_s``, timed from ``begin_s``."""
+    keep = [
+        k for k, t in enumerate(recording.t_s) if begin_s - _ROUNDING_S <= t <= end_s + _ROUNDING_S
+    ]
+    part = slice(keep[0], keep[-1] + 1)
+    axes = {
+        name: AxisTrace(
+            stick=trace.stick[part],
+            sent=trace.sent[part],
+            speed=trace.speed[part],
+            sway_deg=None if trace.sway_deg is None else trace.sway_deg[part],
+        )
+        for name, trace in recording.axes.items()
+    }
+    return Recording(t_s=[t - begin_s for t in recording.t_s[part]], axes=axes)

@@ -1,0 +1,116 @@
+"""The comparison of a raw and a shaped drive as a table for the terminal."""
+
+from collections.abc import Mapping
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from canshaper.report.metrics import MIN_RAW_DEG
+
+NOTHING = "-"
+_SWAY_COLUMNS = (
+    ("peak sway", "peak"),
+    ("RMS sway", "rms"),
+    ("residual", "residual"),
+)
+_PAIR_COLUMNS = (
+    ("time to 95 %", "s", "time_to_95_s", 1.0),
+    ("run-on", "s", "run_on_s", 1.0),
+    ("dip", "%", "dip", 100.0),
+    ("re-rise", "%", "re_rise", 100.0),
+)
+
+
+def print_report(report: Mapping[str, Any], console: Console) -> None:
+    """Print a report of ``metrics.report_dict``; it fits in 100 columns.
+
+    Sway is given in degrees, raw then shaped, the reduction below; dip and re-rise in percent of
+    full command. Where an axis has no such measure there is a "-".
+    """
+    arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
+    console.print(_table(report["axes"], arrow))
+    console.print(
+        Text(f"raw {arrow} shaped, raw / shaped: the same script with filters off, then on", "dim")
+    )
+    for name, axis in report["axes"].items():
+        line = _cross_line(name, axis, arrow)
+        if line is not None:
+            console.print(line)
+    console.print(_drive_line(report))
+
+
+def axis_title(name: str) -> str:
+    """Name of an axis as a reader expects it: ``near_far`` becomes ``Near-far``."""
+    return name.replace("_", "-").capitalize()
+
+
+def _table(axes: Mapping[str, Any], arrow: str) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, show_lines=False)
+    table.add_column("axis\n", no_wrap=True)
+    for title, _ in _SWAY_COLUMNS:
+        table.add_column(f"{title}\ndeg", justify="right", no_wrap=True)
+    for title, unit, _, _ in _PAIR_COLUMNS:
+        table.add_column(f"{title}\n{unit}", justify="right", no_wrap=True)
+    for name, axis in axes.items():
+        swings = [_sway_cell(axis, measure, arrow) for _, measure in _SWAY_COLUMNS]
+        pairs = [
+            _pair_cell(axis["raw"][key], axis["shaped"][key], unit, scale)
+            for _, unit, key, scale in _PAIR_COLUMNS
+        ]
+        table.add_row(Text(axis_title(name), style="bold"), *swings, *pairs, end_section=True)
+    return table
+
+
+def _sway_cell(axis: Mapping[str, Any], measure: str, arrow: str) -> Text:
+    raw, shaped = axis["raw"][f"{measure}_deg"], axis["shaped"][f"{measure}_deg"]
+    if raw is None and shaped is None:
+        return Text(NOTHING, style="dim")
+    cell = Text(f"{_number(raw, 1)} {arrow} {_number(shaped, 1)}")
+    reduction = axis[f"{measure}_reduction_pct"]
+    if reduction is not None:
+        cell.append("\n").append(*_change(reduction))
+    return cell
+
+
+def _pair_cell(raw: float | None, shaped: float | None, unit: str, scale: float) -> Text:
+    if raw is None and shaped is None:
+        return Text(NOTHING, style="dim")
+    digits = 2 if unit == "s" else 0
+    values = [None if value is None else scale * value for value in (raw, shaped)]
+    return Text(" / ".join(_number(value, digits) for value in values))
+
+
+def _cross_line(name: str, axis: Mapping[str, Any], arrow: str) -> Text | None:
+    """Say what swing is left in the other plane; None where there is none to speak of."""
+    raw, shaped = axis["raw"]["cross_residual_deg"], axis["shaped"]["cross_residual_deg"]
+    if max(raw or 0.0, shaped or 0.0) < MIN_RAW_DEG:
+        return None
+    line = Text(
+        f"After {axis_title(name).lower()}, residual sway in the other plane: "
+        f"{_number(raw, 1)} {arrow} {_number(shaped, 1)} deg"
+    )
+    reduction = axis["cross_residual_reduction_pct"]
+    if reduction is not None:
+        line.append("  ").append(*_change(reduction))
+    return line
+
+
+def _drive_line(report: Mapping[str, Any]) -> Text:
+    missed = report["missed_deadlines"]
+    line = Text("Missed deadlines: ")
+    line.append(NOTHING if missed is None else str(missed), style="bold red" if missed else "bold")
+    line.append(f"   transport: {report['transport']}   drive: {report['duration_s']:.1f} s")
+    return line
+
+
+def _change(reduction_pct: float) -> tuple[str, str]:
+    """Return the change with its sign, and a style: a reduction of 97 % reads -97 %."""
+    change = round(-reduction_pct)
+    return f"{change:+d} %" if change else "0 %", "bold red" if change > 0 else "bold green"
+
+
+def _number(value: float | None, digits: int) -> str:
+    return NOTHING if value is None else f"{value:.{digits}f}"

@@ -1,0 +1,1 @@
+"""The daemon: controller (frames in, frames out), loop, health."""

@@ -1,0 +1,277 @@
+"""One axis: the state machine around filter and output limits.
+
+Sans-I/O: every tick takes the checked input of that moment and returns what the valve frame shall
+carry. Nothing but MOVING states may give anything but neutral, and a MOVING state is entered only
+from READY, which takes a fresh, valid, enabled stick seen in neutral.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from canshaper.shaping.limits import (
+    OutputLimits,
+    RecentCommand,
+    allowed_range,
+    on_grid,
+    rate_limited,
+    within,
+)
+from canshaper.shaping.registry import Shaper
+from canshaper.shaping.states import MOVING, Reason, State
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+# Time constant with which the difference at a change of filter fades: quick against a swing of
+# one to three seconds, slow against a valve of a tenth of a second.
+BLEND_S = 0.3
+
+
+@dataclass(frozen=True, slots=True)
+class StickInput:
+    """Input of one axis at one tick, already checked.
+
+    Attributes:
+        command: stick in [-1, 1]; not looked at while ``fault`` is set.
+        fault: why the stick (or a switch it needs) cannot be used; None when fresh and valid.
+        enabled: enable switch; not looked at while ``fault`` is set, so that a lost frame gives
+            a shaped stop and a released switch an immediate one.
+        bypass: the operator asks for the unshaped stick.
+        reset: reset switch (its rising edge counts).
+        trip: a cause for neutral at once that is there now.
+    """
+
+    command: float = 0.0
+    fault: Reason | None = None
+    enabled: bool = True
+    bypass: bool = False
+    reset: bool = False
+    trip: Reason | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A change of state, with its reason."""
+
+    old: State
+    new: State
+    reason: Reason
+
+
+class Axis:
+    """State machine, filter and limits of one axis.
+
+    Args:
+        tick_s: time between two calls of ``tick``.
+        limits: output limits.
+        sway: sway model, or None where the axis has none.
+        shaper: the filter.
+        neutral_band: |stick| up to which it counts as neutral.
+        stop_s: longest duration of STOPPING.
+        grid_steps: raw steps of the valve frame from zero to full command.
+
+    Attributes:
+        raw: what the valve frame carries now, in grid steps (deadband included).
+        sent: the velocity that gives, [-1, 1]: what the sway model was told.
+        command: the operator's command that was in force at the last tick, [-1, 1].
+    """
+
+    def __init__(
+        self,
+        tick_s: float,
+        limits: OutputLimits,
+        *,
+        sway: SwayModel | None,
+        shaper: Shaper,
+        neutral_band: float = 0.02,
+        stop_s: float = 2.0,
+        grid_steps: int = 125,
+    ) -> None:
+        self.state = State.NEUTRAL_WAIT
+        self.reason = Reason.START
+        self.raw = 0
+        self.sent = 0.0
+        self.command = 0.0
+        self.sway = sway
+        self._shaper = shaper
+        self._tick_s = tick_s
+        self._limits = limits
+        self._neutral_band = neutral_band
+        self._grid_steps = grid_steps
+        self._rise = limits.rise_per_s * tick_s
+        self._fall = limits.fall_per_s * tick_s
+        self._stop_ticks = max(1, round(stop_s / tick_s))
+        self._recent = RecentCommand(round(limits.tail_s / tick_s))
+        self._fade = math.exp(-tick_s / BLEND_S)
+        self._bump = 0.0
+        self._rebump = False
+        self._bypassed = False
+        self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
+        self._stopping = 0
+        self._was_enabled = True
+        self._was_reset = True
+
+    @property
+    def neutral(self) -> bool:
+        """Whether the axis is at rest in a state that cannot move without the operator."""
+        return self.state not in MOVING
+
+    def tick(self, stick: StickInput) -> Transition | None:
+        """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
+
+        Returns:
+            The change of state of this tick, or None.
+        """
+        old = self.state
+        self._decide(stick)
+        command = 0.0
+        if self.state in (State.ACTIVE, State.BYPASS_ON):
+            command = self._deadzone(stick.command)
+        self.command = command
+        try:
+            wanted = self._wanted(command)
+            if self.state in MOVING:
+                self._drive(command, wanted)
+            else:
+                self._rest()
+        except ValueError:
+            self._output_invalid()
+        if self.sway is not None:
+            self.sway.step(self.sent)
+        return None if self.state is old else Transition(old, self.state, self.reason)
+
+    def hold(self, ticks: int) -> None:
+        """Tell the model that the last output was held for ``ticks`` missed ticks."""
+        if self.sway is not None:
+            for _ in range(ticks):
+                self.sway.step(self.sent)
+
+    def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
+        """Change sway data and filter, also in motion, without a jump of the output.
+
+        The model keeps the physical swing; the difference that the new filter makes at this
+        moment fades with ``BLEND_S``.
+        """
+        if self.sway is None:
+            self.sway = SwayModel(mode, self._tick_s)
+        else:
+            self.sway = self.sway.retuned(mode, self.sent)
+        self._shaper = shaper_for(self.sway)
+        self._rebump = True
+
+    # -- the state machine ---------------------------------------------------------------------
+
+    def _decide(self, stick: StickInput) -> None:
+        """Move to the state that this tick's input asks for."""
+        valid = stick.fault is None
+        rising = (stick.reset and not self._was_reset) or (
+            valid and stick.enabled and not self._was_enabled
+        )
+        self._was_reset = stick.reset
+        if valid:
+            self._was_enabled = stick.enabled
+        centred = valid and abs(stick.command) <= self._neutral_band
+
+        if stick.trip is not None:
+            if self.state is not State.TRIPPED:
+                self._go(State.TRIPPED, stick.trip)
+        elif self.state is State.TRIPPED:
+            if rising and centred:
+                self._go(State.NEUTRAL_WAIT, Reason.RESET)
+        elif self.state is State.NEUTRAL_WAIT:
+            self._wait(stick, centred)
+        elif self.state is State.READY:
+            self._ready(stick, centred)
+        else:
+            self._moving(stick, centred)
+
+    def _wait(self, stick: StickInput, centred: bool) -> None:
+        if stick.fault is not None:
+            self.reason = stick.fault
+        elif not centred:
+            self.reason = Reason.STICK_NOT_NEUTRAL
+        elif not stick.enabled:
+            self.reason = Reason.ENABLE_OFF
+        else:
+            self._go(State.READY, Reason.STICK_NEUTRAL)
+
+    def _ready(self, stick: StickInput, centred: bool) -> None:
+        if stick.fault is not None:
+            self._go(State.NEUTRAL_WAIT, stick.fault)
+        elif not stick.enabled:
+            self._go(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)
+        elif not centred:
+            if stick.bypass:
+                self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
+            else:
+                self._go(State.ACTIVE, Reason.STICK_MOVED)
+
+    def _moving(self, stick: StickInput, centred: bool) -> None:
+        if stick.fault is None and not stick.enabled:
+            self._go(State.TRIPPED, Reason.ENABLE_LOST)
+        elif self.state is State.STOPPING:
+            self._stopping += 1
+            if self._stopping >= self._stop_ticks or self._at_rest():
+                self._go(State.NEUTRAL_WAIT, Reason.STOP_DONE)
+        elif stick.fault is not None:
+            self._stopping = 0
+            self._go(State.STOPPING, stick.fault)
+        elif centred and self._at_rest():
+            self._go(State.READY, Reason.AT_REST)
+        elif self.state is State.ACTIVE and stick.bypass:
+            self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
+        elif self.state is State.BYPASS_ON and not stick.bypass:
+            self._go(State.ACTIVE, Reason.BYPASS_RELEASED)
+
+    def _go(self, state: State, reason: Reason) -> None:
+        self.state, self.reason = state, reason
+        # A stop goes on with whatever drove the axis before.
+        if state is not State.STOPPING:
+            bypassed = state is State.BYPASS_ON
+            self._rebump = bypassed is not self._bypassed
+            self._bypassed = bypassed
+
+    def _at_rest(self) -> bool:
+        """Neutral is sent and the run-on is over: the filter can ask for nothing any more."""
+        return self.raw == 0 and self._recent.low == 0.0 and self._recent.high == 0.0
+
+    # -- the output ----------------------------------------------------------------------------
+
+    def _deadzone(self, command: float) -> float:
+        return 0.0 if abs(command) <= self._neutral_band else command
+
+    def _wanted(self, command: float) -> float:
+        """What the filter asks for, joined without a step to what was sent before a change."""
+        wanted = self._shaper.wanted(command)
+        if self._bypassed:
+            wanted = command
+        if self._rebump:
+            self._rebump = False
+            self._bump = self._limited - wanted
+        elif self._bump:
+            self._bump *= self._fade
+            if abs(self._bump) < 1e-6:  # far below any frame's resolution
+                self._bump = 0.0
+        return wanted + self._bump
+
+    def _drive(self, command: float, wanted: float) -> None:
+        limits = self._limits
+        self._recent.add(command)
+        low, high = allowed_range(command, self._recent.low, self._recent.high, limits)
+        target = within(wanted, low, high, limits.minimum)
+        limited = rate_limited(target, self._limited, self._rise, self._fall)
+        self._limited = limited
+        self.raw, self.sent = on_grid(
+            limited, min(low, limited), max(high, limited), limits.deadband, self._grid_steps
+        )
+
+    def _rest(self) -> None:
+        self._recent.clear()
+        self._bump = self._limited = self.sent = 0.0
+        self.raw = 0
+
+    def _output_invalid(self) -> None:
+        """Neutral and latched, with a model that starts anew: its state cannot be trusted."""
+        self._go(State.TRIPPED, Reason.OUTPUT_INVALID)
+        self._rest()
+        if self.sway is not None:
+            self.sway.angle = self.sway.rate = 0.0

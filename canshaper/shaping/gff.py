@@ -1,0 +1,91 @@
+"""The limit-aware optimal feedforward filter G_FF (paper Eq. 13) as feedback from a sway model.
+
+    G_FF(s) = (s^2/w^2 + 2 zeta s/w + 1) / (a2 s^2 + a1 s + 1)
+
+Realised as state feedback on the model of the sway that is driven by what is really sent:
+
+    wanted output    v* = u - K1 angle - K2 (rate + u)       u: operator's command
+    model update     x += F (angle, rate + v)                v: v* after all limits and rounding
+
+While v = v*, the map u -> v has the zeros of the sampled sway, exp(sway pole T), the poles
+exp(p_i T), and gain one: it is Eq. 13 with matched poles and zeros. When a limit acts, the model
+still knows the true sway, and the filter goes on damping it. (rate + u vanishes in the steady
+state, so the gain is one for every K, not only for an exactly computed one.)
+"""
+
+import math
+from typing import Self
+
+from canshaper.shaping.sway import SwayModel
+
+
+class Gff:
+    """Gains of the limit-aware G_FF for one sway mode, tick and pair of real poles.
+
+    Args:
+        sway: the sway model of the axis; whoever owns it steps it with what was really sent.
+        poles_rad_s: the two poles of the filter, real and negative.
+
+    Raises:
+        ValueError: a pole is not negative or too fast for the tick.
+    """
+
+    __slots__ = ("_sway", "k1", "k2", "poles_rad_s")
+
+    def __init__(self, sway: SwayModel, poles_rad_s: tuple[float, float]) -> None:
+        # Faster than 1/T the sampled filter is a dead-beat one that no valve can follow.
+        fastest = -1.0 / sway.tick_s
+        for pole in poles_rad_s:
+            if not fastest <= pole < 0.0:
+                raise ValueError(
+                    f"pole is {pole:g} rad/s, allowed is {fastest:g} to below 0 rad/s"
+                    f" at a tick of {sway.tick_s:g} s"
+                )
+        self._sway = sway
+        self.poles_rad_s = poles_rad_s
+        d1, d2 = (math.expm1(p * sway.tick_s) for p in poles_rad_s)
+        # In increments d = z - 1 the closed loop F - F (0,1) K has trace d1 + d2, determinant
+        # d1 d2; det(F) is the product of the sway poles' own increments.
+        swing = sway.mode.pole * sway.tick_s
+        det_f = (
+            math.expm1(swing.real) ** 2
+            + 4.0 * math.exp(swing.real) * math.sin(0.5 * swing.imag) ** 2
+        )
+        dc = d1 * d2 / det_f
+        self.k2 = 1.0 - dc
+        self.k1 = (sway.f11 + sway.f22 * dc - d1 - d2) / sway.f12
+
+    @classmethod
+    def from_denominator(cls, sway: SwayModel, a1: float, a2: float) -> Self:
+        """Gains from the denominator a2 s^2 + a1 s + 1 of Eq. 13 (a1 in s, a2 in s^2)."""
+        return cls(sway, poles_from_denominator(a1, a2))
+
+    def wanted(self, command: float) -> float:
+        """Output the filter asks for, before limits; ``command`` in [-1, 1]."""
+        sway = self._sway
+        return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
+
+
+def poles_from_denominator(a1: float, a2: float) -> tuple[float, float]:
+    """Poles of 1 / (a2 s^2 + a1 s + 1), rad/s, the faster one first.
+
+    Raises:
+        ValueError: a1 or a2 is not positive, or the poles are not real (paper Eq. 14d).
+    """
+    if not (math.isfinite(a1) and math.isfinite(a2) and a1 > 0.0 and a2 > 0.0):
+        raise ValueError(f"a1 is {a1:g}, a2 is {a2:g}, allowed are positive numbers")
+    discriminant = a1 * a1 - 4.0 * a2
+    if discriminant < 0.0:
+        raise ValueError(
+            f"a1 is {a1:g}, allowed is {2.0 * math.sqrt(a2):.6g} or more for a2 = {a2:g}"
+            " (real poles, a1^2 >= 4 a2)"
+        )
+    # Citardauq's form: no cancellation when the poles lie far apart.
+    q = -0.5 * (a1 + math.sqrt(discriminant))
+    return q / a2, 1.0 / q
+
+
+def denominator_from_poles(poles_rad_s: tuple[float, float]) -> tuple[float, float]:
+    """Coefficients (a1, a2) of the denominator with these two negative poles."""
+    p, q = poles_rad_s
+    return -(1.0 / p + 1.0 / q), 1.0 / (p * q)

@@ -1,0 +1,169 @@
+"""Output limits: the last line before the frame, pure functions, the same for every filter.
+
+Order: range the operator allows -> minimum and maximum -> rise and fall rate -> grid of the frame.
+Velocities are fractions of full speed in [-1, 1]; "command" is what the frame carries, with the
+valve's deadband already added.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class OutputLimits:
+    """Limits of one axis.
+
+    Attributes:
+        maximum: largest |velocity|, 0 to 1.
+        minimum: |velocity| below which the output is zero, 0 to below ``maximum``.
+        rise_per_s: fastest growth of |velocity|, full scales per second.
+        fall_per_s: fastest fall of |velocity| towards zero, full scales per second.
+        deadband: fraction of the command in which the valve does not open; added to every
+            command that is not zero.
+        tail_s: how long after the operator asked for a speed the output may still be as fast.
+        allow_faster: the output may exceed what the operator asks or asked within the tail.
+        allow_reverse: the output may go against the lever.
+    """
+
+    maximum: float = 1.0
+    minimum: float = 0.0
+    rise_per_s: float = 5.0
+    fall_per_s: float = 5.0
+    deadband: float = 0.0
+    tail_s: float = 2.0
+    allow_faster: bool = False
+    allow_reverse: bool = False
+
+
+class RecentCommand:
+    """Largest and smallest command of the last ``ticks`` ticks, zero included (sliding window).
+
+    Amortised constant time: two monotonic queues.
+    """
+
+    __slots__ = ("_largest", "_now", "_smallest", "_ticks", "high", "low")
+
+    def __init__(self, ticks: int) -> None:
+        self._ticks = ticks
+        self._now = 0
+        self._largest: deque[tuple[int, float]] = deque()
+        self._smallest: deque[tuple[int, float]] = deque()
+        self.low = 0.0
+        self.high = 0.0
+
+    def clear(self) -> None:
+        """Forget every command: nothing was asked within the tail."""
+        self._largest.clear()
+        self._smallest.clear()
+        self.low = self.high = 0.0
+
+    def add(self, command: float) -> None:
+        """Take this tick's command; then ``low <= 0 <= high`` bound the recent ones."""
+        now = self._now = self._now + 1
+        largest, smallest = self._largest, self._smallest
+        while largest and largest[-1][1] <= command:
+            largest.pop()
+        largest.append((now, command))
+        while smallest and smallest[-1][1] >= command:
+            smallest.pop()
+        smallest.append((now, command))
+        expired = now - self._ticks
+        if largest[0][0] < expired:
+            largest.popleft()
+        if smallest[0][0] < expired:
+            smallest.popleft()
+        self.high = max(0.0, largest[0][1])
+        self.low = min(0.0, smallest[0][1])
+
+
+def allowed_range(
+    command: float, recent_low: float, recent_high: float, limits: OutputLimits
+) -> tuple[float, float]:
+    """Range the operator allows now: never faster than asked, never against the lever.
+
+    Args:
+        command: the operator's command now, [-1, 1].
+        recent_low: smallest command within the tail, 0 or negative.
+        recent_high: largest command within the tail, 0 or positive.
+        limits: the axis' limits.
+
+    Returns:
+        (low, high) with low <= 0 <= high.
+    """
+    if recent_low == 0.0 and recent_high == 0.0:
+        return 0.0, 0.0  # nothing asked within the tail: nothing moves, whatever is configured
+    low, high = recent_low, recent_high
+    if limits.allow_faster:
+        low, high = (-1.0 if low < 0.0 else 0.0), (1.0 if high > 0.0 else 0.0)
+    if limits.allow_reverse:
+        low, high = min(low, -high), max(high, -low)
+    elif command > 0.0:
+        low = 0.0
+    elif command < 0.0:
+        high = 0.0
+    return max(low, -limits.maximum), min(high, limits.maximum)
+
+
+def within(velocity: float, low: float, high: float, minimum: float) -> float:
+    """Clip to [low, high]; below ``minimum`` in magnitude the result is zero.
+
+    Raises:
+        ValueError: the velocity is not a number; a filter gone wrong must not reach a valve.
+    """
+    if not math.isfinite(velocity):
+        raise ValueError(f"filter output is {velocity}")
+    clipped = min(max(velocity, low), high)
+    return clipped if abs(clipped) >= minimum else 0.0
+
+
+def rate_limited(target: float, last: float, rise: float, fall: float) -> float:
+    """Move from ``last`` towards ``target`` by at most ``rise`` (away from zero) or ``fall``.
+
+    Both are steps per tick. A change of sign falls to zero first and uses what is left of the
+    tick to rise.
+    """
+    if last < 0.0:
+        return -rate_limited(-target, -last, rise, fall)
+    if target >= last:
+        return min(target, last + rise)
+    if target >= 0.0 or last > fall:
+        return max(target, last - fall)
+    # last/fall of the tick are used up by the way to zero
+    return max(target, -rise * (1.0 - last / fall))
+
+
+def with_deadband(velocity: float, deadband: float) -> float:
+    """Command for a velocity: the deadband is jumped over, full speed stays full command."""
+    if velocity == 0.0:
+        return 0.0
+    return math.copysign(deadband + (1.0 - deadband) * abs(velocity), velocity)
+
+
+def without_deadband(command: float, deadband: float) -> float:
+    """Velocity that a command gives: the inverse of ``with_deadband``, zero inside the deadband."""
+    magnitude = abs(command) - deadband
+    return math.copysign(magnitude / (1.0 - deadband), command) if magnitude > 0.0 else 0.0
+
+
+def on_grid(
+    velocity: float, low: float, high: float, deadband: float, steps: int
+) -> tuple[int, float]:
+    """Round to what the frame can carry.
+
+    Args:
+        velocity: limited velocity, [-1, 1].
+        low: lower bound that rounding must not pass.
+        high: upper bound that rounding must not pass.
+        deadband: deadband to add, fraction of full command.
+        steps: raw steps of the frame from zero to full command.
+
+    Returns:
+        (raw step of the frame, velocity which that step gives: what the filter must be told).
+    """
+    raw = round(with_deadband(velocity, deadband) * steps)
+    sent = without_deadband(raw / steps, deadband)
+    while raw and not low <= sent <= high:
+        raw += -1 if raw > 0 else 1
+        sent = without_deadband(raw / steps, deadband)
+    return (raw, sent) if sent else (0, 0.0)

@@ -1,0 +1,55 @@
+"""States of an axis, and the reasons for which it enters them.
+
+The numbers are those of the status frames; the DBC files carry the same tables. State names follow
+OPC 40020-1 where it has one (BYPASS_ON).
+"""
+
+from enum import IntEnum
+
+
+class State(IntEnum):
+    """State of one axis."""
+
+    NEUTRAL_WAIT = 0
+    """Output neutral; waiting for a valid, enabled stick in neutral."""
+    READY = 1
+    """Output neutral; the next movement of the stick moves the axis."""
+    ACTIVE = 2
+    """The stick drives the axis through the filter; also the bounded run-on after release."""
+    BYPASS_ON = 3
+    """The stick drives the axis through the output limits only."""
+    STOPPING = 4
+    """The input is lost or invalid: command to zero through the filter, bounded in time."""
+    TRIPPED = 5
+    """Output neutral at once; latched."""
+
+
+MOVING = frozenset((State.ACTIVE, State.BYPASS_ON, State.STOPPING))
+"""The only states in which a valve frame may carry anything but neutral."""
+
+
+class Reason(IntEnum):
+    """Why an axis is in its state; in NEUTRAL_WAIT, what it still waits for."""
+
+    START = 0
+    STICK_NEUTRAL = 1
+    STICK_MOVED = 2
+    AT_REST = 3
+    BYPASS_REQUESTED = 4
+    BYPASS_RELEASED = 5
+    STOP_DONE = 6
+    RESET = 7
+    STICK_NOT_NEUTRAL = 16
+    ENABLE_OFF = 17
+    # Input lost or invalid: bounded shaped stop.
+    STICK_TIMEOUT = 32
+    STICK_ERROR = 33
+    STICK_NOT_AVAILABLE = 34
+    STICK_OUT_OF_RANGE = 35
+    STICK_NOT_A_NUMBER = 36
+    SWITCH_INVALID = 37
+    # Neutral at once, latched.
+    ENABLE_LOST = 64
+    OUTPUT_INVALID = 65
+    SEND_FAILED = 66
+    LOOP_STALLED = 67

@@ -1,0 +1,146 @@
+"""Sway mode of the hanging tool and its exact sampled model.
+
+The grapple hangs on a free joint. For one axis, linearised about rest (paper Eq. 11-12,
+corrected), with a the acceleration of the tip,
+
+    theta'' + 2 zeta omega theta' + omega^2 theta = (omega^2 / g) a
+
+up to a sign that depends on the axis and that no filter needs. For any pendulum of this kind,
+also for the two-link one, the input gain is omega^2 / g, so period and damping say everything.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import Self
+
+GRAVITY_M_S2 = 9.81
+
+
+def _require(name: str, value: float, low: float, high: float, unit: str) -> float:
+    """Return ``value`` when it is finite and within [low, high]; ValueError otherwise."""
+    if not (math.isfinite(value) and low <= value <= high):
+        raise ValueError(
+            f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}".strip()
+        )
+    return value
+
+
+@dataclass(frozen=True, slots=True)
+class SwayMode:
+    """Undamped natural frequency and damping ratio of one axis' sway.
+
+    Attributes:
+        omega_rad_s: undamped natural frequency, 0.5 to 50 rad/s (length about 39 m to 4 mm).
+        damping_ratio: 0 (swings for ever) to below 1.
+
+    Raises:
+        ValueError: a value is outside its range; the message names value and range.
+    """
+
+    omega_rad_s: float
+    damping_ratio: float
+
+    def __post_init__(self) -> None:
+        _require("natural frequency", self.omega_rad_s, 0.5, 50.0, "rad/s")
+        _require("damping ratio", self.damping_ratio, 0.0, 0.95, "")
+
+    @classmethod
+    def from_grapple(cls, length_m: float, damping_nms: float, mass_kg: float) -> Self:
+        """Mode from grapple data: omega^2 = g/l, 2 zeta omega = c/(m l^2) (paper Eq. 12-13)."""
+        _require("pendulum length", length_m, 0.05, 30.0, "m")
+        _require("joint damping", damping_nms, 0.0, 1e6, "N m s/rad")
+        _require("mass", mass_kg, 1.0, 1e5, "kg")
+        omega = math.sqrt(GRAVITY_M_S2 / length_m)
+        return cls(omega, damping_nms / (mass_kg * length_m**2) / (2.0 * omega))
+
+    @classmethod
+    def from_period(cls, period_s: float, damping_ratio: float) -> Self:
+        """Mode from the period seen on a stopwatch (that of the damped swing) and damping ratio."""
+        _require("period", period_s, 0.15, 12.0, "s")
+        _require("damping ratio", damping_ratio, 0.0, 0.95, "")
+        return cls(2.0 * math.pi / (period_s * math.sqrt(1.0 - damping_ratio**2)), damping_ratio)
+
+    @classmethod
+    def from_decay(cls, period_s: float, decay_per_swing: float) -> Self:
+        """Mode from period and decay: amplitude lost over one full swing, as a fraction.
+
+        0.2 says that each swing is 20 % smaller than the one before. The logarithmic decrement
+        d = -ln(1 - decay) gives zeta = d / sqrt(4 pi^2 + d^2).
+        """
+        _require("decay per swing", decay_per_swing, 0.0, 0.99, "")
+        decrement = -math.log1p(-decay_per_swing)
+        return cls.from_period(period_s, decrement / math.hypot(2.0 * math.pi, decrement))
+
+    @property
+    def pole(self) -> complex:
+        """Upper one of the two sway poles, rad/s."""
+        zeta = self.damping_ratio
+        return self.omega_rad_s * complex(-zeta, math.sqrt(1.0 - zeta**2))
+
+    @property
+    def period_s(self) -> float:
+        """Period of the damped swing, s."""
+        return 2.0 * math.pi / self.pole.imag
+
+    @property
+    def angle_per_speed_rad(self) -> float:
+        """Swing angle in rad per m/s of the normalised model angle (``SwayModel.angle``)."""
+        return self.omega_rad_s**2 / GRAVITY_M_S2
+
+
+class SwayModel:
+    """Exactly sampled sway of one axis, driven by the velocity that is really sent.
+
+    State (normalised to the axis' full speed V in m/s and to the gain k = omega^2/g):
+
+        angle = theta / (k V)            s
+        rate  = theta' / (k V) - v       1        v: velocity in [-1, 1], held over the tick
+
+    Taking v out of the rate removes the derivative of the input from the equations. The discrete
+    equations are kept as increments, F = Ad - I, because at a tick of 1 ms Ad is so close to I
+    that half of the digits would be lost. The equilibrium under constant v, (0, -v), has to be
+    kept exactly; hence Bd = F (0, 1), and one step is  x += F (angle, rate + v).
+    """
+
+    __slots__ = ("angle", "f11", "f12", "f21", "f22", "mode", "rate", "tick_s")
+
+    def __init__(self, mode: SwayMode, tick_s: float) -> None:
+        self.mode = mode
+        self.tick_s = _require("tick", tick_s, 1e-4, 0.2, "s")
+        self.angle = 0.0
+        self.rate = 0.0
+        pole = mode.pole
+        decay = math.exp(pole.real * tick_s)
+        sine = decay * math.sin(pole.imag * tick_s) / pole.imag
+        # decay * cos(wd T) - 1 without cancellation
+        cosine_1 = (
+            math.expm1(pole.real * tick_s) - 2.0 * decay * math.sin(0.5 * pole.imag * tick_s) ** 2
+        )
+        self.f11 = cosine_1 - pole.real * sine
+        self.f12 = sine
+        self.f21 = -(mode.omega_rad_s**2) * sine
+        self.f22 = cosine_1 + pole.real * sine
+
+    def step(self, velocity: float) -> None:
+        """Advance one tick in which ``velocity`` in [-1, 1] was held."""
+        angle = self.angle
+        swing = self.rate + velocity
+        self.angle = angle + self.f11 * angle + self.f12 * swing
+        self.rate += self.f21 * angle + self.f22 * swing
+
+    def retuned(self, mode: SwayMode, velocity: float) -> "SwayModel":
+        """Return a model with another mode at the same physical angle and rate.
+
+        Args:
+            mode: the new sway mode.
+            velocity: the velocity being sent now, [-1, 1] (part of the normalised rate).
+        """
+        model = SwayModel(mode, self.tick_s)
+        scale = self.mode.angle_per_speed_rad / mode.angle_per_speed_rad
+        model.angle = self.angle * scale
+        model.rate = (self.rate + velocity) * scale - velocity
+        return model
+
+    def sway_rad(self, full_speed_m_s: float) -> float:
+        """Predicted swing angle, rad, for an axis whose full speed is ``full_speed_m_s``."""
+        return self.angle * self.mode.angle_per_speed_rad * full_speed_m_s
