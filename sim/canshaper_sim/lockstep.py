@@ -1,0 +1,65 @@
+"""The closed loop without clock and bus: operator, controller and crane tick by tick.
+
+The controller is the daemon's own, and everything passes through the same frames.
+"""
+
+from collections.abc import Callable
+
+from canshaper.can.binding import Deployment
+from canshaper.report.recording import Recording
+from canshaper.service.controller import Controller
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import Script
+from canshaper_sim.plant import PlantNode
+from canshaper_sim.recorder import Recorder
+
+
+def drive(
+    deployment: Deployment,
+    script: Script,
+    *,
+    bypass: bool = False,
+    parameters: CraneParameters | None = None,
+    prepare: Callable[[Controller], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Recording:
+    """Drive a script through a deployment.
+
+    Args:
+        deployment: the machine; its buses are not opened.
+        script: what the operator does.
+        bypass: drive with anti-sway switched off.
+        parameters: the crane; by default the nominal one.
+        prepare: called with the fresh controller, to put another filter in.
+        progress: called with the simulated seconds now and then.
+
+    Returns:
+        The recorded drive, one row a tick.
+    """
+    controller = Controller(deployment)
+    if prepare:
+        prepare(controller)
+    plant = PlantNode(deployment, parameters)
+    levers = LeverNode(deployment, script, bypass=bypass)
+    recorder = Recorder(deployment, parameters)
+    tick_ms = deployment.config.tick_ms
+    step_s = tick_ms / 1000.0
+    for time_ms in range(0, round(script.duration_s * 1000.0), tick_ms):
+        time_s = time_ms / 1000.0
+        now_ns = time_ms * 1_000_000
+        # A lever that sends more often than the loop ticks is seen with its newest frame.
+        for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1):
+            for frame in levers.frames(ms):
+                controller.receive(frame, now_ns)
+                recorder.receive(frame, time_s)
+        for frame in controller.tick(now_ns):
+            plant.receive(frame)
+            recorder.receive(frame, time_s)
+        controller.events.clear()
+        plant.advance(step_s)
+        for frame in plant.feedback():
+            recorder.receive(frame, time_s + step_s)
+        if progress and time_ms % 1000 == 0:
+            progress(time_s)
+    return recorder.recording()

@@ -1,0 +1,116 @@
+"""From the frames on the buses to a recording: what was asked, sent, and what the crane did."""
+
+from typing import Any
+
+from canshaper.can.binding import Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.signals import VelocitySignal, find_signal
+from canshaper.report.recording import AxisTrace, Recording
+from canshaper.shaping.limits import without_deadband
+from canshaper.shaping.states import Reason
+from canshaper_sim.crane import LIFT, NEAR_FAR, SLEW, CraneParameters
+
+_SPEED_SIGNAL = {SLEW: "SlewRate", NEAR_FAR: "RadialSpeed", LIFT: "VerticalSpeed"}
+_SWAY_SIGNAL = {SLEW: "SwayPerpendicular", NEAR_FAR: "SwayParallel"}
+
+
+class Recorder:
+    """Takes every frame; one row for each sway feedback, from the first stick frame on."""
+
+    def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
+        crane = parameters or CraneParameters()
+        self._full = {
+            SLEW: crane.slew_full_speed_rad_s,
+            NEAR_FAR: crane.near_far_full_speed_m_s,
+            LIFT: crane.lift_full_speed_m_s,
+        }
+        self._axes = deployment.axes
+        self._handlers: dict[tuple[str, int, bool], Any] = {}
+        self._sticks: dict[str, list[tuple[str, VelocitySignal]]] = {}
+        for lever in deployment.levers.values():
+            self._handlers[lever.key] = (self._stick, lever.message)
+            self._sticks[lever.message.name] = [
+                (name, VelocitySignal.of(signal))
+                for name, axis in deployment.axes.items()
+                if axis.config.stick.lever == lever.name
+                and (signal := find_signal(lever.message, axis.config.stick.signal))
+            ]
+        self._valves: dict[str, str] = {}
+        for name, axis in deployment.axes.items():
+            bus, message = axis.config.valve.bus, axis.valve_message
+            self._handlers[bus, message.frame_id, message.is_extended_frame] = (
+                self._valve,
+                message,
+            )
+            self._valves[message.name] = name
+        for message_name, handler in (
+            ("TipVelocity", self._speed),
+            ("GrappleSway", self._sway),
+            ("ShaperStatus", self._status),
+        ):
+            found = deployment.messages.find(message_name)
+            if not isinstance(found, str):
+                message = found[1]
+                for bus in deployment.config.buses:
+                    key = (bus, message.frame_id, message.is_extended_frame)
+                    self._handlers[key] = (handler, message)
+        self._start_s: float | None = None
+        self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in self._axes}
+        self._t_s: list[float] = []
+        self._rows: dict[str, list[list[float]]] = {name: [] for name in self._axes}
+        self.missed_deadlines = 0
+        self.seen: set[str] = set()
+
+    def receive(self, frame: Frame, time_s: float) -> None:
+        """Take a frame seen at this time (any origin, increasing)."""
+        entry = self._handlers.get((frame.bus, frame.can_id, frame.extended))
+        if entry is None:
+            return
+        handler, message = entry
+        self.seen.add(message.name)
+        handler(message, frame.data, time_s)
+
+    def recording(self) -> Recording:
+        """Everything so far."""
+        traces = {}
+        for name, rows in self._rows.items():
+            columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
+            stick, sent, speed, sway = columns
+            traces[name] = AxisTrace(stick, sent, speed, sway if name in _SWAY_SIGNAL else None)
+        return Recording(list(self._t_s), traces)
+
+    @staticmethod
+    def _raw(message: Any, data: bytes) -> Any:
+        return message.decode(data, decode_choices=False, scaling=False)
+
+    def _stick(self, message: Any, data: bytes, time_s: float) -> None:
+        if self._start_s is None:
+            self._start_s = time_s
+        raw = self._raw(message, data)
+        for name, signal in self._sticks[message.name]:
+            command = signal.command(raw[signal.name])
+            self._now[name][0] = 0.0 if isinstance(command, Reason) else command
+
+    def _valve(self, message: Any, data: bytes, _time_s: float) -> None:
+        name = self._valves[message.name]
+        axis = self._axes[name]
+        raw = self._raw(message, data)[axis.config.valve.signal]
+        command = axis.valve.velocity_steps(raw) / axis.valve.steps
+        self._now[name][1] = without_deadband(command, axis.config.limits.deadband_pct / 100.0)
+
+    def _speed(self, message: Any, data: bytes, _time_s: float) -> None:
+        values = message.decode(data)
+        for name, now in self._now.items():
+            now[2] = values[_SPEED_SIGNAL[name]] / self._full[name]
+
+    def _sway(self, message: Any, data: bytes, time_s: float) -> None:
+        if self._start_s is None:
+            return
+        values = message.decode(data)
+        self._t_s.append(time_s - self._start_s)
+        for name, now in self._now.items():
+            now[3] = values.get(_SWAY_SIGNAL.get(name), 0.0)
+            self._rows[name].append(list(now))
+
+    def _status(self, message: Any, data: bytes, _time_s: float) -> None:
+        self.missed_deadlines = int(self._raw(message, data)["MissedDeadlines"])

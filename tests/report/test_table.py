@@ -1,0 +1,85 @@
+import io
+from typing import Any
+
+import pytest
+from rich.console import Console
+
+from canshaper.report.metrics import report_dict
+from canshaper.report.recording import Recording
+from canshaper.report.table import print_report
+
+
+def printed(report: dict[str, Any], *, encoding: str = "utf-8") -> str:
+    stream = io.TextIOWrapper(io.BytesIO(), encoding=encoding)
+    print_report(report, Console(file=stream, width=100, color_system=None))
+    stream.flush()
+    stream.seek(0)
+    return stream.read()
+
+
+@pytest.fixture
+def report(pair: tuple[Recording, Recording]) -> dict[str, Any]:
+    return report_dict(*pair, transport="udp_multicast", missed_deadlines=0)
+
+
+def test_table_tells_every_number_within_100_columns(report: dict[str, Any]) -> None:
+    text = printed(report)
+    assert max(map(len, text.splitlines())) <= 100
+    assert "…" not in text
+    for name in ("near_far", "slew"):
+        axis = report["axes"][name]
+        raw, shaped = axis["raw"], axis["shaped"]
+        for measure in ("peak", "rms", "residual"):
+            assert f"{raw[measure + '_deg']:.1f} → {shaped[measure + '_deg']:.1f}" in text
+            assert f"-{axis[measure + '_reduction_pct']:.0f} %" in text
+        for measure in ("time_to_95_s", "run_on_s"):
+            assert f"{raw[measure]:.2f} / {shaped[measure]:.2f}" in text
+        for measure in ("dip", "re_rise"):
+            assert f"0 / {100 * shaped[measure]:.0f}" in text
+    for heading in (
+        "peak sway",
+        "RMS sway",
+        "residual",
+        "time to 95 %",
+        "run-on",
+        "dip",
+        "re-rise",
+    ):
+        assert heading in text
+
+
+def test_lift_shows_dashes_for_sway_and_its_times(report: dict[str, Any]) -> None:
+    lift = next(line for line in printed(report).splitlines() if line.strip().startswith("Lift"))
+    assert lift.split()[:4] == ["Lift", "-", "-", "-"]
+    assert "0.3" in lift
+
+
+def test_swing_in_the_other_plane_is_told_where_there_is_some(report: dict[str, Any]) -> None:
+    text = printed(report)
+    assert "After slew, residual sway in the other plane" in text
+    assert "After near-far" not in text
+
+
+def test_missed_deadlines_and_transport(report: dict[str, Any]) -> None:
+    text = printed(report)
+    assert "Missed deadlines: 0" in text
+    assert "udp_multicast" in text
+    assert "Missed deadlines: -" in printed(report | {"missed_deadlines": None})
+
+
+def test_a_worse_swing_reads_as_an_increase(report: dict[str, Any]) -> None:
+    report["axes"]["slew"]["residual_reduction_pct"] = -12.4
+    assert "+12 %" in printed(report)
+
+
+def test_a_measure_of_one_drive_only(report: dict[str, Any]) -> None:
+    slew = report["axes"]["slew"]
+    slew["shaped"]["residual_deg"] = slew["residual_reduction_pct"] = None
+    slew["shaped"]["time_to_95_s"] = None
+    text = printed(report)
+    assert f"{slew['raw']['residual_deg']:.1f} → -" in text
+    assert f"{slew['raw']['time_to_95_s']:.2f} / -" in text
+
+
+def test_a_terminal_without_unicode(report: dict[str, Any]) -> None:
+    assert "->" in printed(report, encoding="ascii")
