@@ -102,6 +102,10 @@ class Port:
             self._echoes.append(frame)
         return True
 
+    def fileno(self) -> int:
+        """File descriptor to wait on; -1 where the interface has none."""
+        return int(self._bus.fileno())
+
     def close(self) -> None:
         """Close the bus; errors of a bus that is gone do not matter any more."""
         try:

@@ -3,7 +3,7 @@
 import typer
 
 from canshaper import __version__
-from canshaper.cli import check, config_schema, run
+from canshaper.cli import check, config_schema, demo, run, sim
 
 app = typer.Typer(
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
@@ -32,6 +32,9 @@ def _main(
 
 app.command("run")(run.run)
 app.command("check")(check.check)
+app.command("demo")(demo.demo)
+app.command("sim")(sim.sim)
+app.command("operator")(sim.operator)
 app.command("config-schema")(config_schema.config_schema)
 
 

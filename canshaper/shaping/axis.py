@@ -133,14 +133,19 @@ class Axis:
                 self._drive(command, wanted)
             else:
                 self._rest()
-        except ValueError:
+        except (ValueError, ArithmeticError):
             self._output_invalid()
         if self.sway is not None:
             self.sway.step(self.sent)
         return None if self.state is old else Transition(old, self.state, self.reason)
 
     def hold(self, ticks: int) -> None:
-        """Tell the model that the last output was held for ``ticks`` missed ticks."""
+        """Tell the axis that the last output was held for ``ticks`` missed ticks.
+
+        They count as time: late ticks lengthen neither the run-on nor a stop.
+        """
+        self._recent.age(ticks)
+        self._stopping += ticks
         if self.sway is not None:
             for _ in range(ticks):
                 self.sway.step(self.sent)
@@ -150,12 +155,16 @@ class Axis:
 
         The model keeps the physical swing; the difference that the new filter makes at this
         moment fades with ``BLEND_S``.
+
+        Raises:
+            ValueError: mode or filter does not suit the tick; model and filter stay as they were.
         """
         if self.sway is None:
-            self.sway = SwayModel(mode, self._tick_s)
+            sway = SwayModel(mode, self._tick_s)
         else:
-            self.sway = self.sway.retuned(mode, self.sent)
-        self._shaper = shaper_for(self.sway)
+            sway = self.sway.retuned(mode, self.sent)
+        self._shaper = shaper_for(sway)
+        self.sway = sway
         self._rebump = True
 
     # -- the state machine ---------------------------------------------------------------------
@@ -223,12 +232,13 @@ class Axis:
             self._go(State.ACTIVE, Reason.BYPASS_RELEASED)
 
     def _go(self, state: State, reason: Reason) -> None:
-        self.state, self.reason = state, reason
         # A stop goes on with whatever drove the axis before.
         if state is not State.STOPPING:
             bypassed = state is State.BYPASS_ON
-            self._rebump = bypassed is not self._bypassed
+            # From rest there is nothing to join to: the stick counts in full at once.
+            self._rebump = self.state in MOVING and bypassed is not self._bypassed
             self._bypassed = bypassed
+        self.state, self.reason = state, reason
 
     def _at_rest(self) -> bool:
         """Neutral is sent and the run-on is over: the filter can ask for nothing any more."""
@@ -273,5 +283,6 @@ class Axis:
         """Neutral and latched, with a model that starts anew: its state cannot be trusted."""
         self._go(State.TRIPPED, Reason.OUTPUT_INVALID)
         self._rest()
+        self.command = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0

@@ -16,7 +16,8 @@ class OutputLimits:
 
     Attributes:
         maximum: largest |velocity|, 0 to 1.
-        minimum: |velocity| below which the output is zero, 0 to below ``maximum``.
+        minimum: |velocity| below which the output goes to zero, 0 to below ``maximum``; the rates
+            hold on the way through.
         rise_per_s: fastest growth of |velocity|, full scales per second.
         fall_per_s: fastest fall of |velocity| towards zero, full scales per second.
         deadband: fraction of the command in which the valve does not open; added to every
@@ -58,6 +59,10 @@ class RecentCommand:
         self._smallest.clear()
         self.low = self.high = 0.0
 
+    def age(self, ticks: int) -> None:
+        """Let ``ticks`` pass without a command; the bounds follow with the next ``add``."""
+        self._now += ticks
+
     def add(self, command: float) -> None:
         """Take this tick's command; then ``low <= 0 <= high`` bound the recent ones."""
         now = self._now = self._now + 1
@@ -69,9 +74,9 @@ class RecentCommand:
             smallest.pop()
         smallest.append((now, command))
         expired = now - self._ticks
-        if largest[0][0] < expired:
+        while largest[0][0] < expired:
             largest.popleft()
-        if smallest[0][0] < expired:
+        while smallest[0][0] < expired:
             smallest.popleft()
         self.high = max(0.0, largest[0][1])
         self.low = min(0.0, smallest[0][1])

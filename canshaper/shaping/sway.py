@@ -100,6 +100,9 @@ class SwayModel:
     equations are kept as increments, F = Ad - I, because at a tick of 1 ms Ad is so close to I
     that half of the digits would be lost. The equilibrium under constant v, (0, -v), has to be
     kept exactly; hence Bd = F (0, 1), and one step is  x += F (angle, rate + v).
+
+    Raises:
+        ValueError: the tick is outside 0.1 to 200 ms, or too long for the mode.
     """
 
     __slots__ = ("angle", "f11", "f12", "f21", "f22", "mode", "rate", "tick_s")
@@ -107,6 +110,9 @@ class SwayModel:
     def __init__(self, mode: SwayMode, tick_s: float) -> None:
         self.mode = mode
         self.tick_s = _require("tick", tick_s, 1e-4, 0.2, "s")
+        # Six samples to a swing; near two, f12 vanishes and with it every feedback from the model.
+        name = f"natural frequency at a tick of {tick_s:g} s"
+        _require(name, mode.omega_rad_s, 0.0, 1.0 / tick_s, "rad/s")
         self.angle = 0.0
         self.rate = 0.0
         pole = mode.pole

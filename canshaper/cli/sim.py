@@ -1,0 +1,78 @@
+"""``canshaper sim`` and ``canshaper operator``: the machine and the hand, simulated on CAN."""
+
+import typer
+
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
+
+SET = typer.Option(
+    None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
+)
+
+
+def sim(
+    file: str = FILE,
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    changes: list[str] | None = SET,
+    show: bool = typer.Option(False, "--show", help="Print all parameters and exit."),
+) -> None:
+    """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
+
+    Reads valve frames, publishes sway, tip position and tip velocity. Ends on SIGTERM or Ctrl-C.
+
+    Examples:
+
+      canshaper sim config/forwarder.yaml
+
+      canshaper sim config/forwarder.yaml --set grapple.l2_m=1.5 --set near_far.lag_s=0.15
+
+      canshaper sim config/forwarder.yaml --show
+    """
+    from canshaper.can.bus import BusError
+    from canshaper.config.source import DeploymentError
+    from canshaper_sim.parameters import changed_parameters, parameter_names
+    from canshaper_sim.realtime import run_plant
+
+    try:
+        parameters = changed_parameters(changes or [])
+        if show:
+            for name, value in parameter_names(parameters).items():
+                typer.echo(f"{name}={value:g}")
+            return
+        run_plant(loader(file, interface, channel)(), parameters)
+    except (DeploymentError, BusError, ValueError) as error:
+        raise fail(error) from None
+
+
+def operator(
+    file: str = FILE,
+    script: str = typer.Option("demo", "--script", help="What the operator does; see --list."),
+    bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway switched off."),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    show: bool = typer.Option(False, "--list", help="List the scripts and exit."),
+) -> None:
+    """Play a scripted operator: joystick frames with the enable switch held.
+
+    Examples:
+
+      canshaper operator config/forwarder.yaml --script loading
+
+      canshaper operator config/forwarder.yaml --script random-7 --bypass
+
+      canshaper operator config/forwarder.yaml --list
+    """
+    from canshaper.can.bus import BusError
+    from canshaper.config.source import DeploymentError
+    from canshaper_sim.operator import SCRIPTS, script_named
+    from canshaper_sim.realtime import run_operator
+
+    if show:
+        for item in SCRIPTS.values():
+            typer.echo(f"{item.name:16} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
+        typer.echo("random-<seed>     30.0 s  any number, always the same strokes")
+        return
+    try:
+        run_operator(loader(file, interface, channel)(), script_named(script), bypass=bypass)
+    except (DeploymentError, BusError, ValueError) as error:
+        raise fail(error) from None

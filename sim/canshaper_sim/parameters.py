@@ -1,0 +1,44 @@
+"""Parameters of the simulated crane by name, for the command line."""
+
+import dataclasses
+from typing import Any
+
+from canshaper_sim.crane import CraneParameters
+
+
+def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
+    """Every parameter by its name, such as ``grapple.l2``, with its value."""
+    values: dict[str, float] = {}
+    owner = CraneParameters() if parameters is None else parameters
+    for field in dataclasses.fields(owner):
+        value = getattr(owner, field.name)
+        if dataclasses.is_dataclass(value):
+            values |= parameter_names(value, f"{prefix}{field.name}.")
+        elif field.init:
+            values[prefix + field.name] = value
+    return values
+
+
+def changed_parameters(changes: list[str]) -> CraneParameters:
+    """The nominal crane with NAME=VALUE changes put in, such as grapple.l2=1.5.
+
+    Raises:
+        ValueError: no such parameter, no number, or a value that makes no crane.
+    """
+    parameters = CraneParameters()
+    known = parameter_names()
+    for change in changes:
+        name, _, text = change.partition("=")
+        if name not in known:
+            raise ValueError(f"--set {change}: no parameter {name!r}, there are {', '.join(known)}")
+        try:
+            value = float(text)
+        except ValueError:
+            raise ValueError(f"--set {change}: found {text!r}, allowed is a number") from None
+        group, _, field = name.rpartition(".")
+        part: Any = value
+        if group:
+            part = dataclasses.replace(getattr(parameters, group), **{field: value})
+            field = group
+        parameters = dataclasses.replace(parameters, **{field: part})
+    return parameters

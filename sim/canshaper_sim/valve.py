@@ -1,0 +1,154 @@
+"""One proportional valve with its actuator: from the value in the valve frame to a speed.
+
+The command goes, in this order, through dead time (bus, valve electronics), the deadband of the
+spool, the flow limit, the rate limit of the spool and the first-order lag of oil and actuator.
+All values are fractions of the full speed of the axis. Between two changes of the command the
+spool moves on straight lines, so rate limit and lag are solved exactly for any step length.
+"""
+
+import math
+from collections import deque
+from dataclasses import dataclass
+
+# Command changes nearer than this to the present are taken as present: rounding of summed steps.
+_SAME_TIME_S = 1e-9
+
+# name -> (lowest, highest) value that still describes a proportional valve on a mobile crane.
+_ALLOWED = {
+    "dead_time_s": (0.0, 0.2),
+    "deadband": (0.0, 0.5),
+    "flow_limit": (0.05, 1.0),
+    "rate_limit_1_s": (0.1, math.inf),  # inf: no rate limit
+    "lag_s": (0.01, 1.0),  # a speed that jumps would need an infinite tip acceleration
+}
+
+
+@dataclass(frozen=True, slots=True)
+class ValveParameters:
+    """What one valve does to its command; the defaults are a common mobile proportional valve."""
+
+    dead_time_s: float = 0.0  # delay of the whole command
+    deadband: float = 0.05  # fraction of full stroke in which no oil flows
+    flow_limit: float = 1.0  # largest |speed|, fraction of full speed
+    rate_limit_1_s: float = 5.0  # full speeds per second of spool travel
+    lag_s: float = 0.1  # time constant; 0.05 .. 0.15 s is usual
+
+    def __post_init__(self) -> None:
+        for name, (low, high) in _ALLOWED.items():
+            value = getattr(self, name)
+            if not low <= value <= high:
+                raise ValueError(f"valve: {name} = {value}, allowed {low} .. {high}")
+
+    def flow(self, command: float) -> float:
+        """Speed in the steady state for a command, both as fractions: deadband and flow limit.
+
+        Just outside the deadband the flow starts at zero; a full command gives a full flow.
+        """
+        opening = (abs(command) - self.deadband) / (1.0 - self.deadband)
+        if opening <= 0.0:
+            return 0.0
+        return math.copysign(min(opening, self.flow_limit), command)
+
+
+class Valve:
+    """A valve in motion: `set_command`, then `advance` in steps, read `speed` and `speed_rate`."""
+
+    __slots__ = (
+        "_decay",
+        "_decay_step_s",
+        "_lag_s",
+        "_pending",
+        "_ramp_1_s",
+        "_requested",
+        "_spool",
+        "_target",
+        "_time_s",
+        "parameters",
+        "speed",
+    )
+
+    def __init__(self, parameters: ValveParameters | None = None) -> None:
+        self.parameters = parameters or ValveParameters()
+        self.speed = 0.0  # achieved speed, fraction of full speed
+        self._lag_s = self.parameters.lag_s
+        self._ramp_1_s = self.parameters.rate_limit_1_s
+        self._spool = 0.0  # flow after the rate limit, before the lag
+        self._target = 0.0  # flow the spool moves to
+        self._requested = 0.0  # flow of the last command, still in the dead time
+        self._pending: deque[tuple[float, float]] = deque()  # (due time, flow)
+        self._time_s = 0.0
+        self._decay_step_s = 0.0  # step length for which _decay is valid
+        self._decay = 1.0
+
+    @property
+    def speed_rate(self) -> float:
+        """Derivative of `speed` in full speeds per second, just after the present instant."""
+        return (self._spool - self.speed) / self._lag_s
+
+    def set_command(self, command: float) -> None:
+        """The valve frame carries `command` from now on; -1 .. 1, larger values meet the limit.
+
+        Raises ValueError for a value that is not finite.
+        """
+        if not math.isfinite(command):
+            raise ValueError(f"valve: command = {command}, allowed finite values")
+        flow = self.parameters.flow(command)
+        if flow == self._requested:
+            return
+        self._requested = flow
+        if self.parameters.dead_time_s > 0.0:
+            self._pending.append((self._time_s + self.parameters.dead_time_s, flow))
+        else:
+            self._move_to(flow)
+
+    def advance(self, step_s: float) -> None:
+        """Let step_s seconds pass."""
+        rest_s = step_s
+        while self._pending:
+            due_s, flow = self._pending[0]
+            wait_s = due_s - self._time_s
+            if wait_s > rest_s + _SAME_TIME_S:
+                break
+            self._pending.popleft()
+            if wait_s > _SAME_TIME_S:
+                wait_s = min(wait_s, rest_s)
+                self._follow(wait_s)
+                self._time_s += wait_s
+                rest_s -= wait_s
+            self._move_to(flow)
+        if rest_s > 0.0:
+            self._follow(rest_s)
+            self._time_s += rest_s
+
+    def _move_to(self, flow: float) -> None:
+        self._target = flow
+        if self._ramp_1_s == math.inf:
+            self._spool = flow
+
+    def _follow(self, step_s: float) -> None:
+        """Spool on a straight line to its target, speed behind it: tau v' = spool - v, exactly."""
+        spool = self._spool
+        gap = self._target - spool
+        if gap == 0.0:
+            if self.speed != spool:
+                self.speed = spool + (self.speed - spool) * self._decay_over(step_s)
+            return
+        ramp = math.copysign(self._ramp_1_s, gap)
+        arrival_s = gap / ramp
+        # The lag answers a ramp, once settled, with the same ramp one time constant late.
+        late = ramp * self._lag_s
+        offset = self.speed - spool + late
+        if arrival_s > step_s:
+            self._spool = spool + ramp * step_s
+            self.speed = self._spool - late + offset * self._decay_over(step_s)
+            return
+        self._spool = self._target
+        at_arrival = self._target - late + offset * math.exp(-arrival_s / self._lag_s)
+        rest_decay = math.exp((arrival_s - step_s) / self._lag_s)
+        self.speed = self._target + (at_arrival - self._target) * rest_decay
+
+    def _decay_over(self, step_s: float) -> float:
+        if step_s != self._decay_step_s:  # steps are nearly always equally long
+            self._decay_step_s = step_s
+            self._decay = math.exp(-step_s / self._lag_s)
+        return self._decay
