@@ -214,7 +214,7 @@ def _mark_residual(
         align = "left" if t < edge else "right" if t > drive.t_s[-1] - edge else "center"
         panel.plot([t], [sway], "o", color=colour, markersize=7, markeredgecolor="white", zorder=4)
         panel.annotate(
-            f"{text}: {abs(sway):.1f}°",
+            f"{text}: {round(abs(sway), 2):.1f}°",
             xy=(t, sway),
             xytext=(t, height),
             ha=align,

@@ -1,0 +1,76 @@
+"""From starting the daemon to its first valve frame, beside the least a gateway could need.
+
+The peer imports python-can and cantools, loads the same DBC and sends one frame. Both are separate
+processes on a multicast group of python-can, started in turn.
+
+    python benchmarks/startup.py [--runs 7]
+"""
+
+import argparse
+import os
+import select
+import signal
+import statistics
+import subprocess
+import sys
+import time
+
+from canshaper.can.bus import Port
+from canshaper.cli.common import data_directory
+from canshaper.config.schema import Bus
+
+PEER = """
+import sys, can, cantools
+database = cantools.database.load_file(sys.argv[1])
+message = database.get_message_by_name("SlewCommand")
+data = message.encode({"Velocity": 0, "AliveCounter": 0})
+with can.Bus(interface="udp_multicast", channel=sys.argv[2], ignore_config=True) as bus:
+    bus.send(can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data))
+"""
+
+
+def first_frame_s(command: list[str], port: Port) -> float:
+    """Seconds from starting the command to the first valve frame on the bus."""
+    for _ in port.frames():
+        pass
+    start = time.monotonic()
+    process = subprocess.Popen(command, stderr=subprocess.DEVNULL)
+    try:
+        while True:
+            if not select.select([port.fileno()], [], [], 30.0)[0]:
+                raise SystemExit(f"no frame from {' '.join(command)}")
+            if any(frame.can_id == 512 for frame in port.frames()):
+                return time.monotonic() - start
+    finally:
+        process.send_signal(signal.SIGTERM)
+        process.wait()
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--runs", type=int, default=7)
+    runs = parser.parse_args().runs
+    group = f"239.77.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+    port = Port("crane", Bus(interface="udp_multicast", channel=group), lambda _fault: None)
+    options = ["--interface", "udp_multicast", "--channel", group]
+    commands = {
+        "canshaper run": [sys.executable, "-m", "canshaper", "run", "forwarder.yaml", *options],
+        "python-can + cantools": [
+            *(sys.executable, "-c", PEER),
+            *(str(data_directory() / "dbc" / "forwarder.dbc"), group),
+        ],
+    }
+    times: dict[str, list[float]] = {name: [] for name in commands}
+    for _ in range(runs):
+        for name, command in commands.items():
+            times[name].append(first_frame_s(command, port))
+    port.close()
+    for name, row in times.items():
+        print(f"{name:24} median {statistics.median(row):.3f} s   max {max(row):.3f} s")
+    ours, peer = (statistics.median(times[name]) for name in commands)
+    print(f"canshaper run / bare start: {ours / peer:.2f}")
+
+
+if __name__ == "__main__":
+    main()

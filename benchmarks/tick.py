@@ -1,0 +1,147 @@
+"""Cost of one tick of the daemon, beside a bare gateway of python-can and cantools.
+
+Both take the same two joystick frames from a bus and send four valve frames to it; the bus is
+python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,
+decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status.
+Each is timed tick by tick, in turn, in one run; the ratio is the figure that counts.
+
+    python benchmarks/tick.py [--ticks 5000]
+"""
+
+import argparse
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.bus import Port
+from canshaper.can.frame import Frame
+from canshaper.cli.common import data_directory
+from canshaper.config.schema import Bus
+from canshaper.service.controller import Controller
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import random_script
+
+FOURTH_VALVE = """
+BO_ 515 RotateCommand: 2 SHAPER
+ SG_ Velocity : 0|8@1- (0.8,0) [-100|100] "%" VALVES
+ SG_ AliveCounter : 8|8@1+ (1,0) [0|255] "" VALVES
+
+CM_ "Example"""
+FOURTH_AXIS = """  rotate:
+    stick: { lever: right, signal: Rotate }
+    valve: { bus: crane, message: RotateCommand, signal: Velocity, alive_counter: AliveCounter }
+    sway: { period_s: 2.0, damping_ratio: 0.05, full_speed_m_s: 1.0 }
+    filter: { kind: gff, a1: 0.708, a2: 0.12 }
+
+status:"""
+
+
+def four_axes(directory: Path) -> Deployment:
+    """The shipped deployment with a fourth axis."""
+    data = data_directory()
+    dbc = (data / "dbc" / "forwarder.dbc").read_text()
+    dbc = dbc.replace('\nCM_ "Example', FOURTH_VALVE)
+    dbc = dbc.replace("BO_ 514 20;", 'BO_ 514 20;\nBA_ "GenMsgCycleTime" BO_ 515 20;')
+    (directory / "four.dbc").write_text(dbc)
+    text = (data / "config" / "forwarder.yaml").read_text()
+    text = text.replace("../dbc/forwarder.dbc", "four.dbc").replace("status:", "STATUS:")
+    text = text.replace("\nSTATUS:", "\n" + FOURTH_AXIS).replace("STATUS:", "status:")
+    (directory / "four.yaml").write_text(text)
+    return load_deployment(directory / "four.yaml")
+
+
+def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
+    """Bare recv, decode, encode, send."""
+    levers = {lever.message.frame_id: lever.message for lever in deployment.levers.values()}
+    routes = [
+        (a.config.stick.signal, a.valve_message, a.config.valve.signal)
+        for a in deployment.axes.values()
+    ]
+    values: dict[str, float] = {}
+    count = 0
+
+    def body(_now_ns: int) -> None:
+        nonlocal count
+        while (message := bus.recv(0)) is not None:
+            decoded = levers[message.arbitration_id].decode(message.data, decode_choices=False)
+            values.update(decoded)  # type: ignore[arg-type]
+        count = (count + 1) % 256
+        for stick, valve, signal in routes:
+            data = valve.encode({signal: values.get(stick, 0.0), "AliveCounter": count})
+            bus.send(can.Message(arbitration_id=valve.frame_id, is_extended_id=False, data=data))
+
+    return body
+
+
+def daemon(controller: Controller, port: Port) -> Callable[[int], None]:
+    """What the daemon does in a tick."""
+
+    def body(now_ns: int) -> None:
+        for frame in port.frames():
+            controller.receive(frame, now_ns)
+        for frame in controller.tick(now_ns):
+            port.send(frame)
+        controller.events.clear()
+
+    return body
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--ticks", type=int, default=5000)
+    ticks = parser.parse_args().ticks
+    with tempfile.TemporaryDirectory() as directory:
+        deployment = four_axes(Path(directory))
+    controller = Controller(deployment)
+    levers = LeverNode(deployment, random_script(1, ticks * 0.02 + 1.0))
+    hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "bare")}
+    port = Port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
+    bare = can.Bus(interface="virtual", channel="bare")
+    bodies = {"ours": daemon(controller, port), "bare": gateway(deployment, bare)}
+    spent: dict[str, list[int]] = {n: [] for n in bodies}
+    pure: list[int] = []
+    for i in range(ticks):
+        frames: list[Frame] = levers.frames(i * 20)
+        for name, body in bodies.items():
+            for f in frames:
+                hands[name].send(
+                    can.Message(arbitration_id=f.can_id, is_extended_id=f.extended, data=f.data)
+                )
+            start = time.perf_counter_ns()
+            body(i * 20_000_000)
+            spent[name].append(time.perf_counter_ns() - start)
+            while hands[name].recv(0) is not None:
+                pass
+    twin = Controller(deployment)
+    for i in range(ticks):
+        for f in levers.frames(i * 20):
+            twin.receive(f, i * 20_000_000)
+        start = time.perf_counter_ns()
+        twin.tick(i * 20_000_000)
+        pure.append(time.perf_counter_ns() - start)
+    for bus in (*hands.values(), bare):
+        bus.shutdown()
+    port.close()
+
+    print(f"{ticks} ticks, 2 joystick frames in, 4 axes (3 with G_FF, 1 off), us per tick")
+    print(f"{'':34}{'median':>9}{'p99':>9}{'max':>9}")
+    rows = (
+        ("controller tick (no bus)", pure),
+        ("daemon body (bus, checks, status)", spent["ours"]),
+        ("bare python-can + cantools loop", spent["bare"]),
+    )
+    for title, row in rows:
+        p99 = statistics.quantiles(row, n=100)[98]
+        print(f"{title:34}{statistics.median(row) / 1e3:9.1f}{p99 / 1e3:9.1f}{max(row) / 1e3:9.1f}")
+    ratio = statistics.median(spent["ours"]) / statistics.median(spent["bare"])
+    print(f"daemon body / bare loop: {ratio:.2f}")
+
+
+if __name__ == "__main__":
+    main()
