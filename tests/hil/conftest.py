@@ -20,7 +20,20 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture
 def can_pair() -> tuple[str, str]:
     """Names of two controllers on one bus: what one sends, the other receives."""
+    return _controllers()[0]
+
+
+@pytest.fixture
+def can_pairs() -> tuple[tuple[str, str], tuple[str, str]]:
+    """Two buses with two controllers each."""
+    pairs = _controllers()
+    if len(pairs) < 2:
+        pytest.skip("this lane has one bus of CAN controllers (--kvaser 4 makes two)")
+    return pairs[0], pairs[1]
+
+
+def _controllers() -> list[tuple[str, str]]:
     names = os.environ["CANSHAPER_CAN"].split()
     if len(names) < 2:
         pytest.skip("this lane has no CAN controllers, only vcan (--lane tcg has them)")
-    return names[0], names[1]
+    return list(zip(names[::2], names[1::2], strict=True))

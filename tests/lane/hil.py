@@ -13,6 +13,7 @@ from .outcome import NO_LANE, say
 
 ROOT = Path(__file__).resolve().parents[2]
 TIMEOUT_S = 900  # for all tests together, on an emulated processor
+KVASER = 4  # two buses: joystick and valves apart
 
 
 def main(arguments: Sequence[str]) -> int:
@@ -21,7 +22,7 @@ def main(arguments: Sequence[str]) -> int:
     given = any(Path(word.partition("::")[0]).exists() for word in arguments)
     pytest = [sys.executable, "-m", "pytest", *([] if given else ["tests/hil"])]
     pytest += ["-p", "no:cacheprovider", *arguments]
-    status = cli.main(["--timeout", str(TIMEOUT_S), "--", *pytest])
+    status = cli.main(["--timeout", str(TIMEOUT_S), "--kvaser", str(KVASER), "--", *pytest])
     if status == NO_LANE:
         say("tests/hil NOT run, for the reason above")
         return 0

@@ -1,0 +1,163 @@
+"""Parts of a machine for these tests: levers by plain cantools, the daemon as a process, a wait."""
+
+import re
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+import can
+import cantools
+
+ROOT = Path(__file__).resolve().parents[2]
+FILE = ROOT / "config" / "forwarder.yaml"
+DBC = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc")
+# Only to end a test that hangs; emulated processors are slow.
+ANSWER_S = 60.0
+JOYSTICKS = (("LeverLeft", ("Slew", "NearFar")), ("LeverRight", ("Lift", "Rotate")))
+VALVES = {"SlewCommand", "NearFarCommand", "LiftCommand"}
+
+
+def open_bus(channel: str) -> can.BusABC:
+    return can.Bus(interface="socketcan", channel=channel, ignore_config=True)
+
+
+def message_name(message: can.Message) -> str | None:
+    if message.is_error_frame or message.is_remote_frame:
+        return None
+    try:
+        return DBC.get_message_by_frame_id(message.arbitration_id).name
+    except KeyError:
+        return None
+
+
+def wait_for(bus: can.BusABC, name: str, accept: Callable[[dict], bool]) -> dict:
+    """The first message of that name whose decoded signals are accepted."""
+    until = time.monotonic() + ANSWER_S
+    last: dict = {}
+    while time.monotonic() < until:
+        message = bus.recv(1.0)
+        if message is not None and message_name(message) == name:
+            last = dict(DBC.decode_message(name, message.data))
+            if accept(last):
+                return last
+    raise AssertionError(f"no such {name} within {ANSWER_S:g} s; the last was {last}")
+
+
+class Levers(threading.Thread):
+    """Both joysticks, sent every 20 ms; set ``values`` or ``silent`` at any time."""
+
+    def __init__(self, channel: str) -> None:
+        super().__init__(daemon=True)
+        self._bus = open_bus(channel)
+        self.values = {"Slew": 0.0, "NearFar": 0.0, "Lift": 0.0, "Rotate": 0.0}
+        self.switches = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
+        self.silent = False
+        self._ended = threading.Event()
+
+    def run(self) -> None:
+        count = 0
+        while not self._ended.wait(0.02):
+            count = (count + 1) % 256
+            if self.silent:
+                continue
+            with suppress(can.CanError):  # the interface may be down
+                self._send(count)
+
+    def _send(self, count: int) -> None:
+        for name, sticks in JOYSTICKS:
+            message = DBC.get_message_by_name(name)
+            signals = {s: self.values[s] for s in sticks}
+            data = message.encode({**signals, **self.switches, "AliveCounter": count})
+            self._bus.send(
+                can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data)
+            )
+
+    def end(self) -> None:
+        self._ended.set()
+        self.join()
+        self._bus.shutdown()
+
+
+@contextmanager
+def levers_on(channel: str) -> Iterator[Levers]:
+    levers = Levers(channel)
+    levers.start()
+    try:
+        yield levers
+    finally:
+        levers.end()
+
+
+class Service:
+    """``canshaper VERB`` as a process with its log."""
+
+    def __init__(self, log: Path, *arguments: str) -> None:
+        self.log = log
+        with log.open("wb") as file:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "canshaper", *arguments], stderr=file, stdout=file
+            )
+
+    def text(self) -> str:
+        return self.log.read_text()
+
+    def wait_log(self, pattern: str) -> None:
+        """Wait until the log has a line like this."""
+        until = time.monotonic() + ANSWER_S
+        while not re.search(pattern, self.text()):
+            assert self.process.poll() is None, f"ended early:\n{self.text()}"
+            assert time.monotonic() < until, f"no {pattern!r} in the log:\n{self.text()}"
+            time.sleep(0.02)
+
+    def end(self, number: int = signal.SIGTERM) -> int:
+        if self.process.poll() is None:
+            self.process.send_signal(number)
+        try:
+            return self.process.wait(ANSWER_S)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+            raise
+
+
+@contextmanager
+def service(log: Path, *arguments: str) -> Iterator[Service]:
+    running = Service(log, *arguments)
+    try:
+        yield running
+    finally:
+        running.end()
+
+
+@contextmanager
+def candump(log: Path, channel: str) -> Iterator[None]:
+    """An independent log of a channel in candump's format, complete when the block is left."""
+    probe = can.Message(arbitration_id=0x7FE, is_extended_id=False)
+    with log.open("wb") as file, open_bus(channel) as bus:
+        process = subprocess.Popen(["candump", "-L", channel], stdout=file)
+        try:
+            _greet(bus, probe, log, 1)
+            yield
+            _greet(bus, probe, log, log.read_text(errors="replace").count("7FE#") + 1)
+        finally:
+            process.terminate()
+            process.wait(ANSWER_S)
+
+
+def _greet(bus: can.BusABC, probe: can.Message, log: Path, wanted: int) -> None:
+    """Send probes until candump has written so many of them: what came before is in the log."""
+    until = time.monotonic() + ANSWER_S
+    while log.read_text(errors="replace").count("7FE#") < wanted:
+        assert time.monotonic() < until, "candump writes nothing"
+        bus.send(probe)
+        time.sleep(0.02)
+
+
+def logged(log: Path) -> list[can.Message]:
+    """Messages of a candump log without the probes."""
+    with can.CanutilsLogReader(log) as reader:
+        return [m for m in reader if m.arbitration_id != 0x7FE]

@@ -1,0 +1,182 @@
+"""The daemon on vcan0: life and faults, seen from foreign tools and plain cantools."""
+
+import signal
+import subprocess
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import can
+import pytest
+
+from tests.hil.machine import (
+    FILE,
+    VALVES,
+    Levers,
+    Service,
+    candump,
+    levers_on,
+    logged,
+    message_name,
+    open_bus,
+    service,
+    wait_for,
+)
+
+
+@pytest.fixture
+def bus() -> Iterator[can.BusABC]:
+    with open_bus("vcan0") as opened:
+        yield opened
+
+
+@pytest.fixture
+def levers() -> Iterator[Levers]:
+    with levers_on("vcan0") as running:
+        yield running
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Service]:
+    with service(tmp_path / "daemon.log", "run", str(FILE)) as running:
+        running.wait_log("started file=")
+        yield running
+
+
+def state(name: str) -> Callable[[dict], bool]:
+    return lambda status: str(status["State"]) == name
+
+
+def drive(bus: can.BusABC, levers: Levers) -> None:
+    """Bring slew into full motion."""
+    wait_for(bus, "SlewStatus", state("READY"))
+    levers.values["Slew"] = 100.0
+    wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 30.0)
+
+
+def test_stick_moves_valve_and_everything_ends_neutral(
+    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    status = wait_for(bus, "SlewStatus", state("ACTIVE"))
+    assert str(status["Reason"]) == "STICK_MOVED"
+    assert status["RawCommand"] == 100.0
+    with candump(tmp_path / "end.log", "vcan0"):
+        assert daemon.end(signal.SIGTERM) == 0
+    last = {}
+    for message in logged(tmp_path / "end.log"):
+        last[message_name(message)] = message.data[0]
+    assert {name: last[name] for name in VALVES} == dict.fromkeys(VALVES, 0)
+    assert "stopped valves=neutral" in daemon.text()
+
+
+def test_ctrl_c_in_motion_ends_neutral(
+    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    with candump(tmp_path / "end.log", "vcan0"):
+        assert daemon.end(signal.SIGINT) == 0
+    slew = [m for m in logged(tmp_path / "end.log") if message_name(m) == "SlewCommand"]
+    assert slew[-1].data[0] == 0
+    assert "Traceback" not in daemon.text()
+
+
+def test_silence_stops_shaped_and_bounded_then_works_again(
+    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    with candump(tmp_path / "silence.log", "vcan0"):
+        levers.silent = True
+        wait_for(bus, "SlewStatus", state("STOPPING"))
+        wait_for(bus, "SlewStatus", state("NEUTRAL_WAIT"))
+    messages = logged(tmp_path / "silence.log")
+    last_lever = max(m.timestamp for m in messages if message_name(m) == "LeverLeft")
+    moving = [m.timestamp for m in messages if message_name(m) == "SlewCommand" and m.data[0] != 0]
+    # Timeout 0.1 s and stop 2 s of the file; one tick each for seeing and sending. An emulated
+    # machine may hold the whole process up, which the daemon cannot see: half a second for that.
+    assert max(moving) - last_lever < 0.1 + 2.0 + 0.04 + 0.5
+    levers.values["Slew"] = 0.0
+    levers.silent = False
+    wait_for(bus, "SlewStatus", state("READY"))
+    levers.values["Slew"] = -60.0
+    wait_for(bus, "SlewCommand", lambda v: v["Velocity"] < -20.0)
+
+
+def test_enable_released_in_motion_is_neutral_at_once_and_latched(
+    bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    drive(bus, levers)
+    levers.switches["Enable"] = 0
+    status = wait_for(bus, "SlewStatus", state("TRIPPED"))
+    assert (str(status["Reason"]), status["ShapedCommand"]) == ("ENABLE_LOST", 0.0)
+    levers.switches["Enable"] = 1  # the stick is still deflected: no way back yet
+    status = wait_for(bus, "SlewStatus", lambda s: True)
+    assert str(status["State"]) == "TRIPPED"
+    levers.values["Slew"] = 0.0
+    levers.switches["Reset"] = 1
+    wait_for(bus, "SlewStatus", state("READY"))
+
+
+def test_bad_frames_are_counted_and_named_and_move_nothing(
+    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+) -> None:
+    wait_for(bus, "SlewStatus", state("READY"))
+    cases = (
+        ("110#E803E803", "WRONG_LENGTH", "WrongLength"),  # full stick in a frame too short
+        ("555#E803E80301000001", "UNKNOWN_ID", "UnknownId"),
+        ("00000110#E803E80301000001", "UNKNOWN_ID", "UnknownId"),  # the number, but 29 bits
+        ("20000004#0004000000000000", "ERROR_FRAME", "ErrorFrames"),
+        ("110#R", "WRONG_LENGTH", "WrongLength"),
+        ("110#FE7FFF7F01000081", "INVALID_SIGNAL", "InvalidSignals"),  # error, not available
+        ("110#D007D00701000082", "INVALID_SIGNAL", "InvalidSignals"),  # 200 %
+    )
+    with candump(tmp_path / "bad.log", "vcan0"):
+        for frame, fault, counter in cases:
+            before = wait_for(bus, "ShaperStatus", lambda s: True)[counter]
+            subprocess.run(["cansend", "vcan0", frame], check=True)
+            status = wait_for(bus, "ShaperStatus", lambda s, c=counter, b=before: s[c] > b)
+            assert status[counter] == before + 1
+            assert str(status["LastFault"]) in (fault, "MISSED_DEADLINE")
+    valve = [m for m in logged(tmp_path / "bad.log") if message_name(m) in VALVES]
+    assert valve
+    assert all(m.data[0] == 0 for m in valve)
+    assert daemon.process.poll() is None
+
+
+def test_interface_down_and_up_is_survived(
+    bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    wait_for(bus, "SlewStatus", state("READY"))
+    subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
+    try:
+        daemon.wait_log("fault=")
+        assert daemon.process.poll() is None
+    finally:
+        subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+    with open_bus("vcan0") as again, levers_on("vcan0"):
+        wait_for(again, "SlewStatus", state("READY"))
+
+
+def test_reload_refuses_a_broken_file_and_applies_a_good_one_in_neutral(
+    bus: can.BusABC, levers: Levers, tmp_path: Path
+) -> None:
+    text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    with service(tmp_path / "daemon.log", "run", str(file)) as daemon:
+        daemon.wait_log("started file=")
+        drive(bus, levers)
+        file.write_text(text.replace("deadband_pct: 5", "deadband_pct: 90", 1))
+        daemon.process.send_signal(signal.SIGHUP)
+        wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 90.0)  # goes on in motion
+        assert "reload=" not in daemon.text()
+        levers.values["Slew"] = 0.0
+        daemon.wait_log(r"reload=refused .*machine\.yaml:\d+: axes\.slew\.limits\.deadband_pct")
+        file.write_text(text.replace("deadband_pct: 5", "max_pct: 40, deadband_pct: 5", 1))
+        daemon.process.send_signal(signal.SIGHUP)
+        daemon.wait_log("reload=applied")
+        wait_for(bus, "SlewStatus", state("READY"))
+        levers.values["Slew"] = 100.0
+        wait_for(bus, "SlewStatus", lambda s: s["ShapedCommand"] > 35.0)
+        levers.values["Slew"] = 0.0
+        held = wait_for(bus, "SlewStatus", state("READY"))
+        assert held["ShapedCommand"] == 0.0
