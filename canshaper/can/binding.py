@@ -1,9 +1,9 @@
 """Deployment file and DBC files brought together: codecs, or every problem at once."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
-from cantools.database.can import Message, Signal
+from cantools.database.can import Message
 
 from canshaper.can.codecs import (
     AxisStatusCodec,
@@ -11,13 +11,30 @@ from canshaper.can.codecs import (
     Sender,
     ServiceStatusCodec,
     ValveCodec,
-    valve_steps,
 )
-from canshaper.can.database import DbcFile, Messages, load_dbc
-from canshaper.can.signals import VelocitySignal, find_signal, symmetrical_range
+from canshaper.can.database import Messages
+from canshaper.can.lookup import Lookup
+from canshaper.can.signals import (
+    VelocitySignal,
+    command_fault,
+    status_faults,
+)
+from canshaper.config.filters import RobustFilter
 from canshaper.config.load import load_config
-from canshaper.config.schema import AxisConfig, DeploymentConfig, Lever, Status, Valve
-from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.config.schema import (
+    AxisConfig,
+    DeploymentConfig,
+    Lever,
+    RadialConfig,
+    Status,
+    Valve,
+)
+from canshaper.config.source import DeploymentError, Place
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.sway import SwayModel
+
+# A valve hears of a stop no sooner than with its next frame.
+SLOWEST_VALVE_MS = 200
 
 
 @dataclass(frozen=True)
@@ -36,6 +53,21 @@ class BoundLever:
 
 
 @dataclass(frozen=True)
+class BoundRadial:
+    """Radial compensation with the message of its radius, where that is measured."""
+
+    config: RadialConfig
+    message: Message | None
+
+    @property
+    def key(self) -> tuple[str, int, bool] | None:
+        """Where the frames of the radius are found."""
+        if self.message is None or self.config.radius is None:
+            return None
+        return self.config.radius.bus, self.message.frame_id, self.message.is_extended_frame
+
+
+@dataclass(frozen=True)
 class BoundAxis:
     """An axis with its valve message and, where it has one, its status message."""
 
@@ -46,6 +78,7 @@ class BoundAxis:
     period_ticks: int
     status: AxisStatusCodec | None
     status_ticks: int
+    radial: BoundRadial | None = None
 
 
 @dataclass(frozen=True)
@@ -68,35 +101,27 @@ def load_deployment(path: Path) -> Deployment:
         DeploymentError: with every problem of all files.
     """
     config, source = load_config(path)
-    return _Binder(path, config, source).deployment()
+    return _Binder(config, source).deployment(path)
 
 
-@dataclass
-class _Binder:
-    """Collects problems while binding, so that all are told at once."""
+class _Binder(Lookup):
+    """Binds part by part; with any problem there is no deployment."""
 
-    path: Path
-    config: DeploymentConfig
-    source: Source
-    problems: list[Problem] = field(default_factory=list)
-    messages: Messages | None = None
-    _used: dict[tuple[str, int, bool], str] = field(default_factory=dict)
-
-    def deployment(self) -> Deployment:
+    def deployment(self, path: Path) -> Deployment:
         config = self.config
         self._check_buses()
-        self._load_files()
-        if self.messages is None:
+        messages = self.load(path.parent)
+        if messages is None:
             raise DeploymentError(self.problems)
         levers = {n: self._lever(n, lever) for n, lever in config.levers.items()}
         axes = {n: self._axis(n, axis) for n, axis in config.axes.items()}
-        service = self._status(("status",), config.status, ServiceStatusCodec.SIGNALS)
+        service = self._status(("status",), config.status, ServiceStatusCodec)
         if self.problems:
             raise DeploymentError(self.problems)
         return Deployment(
-            self.path,
+            path,
             config,
-            self.messages,
+            messages,
             {n: lever for n, lever in levers.items() if lever},
             {n: axis for n, axis in axes.items() if axis},
             ServiceStatusCodec(service[0]) if service else None,
@@ -108,36 +133,27 @@ class _Binder:
         for name, bus in self.config.buses.items():
             key = (bus.interface, bus.channel)
             if key in seen:
-                self._add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
+                self.add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
             seen[key] = name
-
-    def _load_files(self) -> None:
-        """Load the DBC files; when one is none, its messages are not missed one by one too."""
-        files = []
-        for i, name in enumerate(self.config.dbc):
-            file, problems = load_dbc(self.path.parent / name)
-            self.problems += problems
-            if file:
-                files.append(file)
-            else:
-                self._add(("dbc", i), f"found {name!r}, which is no DBC file that can be used")
-        if len(files) == len(self.config.dbc):
-            self.messages = Messages(files)
 
     def _lever(self, name: str, lever: Lever) -> BoundLever | None:
         place: Place = ("levers", name)
-        found = self._message(place, lever.bus, lever.message, takes=True)
+        found = self.message(place, lever.bus, lever.message, takes=True)
         if not found:
             return None
         file, message = found
         before = len(self.problems)
+        use: dict[str, str] = {}
         for key in ("enable", "reset", "anti_sway_off", "alive_counter"):
-            self._signal((*place, key), message, getattr(lever, key))
+            if signal := self.signal((*place, key), message, getattr(lever, key)):
+                self.integer((*place, key), signal)
+                self.alone((*place, key), signal, use)
+                use[signal.name] = key
         cycle = message.cycle_time
         if not cycle:
             self.problems.append(file.problem(message, "has no GenMsgCycleTime"))
         elif lever.timeout_ms < 2 * cycle:
-            self._add(
+            self.add(
                 (*place, "timeout_ms"),
                 f"found {lever.timeout_ms}, allowed is {2 * cycle} ms or more:"
                 f" twice the cycle of {lever.message}",
@@ -146,8 +162,9 @@ class _Binder:
         for axis_name, axis in self.config.axes.items():
             if axis.stick.lever == name:
                 at = ("axes", axis_name, "stick", "signal")
-                signal = self._signal(at, message, axis.stick.signal)
-                if signal and self._full_scale(file, message, signal):
+                signal = self.signal(at, message, axis.stick.signal)
+                if signal and self.full_scale(file, message, signal):
+                    self.alone(at, signal, use)
                     velocities.append(VelocitySignal.of(signal))
         if len(self.problems) > before:
             return None
@@ -158,12 +175,15 @@ class _Binder:
         before = len(self.problems)
         if axis.stick.lever not in self.config.levers:
             names = ", ".join(self.config.levers)
-            self._add((*place, "stick", "lever"), f"found {axis.stick.lever!r}, levers are {names}")
+            self.add((*place, "stick", "lever"), f"found {axis.stick.lever!r}, levers are {names}")
         bound = self._valve((*place, "valve"), axis.valve)
-        status = self._status((*place, "status"), axis.status, AxisStatusCodec.SIGNALS)
+        status = self._status((*place, "status"), axis.status, AxisStatusCodec)
         if bound is None or len(self.problems) > before:
             return None
         message, codec, ticks = bound
+        if fault := _filter_fault(axis, ticks * self.config.tick_ms / 1000.0):
+            self.add((*place, "filter"), fault)
+            return None
         return BoundAxis(
             name,
             axis,
@@ -172,24 +192,60 @@ class _Binder:
             ticks,
             AxisStatusCodec(status[0]) if status else None,
             status[1] if status else 0,
+            self._radial((*place, "radial_compensation"), axis),
         )
 
+    def _radial(self, place: Place, axis: AxisConfig) -> BoundRadial | None:
+        config = axis.radial_compensation
+        if config is None:
+            return None
+        target = self.config.axes.get(config.axis)
+        if target is None or target is axis:
+            others = ", ".join(n for n, a in self.config.axes.items() if a is not axis)
+            self.add((*place, "axis"), f"found {config.axis!r}, other axes are {others}")
+        elif target.sway is None:
+            self.add((*place, "axis"), f"found {config.axis!r}, which has no sway data")
+        elif self._cycle(target) != self._cycle(axis):
+            self.add((*place, "axis"), f"found {config.axis!r}, whose valve has another cycle")
+        if axis.sway is None:
+            self.add(place, "needs the sway data of its own axis; found no sway")
+        radius = config.radius
+        if radius is None:
+            return BoundRadial(config, None)
+        at: Place = (*place, "radius")
+        found = self.message(at, radius.bus, radius.message, takes=True)
+        signal = self.signal((*at, "signal"), found[1], radius.signal) if found else None
+        if found is None or signal is None:
+            return None
+        if signal.minimum is None or signal.maximum is None or signal.maximum <= signal.minimum:
+            self.problems.append(found[0].problem(found[1], f"{signal.name} has no range"))
+        return BoundRadial(config, found[1])
+
+    def _cycle(self, axis: AxisConfig) -> int | None:
+        """Cycle of the axis' valve message; None where there is no such message."""
+        found = self.messages.find(axis.valve.message)
+        return None if isinstance(found, str) else found[1].cycle_time
+
     def _valve(self, place: Place, valve: Valve) -> tuple[Message, ValveCodec, int] | None:
-        found = self._message(place, valve.bus, valve.message, takes=False)
+        found = self.message(place, valve.bus, valve.message, takes=False)
         if not found:
             return None
         file, message = found
-        ticks = self._period(file, message)
-        signal = self._signal((*place, "signal"), message, valve.signal)
-        self._signal((*place, "alive_counter"), message, valve.alive_counter)
-        if not signal or not ticks or not self._full_scale(file, message, signal):
+        ticks = self.period(file, message)
+        if ticks * self.config.tick_ms > SLOWEST_VALVE_MS:
+            text = f"has GenMsgCycleTime {message.cycle_time} ms, allowed for a valve is up to"
+            self.problems.append(file.problem(message, f"{text} {SLOWEST_VALVE_MS} ms"))
+        signal = self.signal((*place, "signal"), message, valve.signal)
+        counter = self.signal((*place, "alive_counter"), message, valve.alive_counter)
+        if counter:
+            self.integer((*place, "alive_counter"), counter, signed=False)
+        if not signal or not ticks or not self.full_scale(file, message, signal):
             return None
-        if signal.is_float:
-            self._add((*place, "signal"), f"{signal.name} is a float, allowed is an integer signal")
-            return None
-        if valve_steps(signal.maximum or 0.0, abs(signal.scale)) < 10:
-            text = f"{signal.name} has fewer than 10 steps to full command"
-            self.problems.append(file.problem(message, text))
+        self.integer((*place, "signal"), signal)
+        if counter:
+            self.alone((*place, "alive_counter"), counter, {signal.name: "signal"})
+        if why := command_fault(signal):
+            self.problems.append(file.problem(message, why))
             return None
         return (
             message,
@@ -198,72 +254,34 @@ class _Binder:
         )
 
     def _status(
-        self, place: Place, status: Status | None, signals: tuple[str, ...]
+        self,
+        place: Place,
+        status: Status | None,
+        codec: type[AxisStatusCodec] | type[ServiceStatusCodec],
     ) -> tuple[Sender, int] | None:
         if status is None:
             return None
-        found = self._message(place, status.bus, status.message, takes=False)
+        found = self.message(place, status.bus, status.message, takes=False)
         if not found:
             return None
         file, message = found
-        missing = [s for s in signals if not find_signal(message, s)]
-        if missing:
-            self.problems.append(file.problem(message, f"lacks the signals {', '.join(missing)}"))
-        ticks = self._period(file, message)
+        faults = status_faults(message, codec.SIGNALS, codec.CODES)
+        self.problems += [file.problem(message, fault) for fault in faults]
+        ticks = self.period(file, message)
         return (Sender(status.bus, message), ticks) if ticks else None
 
-    def _message(
-        self, place: Place, bus: str, name: str, *, takes: bool
-    ) -> tuple[DbcFile, Message] | None:
-        """The message; noted as used on that bus, where no other part may use it."""
-        if bus not in self.config.buses:
-            self._add((*place, "bus"), f"found {bus!r}, buses are {', '.join(self.config.buses)}")
-        assert self.messages is not None
-        found = self.messages.find(name)
-        if isinstance(found, str):
-            self._add((*place, "message"), found)
-            return None
-        message = found[1]
-        where = ".".join(str(p) for p in place)
-        key = (bus, message.frame_id, message.is_extended_frame)
-        if key in self._used:
-            self._add(
-                (*place, "message"),
-                f"{name} has the id {message.frame_id:#x} on bus {bus}, which is used already"
-                f" by {self._used[key]}",
-            )
-        self._used[key] = where
-        if message.length > 8:
-            self._add((*place, "message"), f"{name} has {message.length} bytes, allowed are 8")
-        if message.is_multiplexed():
-            verb = "taken from" if takes else "sent in"
-            self._add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
-        return found
 
-    def _signal(self, place: Place, message: Message, name: str | None) -> Signal | None:
-        if name is None:
-            return None
-        signal = find_signal(message, name)
-        if signal is None:
-            names = ", ".join(s.name for s in message.signals)
-            self._add(place, f"found {name!r}, signals of {message.name} are {names}")
-        return signal
-
-    def _full_scale(self, file: DbcFile, message: Message, signal: Signal) -> bool:
-        why = symmetrical_range(signal)
-        if why:
-            self.problems.append(file.problem(message, why))
-        return not why
-
-    def _period(self, file: DbcFile, message: Message) -> int:
-        """Ticks between two sendings of a message, from its GenMsgCycleTime; 0 when impossible."""
-        cycle, tick = message.cycle_time, self.config.tick_ms
-        if not cycle or cycle % tick:
-            found = f"GenMsgCycleTime {cycle} ms" if cycle else "no GenMsgCycleTime"
-            text = f"has {found}, allowed is a multiple of tick_ms, {tick} ms"
-            self.problems.append(file.problem(message, text))
-            return 0
-        return cycle // tick
-
-    def _add(self, place: Place, text: str) -> None:
-        self.problems.append(self.source.problem(place, text))
+def _filter_fault(axis: AxisConfig, period_s: float) -> str | None:
+    """Why the filter cannot run at the period of the valve, or None."""
+    chosen = axis.filter
+    if isinstance(chosen, RobustFilter) and chosen.tick_ms != round(1000.0 * period_s):
+        return (
+            f"tick_ms of the taps is {chosen.tick_ms} ms, allowed is the period of the valve,"
+            f" {1000.0 * period_s:g} ms"
+        )
+    try:
+        sway = SwayModel(axis.sway.mode(), period_s) if axis.sway else None
+        build_shaper(chosen.kind, period_s, sway, **chosen.parameters())
+    except ValueError as error:
+        return str(error)
+    return None

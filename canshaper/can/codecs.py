@@ -1,14 +1,14 @@
 """Codecs of one lever, one valve and the status messages. Decode and encode through cantools."""
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 from bitstruct import Error as BitstructError
 from cantools.database import DecodeError
 from cantools.database.can import Message
 
-from canshaper.can.frame import Frame
-from canshaper.can.signals import FieldSet, VelocitySignal
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.signals import FieldSet, VelocitySignal, valve_steps
 from canshaper.shaping.states import Reason, State
 
 
@@ -88,17 +88,13 @@ class ValveCodec:
         return self._sign * (raw - self._zero)
 
 
-def valve_steps(full: float, scale: float) -> int:
-    """Raw steps from zero to full command; rounded down so that full is never passed."""
-    return int(full / scale + 1e-6)
-
-
 @dataclass(frozen=True, slots=True)
 class AxisStatusCodec:
     """Status message of an axis."""
 
     sender: Sender
     SIGNALS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway")
+    CODES: ClassVar[dict[str, int]] = {"State": max(State), "Reason": max(Reason)}
 
     def frame(
         self, state: State, reason: Reason, command: float, sent: float, sway_deg: float
@@ -130,6 +126,7 @@ class ServiceStatusCodec:
         "InvalidSignals",
         "SendFailures",
     )
+    CODES: ClassVar[dict[str, int]] = {"LastFault": max(FrameFault)}
 
     def frame(self, values: dict[str, int]) -> Frame:
         """Status frame from the counters by signal name."""

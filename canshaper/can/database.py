@@ -21,24 +21,38 @@ class DbcFile:
     def problem(self, message: Message, text: str) -> Problem:
         """A problem of this file at the line where the message is defined."""
         number = message.frame_id | (0x80000000 if message.is_extended_frame else 0)
-        start = re.compile(rf"\s*BO_\s+{number}\s")
-        lines = self.path.read_text(encoding="cp1252").splitlines()
-        line = next((i for i, row in enumerate(lines, 1) if start.match(row)), None)
+        line = _line_of(self.path, rf"BO_\s+{number}\s+{message.name}\b")
         return Problem(str(self.path), line, message.name, text)
 
 
+def _line_of(path: Path, pattern: str) -> int | None:
+    """Number of the first line of a file that starts with a pattern."""
+    rows = path.read_text(encoding="cp1252", errors="replace").splitlines()
+    start = re.compile(rf"\s*{pattern}")
+    return next((i for i, row in enumerate(rows, 1) if start.match(row)), None)
+
+
 def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
-    """Load a DBC file strictly; instead of a file its problems, where it is none."""
+    """Load a DBC file strictly; instead of a file its problems, where it is none.
+
+    Raises:
+        OSError: the file cannot be read.
+    """
     # cantools only logs that of two messages with one id the first is lost; found below.
     logging.getLogger("cantools").setLevel(logging.ERROR)
     try:
         database = cantools.database.load_file(str(path), database_format="dbc")
-    except OSError as error:
-        return None, [Problem(str(path), None, "", error.strerror or str(error))]
+    except OSError:
+        raise
     except Exception as error:  # whatever a broken file makes the parser raise
-        text = str(error) or type(error).__name__
-        at = re.search(r"at line (\d+)", text)
-        line = int(at.group(1)) if at else None
+        cause = getattr(error, "e_dbc", None) or error  # without the names of other formats
+        text = " ".join(str(cause).split()) or type(cause).__name__
+        if at := re.search(r"at line (\d+)", text):
+            line: int | None = int(at.group(1))
+        elif at := re.search(r"in message (\w+)|unused VAL_ entries in DBC: (VAL_ \d+ \w+)", text):
+            line = _line_of(path, rf"BO_\s+\d+\s+{at[1]}\b" if at[1] else re.escape(at[2]))
+        else:
+            line = None
         return None, [Problem(str(path), line, "", f"not a DBC file that can be used: {text}")]
     assert isinstance(database, Database)
     loaded = DbcFile(path, database)
@@ -62,13 +76,18 @@ class Messages:
             for message in file.database.messages:
                 self._by_name.setdefault(message.name, []).append((file, message))
 
+    def ids(self) -> set[tuple[int, bool]]:
+        """(id, extended) of every message."""
+        found = (message for entries in self._by_name.values() for _, message in entries)
+        return {(message.frame_id, message.is_extended_frame) for message in found}
+
     def find(self, name: str) -> tuple[DbcFile, Message] | str:
         """The message and its file, or why there is none."""
         found = self._by_name.get(name, [])
         if not found:
-            names = ", ".join(sorted(self._by_name)) or "none, no DBC file could be loaded"
+            names = ", ".join(sorted(self._by_name)) or "none"
             return f"found {name!r}, messages of the DBC files are {names}"
         if len(found) > 1:
             files = ", ".join(str(f.path) for f, _ in found)
-            return f"{name!r} is in more than one DBC file: {files}"
+            return f"{name!r} stands more than once in the DBC files: {files}"
         return found[0]

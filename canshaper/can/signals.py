@@ -6,6 +6,7 @@ everything here is decoded raw (``decode_choices=False, scaling=False``) and jud
 
 import math
 import re
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +15,7 @@ from cantools.database.can import Message, Signal
 from canshaper.shaping.states import Reason
 
 # Names that the tables of a DBC give to raw values that are no measurement.
-_NOT_AVAILABLE = re.compile(r"not.?avail|^(na|n/a|sna)$", re.IGNORECASE)
+_NOT_AVAILABLE = re.compile(r"not.?avail|unavail|^(na|n/a|sna)$", re.IGNORECASE)
 _ERROR = re.compile(r"err|fault|fail|invalid|reserved|defect|not.?valid", re.IGNORECASE)
 
 
@@ -33,6 +34,8 @@ def raw_limits(signal: Signal) -> tuple[int, int]:
 def symmetrical_range(signal: Signal) -> str | None:
     """Why the DBC range of a velocity signal cannot serve as full scale, or None when it can."""
     low, high = signal.minimum, signal.maximum
+    if not signal.scale:
+        return f"{signal.name} has a scale of 0, allowed is any other"
     if low is None or high is None or high <= low:
         return f"{signal.name} has no range in the DBC; full speed is taken from it"
     if not math.isclose(-low, high):
@@ -40,12 +43,48 @@ def symmetrical_range(signal: Signal) -> str | None:
     if not signal.is_float:
         raw_low, raw_high = raw_limits(signal)
         ends = [(v - signal.offset) / signal.scale for v in (low, high)]
-        if min(ends) < raw_low or max(ends) > raw_high:
+        # A millionth of a step: scale and range are decimals, 88.9 / 0.7 is a little above 127.
+        if min(ends) < raw_low - 1e-6 or max(ends) > raw_high + 1e-6:
             return (
                 f"{signal.name} cannot reach its range [{low:g}|{high:g}] with {signal.length}"
                 f" bits at {signal.scale:g} per bit"
             )
     return None
+
+
+def valve_steps(full: float, scale: float) -> int:
+    """Raw steps from zero to full command; rounded down so that full is never passed."""
+    return int(full / scale + 1e-6)
+
+
+def command_fault(signal: Signal) -> str | None:
+    """Why a valve cannot be commanded with a signal of symmetrical range, or None."""
+    if valve_steps(signal.maximum or 0.0, abs(signal.scale)) < 10:
+        return f"{signal.name} has fewer than 10 steps to full command"
+    zero = signal.offset / signal.scale
+    if abs(zero - round(zero)) > 1e-6:
+        return f"{signal.name} has no raw value for zero, which neutral needs"
+    return None
+
+
+def status_faults(message: Message, names: Iterable[str], codes: dict[str, int]) -> list[str]:
+    """Why a message cannot carry a status.
+
+    Args:
+        message: the message.
+        names: signals of the status.
+        codes: largest number that a signal has to carry, where that is fixed.
+    """
+    signals = {s.name: s for s in message.signals if s.name in names}
+    missing = [n for n in names if n not in signals]
+    faults = [f"lacks the signals {', '.join(missing)}"] if missing else []
+    for name, signal in signals.items():
+        if signal.is_float or not signal.scale:
+            found = "is a float" if signal.is_float else "has a scale of 0"
+            faults.append(f"{name} {found}; allowed is an integer signal with a scale")
+        elif raw_limits(signal)[1] < codes.get(name, 0):
+            faults.append(f"{name} cannot carry {codes[name]} with {signal.length} bits")
+    return faults
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,8 +134,10 @@ class FieldSet:
         }
 
     @staticmethod
-    def _start(signal: Signal) -> int:
+    def _start(signal: Signal) -> int | float:
         """GenSigStartValue (a raw value), within the bits of the signal."""
+        if signal.is_float:
+            return float(signal.raw_initial or 0.0)
         low, high = raw_limits(signal)
         return min(max(int(signal.raw_initial or 0), low), high)
 

@@ -57,6 +57,9 @@ def loader(
             buses[name] = buses[name].model_copy(update={"channel": channel})
         if interface:
             buses = {n: b.model_copy(update={"interface": interface}) for n, b in buses.items()}
+        if len({(b.interface, b.channel) for b in buses.values()}) < len(buses):
+            text = f"two of the buses {', '.join(buses)} have one channel; allowed is one for each"
+            raise DeploymentError([Problem("command line", None, "--channel", text)])
         return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
 
     return load

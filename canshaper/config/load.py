@@ -2,7 +2,7 @@
 
 import types
 from pathlib import Path
-from typing import Annotated, Any, Union, get_args, get_origin
+from typing import Annotated, Any, Self, TypeVar, Union, get_args, get_origin
 
 import annotated_types
 from pydantic import BaseModel, ValidationError
@@ -10,7 +10,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import ErrorDetails
 
 from canshaper.config.schema import DeploymentConfig
+from canshaper.config.section import Section
 from canshaper.config.source import DeploymentError, Place, Problem, Source
+
+_S = TypeVar("_S", bound=Section)
+
+_WORDS = {
+    str: "text (in quotes where it looks like a number)",
+    bool: "true or false",
+    list: "a list",
+    dict: "a section with a name for every entry",
+}
 
 
 def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
@@ -19,92 +29,119 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
     Raises:
         DeploymentError: with every problem of the file, each with its line.
     """
+    return load_section(path, DeploymentConfig)
+
+
+def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:
+    """Read and validate a file whose whole content is one section.
+
+    Raises:
+        DeploymentError: with every problem of the file, each with its line.
+    """
     source = Source(path)
     try:
-        return DeploymentConfig.model_validate(source.data), source
+        return schema.model_validate(source.data), source
     except ValidationError as error:
-        problems = [_problem(source, detail) for detail in error.errors()]
+        problems = [_problem(source, detail, schema) for detail in error.errors()]
         raise DeploymentError(_unique(problems)) from None
 
 
-def _problem(source: Source, error: ErrorDetails) -> Problem:
-    kind, found = error["type"], error["input"]
-    path = _in_file(source.data, error["loc"], names_absent_key=kind == "missing")
-    owner, field = _place(path)
+def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Problem:
+    kind, found, context = error["type"], error["input"], error.get("ctx", {})
+    place = _Place.of(error["loc"], schema)
     if kind == "extra_forbidden":
-        keys = ", ".join(owner.model_fields) if owner else ""
-        return source.problem(path, f"unknown key; allowed are {keys}")
-    if kind == "missing":
-        text = field.description if field and field.description else ""
-        return source.problem(path, f"missing{': ' + text if text else ''}")
-    if kind == "value_error":
-        return source.problem(path, str(error["ctx"]["error"]))
-    if kind in ("union_tag_invalid", "union_tag_not_found"):
-        tags = error.get("ctx", {}).get("expected_tags", "'off', 'gff'")
+        text = f"unknown key; allowed are {', '.join(place.owner.model_fields)}"
+    elif kind == "missing":
+        text = f"missing: {place.description}"
+    elif kind == "value_error":
+        text = str(context["error"])
+    elif kind in ("union_tag_invalid", "union_tag_not_found"):
+        place.path += ("kind",)
         found = found.get("kind") if isinstance(found, dict) else found
-        return source.problem((*path, "kind"), f"found {found!r}, allowed is {tags}")
-    allowed = _range(field) or error["msg"][:1].lower() + error["msg"][1:]
-    return source.problem(path, f"found {_short(found)}, allowed is {allowed}")
+        text = f"found {found!r}, allowed is {context.get('expected_tags', place.kinds)}"
+    elif kind in ("too_short", "too_long"):
+        number = context["min_length" if kind == "too_short" else "max_length"]
+        most = "or more entries" if kind == "too_short" else "entries at most"
+        text = f"found {_short(found)}, allowed are {number} {most}"
+    else:
+        text = f"found {_short(found)}, allowed is {place.allowed or error['msg']}"
+    return source.problem(place.path, text)
 
 
-def _in_file(data: Any, location: tuple[int | str, ...], *, names_absent_key: bool) -> Place:
-    """Path in the file for a location of pydantic, which also names branches of unions."""
-    path: list[str | int] = []
-    for i, part in enumerate(location):
-        key = isinstance(data, dict) and part in data
-        index = isinstance(data, list) and isinstance(part, int) and part < len(data)
-        if key or index:
-            path.append(part)
-            data = data[part]
-        elif names_absent_key and i == len(location) - 1:
-            path.append(part)
-    return tuple(path)
+class _Place:
+    """Where an error lies: its path in the file and what the schema says of that place."""
+
+    def __init__(self, schema: type[Section]) -> None:
+        self.path: Place = ()
+        self.owner: type[BaseModel] = schema
+        self.description = ""
+        self._type: Any = schema
+        self._metadata: list[Any] = []
+
+    @classmethod
+    def of(cls, location: tuple[int | str, ...], schema: type[Section]) -> Self:
+        """Follow a location of pydantic, which also names branches of unions, into the schema."""
+        place = cls(schema)
+        for part in location:
+            place._enter(part)
+        return place
+
+    def _enter(self, part: int | str) -> None:
+        arguments = get_args(self._type)
+        sections = [a for a in arguments if isinstance(a, type) and issubclass(a, Section)]
+        if isinstance(self._type, type) and issubclass(self._type, Section):
+            self.path += (part,)
+            self.owner = self._type
+            field = self._type.model_fields.get(str(part))
+            self.description = field.description or "" if field else ""
+            self._is(field.annotation if field else None, field)
+        elif sections and get_origin(self._type) is not dict:  # filters, told apart by their kind
+            self._is(next(s for s in sections if part in _kinds(s)))
+        elif arguments and part != "[key]":
+            self.path += (part,)
+            self._is(arguments[-1])  # of a value of a dict, or of an entry of a list
+
+    def _is(self, annotation: Any, field: FieldInfo | None = None) -> None:
+        """Note the type of this place, without ``Annotated`` and ``None`` around it."""
+        self._metadata = [field] if field else []
+        while annotation is not None:
+            arguments = get_args(annotation)
+            some = [a for a in arguments if a is not types.NoneType]
+            if get_origin(annotation) is Annotated:
+                self._metadata += arguments[1:]
+                annotation = arguments[0]
+            elif get_origin(annotation) in (Union, types.UnionType) and len(some) == 1:
+                annotation = some[0]
+            else:
+                break
+        self._type = annotation
+
+    @property
+    def kinds(self) -> str:
+        """Every kind of section that may stand here."""
+        return ", ".join(repr(k) for section in get_args(self._type) for k in _kinds(section))
+
+    @property
+    def allowed(self) -> str:
+        """What may stand here, in words."""
+        fields = [m for m in self._metadata if isinstance(m, FieldInfo)]
+        limits = [limit for f in fields for limit in f.metadata]
+        low = next((m.ge for m in limits if isinstance(m, annotated_types.Ge)), None)
+        high = next((m.le for m in limits if isinstance(m, annotated_types.Le)), None)
+        if low is not None and high is not None:
+            units = [f.json_schema_extra for f in fields if isinstance(f.json_schema_extra, dict)]
+            whole = "a whole number, " if self._type is int else ""
+            return f"{whole}{low:g} to {high:g} {units[0]['unit'] if units else ''}".rstrip()
+        if isinstance(self._type, type) and issubclass(self._type, Section):
+            return f"a section with the keys {', '.join(self._type.model_fields)}"
+        if get_origin(self._type) in (Union, types.UnionType):
+            return f"a section of the kind {self.kinds}"
+        return _WORDS.get(get_origin(self._type) or self._type, "")
 
 
-def _place(path: Place) -> tuple[type[BaseModel] | None, FieldInfo | None]:
-    """Section and field that a path of the file belongs to, as far as they exist."""
-    owners: list[type[BaseModel]] = [DeploymentConfig]
-    field: FieldInfo | None = None
-    for part in path:
-        owner = next((o for o in owners if part in o.model_fields), None)
-        if owner is not None and isinstance(part, str):
-            field = owner.model_fields[part]
-            below = _sections(field.annotation)
-            if part != path[-1] or not below:
-                owners = below or [owner]
-        elif part is not path[-1]:
-            continue  # a name chosen by the user, such as that of an axis
-        else:
-            field = None
-    return (owners[-1] if owners else None), field
-
-
-def _sections(annotation: Any) -> list[type[BaseModel]]:
-    """Every section inside a type, such as those of a union or of the values of a dict."""
-    if isinstance(annotation, type) and issubclass(annotation, BaseModel):
-        return [annotation]
-    if get_origin(annotation) in (Union, types.UnionType, dict, list, Annotated):
-        return [s for a in get_args(annotation) for s in _sections(a)]
-    return []
-
-
-def _range(field: FieldInfo | None) -> str:
-    """Range of a number, with its unit, or nothing."""
-    if field is None:
-        return ""
-    metadata = list(field.metadata)
-    extra = field.json_schema_extra
-    for argument in get_args(field.annotation):
-        for info in getattr(argument, "__metadata__", ()):
-            if isinstance(info, FieldInfo):
-                metadata += info.metadata
-                extra = extra or info.json_schema_extra
-    low = next((m.ge for m in metadata if isinstance(m, annotated_types.Ge)), None)
-    high = next((m.le for m in metadata if isinstance(m, annotated_types.Le)), None)
-    if low is None or high is None:
-        return ""
-    unit = extra.get("unit", "") if isinstance(extra, dict) else ""
-    return f"{low:g} to {high:g} {unit}".rstrip()
+def _kinds(section: type[BaseModel]) -> tuple[Any, ...]:
+    """Values that the key ``kind`` of a section may have."""
+    return get_args(section.model_fields["kind"].annotation)
 
 
 def _short(value: Any) -> str:

@@ -1,29 +1,14 @@
 """Schema of the deployment file. Unknown keys are errors; every number has a range and a unit."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Self
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import Field, model_validator
 
-from canshaper.shaping.gff import poles_from_denominator
+from canshaper.config.filters import Filter
+from canshaper.config.section import Section, number
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import KINDS_OF_SWAY
 from canshaper.shaping.sway import SwayMode
-
-
-def number(low: float, high: float, unit: str, text: str) -> Any:
-    """Field of a number within [low, high]; the unit appears in errors and in the JSON schema."""
-    return Field(
-        ge=low,
-        le=high,
-        allow_inf_nan=False,
-        description=f"{text} ({unit})" if unit else text,
-        json_schema_extra={"unit": unit},
-    )
-
-
-class Section(BaseModel):
-    """A part of the file: frozen, no unknown keys, no silent conversion of types."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
 
 
 class Bus(Section):
@@ -103,7 +88,7 @@ class Sway(Section):
         Raises:
             ValueError: the data is incomplete, given twice, or makes no sense.
         """
-        given = self.model_fields_set - {"full_speed_m_s"}
+        given = self.model_dump(exclude={"full_speed_m_s"}, exclude_none=True).keys()
         if given == {"length_m", "damping_nms", "mass_kg"}:
             assert self.length_m and self.mass_kg and self.damping_nms is not None
             return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)
@@ -119,49 +104,35 @@ class Sway(Section):
         )
 
 
-class OffFilter(Section):
-    """No shaping: output limits only."""
+class Radius(Section):
+    """Radius of the tip, measured."""
 
-    kind: Literal["off"]
+    bus: str = Field(description="name of the bus the message arrives on")
+    message: str = Field(description="message in the DBC files")
+    signal: str = Field(description="signal with the radius in m")
+    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
 
 
-class GffFilter(Section):
-    """The limit-aware G_FF, by its denominator (``a1``, ``a2``) or by its poles."""
+class RadialConfig(Section):
+    """Radial compensation of a slew axis: see ``RadialCompensation``."""
 
-    kind: Literal["gff"]
-    a1: Annotated[float, number(1e-3, 20, "s", "coefficient a1 of the denominator")] | None = None
-    a2: Annotated[float, number(1e-6, 100, "s^2", "coefficient a2 of the denominator")] | None = (
-        None
-    )
-    poles_rad_s: (
-        Annotated[
-            list[Annotated[float, number(-100, -0.1, "rad/s", "pole of the filter")]],
-            Field(min_length=2, max_length=2),
-        ]
-        | None
+    axis: str = Field(description="the near-far axis, which moves the tip in and out")
+    full_speed_rad_s: Annotated[
+        float, number(0.05, 3, "rad/s", "angular speed at full slew command")
+    ]
+    radius_m: (
+        Annotated[float, number(0.5, 30, "m", "radius of the tip, where it is fixed")] | None
     ) = None
+    radius: Radius | None = None
+    max_pct: Annotated[float, number(1, 50, "% of full near-far speed", "fastest compensation")] = (
+        25.0
+    )
 
     @model_validator(mode="after")
-    def _complete(self) -> Self:
-        self.poles()
+    def _one_radius(self) -> Self:
+        if (self.radius_m is None) == (self.radius is None):
+            raise ValueError("allowed is one of radius_m and radius")
         return self
-
-    def poles(self) -> tuple[float, float]:
-        """Both poles, rad/s.
-
-        Raises:
-            ValueError: given twice or not at all, or the poles are not real.
-        """
-        given = self.model_fields_set - {"kind"}
-        if given == {"a1", "a2"}:
-            assert self.a1 and self.a2
-            return poles_from_denominator(self.a1, self.a2)
-        if given == {"poles_rad_s"}:
-            assert self.poles_rad_s
-            return self.poles_rad_s[0], self.poles_rad_s[1]
-        raise ValueError(
-            f"found {', '.join(sorted(given)) or 'neither'}; allowed are a1 and a2, or poles_rad_s"
-        )
 
 
 class Limits(Section):
@@ -210,17 +181,20 @@ class Limits(Section):
 class AxisConfig(Section):
     """One axis: from which stick, through which filter and limits, to which valve."""
 
-    stick: Stick
-    valve: Valve
+    stick: Stick = Field(description="the stick that commands the axis")
+    valve: Valve = Field(description="the valve that moves the axis")
     status: Status | None = None
     sway: Sway | None = None
-    filter: Annotated[OffFilter | GffFilter, Field(discriminator="kind")]
+    filter: Filter = Field(discriminator="kind", description="filter of the axis")
     limits: Limits = Limits()
+    radial_compensation: RadialConfig | None = None
 
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
-        if self.filter.kind == "gff" and self.sway is None:
-            raise ValueError("filter gff needs the sway data of the axis; found no sway")
+        if self.filter.kind in KINDS_OF_SWAY and self.sway is None:
+            raise ValueError(
+                f"filter {self.filter.kind} needs the sway data of the axis; found no sway"
+            )
         return self
 
 
@@ -228,9 +202,8 @@ class DeploymentConfig(Section):
     """A machine: buses, DBC files, levers and axes."""
 
     tick_ms: Annotated[int, number(1, 50, "ms", "period of the control loop")] = 20
-    buses: Annotated[dict[str, Bus], Field(min_length=1)]
-    dbc: Annotated[list[str], Field(min_length=1)]
-    """DBC files, relative to the deployment file."""
-    levers: Annotated[dict[str, Lever], Field(min_length=1)]
-    axes: Annotated[dict[str, AxisConfig], Field(min_length=1)]
+    buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
+    dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
+    levers: dict[str, Lever] = Field(min_length=1, description="joystick messages by name")
+    axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
     status: Status | None = None

@@ -1,5 +1,6 @@
 """YAML with line numbers, and the problems found in files."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,6 +8,15 @@ from typing import Any
 import yaml
 
 Place = tuple[str | int, ...]
+
+# Far beyond any machine; anchors within anchors can make a few lines grow without end.
+MOST_NODES = 50_000
+
+_TAG = "tag:yaml.org,2002:"
+_SCALARS = frozenset(_TAG + t for t in ("str", "int", "float", "bool", "null", "timestamp"))
+_WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})")
+_DECIMAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
+_NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
 
 @dataclass(frozen=True)
@@ -42,14 +52,17 @@ class Source:
         self.path = path
         self._lines: dict[Place, int] = {}
         self._problems: list[Problem] = []
+        self._count = 0
         try:
-            text = path.read_text(encoding="utf-8")
-            loader = yaml.SafeLoader(text)
-            node = loader.get_single_node()
-            self.data: Any = {} if node is None else self._build(loader, node, ())
+            node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+            self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:
             raise DeploymentError([self.problem((), error.strerror or str(error))]) from None
-        except (yaml.YAMLError, ValueError) as error:  # ValueError: not UTF-8, or a bad scalar
+        except RecursionError:
+            text = "nested too deeply, or an anchor that contains itself"
+            raise DeploymentError([self.problem((), text)]) from None
+        # ValueError: not UTF-8; ValueError and OverflowError: an escape that is no character
+        except (yaml.YAMLError, ValueError, OverflowError) as error:
             mark = getattr(error, "problem_mark", None)
             text = getattr(error, "problem", None) or str(error).splitlines()[0]
             line = mark.line + 1 if mark else None
@@ -66,30 +79,58 @@ class Source:
             str(self.path), self._lines.get(near), ".".join(str(p) for p in path), message
         )
 
-    def _build(self, loader: yaml.SafeLoader, node: yaml.Node, path: Place) -> Any:
+    def _build(self, node: yaml.Node, path: Place) -> Any:
+        """Data of a node; only what is named here can come out, whatever tags the file has."""
         self._lines.setdefault(path, node.start_mark.line + 1)
-        if isinstance(node, yaml.MappingNode):
-            result: dict[Any, Any] = {}
-            for key_node, value_node in node.value:
-                key = loader.construct_object(key_node, deep=True)
-                here = (*path, key)
-                if not isinstance(key, str):
-                    self._add(here, key_node, f"found key {key!r}, allowed are words")
-                    continue
-                if key in result:
-                    self._add(
-                        here, key_node, f"key stands twice, first in line {self._lines[here]}"
-                    )
-                    continue
-                self._lines[here] = key_node.start_mark.line + 1
-                result[key] = self._build(loader, value_node, here)
-            return result
-        if isinstance(node, yaml.SequenceNode):
-            return [self._build(loader, n, (*path, i)) for i, n in enumerate(node.value)]
-        if node.tag == "tag:yaml.org,2002:bool" and node.value.lower() not in ("true", "false"):
-            return node.value  # YAML 1.1 reads "off" as false; here it is the name of a filter
-        return loader.construct_object(node, deep=True)
+        self._count += 1
+        if self._count > MOST_NODES:
+            raise yaml.MarkedYAMLError(None, None, "too large", node.start_mark)
+        if isinstance(node, yaml.MappingNode) and node.tag == _TAG + "map":
+            return self._mapping(node, path)
+        if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
+            return [self._build(n, (*path, i)) for i, n in enumerate(node.value)]
+        if isinstance(node, yaml.ScalarNode) and node.tag in _SCALARS:
+            return _scalar(node)
+        self._add(path, node, f"found the tag {node.tag.replace(_TAG, '!!')}, which is not allowed")
+        return None
+
+    def _mapping(self, node: yaml.MappingNode, path: Place) -> dict[str, Any]:
+        result: dict[str, Any] = {}
+        for key_node, value_node in node.value:
+            plain = isinstance(key_node, yaml.ScalarNode) and key_node.tag in _SCALARS
+            key = _scalar(key_node) if plain else None
+            if not isinstance(key, str):
+                found = repr(key_node.value) if key_node.id == "scalar" else f"a {key_node.id}"
+                self._add(path, key_node, f"found the key {found}, allowed are words")
+                continue
+            here = (*path, key)
+            if key in result:
+                text = f"key stands twice, first in line {self._lines[here]}"
+                self._add(here, key_node, text)
+                continue
+            self._lines[here] = key_node.start_mark.line + 1
+            result[key] = self._build(value_node, here)
+        return result
 
     def _add(self, path: Place, node: yaml.Node, message: str) -> None:
         where = ".".join(str(p) for p in path)
         self._problems.append(Problem(str(self.path), node.start_mark.line + 1, where, message))
+
+
+def _scalar(node: yaml.ScalarNode) -> str | int | float | bool | None:
+    """Value of a scalar as YAML 1.2 and its readers see it.
+
+    PyYAML follows YAML 1.1, where off is false, 010 is 8, 1:30 is 90 and 1e3 is text. The first
+    is the name of a filter here; the others would be numbers that nobody meant.
+    """
+    text: str = node.value
+    plain = node.style is None
+    if plain and node.tag == _TAG + "null":
+        return None
+    if plain and node.tag == _TAG + "bool" and text.lower() in ("true", "false"):
+        return text.lower() == "true"
+    if plain and _WHOLE.fullmatch(text):
+        return int(text)
+    if plain and (_DECIMAL.fullmatch(text) or _NOT_FINITE.fullmatch(text)):
+        return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
+    return text

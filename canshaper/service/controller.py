@@ -3,18 +3,15 @@
 The same object runs in the daemon, in lock-step simulation and in replay of a log.
 """
 
-import math
 from dataclasses import dataclass
 
-from canshaper.can.binding import BoundAxis, Deployment
+from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.config.schema import GffFilter
 from canshaper.service.lever import LeverInput
-from canshaper.shaping.axis import Axis, Transition
-from canshaper.shaping.gff import Gff
-from canshaper.shaping.registry import Off, Shaper
+from canshaper.service.radius import RadiusInput
+from canshaper.service.runner import AxisRunner, Compensator
+from canshaper.shaping.axis import Transition
 from canshaper.shaping.states import Reason
-from canshaper.shaping.sway import SwayModel
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,50 +52,6 @@ class Counters:
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
-class AxisRunner:
-    """One axis with its codecs: when it is due, what it sends."""
-
-    def __init__(self, bound: BoundAxis, tick_s: float, lever: LeverInput) -> None:
-        config = bound.config
-        self.bound = bound
-        self._lever = lever
-        self._signal = config.stick.signal
-        period_s = tick_s * bound.period_ticks
-        sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
-        self.axis = Axis(
-            period_s,
-            config.limits.output_limits(),
-            sway=sway,
-            shaper=build_shaper(bound, sway),
-            neutral_band=config.stick.neutral_pct / 100.0,
-            stop_s=config.limits.stop_s,
-            grid_steps=bound.valve.steps,
-        )
-        self._sway_deg = 0.0
-        if config.sway:
-            model = config.sway.mode().angle_per_speed_rad
-            self._sway_deg = math.degrees(model * config.sway.full_speed_m_s)
-        self.trip: Reason | None = None
-
-    def tick(self, now_ns: int) -> Transition | None:
-        """One step of the axis; a trip cause noted since the last one acts now."""
-        stick = self._lever.stick(self._signal, now_ns, self.trip)
-        self.trip = None
-        return self.axis.tick(stick)
-
-    def valve_frame(self) -> Frame:
-        """The frame for what the axis sends now."""
-        return self.bound.valve.frame(self.axis.raw)
-
-    def status_frame(self) -> Frame | None:
-        """Status of the axis, where it has a message for it."""
-        if self.bound.status is None:
-            return None
-        axis = self.axis
-        sway_deg = axis.sway.angle * self._sway_deg if axis.sway else 0.0
-        return self.bound.status.frame(axis.state, axis.reason, axis.command, axis.sent, sway_deg)
-
-
 class Controller:
     """All axes of a deployment.
 
@@ -112,17 +65,32 @@ class Controller:
         self.counters = Counters()
         self.events: list[Event] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
-        self._inputs = {lever.key: levers[name] for name, lever in deployment.levers.items()}
+        self._inputs: dict[tuple[str, int, bool], LeverInput | RadiusInput] = {
+            lever.key: levers[name] for name, lever in deployment.levers.items()
+        }
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
             name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
             for name, bound in deployment.axes.items()
         }
         self._by_message = {
-            (a.bound.config.valve.bus, a.bound.valve_message.frame_id): a
+            (a.bound.config.valve.bus, m.frame_id, m.is_extended_frame): a
             for a in self.axes.values()
+            for m in [a.bound.valve_message]
         }
-        self._ticks = 0
+        for runner in self.axes.values():
+            if runner.bound.radial is not None:
+                radius = RadiusInput(runner.bound.radial)
+                if runner.bound.radial.key is not None:
+                    self._inputs[runner.bound.radial.key] = radius
+                target = self.axes[runner.bound.radial.config.axis]
+                runner.compensator = Compensator(runner, target, radius)
+        # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
+        used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._by_message)}
+        self._others = deployment.messages.ids() - used
+        # An axis that asks something of another one goes first.
+        self._order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
+        self._last = -1  # number of the last deadline
 
     @property
     def neutral(self) -> bool:
@@ -131,8 +99,13 @@ class Controller:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception."""
-        lever = self._inputs.get((frame.bus, frame.can_id, frame.extended))
-        fault = FrameFault.UNKNOWN_ID if lever is None else lever.receive(frame.data, now_ns)
+        entry = self._inputs.get((frame.bus, frame.can_id, frame.extended))
+        if entry is not None:
+            fault = entry.receive(frame.data, now_ns)
+        elif (frame.can_id, frame.extended) in self._others:
+            return
+        else:
+            fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
 
@@ -149,37 +122,39 @@ class Controller:
         """
         frames: list[Frame] = []
         status: list[Frame] = []
-        ticks = self._ticks
+        last, now = self._last, self._last + 1 + missed
+        self._last = now
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
-        for name, runner in self.axes.items():
-            if ticks % runner.bound.period_ticks == 0:
-                if missed:
-                    runner.axis.hold(missed // runner.bound.period_ticks)
+        for name, runner in self._order:
+            transition = None
+            if passed := _passed(last, now, runner.bound.period_ticks):
+                runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns)
                 frames.append(runner.valve_frame())
                 if transition is not None:
                     self.events.append(Event(name, transition))
-                due = transition is not None or ticks % (runner.bound.status_ticks or 1) == 0
-                if due and (frame := runner.status_frame()):
-                    status.append(frame)
-        if self.deployment.status and ticks % self.deployment.status_ticks == 0:
-            status.append(self.deployment.status.frame(self.counters.status()))
-        self._ticks = ticks + 1
+            due = transition is not None or _passed(last, now, runner.bound.status_ticks)
+            if due and (frame := runner.status_frame()):
+                status.append(frame)
+        service = self.deployment.status
+        if service and _passed(last, now, self.deployment.status_ticks):
+            status.append(service.frame(self.counters.status()))
         return frames + status
 
     def stalled(self) -> None:
         """The loop stood still for longer than any input may be old: nothing known still holds."""
-        for lever in self._inputs.values():
-            lever.forget()
+        for entry in self._inputs.values():
+            entry.forget()
         for runner in self.axes.values():
+            runner.lost = True
             if not runner.axis.neutral:
                 runner.trip = Reason.LOOP_STALLED
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus; the axis of a valve frame trips."""
         self.counters.add(FrameFault.SEND_FAILED)
-        runner = self._by_message.get((frame.bus, frame.can_id))
+        runner = self._by_message.get((frame.bus, frame.can_id, frame.extended))
         if runner is not None and not runner.axis.neutral:
             runner.trip = Reason.SEND_FAILED
 
@@ -188,10 +163,6 @@ class Controller:
         return [runner.bound.valve.frame(0) for runner in self.axes.values()]
 
 
-def build_shaper(bound: BoundAxis, sway: SwayModel | None) -> Shaper:
-    """The filter that the deployment file names."""
-    config = bound.config.filter
-    if isinstance(config, GffFilter):
-        assert sway is not None  # the schema asks for it
-        return Gff(sway, config.poles())
-    return Off()
+def _passed(last: int, now: int, period: int) -> int:
+    """How many multiples of the period lie after deadline ``last``, up to ``now``."""
+    return now // period - last // period if period else 0

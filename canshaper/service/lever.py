@@ -50,9 +50,11 @@ class LeverInput:
         command = self._commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
-        if isinstance(command, Reason):
-            return StickInput(fault=command, bypass=bypass, trip=trip)
         enable = raw[self._enable]
+        if isinstance(command, Reason):
+            if enable == 0:  # seen released: an immediate stop, not the shaped one of a lost stick
+                return StickInput(enabled=False, bypass=bypass, trip=trip)
+            return StickInput(fault=command, bypass=bypass, trip=trip)
         if enable not in (0, 1):
             return StickInput(fault=Reason.SWITCH_INVALID, bypass=bypass, trip=trip)
         return StickInput(command, None, enable == 1, bypass, reset, trip)

@@ -24,6 +24,8 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 # Time constant with which the difference at a change of filter fades: quick against a swing of
 # one to three seconds, slow against a valve of a tenth of a second.
 BLEND_S = 0.3
+# Most that may be owed of an added velocity, full speed times ticks: a few steps of a coarse grid.
+MOST_OWED = 0.1
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,7 +73,8 @@ class Axis:
 
     Attributes:
         raw: what the valve frame carries now, in grid steps (deadband included).
-        sent: the velocity that gives, [-1, 1]: what the sway model was told.
+        sent: the velocity that gives, [-1, 1].
+        told: what the sway model was told: ``sent`` without what another axis asked.
         command: the operator's command that was in force at the last tick, [-1, 1].
     """
 
@@ -90,6 +93,7 @@ class Axis:
         self.reason = Reason.START
         self.raw = 0
         self.sent = 0.0
+        self.told = 0.0
         self.command = 0.0
         self.sway = sway
         self._shaper = shaper
@@ -106,6 +110,7 @@ class Axis:
         self._rebump = False
         self._bypassed = False
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
+        self._owed = 0.0  # of a velocity added by another axis, not yet sent
         self._stopping = 0
         self._was_enabled = True
         self._was_reset = True
@@ -115,28 +120,38 @@ class Axis:
         """Whether the axis is at rest in a state that cannot move without the operator."""
         return self.state not in MOVING
 
-    def tick(self, stick: StickInput) -> Transition | None:
+    def tick(self, stick: StickInput, added: float = 0.0) -> Transition | None:
         """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
+
+        Args:
+            stick: the checked input.
+            added: velocity that another moving axis asks of this one, fraction of full speed. Its
+                operator answers for it; it is carried out while this axis is enabled, its stick
+                valid, and anti-sway on. The sway model is not told of it: it is there to cause no
+                swing.
 
         Returns:
             The change of state of this tick, or None.
         """
         old = self.state
-        self._decide(stick)
+        self._decide(stick, added)
+        if self.state is not State.ACTIVE:
+            added = 0.0
         command = 0.0
-        if self.state in (State.ACTIVE, State.BYPASS_ON):
-            command = self._deadzone(stick.command)
-        self.command = command
         try:
+            if self.state in (State.ACTIVE, State.BYPASS_ON):
+                command = self._deadzone(stick.command)
+            self.command = command
             wanted = self._wanted(command)
             if self.state in MOVING:
-                self._drive(command, wanted)
+                self._drive(command, wanted, added)
             else:
                 self._rest()
         except (ValueError, ArithmeticError):
             self._output_invalid()
+        self.told = self.sent - added if self.state is State.ACTIVE else self.sent
         if self.sway is not None:
-            self.sway.step(self.sent)
+            self.sway.step(self.told)
         return None if self.state is old else Transition(old, self.state, self.reason)
 
     def hold(self, ticks: int) -> None:
@@ -148,7 +163,7 @@ class Axis:
         self._stopping += ticks
         if self.sway is not None:
             for _ in range(ticks):
-                self.sway.step(self.sent)
+                self.sway.step(self.told)
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
         """Change sway data and filter, also in motion, without a jump of the output.
@@ -162,14 +177,14 @@ class Axis:
         if self.sway is None:
             sway = SwayModel(mode, self._tick_s)
         else:
-            sway = self.sway.retuned(mode, self.sent)
+            sway = self.sway.retuned(mode, self.told)
         self._shaper = shaper_for(sway)
         self.sway = sway
         self._rebump = True
 
     # -- the state machine ---------------------------------------------------------------------
 
-    def _decide(self, stick: StickInput) -> None:
+    def _decide(self, stick: StickInput, added: float) -> None:
         """Move to the state that this tick's input asks for."""
         valid = stick.fault is None
         rising = (stick.reset and not self._was_reset) or (
@@ -189,9 +204,9 @@ class Axis:
         elif self.state is State.NEUTRAL_WAIT:
             self._wait(stick, centred)
         elif self.state is State.READY:
-            self._ready(stick, centred)
+            self._ready(stick, centred, added)
         else:
-            self._moving(stick, centred)
+            self._moving(stick, centred, added)
 
     def _wait(self, stick: StickInput, centred: bool) -> None:
         if stick.fault is not None:
@@ -203,7 +218,7 @@ class Axis:
         else:
             self._go(State.READY, Reason.STICK_NEUTRAL)
 
-    def _ready(self, stick: StickInput, centred: bool) -> None:
+    def _ready(self, stick: StickInput, centred: bool, added: float) -> None:
         if stick.fault is not None:
             self._go(State.NEUTRAL_WAIT, stick.fault)
         elif not stick.enabled:
@@ -213,8 +228,10 @@ class Axis:
                 self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
             else:
                 self._go(State.ACTIVE, Reason.STICK_MOVED)
+        elif added and not stick.bypass:
+            self._go(State.ACTIVE, Reason.COMPENSATING)
 
-    def _moving(self, stick: StickInput, centred: bool) -> None:
+    def _moving(self, stick: StickInput, centred: bool, added: float) -> None:
         if stick.fault is None and not stick.enabled:
             self._go(State.TRIPPED, Reason.ENABLE_LOST)
         elif self.state is State.STOPPING:
@@ -224,7 +241,7 @@ class Axis:
         elif stick.fault is not None:
             self._stopping = 0
             self._go(State.STOPPING, stick.fault)
-        elif centred and self._at_rest():
+        elif centred and not added and self._at_rest():
             self._go(State.READY, Reason.AT_REST)
         elif self.state is State.ACTIVE and stick.bypass:
             self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
@@ -247,6 +264,8 @@ class Axis:
     # -- the output ----------------------------------------------------------------------------
 
     def _deadzone(self, command: float) -> float:
+        if not math.isfinite(command):  # it would stay in the memory of a filter
+            raise ValueError(f"command is {command}")
         return 0.0 if abs(command) <= self._neutral_band else command
 
     def _wanted(self, command: float) -> float:
@@ -263,20 +282,40 @@ class Axis:
                 self._bump = 0.0
         return wanted + self._bump
 
-    def _drive(self, command: float, wanted: float) -> None:
+    def _drive(self, command: float, wanted: float, added: float) -> None:
         limits = self._limits
         self._recent.add(command)
         low, high = allowed_range(command, self._recent.low, self._recent.high, limits)
         target = within(wanted, low, high, limits.minimum)
+        if added:
+            self._drive_both(target, added)
+            return
         limited = rate_limited(target, self._limited, self._rise, self._fall)
         self._limited = limited
         self.raw, self.sent = on_grid(
             limited, min(low, limited), max(high, limited), limits.deadband, self._grid_steps
         )
 
+    def _drive_both(self, target: float, added: float) -> None:
+        """Send the operator's part and the added one.
+
+        The added part is a path to be run, slow and with few steps of the grid: what rounding and
+        rates leave out is owed and paid while the axis moves anyway, never by a twitch.
+        """
+        limits = self._limits
+        step = 1.0 / self._grid_steps
+        wish = within(target + added, -limits.maximum, limits.maximum, 0.5 * step)
+        paid = self._owed if wish else 0.0
+        aim = within(wish + paid, -limits.maximum, limits.maximum, 0.0)
+        self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
+        self.raw, self.sent = on_grid(
+            self._limited, -limits.maximum, limits.maximum, limits.deadband, self._grid_steps
+        )
+        self._owed = within(self._owed + target + added - self.sent, -MOST_OWED, MOST_OWED, 0.0)
+
     def _rest(self) -> None:
         self._recent.clear()
-        self._bump = self._limited = self.sent = 0.0
+        self._bump = self._limited = self._owed = self.sent = 0.0
         self.raw = 0
 
     def _output_invalid(self) -> None:

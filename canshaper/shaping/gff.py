@@ -25,23 +25,35 @@ class Gff:
     Args:
         sway: the sway model of the axis; whoever owns it steps it with what was really sent.
         poles_rad_s: the two poles of the filter, real and negative.
+        third_pole_rad_s: a third real pole, as a first-order lag on the command: without it a step
+            on the stick comes out at once as 1/(a2 w^2) times the command.
 
     Raises:
         ValueError: a pole is not negative or too fast for the tick.
     """
 
-    __slots__ = ("_sway", "k1", "k2", "poles_rad_s")
+    __slots__ = ("_command", "_share", "_sway", "k1", "k2", "poles_rad_s")
 
-    def __init__(self, sway: SwayModel, poles_rad_s: tuple[float, float]) -> None:
+    def __init__(
+        self,
+        sway: SwayModel,
+        poles_rad_s: tuple[float, float],
+        third_pole_rad_s: float | None = None,
+    ) -> None:
         # Faster than 1/T the sampled filter is a dead-beat one that no valve can follow.
         fastest = -1.0 / sway.tick_s
-        for pole in poles_rad_s:
+        for pole in (*poles_rad_s, *([] if third_pole_rad_s is None else [third_pole_rad_s])):
             if not fastest <= pole < 0.0:
                 raise ValueError(
                     f"pole is {pole:g} rad/s, allowed is {fastest:g} to below 0 rad/s"
                     f" at a tick of {sway.tick_s:g} s"
                 )
         self._sway = sway
+        # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
+        self._share = (
+            1.0 if third_pole_rad_s is None else -math.expm1(third_pole_rad_s * sway.tick_s)
+        )
+        self._command = 0.0
         self.poles_rad_s = poles_rad_s
         d1, d2 = (math.expm1(p * sway.tick_s) for p in poles_rad_s)
         # In increments d = z - 1 the closed loop F - F (0,1) K has trace d1 + d2, determinant
@@ -63,6 +75,8 @@ class Gff:
     def wanted(self, command: float) -> float:
         """Output the filter asks for, before limits; ``command`` in [-1, 1]."""
         sway = self._sway
+        self._command += self._share * (command - self._command)
+        command = self._command
         return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
 
 

@@ -1,6 +1,12 @@
 """Every filter that an axis may run, by the name it has in a deployment file."""
 
+from collections.abc import Callable, Sequence
 from typing import Protocol
+
+from canshaper.shaping.fir import Fir, convolved, ei_taps, zv_taps
+from canshaper.shaping.gff import Gff, poles_from_denominator
+from canshaper.shaping.smoothing import FirstOrder, SCurve
+from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 class Shaper(Protocol):
@@ -22,3 +28,68 @@ class Off:
     def wanted(self, command: float) -> float:
         """Return the command itself."""
         return command
+
+
+def _gff(
+    sway: SwayModel,
+    *,
+    a1: float | None = None,
+    a2: float | None = None,
+    poles_rad_s: Sequence[float] | None = None,
+    third_pole_rad_s: float | None = None,
+) -> Shaper:
+    if poles_rad_s is not None:
+        poles = poles_rad_s[0], poles_rad_s[1]
+    elif a1 is not None and a2 is not None:
+        poles = poles_from_denominator(a1, a2)
+    else:
+        raise ValueError("allowed are a1 and a2, or poles_rad_s")
+    return Gff(sway, poles, third_pole_rad_s)
+
+
+def _zvd(sway: SwayModel) -> Shaper:
+    zv = zv_taps(sway.mode, sway.tick_s)
+    return Fir(convolved(zv, zv))
+
+
+def _two_mode(sway: SwayModel, *, period_s: float, damping_ratio: float) -> Shaper:
+    second = SwayMode.from_period(period_s, damping_ratio)
+    return Fir(convolved(zv_taps(sway.mode, sway.tick_s), zv_taps(second, sway.tick_s)))
+
+
+# Filters that need the sway of their axis.
+_OF_SWAY: dict[str, Callable[..., Shaper]] = {
+    "gff": _gff,
+    "zv": lambda sway: Fir(zv_taps(sway.mode, sway.tick_s)),
+    "zvd": _zvd,
+    "ei": lambda sway, *, residual_pct: Fir(ei_taps(sway.mode, sway.tick_s, residual_pct / 100.0)),
+    "two_mode": _two_mode,
+}
+# Filters that need the tick only.
+_OF_TICK: dict[str, Callable[..., Shaper]] = {
+    "off": lambda _tick_s: Off(),
+    "first_order": FirstOrder,
+    "s_curve": SCurve,
+    "robust": lambda _tick_s, *, taps: Fir(taps),
+}
+KINDS_OF_SWAY = frozenset(_OF_SWAY)
+KINDS = (*_OF_TICK, *_OF_SWAY)
+
+
+def build_shaper(kind: str, tick_s: float, sway: SwayModel | None, **parameters: object) -> Shaper:
+    """Make a filter.
+
+    Args:
+        kind: its name, one of ``KINDS``.
+        tick_s: time between two ticks of the axis.
+        sway: sway model of the axis; the filter may keep it, its owner steps it.
+        parameters: those of the filter, by their names in the deployment file.
+
+    Raises:
+        ValueError: the parameters make no filter, or it needs sway data and there is none.
+    """
+    if kind in _OF_TICK:
+        return _OF_TICK[kind](tick_s, **parameters)
+    if sway is None:
+        raise ValueError(f"filter {kind} needs the sway data of the axis; found no sway")
+    return _OF_SWAY[kind](sway, **parameters)

@@ -39,6 +39,7 @@ class Reason(IntEnum):
     BYPASS_RELEASED = 5
     STOP_DONE = 6
     RESET = 7
+    COMPENSATING = 8
     STICK_NOT_NEUTRAL = 16
     ENABLE_OFF = 17
     # Input lost or invalid: bounded shaped stop.

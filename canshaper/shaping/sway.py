@@ -19,9 +19,8 @@ GRAVITY_M_S2 = 9.81
 def _require(name: str, value: float, low: float, high: float, unit: str) -> float:
     """Return ``value`` when it is finite and within [low, high]; ValueError otherwise."""
     if not (math.isfinite(value) and low <= value <= high):
-        raise ValueError(
-            f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}".strip()
-        )
+        found, allowed = f"{value:g} {unit}".strip(), f"{low:g} to {high:g} {unit}".strip()
+        raise ValueError(f"{name} is {found}, allowed is {allowed}")
     return value
 
 

@@ -1,0 +1,109 @@
+"""Messages and signals that a deployment file names, or the problems with them."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from cantools.database.can import Message, Signal
+
+from canshaper.can.database import DbcFile, Messages, load_dbc
+from canshaper.can.signals import find_signal, symmetrical_range
+from canshaper.config.schema import DeploymentConfig
+from canshaper.config.source import Place, Problem, Source
+
+
+@dataclass
+class Lookup:
+    """Finds messages and signals; collects problems, so that all are told at once."""
+
+    config: DeploymentConfig
+    source: Source
+    problems: list[Problem] = field(default_factory=list)
+    messages: Messages = field(default_factory=lambda: Messages([]))
+    _used: dict[tuple[str, int, bool], str] = field(default_factory=dict)
+
+    def add(self, place: Place, text: str) -> None:
+        """Note a problem at a place of the deployment file."""
+        self.problems.append(self.source.problem(place, text))
+
+    def load(self, directory: Path) -> Messages | None:
+        """Load the DBC files; None when one is none, so that its messages are not missed too."""
+        files = []
+        for i, name in enumerate(self.config.dbc):
+            try:
+                file, problems = load_dbc(directory / name)
+            except OSError as error:
+                self.add(("dbc", i), f"found {name!r}: {error.strerror or error}")
+                continue
+            self.problems += problems
+            if file:
+                files.append(file)
+        if len(files) < len(self.config.dbc):
+            return None
+        self.messages = Messages(files)
+        return self.messages
+
+    def message(
+        self, place: Place, bus: str, name: str, *, takes: bool
+    ) -> tuple[DbcFile, Message] | None:
+        """The message; noted as used on that bus, where no other part may use it."""
+        if bus not in self.config.buses:
+            self.add((*place, "bus"), f"found {bus!r}, buses are {', '.join(self.config.buses)}")
+        found = self.messages.find(name)
+        if isinstance(found, str):
+            self.add((*place, "message"), found)
+            return None
+        message = found[1]
+        where = ".".join(str(p) for p in place)
+        key = (bus, message.frame_id, message.is_extended_frame)
+        if key in self._used:
+            self.add(
+                (*place, "message"),
+                f"{name} has the id {message.frame_id:#x} on bus {bus}, which is used already"
+                f" by {self._used[key]}",
+            )
+        self._used[key] = where
+        if message.length > 8:
+            self.add((*place, "message"), f"{name} has {message.length} bytes, allowed are 8")
+        if message.is_multiplexed():
+            verb = "taken from" if takes else "sent in"
+            self.add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
+        return found
+
+    def signal(self, place: Place, message: Message, name: str | None) -> Signal | None:
+        """The signal; None when there is none of that name, or none was asked for."""
+        if name is None:
+            return None
+        signal = find_signal(message, name)
+        if signal is None:
+            names = ", ".join(s.name for s in message.signals)
+            self.add(place, f"found {name!r}, signals of {message.name} are {names}")
+        return signal
+
+    def integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
+        """A switch or counter is told by its raw value, which must be a whole number."""
+        if signal.is_float or (signal.is_signed and not signed):
+            found = "is a float" if signal.is_float else "has a sign"
+            allowed = "an integer" if signed else "an unsigned integer"
+            self.add(place, f"{signal.name} {found}, allowed is {allowed} signal")
+
+    def alone(self, place: Place, signal: Signal, use: dict[str, str]) -> None:
+        """A switch that is a stick too, or a counter that is a command, would move the axis."""
+        if signal.name in use:
+            self.add(place, f"found {signal.name!r}, which is {use[signal.name]} already")
+
+    def full_scale(self, file: DbcFile, message: Message, signal: Signal) -> bool:
+        """Whether the DBC range of a velocity can serve as full scale."""
+        why = symmetrical_range(signal)
+        if why:
+            self.problems.append(file.problem(message, why))
+        return not why
+
+    def period(self, file: DbcFile, message: Message) -> int:
+        """Ticks between two sendings of a message, from its GenMsgCycleTime; 0 when impossible."""
+        cycle, tick = message.cycle_time, self.config.tick_ms
+        if not cycle or cycle % tick:
+            found = f"GenMsgCycleTime {cycle} ms" if cycle else "no GenMsgCycleTime"
+            text = f"has {found}, allowed is a multiple of tick_ms, {tick} ms"
+            self.problems.append(file.problem(message, text))
+            return 0
+        return cycle // tick

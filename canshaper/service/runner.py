@@ -1,0 +1,123 @@
+"""One axis of a deployment at work, and the compensation that one axis asks of another."""
+
+import math
+
+from canshaper.can.binding import BoundAxis
+from canshaper.can.frame import Frame
+from canshaper.service.lever import LeverInput
+from canshaper.service.radius import RadiusInput
+from canshaper.shaping.axis import Axis, StickInput, Transition
+from canshaper.shaping.radial import RadialCompensation
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.states import Reason, State
+from canshaper.shaping.sway import SwayModel
+
+
+class AxisRunner:
+    """One axis with its codecs: when it is due, what it sends.
+
+    Attributes:
+        trip: a cause for neutral at once, noted since the last tick.
+        lost: the input was lost since the last tick, though it may be back: neutral comes first.
+        added: velocity that another axis asks of this one, fraction of full speed.
+        compensator: what this axis asks of another one, where it slews.
+    """
+
+    def __init__(self, bound: BoundAxis, tick_s: float, lever: LeverInput) -> None:
+        config = bound.config
+        self.bound = bound
+        self._lever = lever
+        self._signal = config.stick.signal
+        period_s = tick_s * bound.period_ticks
+        sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
+        self.axis = Axis(
+            period_s,
+            config.limits.output_limits(),
+            sway=sway,
+            shaper=build_shaper(config.filter.kind, period_s, sway, **config.filter.parameters()),
+            neutral_band=config.stick.neutral_pct / 100.0,
+            stop_s=config.limits.stop_s,
+            grid_steps=bound.valve.steps,
+        )
+        self._sway_deg = 0.0
+        if config.sway:
+            model = config.sway.mode().angle_per_speed_rad
+            self._sway_deg = math.degrees(model * config.sway.full_speed_m_s)
+        self.trip: Reason | None = None
+        self.lost = False
+        self.added = 0.0
+        self.compensator: Compensator | None = None
+
+    def tick(self, now_ns: int) -> Transition | None:
+        """One step of the axis; a trip cause noted since the last one acts now."""
+        stick = self._lever.stick(self._signal, now_ns, self.trip)
+        if self.lost:
+            stick = StickInput(fault=Reason.STICK_TIMEOUT, trip=self.trip)
+        self.trip, self.lost = None, False
+        if self.compensator is None:
+            return self.axis.tick(stick, self.added)
+        self.compensator.before_slew()
+        transition = self.axis.tick(stick, self.added)
+        self.compensator.after_slew(now_ns)
+        return transition
+
+    def valve_frame(self) -> Frame:
+        """The frame for what the axis sends now."""
+        return self.bound.valve.frame(self.axis.raw)
+
+    def status_frame(self) -> Frame | None:
+        """Status of the axis, where it has a message for it."""
+        if self.bound.status is None:
+            return None
+        axis = self.axis
+        sway_deg = axis.sway.angle * self._sway_deg if axis.sway else 0.0
+        return self.bound.status.frame(axis.state, axis.reason, axis.command, axis.sent, sway_deg)
+
+
+class Compensator:
+    """Radial compensation from a slew axis to its near-far axis.
+
+    Args:
+        slew: the axis that slews.
+        near_far: the axis that moves the tip in and out.
+        radius: where the radius of the tip comes from.
+    """
+
+    def __init__(self, slew: AxisRunner, near_far: AxisRunner, radius: RadiusInput) -> None:
+        radial, sway = slew.bound.radial, near_far.bound.config.sway
+        assert radial is not None  # only such axes have one
+        assert sway is not None  # checked with the deployment
+        self._slew = slew
+        self._near_far = near_far
+        self._radius = radius
+        self._radial = RadialCompensation(
+            sway.mode(),
+            radial.config.full_speed_rad_s,
+            sway.full_speed_m_s,
+            radial.config.max_pct / 100.0,
+        )
+        self._share = 1.0
+
+    def before_slew(self) -> None:
+        """Tell the slew axis what to add in this tick."""
+        axis = self._slew.axis
+        self._share = 1.0
+        self._slew.added = 0.0
+        if self._moving() and axis.sway is not None:
+            self._share = self._radial.tip_share(axis.sway, axis.told)
+            self._slew.added = self._radial.slew(axis.sway, axis.told)
+
+    def after_slew(self, now_ns: int) -> None:
+        """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
+        axis = self._slew.axis
+        sway = axis.sway
+        self._near_far.added = 0.0
+        if self._moving() and sway is not None:
+            share = self._radial.tip_share(sway, axis.told)
+            circle_m = self._radius.circle_m(now_ns, share)
+            if circle_m is not None:
+                added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
+                self._near_far.added = added
+
+    def _moving(self) -> bool:
+        return self._slew.axis.state in (State.ACTIVE, State.STOPPING)

@@ -1,0 +1,98 @@
+"""Shapers with a finite impulse response: ZV, ZVD, EI, two-mode, and any list of taps.
+
+Non-negative taps that sum to one keep the output within the range of the commands of their length:
+such a shaper is never clipped. A bare shaper leaves |H(p)| = |sum h_k exp(-p k T)| of the swing
+with sway pole p.
+"""
+
+import cmath
+import math
+from collections import deque
+from collections.abc import Sequence
+from operator import mul
+
+from canshaper.shaping.sway import SwayMode
+
+
+class Fir:
+    """Convolution of the command with taps, one a tick, the newest command first.
+
+    Args:
+        taps: impulse response, sum 1.
+
+    Raises:
+        ValueError: no taps, a tap that is not a number, or a sum that is not 1.
+    """
+
+    __slots__ = ("_history", "taps")
+
+    def __init__(self, taps: Sequence[float]) -> None:
+        total = math.fsum(taps)
+        # A tenth of a percent is rounding of taps written to a file, far below any valve's step.
+        if not abs(total - 1.0) <= 1e-3:
+            raise ValueError(f"sum of the taps is {total:g}, allowed is 1")
+        self.taps = tuple(tap / total for tap in taps)
+        self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
+
+    def wanted(self, command: float) -> float:
+        """Output for this tick's command."""
+        self._history.appendleft(command)
+        return math.fsum(map(mul, self.taps, self._history))
+
+
+def zv_taps(mode: SwayMode, tick_s: float) -> list[float]:
+    """Zero vibration: two impulses half a swing apart, the second on two neighbouring ticks.
+
+    Half a swing is no whole number of ticks; two taps around it, with the first and the sum, meet
+    H(p) = 0 exactly (three real equations).
+    """
+    pole = mode.pole
+    n = math.floor(0.5 * mode.period_s / tick_s + 1e-9)
+    # 1 + a w_n + b w_(n+1) = 0 with w_k = exp(-p k T), then scaled to sum 1
+    one, two = cmath.exp(-pole * n * tick_s), cmath.exp(-pole * (n + 1) * tick_s)
+    determinant = one.real * two.imag - one.imag * two.real
+    a, b = -two.imag / determinant, one.imag / determinant
+    if abs(b) < 1e-9:  # half a swing is a whole number of ticks
+        a, b = a + b, 0.0
+    total = 1.0 + a + b
+    taps = [0.0] * (n + 2)
+    taps[0], taps[n], taps[n + 1] = 1.0 / total, a / total, b / total
+    return taps if b else taps[:-1]
+
+
+def convolved(first: Sequence[float], second: Sequence[float]) -> list[float]:
+    """Taps of two shapers in series."""
+    taps = [0.0] * (len(first) + len(second) - 1)
+    for i, a in enumerate(first):
+        if a:
+            for k, b in enumerate(second):
+                taps[i + k] += a * b
+    return taps
+
+
+def ei_taps(mode: SwayMode, tick_s: float, residual: float) -> list[float]:
+    """Extra-insensitive: ``residual`` of the swing is left at the nominal period, zero beside it.
+
+    Three impulses half a swing apart, (1+V)/4, (1-V)/2, (1+V)/4, each smaller by the decay of half
+    a swing; between two ticks an impulse is shared linearly (error (omega T)^2 / 8 at most).
+    """
+    half = 0.5 * mode.period_s
+    decay = math.exp(mode.pole.real * half)
+    weights = (
+        0.25 * (1.0 + residual),
+        0.5 * (1.0 - residual) * decay,
+        0.25 * (1.0 + residual) * decay**2,
+    )
+    taps = [0.0] * (math.ceil(2.0 * half / tick_s) + 1)
+    for i, weight in enumerate(weights):
+        place, share = divmod(i * half / tick_s, 1.0)
+        taps[int(place)] += weight * (1.0 - share) / math.fsum(weights)
+        if share:
+            taps[int(place) + 1] += weight * share / math.fsum(weights)
+    return taps
+
+
+def residual_left(taps: Sequence[float], mode: SwayMode, tick_s: float) -> float:
+    """Fraction of the swing that a bare shaper leaves in a mode."""
+    step = cmath.exp(-mode.pole * tick_s)
+    return abs(sum(tap * step**k for k, tap in enumerate(taps)))

@@ -1,0 +1,198 @@
+"""The robust shaper: a non-negative impulse response for a range of pendulum lengths, by LP.
+
+Taps h_k >= 0 with sum 1 keep the output within the range of the commands, so it is never clipped;
+taps below the valve's rate times the tick keep a press or a release within the rate. Among these
+the programme finds the one with the least worst residual |H(p)| over the range (``least_residual``)
+or the shortest one below a given residual (``shortest``). No shaper of this kind can beat the
+optimum: it is also the limit that others are measured against.
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linprog
+
+from canshaper.shaping.sway import SwayMode
+
+# |H| <= r is a disc; a polygon of so many sides around it is at most 0.3 % larger.
+_SIDES = 40
+# Lengths at which the residual is bounded; between them it rises by far less than a percent of it.
+_LENGTHS = 25
+
+
+@dataclass(frozen=True)
+class RobustShaper:
+    """A designed impulse response.
+
+    Attributes:
+        taps: impulse response at the tick, sum 1.
+        residual: largest |H(p)| over the range of lengths, fraction of the swing.
+        duration_s: from the first to the last tap.
+        mean_delay_s: centre of the taps: how far the crane lags behind the stick.
+    """
+
+    taps: tuple[float, ...]
+    residual: float
+    duration_s: float
+    mean_delay_s: float
+
+
+def modes_over_range(mode: SwayMode, range_pct: float, count: int = _LENGTHS) -> list[SwayMode]:
+    """Modes for pendulum lengths of -range ... +range percent, with the damping ratio kept."""
+    lengths = np.linspace(1.0 - range_pct / 100.0, 1.0 + range_pct / 100.0, count)
+    return [SwayMode(mode.omega_rad_s / math.sqrt(x), mode.damping_ratio) for x in lengths]
+
+
+def least_residual(
+    mode: SwayMode, *, tick_s: float, duration_s: float, range_pct: float, rate_per_s: float
+) -> RobustShaper:
+    """Least worst residual over the range that taps within the duration and the rate can give.
+
+    Args:
+        mode: nominal sway mode.
+        tick_s: tick of the axis.
+        duration_s: length of the impulse response.
+        range_pct: pendulum length error covered, +- percent, 0 to 60.
+        rate_per_s: rate of the valve, full speeds per second.
+
+    Raises:
+        ValueError: a value is out of range, or the rate cannot reach full speed in the duration.
+    """
+    _check(tick_s, duration_s, range_pct, rate_per_s)
+    count = round(duration_s / tick_s) + 1
+    if count * tick_s * rate_per_s < 1.0:
+        raise ValueError(
+            f"duration is {duration_s:g} s, allowed is {1.0 / rate_per_s:g} s or more:"
+            f" the valve takes that long to full speed at {rate_per_s:g} /s"
+        )
+    rows = _residual_rows(mode, tick_s, count, range_pct)
+    # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
+    delay = np.arange(count) * tick_s
+    objective = np.append(1e-6 * delay, 1.0)
+    bounds = [(0.0, rate_per_s * tick_s)] * count + [(0.0, None)]
+    solution = linprog(
+        objective,
+        A_ub=np.hstack([rows, -np.ones((len(rows), 1))]),
+        b_ub=np.zeros(len(rows)),
+        A_eq=np.append(np.ones(count), 0.0)[None, :],
+        b_eq=[1.0],
+        bounds=bounds,
+        method="highs",
+    )
+    if not solution.success:
+        raise ValueError(f"no impulse response found: {solution.message}")
+    return _shaper(np.clip(solution.x[:count], 0.0, None), mode, tick_s, range_pct)
+
+
+def shortest(
+    mode: SwayMode, *, tick_s: float, residual_pct: float, range_pct: float, rate_per_s: float
+) -> RobustShaper:
+    """Shortest impulse response with at most this residual over the range (bisection).
+
+    Raises:
+        ValueError: not reached within five swings, or a value out of range.
+    """
+    longest = 5.0 * mode.period_s
+    _check(tick_s, longest, range_pct, rate_per_s)
+    low = math.ceil(1.0 / rate_per_s / tick_s)
+    high = round(longest / tick_s)
+
+    def design(ticks: int) -> RobustShaper:
+        return least_residual(
+            mode,
+            tick_s=tick_s,
+            duration_s=ticks * tick_s,
+            range_pct=range_pct,
+            rate_per_s=rate_per_s,
+        )
+
+    best = design(high)
+    if best.residual > residual_pct / 100.0:
+        raise ValueError(
+            f"residual is {residual_pct:g} %, allowed is {100.0 * best.residual:.2g} % or more"
+            f" for +-{range_pct:g} % length with a valve rate of {rate_per_s:g} /s"
+        )
+    while low < high:
+        middle = (low + high) // 2
+        found = design(middle)
+        if found.residual <= residual_pct / 100.0:
+            high, best = middle, found
+        else:
+            low = middle + 1
+    return best
+
+
+def time_optimal_s(
+    mode: SwayMode, *, tick_s: float, rate_per_s: float, low: float = 0.0, high: float = 1.0
+) -> float:
+    """Shortest time to change the speed by one with no swing left, output within [low, high].
+
+    Not a shaper for moving sticks (it may step back and forth): the limit that none can pass.
+    """
+    n_low, n_high = 1, round(3.0 * mode.period_s / tick_s)
+
+    def feasible(n: int) -> bool:
+        # Steps d_0 ... d_n, free in sign; the output is their running sum.
+        count = n + 1
+        angle = np.exp(-mode.pole * tick_s * np.arange(count))
+        sums = np.tril(np.ones((count, count)))
+        result = linprog(
+            np.zeros(count),
+            A_ub=np.vstack([sums, -sums]),
+            b_ub=np.concatenate([np.full(count, high), np.full(count, -low)]),
+            A_eq=np.vstack([angle.real, angle.imag, np.ones(count)]),
+            b_eq=[0.0, 0.0, 1.0],
+            bounds=[(-rate_per_s * tick_s, rate_per_s * tick_s)] * count,
+            method="highs",
+        )
+        return bool(result.success)
+
+    while n_low < n_high:
+        middle = (n_low + n_high) // 2
+        if feasible(middle):
+            n_high = middle
+        else:
+            n_low = middle + 1
+    return n_high * tick_s
+
+
+def _residual_rows(
+    mode: SwayMode, tick_s: float, count: int, range_pct: float
+) -> NDArray[np.float64]:
+    """Rows whose product with the taps is Re(H e^(-i phi)) for every length and direction."""
+    k = np.arange(count)
+    turns = np.exp(-2j * np.pi * np.arange(_SIDES) / _SIDES)
+    rows = []
+    for one in modes_over_range(mode, range_pct):
+        response = np.exp(-one.pole * tick_s * k)
+        rows.append((turns[:, None] * response[None, :]).real)
+    return np.vstack(rows)
+
+
+def _shaper(
+    taps: NDArray[np.float64], mode: SwayMode, tick_s: float, range_pct: float
+) -> RobustShaper:
+    taps = taps / taps.sum()
+    k = np.arange(len(taps))
+    fine = modes_over_range(mode, range_pct, 4 * _LENGTHS + 1)
+    residual = max(abs(np.sum(taps * np.exp(-m.pole * tick_s * k))) for m in fine)
+    used = np.flatnonzero(taps > 1e-9)
+    return RobustShaper(
+        tuple(float(t) for t in taps[: used[-1] + 1]),
+        float(residual),
+        float((used[-1] - used[0]) * tick_s),
+        float(np.sum(k * taps) * tick_s),
+    )
+
+
+def _check(tick_s: float, duration_s: float, range_pct: float, rate_per_s: float) -> None:
+    for name, value, low, high, unit in (
+        ("tick", tick_s, 1e-3, 0.2, "s"),
+        ("duration", duration_s, 0.02, 60.0, "s"),
+        ("range of length", range_pct, 0.0, 60.0, "%"),
+        ("valve rate", rate_per_s, 0.2, 1000.0, "1/s"),
+    ):
+        if not low <= value <= high:
+            raise ValueError(f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}")

@@ -1,0 +1,51 @@
+"""A machine on disk, made from the shipped one by changing deployment and DBC file."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.config.source import DeploymentError
+
+ROOT = Path(__file__).parents[2]
+
+
+class Machine:
+    """Deployment file and DBC file in a directory of their own."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.yaml = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+        self.yaml = self.yaml.replace("../dbc/forwarder.dbc", "machine.dbc")
+        self.dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+
+    def in_yaml(self, old: str, new: str) -> int:
+        """Replace the first ``old`` of the deployment file; return its line."""
+        assert old in self.yaml, old
+        line = self.yaml[: self.yaml.index(old)].count("\n") + 1
+        self.yaml = self.yaml.replace(old, new, 1)
+        return line
+
+    def in_dbc(self, old: str, new: str) -> int:
+        """Replace the first ``old`` of the DBC file; return its line."""
+        assert old in self.dbc, old
+        line = self.dbc[: self.dbc.index(old)].count("\n") + 1
+        self.dbc = self.dbc.replace(old, new, 1)
+        return line
+
+    def load(self) -> Deployment:
+        path = self.directory / "machine.yaml"
+        path.write_text(self.yaml, encoding="utf-8")
+        (self.directory / "machine.dbc").write_text(self.dbc, encoding="cp1252")
+        return load_deployment(path)
+
+    def problems(self) -> list[str]:
+        """Every problem, without the directory."""
+        with pytest.raises(DeploymentError) as caught:
+            self.load()
+        return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)

@@ -1,0 +1,297 @@
+"""Codecs of levers, valves and status, judged by plain cantools."""
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import cantools
+import pytest
+from cantools.database.can import Message
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.can.codecs import (
+    AxisStatusCodec,
+    LeverCodec,
+    Sender,
+    ServiceStatusCodec,
+    ValveCodec,
+    WrongLengthError,
+)
+from canshaper.can.frame import FrameFault
+from canshaper.can.signals import FieldSet, VelocitySignal
+from canshaper.shaping.states import Reason, State
+
+SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
+shipped: Any = cantools.database.load_file(SHIPPED)
+
+# One message of every kind of signal: J1939's 10 bits with an offset, big-endian, float, falling.
+DBC = """VERSION ""
+
+BU_: A
+
+BO_ 1 Lever: 8 A
+ SG_ Stick : 0|10@1+ (0.2,-100) [-100|100] "%" A
+ SG_ Enable : 10|2@1+ (1,0) [0|3] "" A
+ SG_ Motorola : 23|12@0- (0.1,0) [-100|100] "%" A
+ SG_ Plain : 32|8@1- (1,0) [-100|100] "%" A
+
+BO_ 2 FloatLever: 5 A
+ SG_ Stick : 0|32@1- (50,0) [-100|100] "%" A
+ SG_ Enable : 32|2@1+ (1,0) [0|3] "" A
+
+BO_ 3 Offset: 8 A
+ SG_ Velocity : 8|8@1+ (0.8,-100) [-100|100] "%" A
+ SG_ Counter : 0|4@1+ (1,0) [0|15] "" A
+ SG_ Unused : 16|8@1+ (1,0) [0|255] "" A
+ SG_ Ratio : 32|32@1- (1,0) [0|0] "" A
+
+BO_ 4 Motorola: 4 A
+ SG_ Velocity : 7|16@0- (0.01,0) [-100|100] "%" A
+
+BO_ 5 Falling: 2 A
+ SG_ Velocity : 0|8@1- (-0.8,0) [-100|100] "%" A
+
+BA_DEF_ SG_ "GenSigStartValue" FLOAT -100000 100000;
+BA_DEF_DEF_ "GenSigStartValue" 0;
+BA_ "GenSigStartValue" SG_ 3 Unused 255;
+BA_ "GenSigStartValue" SG_ 3 Ratio 1.5;
+VAL_ 1 Stick 1021 "Parameter error" 1022 "Error indicator" 1023 "Not available" ;
+VAL_ 1 Plain 0 "Centre" 50 "SNA" 51 "Defective" ;
+SIG_VALTYPE_ 2 Stick : 1;
+SIG_VALTYPE_ 3 Ratio : 1;
+"""
+custom: Any = cantools.database.load_string(DBC, "dbc")
+
+
+def signal(message: Message, name: str) -> Any:
+    return message.get_signal_by_name(name)
+
+
+def velocity(message: str, name: str = "Stick") -> VelocitySignal:
+    return VelocitySignal.of(signal(custom.get_message_by_name(message), name))
+
+
+def lever(message: str) -> LeverCodec:
+    return LeverCodec(custom.get_message_by_name(message), [velocity(message)])
+
+
+def valve(message: str, counter: str | None = None) -> ValveCodec:
+    return ValveCodec(Sender("b", custom.get_message_by_name(message)), "Velocity", counter)
+
+
+def raw_lever(stick: int) -> bytes:
+    data = custom.get_message_by_name("Lever").encode(
+        {"Stick": stick, "Enable": 1, "Motorola": 0, "Plain": 0}, scaling=False, strict=False
+    )
+    assert isinstance(data, bytes)
+    return data
+
+
+# -- levers ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("raw", "command"),
+    [
+        (500, 0.0),
+        (0, -1.0),
+        (1000, 1.0),
+        (501, 0.002),
+        (1001, Reason.STICK_OUT_OF_RANGE),
+        (1020, Reason.STICK_OUT_OF_RANGE),
+        (1021, Reason.STICK_ERROR),
+        (1022, Reason.STICK_ERROR),  # would be 104.4 % when scaled
+        (1023, Reason.STICK_NOT_AVAILABLE),
+    ],
+)
+def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None:
+    values, commands = lever("Lever").decode(raw_lever(raw))
+    assert values["Stick"] == raw
+    assert commands == {"Stick": pytest.approx(command)}
+
+
+@pytest.mark.parametrize(
+    ("raw", "command"),
+    [(50, Reason.STICK_NOT_AVAILABLE), (51, Reason.STICK_ERROR), (0, 0.0), (49, 0.49), (52, 0.52)],
+)
+def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reason) -> None:
+    assert velocity("Lever", "Plain").command(raw) == command
+
+
+@pytest.mark.parametrize(
+    ("name", "reason"),
+    [
+        ("Not Available", Reason.STICK_NOT_AVAILABLE),
+        ("NotAvailable", Reason.STICK_NOT_AVAILABLE),
+        ("not_available", Reason.STICK_NOT_AVAILABLE),
+        ("Unavailable", Reason.STICK_NOT_AVAILABLE),
+        ("SNA", Reason.STICK_NOT_AVAILABLE),
+        ("N/A", Reason.STICK_NOT_AVAILABLE),
+        ("Error", Reason.STICK_ERROR),
+        ("SensorFault", Reason.STICK_ERROR),
+        ("invalid", Reason.STICK_ERROR),
+        ("Not valid", Reason.STICK_ERROR),
+        ("Reserved", Reason.STICK_ERROR),
+    ],
+)
+def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
+    text = DBC.replace('50 "SNA"', f'50 "{name}"')
+    message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
+    assert VelocitySignal.of(signal(message, "Plain")).command(50) == reason
+
+
+@pytest.mark.parametrize(
+    ("value", "command"),
+    [
+        (0.0, 0.0),
+        (2.0, 1.0),
+        (-1.0, -0.5),
+        (2.1, Reason.STICK_OUT_OF_RANGE),
+        (float("nan"), Reason.STICK_NOT_A_NUMBER),
+        (float("inf"), Reason.STICK_NOT_A_NUMBER),
+        (float("-inf"), Reason.STICK_NOT_A_NUMBER),
+        (3.4e38, Reason.STICK_OUT_OF_RANGE),
+    ],
+)
+def test_float_sticks(value: float, command: float | Reason) -> None:
+    _, commands = lever("FloatLever").decode(struct.pack("<fB", value, 1))
+    assert commands == {"Stick": command}
+
+
+@pytest.mark.parametrize("length", [0, 1, 7, 9, 64])
+def test_another_length_is_refused(length: int) -> None:
+    with pytest.raises(WrongLengthError):
+        lever("Lever").decode(bytes(length))
+
+
+@pytest.mark.parametrize("switch", [0, 1, 2, 3])
+def test_switches_come_raw(switch: int) -> None:
+    data = bytearray(raw_lever(500))
+    data[1] = data[1] & 0b11 | switch << 2
+    values, _ = lever("Lever").decode(bytes(data))
+    assert values["Enable"] == switch
+
+
+@given(data=st.binary(min_size=8, max_size=8))
+def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
+    message = custom.get_message_by_name("Lever")
+    names = ["Stick", "Motorola", "Plain"]
+    codec = LeverCodec(message, [velocity("Lever", n) for n in names])
+    _, commands = codec.decode(data)
+    judge = message.decode(data, decode_choices=False)
+    named = message.decode(data, decode_choices=True)
+    assert isinstance(judge, dict)
+    assert isinstance(named, dict)
+    for name in names:
+        command, scaled = commands[name], judge[name]
+        assert isinstance(scaled, int | float)
+        if isinstance(command, Reason):
+            coded = not isinstance(named[name], int | float) and str(named[name]) != "Centre"
+            assert coded or abs(scaled) > 100
+        else:
+            assert command == pytest.approx(scaled / 100)
+            assert -1.0 <= command <= 1.0
+
+
+# -- valves ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("message", "steps", "data"),
+    [
+        ("Offset", 0, "00 7d ff 00 00 00 c0 3f"),  # raw 125 is 0 %; the others at their start value
+        ("Offset", -125, "00 00 ff 00 00 00 c0 3f"),
+        ("Offset", 125, "00 fa ff 00 00 00 c0 3f"),
+        ("Motorola", 10_000, "27 10 00 00"),
+        ("Motorola", -1, "ff ff 00 00"),
+        ("Falling", 125, "83 00"),
+        ("Falling", -125, "7d 00"),
+    ],
+)
+def test_steps_become_bytes(message: str, steps: int, data: str) -> None:
+    assert valve(message).frame(steps).data == bytes.fromhex(data)
+
+
+@pytest.mark.parametrize("message", ["Offset", "Motorola", "Falling"])
+def test_steps_are_judged_by_cantools(message: str) -> None:
+    codec = valve(message)
+    for steps in {-codec.steps, -codec.steps // 3, -1, 0, 1, codec.steps // 2, codec.steps}:
+        judge = custom.get_message_by_name(message).decode(codec.frame(steps).data)
+        assert isinstance(judge, dict)
+        assert judge["Velocity"] == pytest.approx(100.0 * steps / codec.steps)
+        raw = custom.get_message_by_name(message).decode(codec.frame(steps).data, scaling=False)
+        assert isinstance(raw, dict)
+        assert codec.velocity_steps(int(raw["Velocity"])) == steps
+
+
+@pytest.mark.parametrize("message", ["Offset", "Motorola", "Falling"])
+def test_steps_beyond_full_command_are_refused(message: str) -> None:
+    codec = valve(message)
+    for steps in (codec.steps + 1, -codec.steps - 1, 10**9):
+        with pytest.raises(ValueError, match=f"allowed is \\+-{codec.steps}"):
+            codec.frame(steps)
+
+
+def test_the_alive_counter_counts_every_frame_and_wraps() -> None:
+    codec = valve("Offset", "Counter")
+    counts = [codec.frame(0).data[0] & 0xF for _ in range(34)]
+    assert counts == [*range(1, 16), *range(16), 0, 1, 2]
+
+
+def test_a_frame_that_is_refused_is_not_counted() -> None:
+    codec = valve("Offset", "Counter")
+    with pytest.raises(ValueError, match="126 steps"):
+        codec.frame(126)
+    assert codec.frame(0).data[0] & 0xF == 1
+
+
+def test_start_values_beyond_the_bits_are_held_within() -> None:
+    text = DBC.replace("SG_ 3 Unused 255", "SG_ 3 Unused 99999")
+    message = cantools.database.load_string(text, "dbc").get_message_by_name("Offset")
+    assert FieldSet(message).encode({})[2] == 255
+
+
+# -- status ----------------------------------------------------------------------------------------
+
+
+def axis_status(*values: Any) -> dict[str, Any]:
+    message = shipped.get_message_by_name("SlewStatus")
+    frame = AxisStatusCodec(Sender("b", message)).frame(*values)
+    decoded = message.decode(frame.data, decode_choices=False)
+    assert isinstance(decoded, dict)
+    return decoded
+
+
+def test_status_carries_what_it_is_told() -> None:
+    decoded = axis_status(State.ACTIVE, Reason.STICK_MOVED, 0.5, -0.25, 12.34)
+    assert decoded == pytest.approx(
+        {"State": 2, "Reason": 2, "RawCommand": 50, "ShapedCommand": -25, "PredictedSway": 12.34}
+    )
+
+
+@pytest.mark.parametrize(("sway", "shown"), [(1e9, 327.67), (-1e9, -327.68), (327.68, 327.67)])
+def test_status_beyond_its_bits_stays_at_the_end(sway: float, shown: float) -> None:
+    assert axis_status(State.READY, Reason.START, 0.0, 0.0, sway)["PredictedSway"] == shown
+
+
+def test_counters_stop_at_their_largest_value() -> None:
+    message = shipped.get_message_by_name("ShaperStatus")
+    codec = ServiceStatusCodec(Sender("b", message))
+    decoded = message.decode(
+        codec.frame({**dict.fromkeys(codec.SIGNALS, 10**6), "LastFault": 7}).data
+    )
+    assert isinstance(decoded, dict)
+    assert decoded.pop("MissedDeadlines") == 65535
+    assert str(decoded.pop("LastFault")) == "BUS_ERROR"
+    assert set(decoded.values()) == {255}
+
+
+def test_tables_of_the_dbc_are_the_numbers_of_the_program() -> None:
+    for name in ("SlewStatus", "NearFarStatus", "LiftStatus"):
+        message = shipped.get_message_by_name(name)
+        for field, enum in (("State", State), ("Reason", Reason)):
+            table = {n: str(text) for n, text in signal(message, field).choices.items()}
+            assert table == {int(m): m.name for m in enum}
+    faults = signal(shipped.get_message_by_name("ShaperStatus"), "LastFault").choices
+    assert {n: str(text) for n, text in faults.items()} == {int(m): m.name for m in FrameFault}

@@ -1,0 +1,232 @@
+"""Every kind of bad deployment file: one clear problem each, with its line, all of them at once."""
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from canshaper.config.load import load_config
+from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.source import DeploymentError
+
+Load = Callable[[str | bytes], DeploymentConfig]
+Problems = Callable[[str | bytes], list[str]]
+
+TOP = "tick_ms, buses, dbc, levers, axes, status"
+AXIS = ", ".join(AxisConfig.model_fields)
+SWAY = (
+    "allowed are length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
+    " and decay_per_swing"
+)
+
+
+def changed(text: str, old: str, new: str) -> tuple[str, int]:
+    """The text with the first ``old`` replaced, and the line of that."""
+    assert old in text
+    return text.replace(old, new, 1), text[: text.index(old)].count("\n") + 1
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        # unknown keys, wherever they stand, with those allowed there
+        ("tick_ms", "tick", f"tick: unknown key; allowed are {TOP}"),
+        (
+            "channel: vcan0",
+            "channel: a, speed: 1",
+            "buses.crane.speed: unknown key; allowed are interface, channel, bitrate",
+        ),
+        (
+            "enable: Enable",
+            "enable: Enable\n    on: X",
+            "levers.left.on: unknown key; allowed are bus, message, timeout_ms, enable, reset,"
+            " anti_sway_off, alive_counter",
+        ),
+        (
+            "{ lever: left,",
+            "{ lever: left, deadzone: 1,",
+            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, neutral_pct",
+        ),
+        (
+            "kind: gff,",
+            "kind: gff, a3: 1,",
+            "axes.slew.filter.a3: unknown key; allowed are kind, a1, a2, poles_rad_s",
+        ),
+        ("kind: off", "kind: off, a1: 1", "axes.lift.filter.a1: unknown key; allowed are kind"),
+        # missing keys, with what they mean
+        ("interface: socketcan, ", "", "buses.crane.interface: missing: python-can interface"),
+        ("lever: left, ", "", "axes.slew.stick.lever: missing: name of a lever"),
+        (", full_speed_m_s: 1.5", "", "axes.slew.sway.full_speed_m_s: missing: speed of the tip"),
+        # numbers
+        ("tick_ms: 20", "tick_ms: 0", "found 0, allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms: 51", "found 51, allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms: 20.0", "found 20.0, allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms: '20'", "found '20', allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms: true", "found True, allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms: 024", "found 24.0, allowed is a whole number, 1 to 50 ms"),
+        ("tick_ms: 20", "tick_ms:", "found None, allowed is a whole number, 1 to 50 ms"),
+        ("timeout_ms: 100", "timeout_ms: 1:40", "found '1:40', allowed is a whole number, 10 to"),
+        ("rise_per_s: 5", "rise_per_s: .nan", "found nan, allowed is 0.2 to 100 full speeds per s"),
+        ("rise_per_s: 5", "rise_per_s: .inf", "found inf, allowed is 0.2 to 100 full speeds per s"),
+        ("rise_per_s: 5", "rise_per_s: -1e999", "found -inf, allowed is 0.2 to 100 full speeds"),
+        ("rise_per_s: 5", "rise_per_s: [5]", "found [5], allowed is 0.2 to 100 full speeds per s"),
+        ("rise_per_s: 5", "rise_per_s: {a: 5}", "found {'a': 5}, allowed is 0.2 to 100 full"),
+        ("neutral_pct: 2", "neutral_pct: 20.1", "found 20.1, allowed is 0.1 to 20 % of full stick"),
+        ("period_s: 2.356", "period_s: 0.1", "axes.slew.sway.period_s: found 0.1, allowed is 0.15"),
+        ("damping_nms: 120", "damping_nms: -1", "found -1, allowed is 0 to 1e+06 N m s/rad"),
+        # other types
+        ("channel: vcan0", "channel: 0", "found 0, allowed is text (in quotes where it looks"),
+        ("tail_s: 2.0", "allow_reverse: 1", "found 1, allowed is true or false"),
+        ("tail_s: 2.0", "allow_faster: yes", "found 'yes', allowed is true or false"),
+        ("[../dbc/forwarder.dbc]", "a.dbc", "dbc: found 'a.dbc', allowed is a list"),
+        ("[../dbc/forwarder.dbc]", "[]", "dbc: found [], allowed are 1 or more entries"),
+        ("[../dbc/forwarder.dbc]", "[3]", "dbc.0: found 3, allowed is text"),
+        (
+            "{ interface: socketcan, channel: vcan0 }",
+            "vcan0",
+            "buses.crane: found 'vcan0', allowed is a section with the keys interface, channel,",
+        ),
+        ("{ kind: off }", "off", "found 'off', allowed is a section of the kind 'off', 'gff'"),
+        # filters
+        ("kind: off", "kind: on", "axes.lift.filter.kind: found 'on', allowed is 'off', 'gff'"),
+        ("kind: off", "", "axes.lift.filter.kind: found None, allowed is 'off', 'gff'"),
+        ("kind: off", "kind: false", "found False, allowed is 'off', 'gff'"),
+        ("a1: 0.708, a2: 0.12", "", "filter: found neither; allowed are a1 and a2, or poles_rad_s"),
+        (", a2: 0.12", "", "axes.slew.filter: found a1; allowed are a1 and a2, or poles_rad_s"),
+        ("a1: 0.708", "a1: null", "axes.slew.filter: found a2; allowed are a1 and a2, or poles"),
+        (
+            "a2: 0.12",
+            "a2: 0.12, poles_rad_s: [-3, -4]",
+            "axes.slew.filter: found a1, a2, poles_rad_s; allowed are a1 and a2, or poles_rad_s",
+        ),
+        ("a1: 0.708", "a1: 0.6", "a1 is 0.6, allowed is 0.69282 or more for a2 = 0.12 (real poles"),
+        ("a1: 0.708, a2: 0.12", "poles_rad_s: [-3]", "found [-3], allowed are 2 or more entries"),
+        (
+            "a1: 0.708, a2: 0.12",
+            "poles_rad_s: [-3, -4, -5]",
+            "found [-3, -4, -5], allowed are 2 entries at most",
+        ),
+        (
+            "a1: 0.708, a2: 0.12",
+            "poles_rad_s: [-3, 4]",
+            "axes.slew.filter.poles_rad_s.1: found 4, allowed is -100 to -0.1 rad/s",
+        ),
+        # sway data
+        ("period_s: 2.356, damping_ratio: 0.038, ", "", f"sway: found no sway data; {SWAY}"),
+        ("damping_ratio: 0.038, ", "", f"axes.slew.sway: found period_s; {SWAY}"),
+        ("mass_kg: 300, ", "", f"axes.near_far.sway: found damping_nms, length_m; {SWAY}"),
+        ("mass_kg: 300", "period_s: 2", f"found damping_nms, length_m, period_s; {SWAY}"),
+        ("mass_kg: 300", "mass_kg: ~", f"axes.near_far.sway: found damping_nms, length_m; {SWAY}"),
+        (
+            "damping_ratio: 0.038",
+            "damping_ratio: 0.038, decay_per_swing: 0.2",
+            f"found damping_ratio, decay_per_swing, period_s; {SWAY}",
+        ),
+        ("damping_nms: 120", "damping_nms: 100000", "axes.near_far.sway: damping ratio is "),
+        # what does not go together
+        ("rise_per_s: 5", "min_pct: 30, max_pct: 30", "min_pct is 30, allowed is below max_pct"),
+        ("    sway: { period", "    # { period", "axes.slew: filter gff needs the sway data"),
+    ],
+)
+def test_one_fault_is_one_problem_with_its_line(
+    shipped: str, problems: Problems, old: str, new: str, says: str
+) -> None:
+    text, line = changed(shipped, old, new)
+    (problem,) = problems(text)
+    assert says in problem
+    told = re.match(r"machine\.yaml:(\d+): ", problem)
+    assert told, problem
+    # a problem of a whole axis stands at its name, that of an added line one below
+    name = shipped.splitlines().index("  slew:") + 1
+    assert int(told[1]) in ((name,) if "needs the sway" in says else (line, line + new.count("\n")))
+
+
+@pytest.mark.parametrize("name", ["slew", "stick", "limits", "buses", "kind", "0"])
+def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
+    shipped: str, problems: Problems, name: str
+) -> None:
+    axis = f"'{name}'" if name == "0" else name
+    text = shipped.replace("  slew:\n", f"  {axis}:\n    stik: 1\n", 1)
+    text = text.replace("{ lever: left, signal: Slew,", "{ leva: left, signal: Slew,", 1)
+    line = shipped.splitlines().index("  slew:") + 2
+    assert problems(text) == [
+        f"machine.yaml:{line}: axes.{name}.stik: unknown key; allowed are {AXIS}",
+        f"machine.yaml:{line + 1}: axes.{name}.stick.leva: unknown key; allowed are"
+        " lever, signal, neutral_pct",
+        f"machine.yaml:{line + 1}: axes.{name}.stick.lever: missing: name of a lever",
+    ]
+
+
+def test_all_problems_are_told_at_once_in_the_order_of_the_file(
+    shipped: str, problems: Problems
+) -> None:
+    text = shipped
+    for old, new in [
+        ("tick_ms: 20", "tick_ms: 99"),
+        ("timeout_ms: 100", "timeout_ms: soon"),
+        ("signal: NearFar,", ""),
+        ("kind: off", "kind: magic"),
+        ("status: { bus: crane, message: ShaperStatus }", "staus: 1"),
+    ]:
+        text, _ = changed(text, old, new)
+    found = problems(text)
+    assert [p.split(": ")[1] for p in found] == [
+        "tick_ms",
+        "levers.left.timeout_ms",
+        "axes.near_far.stick.signal",
+        "axes.lift.filter.kind",
+        "staus",
+    ]
+    lines = [int(p.split(":")[1]) for p in found]
+    assert lines == sorted(lines)
+
+
+@pytest.mark.parametrize("text", ["", "# nothing\n", "{}\n"])
+def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
+    keys = [re.sub(r"^machine\.yaml(:1)?: ", "", p).split(": ", 1) for p in problems(text)]
+    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "levers"]
+    assert all(text.startswith("missing: ") for _, text in keys)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"), [("- a\n", "['a']"), ("~\n", "None"), ("3\n", "3"), ("hello\n", "'hello'")]
+)
+def test_a_file_that_is_no_mapping(problems: Problems, text: str, found: str) -> None:
+    says = f"machine.yaml:1: found {found}, allowed is a section with the keys {TOP}"
+    assert problems(text) == [says]
+
+
+def test_long_findings_are_cut(shipped: str, problems: Problems) -> None:
+    (problem,) = problems(shipped.replace("tick_ms: 20", f"tick_ms: {'x' * 500}"))
+    assert len(problem) < 160
+    assert "'xxx" in problem
+
+
+def test_missing_file(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError) as caught:
+        load_config(tmp_path / "none.yaml")
+    assert str(caught.value) == f"{tmp_path / 'none.yaml'}: No such file or directory"
+
+
+def test_off_needs_no_quotes(shipped: str, load: Load) -> None:
+    for word in ("off", "'off'", '"off"'):
+        config = load(shipped.replace("kind: off", f"kind: {word}"))
+        assert config.axes["lift"].filter.kind == "off"
+
+
+def test_numbers_with_an_exponent_are_numbers(shipped: str, load: Load) -> None:
+    sway = load(shipped.replace("damping_nms: 120", "damping_nms: 1.2e2")).axes["near_far"].sway
+    assert sway
+    assert sway.damping_nms == 120.0
+
+
+def test_the_shipped_file_is_read_as_it_stands(shipped: str, load: Load) -> None:
+    config = load(shipped)
+    assert config.tick_ms == 20
+    assert list(config.axes) == ["slew", "near_far", "lift"]
+    slew = config.axes["slew"]
+    assert slew.filter.model_dump(exclude_none=True) == {"kind": "gff", "a1": 0.708, "a2": 0.12}
+    assert (slew.limits.deadband_pct, slew.limits.rise_per_s) == (5, 5)
+    assert slew.sway
+    assert slew.sway.mode().damping_ratio == 0.038

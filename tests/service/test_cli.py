@@ -1,0 +1,214 @@
+"""The command line: exit codes, what it prints, and what it must not import or start."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import can
+import pytest
+import typer
+from typer.testing import CliRunner
+
+from canshaper import __version__
+from canshaper.cli.app import app
+from canshaper.cli.common import loader
+from canshaper.config.source import DeploymentError
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = ROOT / "config" / "forwarder.yaml"
+VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+# Nothing of these belongs on a small machine PC.
+HEAVY = ("casadi", "scipy", "numpy", "matplotlib", "pandas")
+
+
+def invoke(*arguments: str) -> Any:
+    return CliRunner().invoke(app, list(arguments), prog_name="canshaper")
+
+
+@pytest.fixture
+def broken(tmp_path: Path) -> Path:
+    path = tmp_path / "broken.yaml"
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    path.write_text(text.replace("tick_ms: 20", "tick_ms: 0").replace("kind: off", "kind: x"))
+    return path
+
+
+@pytest.fixture
+def two_buses(tmp_path: Path) -> Path:
+    path = tmp_path / "two.yaml"
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    bus = "  crane: { interface: socketcan, channel: vcan0 }\n"
+    path.write_text(text.replace(bus, bus + bus.replace("crane", "boom").replace("vcan0", "vcan1")))
+    return path
+
+
+@pytest.fixture
+def opened(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
+    """Every attempt to open a bus; none succeeds."""
+    attempts: list[dict[str, Any]] = []
+
+    def refuse(**options: Any) -> None:
+        attempts.append(options)
+        raise OSError("no such device")
+
+    monkeypatch.setattr(can, "Bus", refuse)
+    return attempts
+
+
+# -- check -----------------------------------------------------------------------------------------
+
+
+def test_check_of_a_good_file_shows_what_it_does() -> None:
+    result = invoke("check", str(SHIPPED))
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    assert result.stdout.splitlines() == [
+        f"{SHIPPED}: good",
+        "  bus crane: socketcan vcan0",
+        "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
+        "  axis near_far: LeverLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
+        "  axis lift: LeverRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
+    ]
+
+
+def test_check_of_a_broken_file_tells_every_problem(broken: Path) -> None:
+    result = invoke("check", str(broken))
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    line = (
+        SHIPPED.read_text(encoding="utf-8")
+        .splitlines()
+        .index("tick_ms: 20 # period of the control loop")
+    )
+    first, second, count = result.stderr.splitlines()
+    assert first == f"{broken}:{line + 1}: tick_ms: found 0, allowed is a whole number, 1 to 50 ms"
+    assert "axes.lift.filter.kind: found 'x', allowed is 'off', 'gff'" in second
+    assert count == "2 problems"
+
+
+def test_check_of_no_file() -> None:
+    result = invoke("check", "nowhere/none.yaml")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines() == [
+        "nowhere/none.yaml: No such file or directory",
+        "1 problem",
+    ]
+
+
+def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("forwarder.yaml", "config/forwarder.yaml"):
+        assert invoke("check", name).exit_code == 0
+    assert invoke("check", "other/forwarder.yaml").exit_code == 2
+    Path("forwarder.yaml").write_text("tick_ms: 0\n", encoding="utf-8")  # one that is there wins
+    assert invoke("check", "forwarder.yaml").exit_code == 2
+
+
+# -- run -------------------------------------------------------------------------------------------
+
+
+def test_run_of_a_broken_file_opens_no_bus(broken: Path, opened: list[dict[str, Any]]) -> None:
+    result = invoke("run", str(broken))
+    assert result.exit_code == 2
+    assert "tick_ms: found 0" in result.stderr
+    assert "kind: found 'x'" in result.stderr
+    assert opened == []
+
+
+def test_run_without_its_bus_says_which(opened: list[dict[str, Any]]) -> None:
+    result = invoke("run", str(SHIPPED), "--channel", "can7")
+    assert result.exit_code == 2
+    assert "bus crane: cannot open socketcan channel can7: no such device" in result.stderr
+    assert [(o["interface"], o["channel"]) for o in opened] == [("socketcan", "can7")]
+
+
+def test_bus_options(two_buses: Path) -> None:
+    buses = loader(str(SHIPPED), "virtual", ["x"])().config.buses
+    assert (buses["crane"].interface, buses["crane"].channel) == ("virtual", "x")
+    buses = loader(str(two_buses), None, ["boom=can1", "crane=can0"])().config.buses
+    assert {n: b.channel for n, b in buses.items()} == {"crane": "can0", "boom": "can1"}
+
+
+@pytest.mark.parametrize(
+    ("channels", "says"),
+    [
+        (["x"], "found 'x', allowed is NAME=CHANNEL with a bus of crane, boom"),
+        (["jib=x"], "found 'jib=x', allowed is NAME=CHANNEL with a bus of crane, boom"),
+        (["crane=vcan1"], "two of the buses crane, boom have one channel"),
+        (["crane=a", "boom=a"], "two of the buses crane, boom have one channel"),
+    ],
+)
+def test_bus_options_that_do_not_fit(two_buses: Path, channels: list[str], says: str) -> None:
+    with pytest.raises(DeploymentError, match=re.escape(f"command line: --channel: {says}")):
+        loader(str(two_buses), None, channels)()
+
+
+# -- the command itself ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("verb", VERBS)
+@pytest.mark.parametrize("option", ["--help", "-h"])
+def test_help_of_every_verb_has_an_example(verb: str, option: str) -> None:
+    result = invoke(verb, option)
+    assert result.exit_code == 0
+    assert re.search(rf"Examples:\s+canshaper {verb}\b", result.stdout)
+
+
+def test_help_names_every_verb() -> None:
+    result = invoke("--help")
+    assert result.exit_code == 0
+    assert {"run", "check", "config-schema"} <= set(VERBS)
+    assert all(re.search(rf"^\s+{verb}\s", result.stdout, re.MULTILINE) for verb in VERBS)
+
+
+def test_version() -> None:
+    result = invoke("--version")
+    assert (result.exit_code, result.stdout) == (0, f"canshaper {__version__}\n")
+
+
+@pytest.mark.parametrize("arguments", [["start"], ["check"], ["check", "--fast", "x"], ["run"]])
+def test_wrong_use_is_an_error_without_a_traceback(arguments: list[str]) -> None:
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    assert "Error: " in result.stderr
+    assert isinstance(result.exception, SystemExit)
+
+
+def python(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return done.stdout.strip()
+
+
+def test_the_daemon_imports_nothing_heavy() -> None:
+    code = f"""
+import sys
+from pathlib import Path
+import canshaper.cli.app, canshaper.can.bus, canshaper.service.daemon
+from canshaper.cli.common import loader
+from canshaper.service.controller import Controller
+controller = Controller(loader({str(SHIPPED)!r})())
+for i in range(100):
+    controller.tick(i * 20_000_000)
+print(len(controller.axes), sorted({{m.split(".")[0] for m in sys.modules}} & set({HEAVY!r})))
+"""
+    assert python(code) == "3 []"
+
+
+def test_the_watch_of_heavy_imports_would_see_one() -> None:
+    assert python("import sys, numpy; print('numpy' in sys.modules)") == "True"
+
+
+def test_the_module_is_the_command() -> None:
+    done = subprocess.run(
+        [sys.executable, "-m", "canshaper", "check", str(SHIPPED)],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0
+    assert done.stdout.startswith(f"{SHIPPED}: good")

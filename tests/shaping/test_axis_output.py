@@ -1,0 +1,246 @@
+"""What an axis sends: joins without a jump, bounds in time, and what the model is told."""
+
+import itertools
+import math
+import random
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import pytest
+
+from canshaper.shaping.axis import BLEND_S, Axis, StickInput
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off
+from canshaper.shaping.states import Reason, State
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+Drive = Any  # the class of conftest.py
+DriveWith = Callable[..., Any]
+
+TICK_S = 0.02
+NEW_MODE = SwayMode(2.2, 0.02)
+FREE = OutputLimits(
+    rise_per_s=100.0, fall_per_s=100.0, tail_s=2.0, allow_faster=True, allow_reverse=True
+)
+FINE = 1_000_000  # grid steps: rounding far below what is looked at
+LOST = StickInput(fault=Reason.STICK_TIMEOUT)
+
+
+class Stubborn:
+    """A filter that never lets go."""
+
+    def wanted(self, command: float) -> float:
+        return 1.0
+
+
+def new_filter(sway: SwayModel) -> Gff:
+    return Gff(sway, (-2.0, -2.5))
+
+
+def largest_step(sent: Sequence[float]) -> float:
+    return max(abs(b - a) for a, b in itertools.pairwise(sent))
+
+
+# -- joins -----------------------------------------------------------------------------------------
+
+
+def join(drive: Drive, what: str, after_s: float) -> tuple[float, list[float]]:
+    """Bypass on or off or a retune in motion; what was sent last, and what in the 0.1 s after."""
+    drive.to_ready().run(StickInput(0.2, bypass=what == "bypass off"), after_s)
+    if what == "bypass off":  # leave a swing behind, so that the filter wants something else
+        drive.run(StickInput(0.1, bypass=True), 0.2)
+    elif what == "retune":
+        drive.axis.retune(NEW_MODE, new_filter)
+    last, before = drive.axis.sent, len(drive.sent)
+    drive.run(StickInput(0.2, bypass=what == "bypass on"), 0.1)
+    return last, drive.sent[before:]
+
+
+@pytest.mark.parametrize("what", ["bypass on", "bypass off", "retune"])
+@pytest.mark.parametrize("after_s", [0.1, 0.2, 0.5, 1.0])
+def test_a_change_in_motion_joins_and_fades(
+    drive_with: DriveWith, what: str, after_s: float
+) -> None:
+    steps = []
+    for tick_s in (0.02, 0.005):
+        drive = drive_with(limits=FREE, grid_steps=FINE, tick_s=tick_s)
+        last, sent = join(drive, what, after_s)
+        assert sent[0] == pytest.approx(last, abs=2e-6)  # nothing jumps,
+        steps.append(largest_step([last, *sent]))
+        drive.run(StickInput(0.2, bypass=what == "bypass on"), 12.0)
+        assert drive.axis.sent == pytest.approx(0.2, abs=1e-3)  # and nothing stays;
+    # continuous: a quarter of the tick, about a quarter of the largest step.
+    assert steps[1] < 0.35 * steps[0] + 1e-5
+
+
+def test_the_difference_at_a_change_fades_with_its_time_constant(drive_with: DriveWith) -> None:
+    class Half:
+        def wanted(self, command: float) -> float:
+            return 0.5 * command
+
+    drive = drive_with(Half(), FREE, grid_steps=FINE).moving(0.8)
+    for k in range(60):
+        drive.tick(StickInput(0.8, bypass=True))
+        expected = 0.8 - 0.4 * math.exp(-k * TICK_S / BLEND_S)
+        assert drive.axis.sent == pytest.approx(expected, abs=2e-6)
+
+
+def test_a_bypass_from_rest_gives_the_stick_at_once(drive_with: DriveWith) -> None:
+    drive = drive_with(limits=FREE, grid_steps=FINE)
+    for command in (0.8, -0.6):
+        drive.to_ready().tick(StickInput(command, bypass=True))
+        assert drive.state is State.BYPASS_ON
+        assert drive.axis.sent == pytest.approx(command, abs=2e-6)
+        drive.run(StickInput(bypass=True), 3.0)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_no_change_beats_the_rates(drive_with: DriveWith, seed: int) -> None:
+    limits = OutputLimits(rise_per_s=2.0, fall_per_s=4.0, tail_s=0.5)
+    drive = drive_with(limits=limits).moving()
+    rng = random.Random(seed)
+    for k in range(60):
+        bypass = rng.random() < 0.5
+        if k % 7 == 0:
+            mode = SwayMode(rng.uniform(1.5, 5.0), rng.uniform(0.0, 0.3))
+            pole = -rng.uniform(1.0, 6.0)
+            drive.axis.retune(mode, lambda sway, pole=pole: Gff(sway, (pole, pole)))
+        drive.run(StickInput(rng.uniform(-1.0, 1.0), bypass=bypass), 0.1)
+    assert largest_step(drive.sent) <= 4.0 * TICK_S + 1.0 / 125 + 1e-12
+    growth = [abs(b) - abs(a) for a, b in itertools.pairwise(drive.sent)]
+    assert max(growth) <= 2.0 * TICK_S + 1.0 / 125 + 1e-12
+
+
+def test_a_retune_keeps_the_swing(drive: Drive) -> None:
+    drive.moving()
+    shown = drive.axis.sway.sway_rad(1.5)
+    assert shown != 0.0
+    drive.axis.retune(NEW_MODE, new_filter)
+    assert drive.axis.sway.mode == NEW_MODE
+    assert drive.axis.sway.sway_rad(1.5) == pytest.approx(shown, rel=1e-12)
+
+
+def test_an_axis_without_sway_can_be_given_one() -> None:
+    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    axis.tick(StickInput())
+    axis.hold(3)
+    axis.retune(NEW_MODE, new_filter)
+    axis.tick(StickInput(0.8))
+    assert axis.sway is not None
+    assert axis.sway.rate != 0.0
+
+
+@pytest.mark.parametrize("mode", [NEW_MODE, SwayMode(2.9, 0.1)])
+def test_a_retune_that_fails_changes_nothing(drive_with: DriveWith, mode: SwayMode) -> None:
+    drive, other = drive_with().moving(), drive_with().moving()
+    with pytest.raises(ValueError, match="pole is -60 rad/s"):
+        drive.axis.retune(mode, lambda sway: Gff(sway, (-60.0, -3.0)))
+    for each in (drive, other):
+        each.run(StickInput(0.5), 1.0)
+        each.run(StickInput(), 2.0)
+    assert drive.raw == other.raw
+    assert drive.axis.sway.angle == other.axis.sway.angle
+
+
+# -- time that passes without a tick ---------------------------------------------------------------
+
+
+def test_missed_ticks_reach_the_model(drive: Drive) -> None:
+    drive.moving()
+    twin = SwayModel(drive.model.mode, TICK_S)
+    twin.angle, twin.rate = drive.model.angle, drive.model.rate
+    raw, sent = drive.axis.raw, drive.axis.sent
+    drive.axis.hold(7)
+    for _ in range(7):
+        twin.step(sent)
+    assert (drive.model.angle, drive.model.rate) == (twin.angle, twin.rate)
+    assert (drive.axis.raw, drive.axis.sent, drive.state) == (raw, sent, State.ACTIVE)
+
+
+@pytest.mark.parametrize("missed", [0, 1, 9])
+def test_late_ticks_lengthen_neither_a_stop_nor_the_run_on(
+    drive_with: DriveWith, missed: int
+) -> None:
+    limits = OutputLimits(rise_per_s=50.0, fall_per_s=50.0, tail_s=1.0)
+    for stick, bound_s in ((LOST, 0.6), (StickInput(), 1.0)):
+        drive = drive_with(Stubborn(), limits, stop_s=0.6).moving()
+        ticks = 0
+        while drive.axis.raw and ticks < 200:
+            drive.tick(stick)
+            drive.axis.hold(missed)
+            ticks += 1
+        # the last output stays until the tick after the bound
+        assert bound_s - TICK_S <= ticks * (1 + missed) * TICK_S <= bound_s + TICK_S * (3 + missed)
+
+
+# -- what is sent ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("deadband", [0.0, 0.05, 0.3])
+@pytest.mark.parametrize("steps", [10, 125, 500])
+def test_the_model_knows_what_the_frame_carries(
+    drive_with: DriveWith, steps: int, deadband: float
+) -> None:
+    limits = OutputLimits(deadband=deadband, tail_s=1.0, maximum=0.9)
+    drive = drive_with(limits=limits, grid_steps=steps).moving(1.0)
+    drive.run(StickInput(0.3), 0.5)
+    drive.run(StickInput(-0.7), 1.0)
+    drive.run(StickInput(), 3.0)
+    assert any(drive.raw)
+    valve = SwayModel(drive.model.mode, TICK_S)
+    for raw, sent in zip(drive.raw, drive.sent, strict=True):
+        # the valve's own view: nothing inside its deadband, full speed at full command
+        velocity = max(0.0, abs(raw) / steps - deadband) / (1.0 - deadband)
+        assert sent == pytest.approx(math.copysign(velocity, raw), abs=1e-12)
+        assert abs(sent) <= 0.9
+        valve.step(sent)
+    assert (drive.model.angle, drive.model.rate) == (valve.angle, valve.rate)
+
+
+def test_a_coarse_frame_does_not_hold_up_a_slow_rate(drive_with: DriveWith) -> None:
+    """One tick's growth is a fortieth of a step: rounding must not swallow it."""
+    limits = OutputLimits(rise_per_s=0.2, fall_per_s=1.0)
+    drive = drive_with(Off(), limits, grid_steps=10).to_ready()
+    drive.run(StickInput(1.0), 5.1)
+    assert drive.axis.raw == 10
+
+
+def test_after_a_trip_nothing_is_left_of_the_command_before_it(drive_with: DriveWith) -> None:
+    drive = drive_with(Stubborn(), OutputLimits(tail_s=2.0)).moving(1.0)
+    drive.tick(StickInput(1.0, trip=Reason.SEND_FAILED))
+    drive.tick(StickInput(reset=True))
+    drive.to_ready()
+    before = len(drive.sent)
+    drive.run(StickInput(0.2), 1.0)
+    assert max(drive.sent[before:]) <= 0.2
+
+
+def test_every_stop_has_its_full_time(drive_with: DriveWith) -> None:
+    drive = drive_with(Stubborn(), stop_s=0.4)
+    for _ in range(3):
+        drive.moving()
+        before = len(drive.raw)
+        drive.run(LOST, 1.0)
+        assert sum(map(bool, drive.raw[before:])) == 20
+
+
+def test_below_the_minimum_the_output_is_zero(drive_with: DriveWith) -> None:
+    drive = drive_with(Off(), OutputLimits(minimum=0.2)).to_ready()
+    drive.run(StickInput(0.19), 1.0)
+    assert not any(drive.raw)
+    drive.run(StickInput(0.21), 1.0)
+    assert drive.axis.sent == pytest.approx(0.21, abs=0.01)
+    drive.run(StickInput(0.19), 1.0)
+    assert drive.axis.raw == 0
+
+
+def test_the_default_output_stays_between_zero_and_the_recent_command(drive: Drive) -> None:
+    drive.moving(0.6)
+    assert min(drive.sent) >= 0.0
+    assert max(drive.sent) <= 0.6
+    before = len(drive.sent)
+    drive.run(StickInput(-0.4), 1.5)
+    falling = [v for v in drive.sent[before:] if v > 0.0]
+    assert falling == sorted(falling, reverse=True)
+    assert min(drive.sent[before:]) >= -0.4

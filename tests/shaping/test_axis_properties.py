@@ -1,0 +1,300 @@
+"""Whatever happens to an axis, these things hold: an independent oracle watches every tick.
+
+It knows inputs and outputs, nothing of the axis' inside. Time is in ticks, missed ones included.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
+
+from canshaper.shaping.axis import Axis, StickInput, Transition
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.states import Reason, State
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+BAND = 0.02
+MODE = SwayMode(2.86, 0.05)
+DRIVEN = (State.ACTIVE, State.BYPASS_ON)
+MAY_MOVE = (*DRIVEN, State.STOPPING)
+LOST = (Reason.STICK_TIMEOUT, Reason.STICK_ERROR, Reason.STICK_NOT_A_NUMBER, Reason.SWITCH_INVALID)
+TRIPS = (Reason.SEND_FAILED, Reason.LOOP_STALLED)
+CAUSES = [*(("fault", reason) for reason in LOST), *(("trip", reason) for reason in TRIPS)]
+SWITCHES = ("enabled", "bypass", "reset")
+WAYS = {
+    State.NEUTRAL_WAIT: {State.READY, State.TRIPPED},
+    State.READY: {State.NEUTRAL_WAIT, State.ACTIVE, State.BYPASS_ON, State.TRIPPED},
+    State.ACTIVE: {State.READY, State.BYPASS_ON, State.STOPPING, State.TRIPPED},
+    State.BYPASS_ON: {State.READY, State.ACTIVE, State.STOPPING, State.TRIPPED},
+    State.STOPPING: {State.NEUTRAL_WAIT, State.TRIPPED},
+    State.TRIPPED: {State.NEUTRAL_WAIT},
+}
+
+
+class Wild:
+    """A filter that says what it likes; also no number at all."""
+
+    says = 1.0
+
+    def wanted(self, command: float) -> float:
+        return self.says
+
+
+@dataclass(frozen=True)
+class Setup:
+    """A machine: limits, frame, timing and filter."""
+
+    limits: OutputLimits
+    filter: str = "gff"
+    tick_s: float = 0.05  # a few ticks to full speed: much happens in a short history
+    stop_s: float = 0.3
+    steps: int = 125
+
+
+SETUPS = [
+    Setup(OutputLimits(tail_s=0.4)),
+    Setup(OutputLimits(deadband=0.05, tail_s=0.2, minimum=0.1), tick_s=0.01),
+    Setup(OutputLimits(rise_per_s=1.5, fall_per_s=8.0, tail_s=0.4, maximum=0.77)),
+    Setup(OutputLimits(rise_per_s=8.0, fall_per_s=1.5, tail_s=0.1), stop_s=1.0),
+    Setup(OutputLimits(tail_s=0.4, deadband=0.25), steps=10),
+    Setup(OutputLimits(tail_s=0.4, allow_faster=True)),
+    Setup(OutputLimits(tail_s=0.4, allow_reverse=True), steps=10),
+    Setup(OutputLimits(tail_s=0.3, allow_faster=True, allow_reverse=True, maximum=0.9)),
+    Setup(OutputLimits(tail_s=0.0), filter="off"),
+    Setup(OutputLimits(tail_s=0.0, rise_per_s=100.0, fall_per_s=100.0), stop_s=0.02),
+    Setup(OutputLimits(tail_s=0.4), filter="wild"),
+    Setup(OutputLimits(tail_s=0.2, rise_per_s=2.0, deadband=0.05), filter="wild", steps=10),
+    Setup(OutputLimits(tail_s=0.2, allow_faster=True, allow_reverse=True), filter="wild"),
+    Setup(OutputLimits(tail_s=0.1, rise_per_s=50.0, fall_per_s=4.0), filter="wild", stop_s=0.1),
+]
+
+sticks = st.one_of(
+    st.sampled_from([0.0, BAND, -BAND, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0]),
+    st.floats(-1.0, 1.0),
+)
+durations = st.sampled_from([1, 2, 3, 5, 10, 20, 40])
+modes = st.builds(SwayMode, st.floats(1.0, 6.0), st.floats(0.0, 0.5))
+anything = st.builds(
+    StickInput,
+    command=sticks,
+    fault=st.none() | st.sampled_from(LOST),
+    enabled=st.booleans(),
+    bypass=st.booleans(),
+    reset=st.booleans(),
+    trip=st.none() | st.none() | st.sampled_from(TRIPS),
+)
+
+
+class AxisUnderWatch(RuleBasedStateMachine):
+    """Drives an axis and checks every tick."""
+
+    @initialize(setup=st.sampled_from(SETUPS))
+    def build(self, setup: Setup) -> None:
+        self.setup = setup
+        self.limits = limits = setup.limits
+        self.wild = Wild()
+        model = SwayModel(MODE, setup.tick_s) if setup.filter == "gff" else None
+        shaper = self.shaper(model, (-5.655, -4.112))
+        rest = {"neutral_band": BAND, "stop_s": setup.stop_s, "grid_steps": setup.steps}
+        self.axis = Axis(setup.tick_s, limits, sway=model, shaper=shaper, **rest)
+        self.shadow = SwayModel(MODE, setup.tick_s)  # the hanging tool, as far as it is known
+        self.rise, self.fall = limits.rise_per_s * setup.tick_s, limits.fall_per_s * setup.tick_s
+        # Rates act before rounding. Half a step to either side makes one step; one and a half where
+        # one of the two had to be rounded down because of a bound.
+        self.slack = 1.5 / (setup.steps * (1.0 - limits.deadband)) + 1e-12
+        self.tail = round(limits.tail_s / setup.tick_s)
+        self.stop = max(1, round(setup.stop_s / setup.tick_s))
+        self.stick = StickInput()
+        # the oracle's memory
+        self.now = 0
+        self.armed = False  # stick seen valid, enabled and neutral since it last was not usable
+        self.asked: list[tuple[int, float]] = []  # when which command was given by such a stick
+        self.overtime = 0  # ticks since the tail after the last of them ended
+        self.stop_from = 0
+        self.enabled_before = self.reset_before = True
+        self.tick()
+
+    def shaper(self, model: SwayModel | None, poles: tuple[float, float]) -> Shaper:
+        if model is not None and self.setup.filter == "gff":
+            return Gff(model, poles)
+        return self.wild if self.setup.filter == "wild" else Off()
+
+    @rule(command=sticks, ticks=durations)
+    def push(self, command: float, ticks: int) -> None:
+        self.keep(replace(self.stick, command=command), ticks)
+
+    @rule(command=sticks, ticks=durations, then=durations)
+    def stroke(self, command: float, ticks: int, then: int) -> None:
+        """Get going, if need be, and reverse."""
+        if self.axis.state not in (State.READY, *DRIVEN):
+            self.recover()
+        self.push(command, ticks)
+        self.push(-command, then)
+
+    @rule()
+    def recover(self) -> None:
+        """What an operator does when nothing moves: let go, switch off and on."""
+        self.stick = StickInput(bypass=self.stick.bypass)
+        self.keep(replace(self.stick, enabled=False), 1)
+        self.keep(self.stick, 2)
+
+    @rule(cause=st.sampled_from(CAUSES), ticks=durations, then=st.lists(anything, max_size=5))
+    def fail(self, cause: tuple[str, Reason], ticks: int, then: list[StickInput]) -> None:
+        name, reason = cause
+        self.keep(replace(self.stick, **{name: reason}), ticks)
+        self.stick = replace(self.stick, **{name: None})
+        self.chaos(then)
+
+    @rule(name=st.sampled_from(SWITCHES), on=st.booleans(), ticks=durations)
+    def switch(self, name: str, on: bool, ticks: int) -> None:
+        self.keep(replace(self.stick, **{name: on}), ticks)
+
+    @rule(inputs=st.lists(anything, min_size=1, max_size=12))
+    def chaos(self, inputs: list[StickInput]) -> None:
+        before = self.stick
+        for self.stick in inputs:
+            self.tick()
+        self.stick = before
+
+    @rule(ticks=st.integers(1, 10))
+    def miss(self, ticks: int) -> None:
+        self.axis.hold(ticks)
+        for _ in range(ticks):
+            self.shadow.step(self.axis.sent)
+        self.now += ticks
+
+    @rule(mode=modes, pole=st.floats(-8.0, -0.5), ticks=durations)
+    def retune(self, mode: SwayMode, pole: float, ticks: int) -> None:
+        known = self.axis.sway is not None
+        self.axis.retune(mode, lambda model: self.shaper(model, (pole, 1.5 * pole)))
+        fresh = SwayModel(mode, self.setup.tick_s)
+        self.shadow = self.shadow.retuned(mode, self.axis.sent) if known else fresh
+        self.keep(self.stick, ticks)
+
+    @rule(says=st.one_of(sticks, st.sampled_from([1e300, -1e300, math.nan, math.inf])))
+    def filter_says(self, says: float) -> None:
+        self.wild.says = says
+
+    def keep(self, stick: StickInput, ticks: int) -> None:
+        self.stick = stick
+        for _ in range(ticks):
+            self.tick()
+
+    def tick(self) -> None:
+        stick, axis = self.stick, self.axis
+        old, sent_before = axis.state, axis.sent
+        transition = axis.tick(stick)
+        self.now += 1
+        if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
+            self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
+        self.shadow.step(axis.sent)
+        self.usable = stick.fault is None and stick.trip is None and stick.enabled
+        self.centred = stick.fault is None and abs(stick.command) <= BAND
+        self.remember()
+        self.check_frame()
+        self.check_way(old, transition, sent_before)
+        self.check_cause()
+        self.check_speed(sent_before)
+        self.check_rate(old, sent_before)
+
+    def remember(self) -> None:
+        """What the operator asked for, by the inputs alone."""
+        if self.usable and self.armed and not self.centred:
+            self.asked.append((self.now, self.stick.command))
+        self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
+        self.overtime = 0 if self.asked else self.overtime + 1
+        self.armed = self.usable and (self.armed or self.centred)
+
+    def check_frame(self) -> None:
+        """A frame that can be sent, the velocity that it gives, and a model that knows it."""
+        axis, limits, steps = self.axis, self.limits, self.setup.steps
+        assert isinstance(axis.raw, int)
+        assert abs(axis.raw) <= steps
+        assert abs(axis.sent) <= limits.maximum
+        opened = max(0.0, abs(axis.raw) / steps - limits.deadband) / (1.0 - limits.deadband)
+        assert math.isclose(axis.sent, math.copysign(opened, axis.raw), abs_tol=1e-12)
+        assert (axis.raw == 0) == (axis.sent == 0.0)
+        if axis.sway is not None:
+            assert math.isfinite(axis.sway.angle)
+            assert (axis.sway.angle, axis.sway.rate) == (self.shadow.angle, self.shadow.rate)
+
+    def check_way(self, old: State, transition: Transition | None, before: float) -> None:
+        """The state machine goes only ways it has, and leaves a trip only as it may."""
+        stick, axis = self.stick, self.axis
+        if axis.state is old:
+            assert transition is None
+        else:
+            assert transition == Transition(old, axis.state, axis.reason)
+            assert axis.state in WAYS[old]
+            if axis.state in (*DRIVEN, State.READY):
+                assert self.usable
+            assert axis.state is not State.READY or self.centred
+            assert old is not State.READY or axis.state not in DRIVEN or not self.centred
+        if old is State.TRIPPED and axis.state is not State.TRIPPED:
+            assert self.centred
+            assert stick.trip is None
+            reset = stick.reset and not self.reset_before
+            assert reset or (stick.enabled and not self.enabled_before)
+        self.reset_before = stick.reset
+        if stick.fault is None:
+            self.enabled_before = stick.enabled
+        self.stop_from = self.stop_from if old is State.STOPPING else self.now
+        ended = self.now - self.stop_from >= self.stop
+        assert not ended or axis.state is not State.STOPPING
+        if old is State.STOPPING and axis.state is State.NEUTRAL_WAIT:
+            assert ended or before == 0.0
+        driven = axis.state in DRIVEN and not self.centred
+        assert axis.command == (stick.command if driven else 0.0)
+
+    def check_cause(self) -> None:
+        """No motion without a fresh, valid, enabled command within the bounded times."""
+        stick, axis = self.stick, self.axis
+        if axis.raw == 0:
+            return
+        assert axis.state in MAY_MOVE
+        assert stick.trip is None
+        assert stick.fault is not None or stick.enabled
+        assert stick.fault is None or axis.state is State.STOPPING
+        # after the tail, as long as it takes to fall from full speed
+        assert self.overtime <= math.ceil(self.limits.maximum / self.fall)
+
+    def check_speed(self, before: float) -> None:
+        """Not faster than asked within the tail, not against the lever, except while falling."""
+        limits, sent = self.limits, self.axis.sent
+        high = max([0.0, *(c for _, c in self.asked)])
+        low = max([0.0, *(-c for _, c in self.asked)])
+        if limits.allow_faster:
+            high, low = math.ceil(high), math.ceil(low)
+        if limits.allow_reverse:
+            high = low = max(high, low)
+        elif self.axis.state in DRIVEN and self.axis.command > 0.0:
+            low = 0.0
+        elif self.axis.state in DRIVEN and self.axis.command < 0.0:
+            high = 0.0
+        allowed, falling = (high, before) if sent > 0.0 else (low, -before)
+        falling = min(falling, falling - self.fall + self.slack)
+        assert abs(sent) <= max(allowed, falling, 0.0) + 1e-12
+
+    def check_rate(self, old: State, before: float) -> None:
+        """Rise and fall within a tick; only a trip or the end of a stop cuts off."""
+        sent, axis = self.axis.sent, self.axis
+        if axis.state not in MAY_MOVE:
+            assert sent == 0.0
+            assert before == 0.0 or axis.state is State.TRIPPED or old is State.STOPPING
+            return
+        if before * sent >= 0.0:
+            assert abs(sent) - abs(before) <= self.rise + self.slack
+            assert abs(before) - abs(sent) <= self.fall + self.slack
+        else:
+            spent = max(0.0, abs(before) - self.slack) / self.fall
+            assert spent + max(0.0, abs(sent) - self.slack) / self.rise <= 1.0 + 1e-9
+
+
+AxisUnderWatch.TestCase.settings = settings(
+    max_examples=800, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+)
+TestAxisUnderWatch = AxisUnderWatch.TestCase

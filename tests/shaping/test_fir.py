@@ -1,0 +1,81 @@
+import math
+import random
+
+import numpy as np
+import pytest
+
+from canshaper.shaping.fir import Fir, convolved, ei_taps, residual_left, zv_taps
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+MODES = [SwayMode.from_period(2.2, zeta) for zeta in (0.0, 0.05, 0.3)]
+TICKS_S = (0.001, 0.01, 0.02, 0.05)
+
+
+@pytest.mark.parametrize("tick_s", TICKS_S)
+@pytest.mark.parametrize("mode", MODES, ids=lambda m: f"zeta {m.damping_ratio}")
+def test_zv_leaves_nothing_at_any_tick(mode: SwayMode, tick_s: float) -> None:
+    taps = zv_taps(mode, tick_s)
+    assert math.fsum(taps) == pytest.approx(1.0, abs=1e-12)
+    assert min(taps) >= 0.0
+    assert residual_left(taps, mode, tick_s) < 2e-9
+    # half a swing long, to the tick
+    assert len(taps) - 1 == math.ceil(0.5 * mode.period_s / tick_s - 1e-9)
+
+
+@pytest.mark.parametrize("mode", MODES, ids=lambda m: f"zeta {m.damping_ratio}")
+def test_zv_on_the_pendulum_itself(mode: SwayMode) -> None:
+    """The judge is the pendulum, not the formula: a step through ZV leaves it at rest."""
+    tick_s = 0.02
+    fir, model = Fir(zv_taps(mode, tick_s)), SwayModel(mode, tick_s)
+    swing = [0.0]
+    for _ in range(400):
+        model.step(fir.wanted(1.0))
+        swing.append(abs(model.angle))
+    assert max(swing) > 0.05
+    assert max(swing[len(fir.taps) :]) < 1e-11
+
+
+def test_zvd_forgives_a_wrong_length_where_zv_does_not() -> None:
+    nominal = SwayMode.from_period(2.2, 0.02)
+    zv = zv_taps(nominal, 0.02)
+    zvd = convolved(zv, zv)
+    assert math.fsum(zvd) == pytest.approx(1.0)
+    off = SwayMode(nominal.omega_rad_s / math.sqrt(1.1), nominal.damping_ratio)  # 10 % longer
+    assert residual_left(zv, off, 0.02) == pytest.approx(0.078, abs=0.01)
+    assert residual_left(zvd, off, 0.02) == pytest.approx(0.006, abs=0.002)
+
+
+def test_ei_leaves_its_residual_at_the_nominal_period_and_less_beside_it() -> None:
+    nominal = SwayMode.from_period(2.2, 0.0)
+    taps = ei_taps(nominal, 0.02, 0.05)
+    assert math.fsum(taps) == pytest.approx(1.0)
+    assert residual_left(taps, nominal, 0.02) == pytest.approx(0.05, abs=1e-3)
+    around = np.linspace(0.8, 1.2, 41)
+    left = [residual_left(taps, SwayMode(nominal.omega_rad_s * x, 0.0), 0.02) for x in around]
+    # Klipper and Singhose: EI with 5 % stays below 5 % within 20 % of the frequency
+    assert max(left) < 0.052
+    assert min(left) < 0.005
+
+
+def test_two_shapers_in_series_cancel_both_modes() -> None:
+    one, two = SwayMode.from_period(2.2, 0.02), SwayMode.from_period(0.9, 0.01)
+    taps = convolved(zv_taps(one, 0.02), zv_taps(two, 0.02))
+    assert residual_left(taps, one, 0.02) < 1e-11
+    assert residual_left(taps, two, 0.02) < 1e-11
+
+
+def test_fir_is_the_convolution_of_the_newest_commands() -> None:
+    source = random.Random(1)
+    taps = [source.random() for _ in range(30)]
+    taps = [t / math.fsum(taps) for t in taps]
+    commands = [source.uniform(-1.0, 1.0) for _ in range(200)]
+    fir = Fir(taps)
+    out = [fir.wanted(c) for c in commands]
+    assert out == pytest.approx(np.convolve(commands, taps)[:200].tolist(), abs=1e-12)
+    assert max(map(abs, out)) <= max(map(abs, commands))
+
+
+@pytest.mark.parametrize("taps", [[], [0.5, 0.4], [1.0, math.nan], [0.0]])
+def test_taps_that_are_no_shaper_are_refused(taps: list[float]) -> None:
+    with pytest.raises(ValueError, match=r"sum of the taps is .*, allowed is 1"):
+        Fir(taps)

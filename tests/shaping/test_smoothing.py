@@ -1,0 +1,41 @@
+import math
+import random
+from itertools import pairwise
+
+import pytest
+
+from canshaper.shaping.smoothing import FirstOrder, SCurve
+
+
+def test_first_order_reaches_63_percent_after_its_time_constant() -> None:
+    lag = FirstOrder(0.02, 0.5)
+    out = [lag.wanted(1.0) for _ in range(25)]
+    assert out[-1] == pytest.approx(1.0 - math.exp(-1.0))
+
+
+@pytest.mark.parametrize("tick_s", [0.005, 0.02])
+@pytest.mark.parametrize("rate, jerk", [(2.0, 8.0), (5.0, 10.0), (1.0, 100.0), (1.0, 2.0)])
+def test_s_curve_keeps_rate_and_jerk_and_arrives(tick_s: float, rate: float, jerk: float) -> None:
+    curve = SCurve(tick_s, rate, jerk)
+    out = [0.0]
+    for command in (1.0, -1.0, 0.3, 0.0):
+        out += [curve.wanted(command) for _ in range(round(5.0 / tick_s))]
+        assert out[-1] == pytest.approx(command, abs=1e-9)
+    steps = [b - a for a, b in pairwise(out)]
+    assert max(map(abs, steps)) <= rate * tick_s * 1.001
+    assert min(out) >= -1.0001  # no overshoot
+    assert max(out) <= 1.0001
+    changes = [b - a for a, b in pairwise(steps)]
+    # the last step of an arrival may take up to two steps of the slope at once
+    assert max(map(abs, changes)) <= 2.0 * jerk * tick_s**2 * 1.001
+
+
+def test_s_curve_on_a_restless_stick_stays_within_the_stick() -> None:
+    source = random.Random(2)
+    curve = SCurve(0.02, 4.0, 20.0)
+    command = 0.0
+    for i in range(20_000):
+        if i % 17 == 0:
+            command = source.uniform(-1.0, 1.0)
+        # a turn of the stick in full motion costs one jerk-limited overshoot of what was asked
+        assert abs(curve.wanted(command)) <= 1.0 + 4.0**2 / (2.0 * 20.0)

@@ -1,0 +1,66 @@
+import math
+
+import numpy as np
+import pytest
+
+from canshaper.shaping.fir import residual_left
+from canshaper.shaping.sway import SwayMode
+from canshaper.tuning.robust import least_residual, modes_over_range, shortest, time_optimal_s
+
+MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
+VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}
+
+
+@pytest.mark.parametrize(
+    "duration_s, range_pct, residual_pct",
+    [(1.6, 15.0, 9.4), (1.8, 15.0, 6.9), (2.2, 30.0, 3.5)],
+)
+def test_designs_of_the_literature_values(
+    duration_s: float, range_pct: float, residual_pct: float
+) -> None:
+    found = least_residual(MODE, duration_s=duration_s, range_pct=range_pct, **VALVE)
+    assert 100.0 * found.residual == pytest.approx(residual_pct, abs=0.4)
+    assert min(found.taps) >= 0.0
+    assert math.fsum(found.taps) == pytest.approx(1.0)
+    assert max(found.taps) <= 5.0 * 0.02 * (1.0 + 1e-9)
+    judged = max(residual_left(found.taps, m, 0.02) for m in modes_over_range(MODE, range_pct, 301))
+    assert judged == pytest.approx(found.residual, rel=0.01)
+
+
+def test_no_other_taps_of_that_kind_do_better() -> None:
+    """The programme claims a limit: random feasible taps never pass it."""
+    best = least_residual(MODE, duration_s=1.6, range_pct=15.0, **VALVE)
+    source = np.random.default_rng(1)
+    count = len(best.taps)
+    modes = modes_over_range(MODE, 15.0)
+    for _ in range(300):
+        other = np.clip(np.array(best.taps) + source.normal(0.0, 0.01, count), 0.0, 0.1)
+        other = np.minimum(other / other.sum(), 0.1)
+        if abs(other.sum() - 1.0) < 1e-3:
+            left = max(residual_left(list(other), m, 0.02) for m in modes)
+            assert left >= best.residual * 0.99
+
+
+def test_shortest_is_as_short_as_can_be() -> None:
+    found = shortest(MODE, residual_pct=5.0, range_pct=30.0, **VALVE)
+    assert found.residual <= 0.05
+    shorter = least_residual(MODE, duration_s=found.duration_s - 0.04, range_pct=30.0, **VALVE)
+    assert shorter.residual > 0.05
+
+
+@pytest.mark.parametrize(
+    "rate, low, seconds", [(5.0, 0.0, 0.92), (50.0, 0.0, 0.74), (5.0, -1.0, 0.92), (2.5, 0.0, 1.12)]
+)
+def test_time_optimal_limit(rate: float, low: float, seconds: float) -> None:
+    assert time_optimal_s(MODE, tick_s=0.02, rate_per_s=rate, low=low) == pytest.approx(
+        seconds, abs=0.021
+    )
+
+
+def test_what_cannot_be_is_refused_with_what_can() -> None:
+    with pytest.raises(ValueError, match=r"duration is 0.1 s, allowed is 0.2 s or more"):
+        least_residual(MODE, duration_s=0.1, range_pct=15.0, **VALVE)
+    with pytest.raises(ValueError, match=r"range of length is 80 %, allowed is 0 to 60 %"):
+        least_residual(MODE, duration_s=1.0, range_pct=80.0, **VALVE)
+    with pytest.raises(ValueError, match=r"residual is 0 %, allowed is .* % or more"):
+        shortest(MODE, residual_pct=0.0, range_pct=60.0, **VALVE)
