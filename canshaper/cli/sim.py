@@ -14,17 +14,29 @@ def sim(
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     changes: list[str] | None = SET,
+    machine: str | None = typer.Option(
+        None,
+        "--machine",
+        help="tip: a valve for each coordinate of the tip; tip-controller: a tip controller drives"
+        " the joints; joints: a valve for each joint. By default tip, or joints where the"
+        " deployment has joint axes.",
+    ),
     show: bool = typer.Option(False, "--show", help="Print all parameters and exit."),
 ) -> None:
     """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
 
-    Reads valve frames, publishes sway, tip position and tip velocity. Ends on SIGTERM or Ctrl-C.
+    Reads valve frames, publishes sway, position and velocity of the tip, and of its joints where
+    the machine has them. Ends on SIGTERM or Ctrl-C.
 
     Examples:
 
       canshaper sim config/forwarder.yaml
 
       canshaper sim config/forwarder.yaml --set grapple.l2_m=1.5 --set near_far.lag_s=0.15
+
+      canshaper sim config/forwarder.yaml --machine tip-controller --set joints.main_boom_m=4.2
+
+      canshaper sim config/forwarder-joints.yaml
 
       canshaper sim config/forwarder.yaml --show
     """
@@ -39,7 +51,7 @@ def sim(
             for name, value in parameter_names(parameters).items():
                 typer.echo(f"{name}={value:g}")
             return
-        run_plant(loader(file, interface, channel)(), parameters)
+        run_plant(loader(file, interface, channel)(), parameters, machine)
     except (DeploymentError, BusError, ValueError) as error:
         raise fail(error) from None
 
@@ -60,19 +72,24 @@ def operator(
 
       canshaper operator config/forwarder.yaml --script random-7 --bypass
 
+      canshaper operator config/forwarder-joints.yaml --script loading-joints
+
       canshaper operator config/forwarder.yaml --list
     """
     from canshaper.can.bus import BusError
     from canshaper.config.source import DeploymentError
+    from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.operator import SCRIPTS, script_named
     from canshaper_sim.realtime import run_operator
 
     if show:
         for item in SCRIPTS.values():
-            typer.echo(f"{item.name:16} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
-        typer.echo("random-<seed>     30.0 s  any number, always the same strokes")
+            typer.echo(f"{item.name:19} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
+        typer.echo("random-<seed>        30.0 s  any number, always the same strokes")
         return
     try:
-        run_operator(loader(file, interface, channel)(), script_named(script), bypass=bypass)
+        deployment = loader(file, interface, channel)()
+        axes = [axis for axis in ALL_AXES if axis in deployment.axes]
+        run_operator(deployment, script_named(script, axes), bypass=bypass)
     except (DeploymentError, BusError, ValueError) as error:
         raise fail(error) from None

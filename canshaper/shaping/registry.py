@@ -5,6 +5,7 @@ from typing import Protocol
 
 from canshaper.shaping.fir import Fir, convolved, ei_taps, zv_taps
 from canshaper.shaping.gff import Gff, poles_from_denominator
+from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.smoothing import FirstOrder, SCurve
 from canshaper.shaping.sway import SwayMode, SwayModel
 
@@ -64,13 +65,13 @@ _OF_SWAY: dict[str, Callable[..., Shaper]] = {
     "zvd": _zvd,
     "ei": lambda sway, *, residual_pct: Fir(ei_taps(sway.mode, sway.tick_s, residual_pct / 100.0)),
     "two_mode": _two_mode,
+    "robust": lambda sway, *, taps: LimitAware(sway, Fir(taps)),
 }
 # Filters that need the tick only.
 _OF_TICK: dict[str, Callable[..., Shaper]] = {
     "off": lambda _tick_s: Off(),
     "first_order": FirstOrder,
     "s_curve": SCurve,
-    "robust": lambda _tick_s, *, taps: Fir(taps),
 }
 KINDS_OF_SWAY = frozenset(_OF_SWAY)
 KINDS = (*_OF_TICK, *_OF_SWAY)

@@ -1,21 +1,35 @@
-"""The simulated crane: three valves move the boom tip, the grapple hangs from it and swings.
+"""The simulated crane: valves move the boom tip, the grapple hangs from it and swings.
 
-The tip moves in cylindrical coordinates about the pillar (slew angle theta1, radius x, height z)
-and follows its valves exactly: boom flexibility and pump pressure are left out, as in the paper.
+Two booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
+(slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
+the tip by their kinematics. Both follow their valves exactly: boom flexibility and pump pressure
+are left out, as in the paper.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Final, NamedTuple
+from typing import Final, NamedTuple, Protocol
 
+from canshaper_sim.actuator import Actuator
+from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
+from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, advance
-from canshaper_sim.valve import Valve, ValveParameters
+from canshaper_sim.joints import JointBoom, JointParameters
+from canshaper_sim.ranges import check_ranges
+from canshaper_sim.tip_controller import TipControllerParameters
+from canshaper_sim.valve import ValveParameters
 
-SLEW: Final = "slew"  # positive: theta1 grows
-NEAR_FAR: Final = "near_far"  # positive: outwards
-LIFT: Final = "lift"  # positive: upwards
-AXES: Final = (SLEW, NEAR_FAR, LIFT)
+__all__ = [
+    "AXES",
+    "LIFT",
+    "NEAR_FAR",
+    "SLEW",
+    "Crane",
+    "CraneParameters",
+    "CraneState",
+    "joint_crane",
+]
 
 # Longest internal step. Free of stops, driven runs agree with 0.5 ms steps within 4e-7 rad (1e-8
 # without dead time), where a stop is met within 5e-4 rad; 20 ms steps would do 3e-6 and 1e-3 rad.
@@ -57,15 +71,16 @@ class CraneParameters:
     start_theta1_rad: float = 0.0
     start_radius_m: float = 3.0
     start_height_m: float = 4.0
+    # The boom of a crane driven by its joints, and the controller that drives them by the tip.
+    joints: JointParameters = field(default_factory=JointParameters)
+    tip_controller: TipControllerParameters = field(default_factory=TipControllerParameters)
 
     def __post_init__(self) -> None:
-        allowed = dict(_ALLOWED)
-        allowed["start_radius_m"] = (self.radius_min_m, self.radius_max_m)
-        allowed["start_height_m"] = (self.height_min_m, self.height_max_m)
-        for name, (low, high) in allowed.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"crane: {name} = {value}, allowed {low} .. {high}")
+        start = {
+            "start_radius_m": (self.radius_min_m, self.radius_max_m),
+            "start_height_m": (self.height_min_m, self.height_max_m),
+        }
+        check_ranges("crane", self, _ALLOWED | start)
 
 
 class CraneState(NamedTuple):
@@ -84,174 +99,63 @@ class CraneState(NamedTuple):
     theta6_rate_rad_s: float
 
 
-class _TipAxis:
-    """One coordinate of the tip: a valve times a full speed, between two end stops.
+class CraneBoom(Protocol):
+    """What carries the grapple: its actuators by axis name, and how they move the tip."""
 
-    `advance` gives position and speed at the middle and the end of a step and the acceleration at
-    start, middle and end. At a stop the oil goes over the relief valve: the valve runs on, the tip
-    stands. The middle acceleration is chosen so that Simpson's rule gives the true change of
-    speed; a stop, or a spool that arrives within the step, thus gives the grapple its exact
-    impulse instead of a spike that depends on where the stages fall.
-    """
+    axes: dict[str, Actuator]
 
-    __slots__ = (
-        "_full_speed",
-        "_high",
-        "_low",
-        "at_stop",
-        "end_acceleration",
-        "middle_acceleration",
-        "middle_position",
-        "middle_speed",
-        "position",
-        "speed",
-        "start_acceleration",
-        "valve",
-    )
+    @property
+    def pose(self) -> tuple[float, float, float, float, float, float]:
+        """theta1, radius, height and their rates; rad, m, per second."""
 
-    def __init__(
-        self, valve: ValveParameters, full_speed: float, start: float, low: float, high: float
-    ) -> None:
-        self.valve = Valve(valve)
-        self.position = start
-        self.speed = 0.0
-        self.at_stop = False
-        self.start_acceleration = 0.0
-        self.middle_position = start
-        self.middle_speed = 0.0
-        self.middle_acceleration = 0.0
-        self.end_acceleration = 0.0
-        self._full_speed = full_speed
-        self._low = low
-        self._high = high
-
-    def advance(self, step_s: float) -> None:
-        """Move on by step_s seconds."""
-        valve = self.valve
-        full_speed = self._full_speed
-        start = self.position
-        start_speed = self.speed
-        self.start_acceleration = full_speed * valve.speed_rate
-        valve.advance(0.5 * step_s)
-        middle_speed = full_speed * valve.speed
-        valve.advance(0.5 * step_s)
-        speed = full_speed * valve.speed
-        end = start + step_s / 6.0 * (start_speed + 4.0 * middle_speed + speed)
-        self.at_stop = not self._low <= end <= self._high
-        if self.at_stop:
-            end = self._low if end < self._low else self._high
-            speed = 0.0
-            middle_speed = 0.25 * (6.0 * (end - start) / step_s - start_speed)
-            # Runge-Kutta sees (a0 + 2 a_mid) h^2/6 as travel and (a0 + 4 a_mid + a1) h/6 as
-            # change of speed: with a1 = 0 both are met.
-            travel = 6.0 * ((end - start) / step_s - start_speed) / step_s
-            middle_acceleration = 0.5 * (-6.0 * start_speed / step_s - travel)
-            self.start_acceleration = travel - 2.0 * middle_acceleration
-            self.end_acceleration = 0.0
-        else:
-            self.end_acceleration = full_speed * valve.speed_rate
-            middle_acceleration = 0.25 * (
-                6.0 * (speed - start_speed) / step_s
-                - self.start_acceleration
-                - self.end_acceleration
-            )
-        # The parabola of the speed through start, middle and end, integrated to the middle.
-        self.middle_position = start + step_s / 24.0 * (
-            5.0 * start_speed + 8.0 * middle_speed - speed
-        )
-        self.middle_speed = middle_speed
-        self.middle_acceleration = middle_acceleration
-        self.position = end
-        self.speed = speed
+    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
+        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
 
 
-class Crane:
-    """Crane and grapple in motion: `step` with the values in the valve frames, read `state`."""
+class TipBoom:
+    """The tip itself, moved by a valve in each cylindrical coordinate."""
 
-    __slots__ = (
-        "_axes",
-        "_lift",
-        "_near_far",
-        "_slew",
-        "_sway",
-        "_time_s",
-        "parameters",
-        "swung_over",
-    )
+    __slots__ = ("_lift", "_near_far", "_slew", "axes")
 
-    def __init__(self, parameters: CraneParameters | None = None, sway: Sway | None = None) -> None:
-        """Stand in the start pose, valves closed; `sway` is the initial sway (default: none)."""
-        p = self.parameters = parameters or CraneParameters()
-        self._slew = _TipAxis(
+    def __init__(self, parameters: CraneParameters) -> None:
+        p = parameters
+        self._slew = Actuator(
             p.slew, p.slew_full_speed_rad_s, p.start_theta1_rad, -math.inf, math.inf
         )
-        self._near_far = _TipAxis(
+        self._near_far = Actuator(
             p.near_far,
             p.near_far_full_speed_m_s,
             p.start_radius_m,
             p.radius_min_m,
             p.radius_max_m,
         )
-        self._lift = _TipAxis(
+        self._lift = Actuator(
             p.lift, p.lift_full_speed_m_s, p.start_height_m, p.height_min_m, p.height_max_m
         )
-        self._axes = {SLEW: self._slew, NEAR_FAR: self._near_far, LIFT: self._lift}
-        self._sway = sway or Sway()
-        self._time_s = 0.0
-        # Set for good once a joint has passed 90 deg: the grapple is above the horizontal, where a
-        # real one falls into its rotator and the numbers mean nothing any more.
-        self.swung_over = False
+        self.axes = {SLEW: self._slew, NEAR_FAR: self._near_far, LIFT: self._lift}
 
     @property
-    def state(self) -> CraneState:
-        """The present state."""
+    def pose(self) -> tuple[float, float, float, float, float, float]:
+        """theta1, radius, height and their rates; rad, m, per second."""
         slew, near_far, lift = self._slew, self._near_far, self._lift
-        return CraneState(
-            self._time_s,
+        return (
             slew.position,
             near_far.position,
             lift.position,
             slew.speed,
             near_far.speed,
             lift.speed,
-            *self._sway,
         )
 
-    @property
-    def axes_at_stop(self) -> tuple[str, ...]:
-        """The axes whose tip coordinate is held by an end stop just now."""
-        return tuple(name for name, axis in self._axes.items() if axis.at_stop)
-
-    def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
-        """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
-
-        An axis that is not in `commands` keeps its last one, as a valve between two frames does.
-        Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
-        """
-        if not 0.0 < dt_s < math.inf:
-            raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
-        for name, command in commands.items():
-            axis = self._axes.get(name)
-            if axis is None:
-                raise ValueError(f"crane: axis {name!r}, allowed {', '.join(AXES)}")
-            axis.valve.set_command(command)
-        # The smallest number of equal steps; the margin forgives rounding of dt_s.
-        count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)
-        step_s = dt_s / count
-        for _ in range(count):
-            self._advance(step_s)
-        self._time_s += dt_s
-        if abs(self._sway.theta5_rad) > _HORIZONTAL or abs(self._sway.theta6_rad) > _HORIZONTAL:
-            self.swung_over = True
-
-    def _advance(self, step_s: float) -> None:
+    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
+        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
         slew, near_far, lift = self._slew, self._near_far, self._lift
         start_radius, start_radius_rate = near_far.position, near_far.speed
         start_slew_rate = slew.speed
         slew.advance(step_s)
         near_far.advance(step_s)
         lift.advance(step_s)
-        tips = (
+        return (
             TipMotion(
                 start_radius,
                 start_radius_rate,
@@ -277,4 +181,75 @@ class Crane:
                 lift.end_acceleration,
             ),
         )
-        self._sway = advance(self.parameters.grapple, self._sway, step_s, tips)
+
+
+class Crane:
+    """Crane and grapple in motion: `step` with the values in the valve frames, read `state`."""
+
+    __slots__ = ("_axes", "_sway", "_time_s", "boom", "parameters", "swung_over")
+
+    def __init__(
+        self,
+        parameters: CraneParameters | None = None,
+        sway: Sway | None = None,
+        boom: CraneBoom | None = None,
+    ) -> None:
+        """Stand in the start pose, valves closed.
+
+        Args:
+            parameters: the crane (default: the nominal one).
+            sway: the initial sway (default: none).
+            boom: what carries the grapple (default: a `TipBoom` of the parameters).
+        """
+        p = self.parameters = parameters or CraneParameters()
+        self.boom = boom or TipBoom(p)
+        self._axes = self.boom.axes
+        self._sway = sway or Sway()
+        self._time_s = 0.0
+        # Set for good once a joint has passed 90 deg: the grapple is above the horizontal, where a
+        # real one falls into its rotator and the numbers mean nothing any more.
+        self.swung_over = False
+
+    @property
+    def state(self) -> CraneState:
+        """The present state."""
+        return CraneState(self._time_s, *self.boom.pose, *self._sway)
+
+    @property
+    def axes_at_stop(self) -> tuple[str, ...]:
+        """The axes that are held by an end stop just now."""
+        return tuple(name for name, axis in self._axes.items() if axis.at_stop)
+
+    def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
+        """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
+
+        An axis that is not in `commands` keeps its last one, as a valve between two frames does.
+        Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
+        """
+        if not 0.0 < dt_s < math.inf:
+            raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
+        for name, command in commands.items():
+            axis = self._axes.get(name)
+            if axis is None:
+                raise ValueError(f"crane: axis {name!r}, allowed {', '.join(self._axes)}")
+            axis.valve.set_command(command)
+        # The smallest number of equal steps; the margin forgives rounding of dt_s.
+        count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)
+        step_s = dt_s / count
+        for _ in range(count):
+            tips = self.boom.advance(step_s)
+            self._sway = advance(self.parameters.grapple, self._sway, step_s, tips)
+        self._time_s += dt_s
+        if abs(self._sway.theta5_rad) > _HORIZONTAL or abs(self._sway.theta6_rad) > _HORIZONTAL:
+            self.swung_over = True
+
+
+def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:
+    """A crane driven joint by joint, with the tip at the same start as the other.
+
+    Raises:
+        ValueError: the joints do not reach the start pose.
+    """
+    p = parameters or CraneParameters()
+    start = (p.start_theta1_rad, p.start_radius_m, p.start_height_m)
+    return Crane(p, sway, JointBoom(p.joints, p.slew, p.slew_full_speed_rad_s, start))

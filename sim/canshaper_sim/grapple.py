@@ -17,6 +17,8 @@ import math
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from canshaper_sim.ranges import check_ranges
+
 
 class TipMotion(NamedTuple):
     """How the boom tip moves at one instant, in cylindrical coordinates about the pillar."""
@@ -80,10 +82,7 @@ class Grapple:
     g_m_s2: float = 9.81
 
     def __post_init__(self) -> None:
-        for name, (low, high) in _ALLOWED.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"grapple: {name} = {value}, allowed {low} .. {high}")
+        check_ranges("grapple", self, _ALLOWED)
 
     @property
     def mode5(self) -> SwayMode:

@@ -4,7 +4,8 @@ from canshaper.can.binding import BoundLever, Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 from canshaper.can.signals import find_signal
-from canshaper_sim.operator import Script
+from canshaper_sim.axes import JOINT_AXES, SLEW
+from canshaper_sim.strokes import Script
 
 
 class _Lever:
@@ -52,9 +53,20 @@ class LeverNode:
         deployment: names the joystick messages and their switches.
         script: what the operator does.
         bypass: the operator has switched anti-sway off.
+
+    Raises:
+        ValueError: the script was made for the other kind of crane, one driven by its tip or by
+            its joints. Axes that a crane merely lacks are left out.
     """
 
     def __init__(self, deployment: Deployment, script: Script, *, bypass: bool = False) -> None:
+        joints = {*JOINT_AXES} - {SLEW}
+        foreign = {*script.axes} - {*deployment.axes}
+        if foreign & joints or (foreign and joints & deployment.axes.keys()):
+            raise ValueError(
+                f"script {script.name} moves {', '.join(script.axes)};"
+                f" the deployment has {', '.join(deployment.axes)}"
+            )
         self.script = script
         self._levers = [_Lever(v, deployment, bypass=bypass) for v in deployment.levers.values()]
         self.cycle_ms = min(lever.cycle_ms for lever in self._levers)

@@ -9,10 +9,15 @@ from canshaper.can.binding import Deployment
 from canshaper.report.recording import Recording
 from canshaper.service.controller import Controller
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import Sway
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
+
+
+class DriveError(ValueError):
+    """The drive could not be made; the message says why."""
 
 
 def drive(
@@ -21,6 +26,8 @@ def drive(
     *,
     bypass: bool = False,
     parameters: CraneParameters | None = None,
+    machine: str | None = None,
+    sway: Sway | None = None,
     prepare: Callable[[Controller], None] | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
@@ -31,17 +38,26 @@ def drive(
         script: what the operator does.
         bypass: drive with anti-sway switched off.
         parameters: the crane; by default the nominal one.
+        machine: tip, tip-controller or joints; by default what the axes of the deployment say.
+        sway: swing of the grapple at the start; by default it hangs still.
         prepare: called with the fresh controller, to put another filter in.
         progress: called with the simulated seconds now and then.
 
     Returns:
         The recorded drive, one row a tick.
+
+    Raises:
+        DeploymentError: the deployment does not fit the machine.
+        DriveError: nor does the script, or there is no such machine or start pose.
     """
     controller = Controller(deployment)
     if prepare:
         prepare(controller)
-    plant = PlantNode(deployment, parameters)
-    levers = LeverNode(deployment, script, bypass=bypass)
+    try:
+        plant = PlantNode(deployment, parameters, machine, sway)
+        levers = LeverNode(deployment, script, bypass=bypass)
+    except ValueError as error:
+        raise DriveError(str(error)) from None
     recorder = Recorder(deployment, parameters)
     tick_ms = deployment.config.tick_ms
     step_s = tick_ms / 1000.0

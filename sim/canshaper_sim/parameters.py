@@ -7,7 +7,7 @@ from canshaper_sim.crane import CraneParameters
 
 
 def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float]:
-    """Every parameter by its name, such as ``grapple.l2``, with its value."""
+    """Every parameter by its name, such as ``grapple.l2_m``, with its value."""
     values: dict[str, float] = {}
     owner = CraneParameters() if parameters is None else parameters
     for field in dataclasses.fields(owner):
@@ -20,7 +20,7 @@ def parameter_names(parameters: Any = None, prefix: str = "") -> dict[str, float
 
 
 def changed_parameters(changes: list[str]) -> CraneParameters:
-    """The nominal crane with NAME=VALUE changes put in, such as grapple.l2=1.5.
+    """The nominal crane with NAME=VALUE changes put in, such as grapple.l2_m=1.5.
 
     Raises:
         ValueError: no such parameter, no number, or a value that makes no crane.
@@ -35,10 +35,12 @@ def changed_parameters(changes: list[str]) -> CraneParameters:
             value = float(text)
         except ValueError:
             raise ValueError(f"--set {change}: found {text!r}, allowed is a number") from None
-        group, _, field = name.rpartition(".")
-        part: Any = value
-        if group:
-            part = dataclasses.replace(getattr(parameters, group), **{field: value})
-            field = group
-        parameters = dataclasses.replace(parameters, **{field: part})
+        parameters = _replaced(parameters, name, value)
     return parameters
+
+
+def _replaced(owner: Any, name: str, value: float) -> Any:
+    """A copy of a parameter object with the parameter of that dotted name changed."""
+    group, _, rest = name.partition(".")
+    new = _replaced(getattr(owner, group), rest, value) if rest else value
+    return dataclasses.replace(owner, **{group: new})

@@ -8,13 +8,22 @@ from canshaper.can.codecs import Sender, ValveCodec
 from canshaper.can.frame import Frame
 from canshaper.can.signals import find_signal
 from canshaper.config.source import DeploymentError, Problem
-from canshaper_sim.crane import AXES, Crane, CraneParameters
+from canshaper_sim.crane import Crane, CraneParameters
+from canshaper_sim.grapple import Sway
+from canshaper_sim.joints import JointBoom
+from canshaper_sim.machines import AXES_OF, JOINTS, TIP, build_machine, machine_for
 
 # Feedback messages and their signals, in the order they are sent; they close with the sway.
 FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "TipPosition": ("SlewAngle", "Radius", "Height"),
     "TipVelocity": ("SlewRate", "RadialSpeed", "VerticalSpeed"),
     "GrappleSway": ("SwayPerpendicular", "SwayParallel"),
+}
+# Sent first by machines that have joints. The lift joint is measured from the horizontal, the
+# knuckle joint from the straight arm, negative when folded in (see `kinematics`).
+JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
+    "JointPosition": ("SlewAngle", "LiftAngle", "KnuckleAngle", "Extension"),
+    "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
 }
 # A valve that hears nothing for this long closes; makers give 100 to 300 ms.
 VALVE_TIMEOUT_S = 0.2
@@ -46,31 +55,42 @@ class _ValveInput:
 class PlantNode:
     """Valves, crane and grapple behind the valve messages of a deployment.
 
+    Args:
+        deployment: names the valve messages; its axes tell the machine where none is named.
+        parameters: the crane; by default the nominal one.
+        machine: one of `machines.MACHINES`.
+        sway: swing of the grapple at the start; by default it hangs still.
+
     Raises:
-        DeploymentError: an axis that this crane does not have, or no feedback messages in the
+        DeploymentError: an axis that this machine does not have, or no feedback messages in the
             DBC files.
+        ValueError: no such machine, or the joints do not reach the start pose.
     """
 
-    def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
-        unknown = [name for name in deployment.axes if name not in AXES]
-        problems = [
-            Problem(str(deployment.path), None, f"axes.{name}", f"the crane has {', '.join(AXES)}")
-            for name in unknown
-        ]
+    def __init__(
+        self,
+        deployment: Deployment,
+        parameters: CraneParameters | None = None,
+        machine: str | None = None,
+        sway: Sway | None = None,
+    ) -> None:
+        name = machine_for(deployment.axes, machine)
+        problems = _axis_problems(deployment, name, named=machine is not None)
         bus = next(iter(deployment.axes.values())).config.valve.bus
+        self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
-        for name, signals in FEEDBACK.items():
-            found = deployment.messages.find(name)
+        for message, signals in self._feedback.items():
+            found = deployment.messages.find(message)
             if isinstance(found, str):
                 problems.append(Problem(str(deployment.path), None, "dbc", found))
             elif missing := [s for s in signals if not find_signal(found[1], s)]:
                 problems.append(found[0].problem(found[1], f"lacks {', '.join(missing)}"))
             else:
-                self._senders[name] = Sender(bus, found[1])
+                self._senders[message] = Sender(bus, found[1])
         if problems:
             raise DeploymentError(problems)
-        self.crane = Crane(parameters)
-        inputs = [_ValveInput(name, deployment) for name in deployment.axes]
+        self._machine = build_machine(name, parameters, sway)
+        inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
         self._valves = {
             (
                 deployment.axes[v.axis].config.valve.bus,
@@ -78,6 +98,11 @@ class PlantNode:
             ): v
             for v in inputs
         }
+
+    @property
+    def crane(self) -> Crane:
+        """Crane and grapple."""
+        return self._machine.crane
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from a bus; those that are no valve commands are passed over."""
@@ -93,20 +118,43 @@ class PlantNode:
                 valve.command = 0.0
             valve.age_s += dt_s
             commands[valve.axis] = valve.command
-        self.crane.step(dt_s, commands)
+        self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
         """Pose, speeds and sway as frames."""
         state = self.crane.state
-        slew_deg = math.degrees(math.remainder(state.theta1_rad, 2.0 * math.pi))
-        values = {
-            "TipPosition": (slew_deg, state.radius_m, state.height_m),
+        values: dict[str, tuple[float, ...]] = {
+            "TipPosition": (_heading_deg(state.theta1_rad), state.radius_m, state.height_m),
             "TipVelocity": (state.theta1_rate_rad_s, state.radius_rate_m_s, state.height_rate_m_s),
             "GrappleSway": (math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)),
         }
+        boom = self.crane.boom
+        if isinstance(boom, JointBoom):
+            slew, lift, knuckle, extension = boom.joints
+            angles = (math.degrees(angle) for angle in (slew, lift, knuckle))
+            values["JointPosition"] = (*angles, extension)
+            values["JointVelocity"] = boom.joint_rates
         frames = []
-        for name, signals in FEEDBACK.items():
+        for name, signals in self._feedback.items():
             sender = self._senders[name]
             raw = {s: sender.fields.raw(s, v) for s, v in zip(signals, values[name], strict=True)}
             frames.append(sender.frame(raw))
         return frames
+
+
+def _heading_deg(theta1_rad: float) -> float:
+    return math.degrees(math.remainder(theta1_rad, 2.0 * math.pi))
+
+
+def _axis_problems(deployment: Deployment, machine: str, *, named: bool) -> list[Problem]:
+    """Axes of the deployment that the machine does not have."""
+    has = f"the crane has {', '.join(AXES_OF[machine])}"
+    if named:
+        has = f"machine {machine} has {', '.join(AXES_OF[machine])}"
+    elif machine == TIP:
+        has += f", or joint by joint {', '.join(AXES_OF[JOINTS])}"
+    return [
+        Problem(str(deployment.path), None, f"axes.{name}", has)
+        for name in deployment.axes
+        if name not in AXES_OF[machine]
+    ]

@@ -13,20 +13,19 @@ from pathlib import Path
 from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port
 from canshaper.report.recording import Recording
+from canshaper_sim.lockstep import DriveError
 from canshaper_sim.operator import Script
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.realtime import open_ports
 from canshaper_sim.recorder import Recorder
+
+__all__ = ["BusDrive", "Crew", "DriveError", "Transport", "choose_transport", "drive_on_bus"]
 
 # Processes import and open their buses; slow virtual machines take many times as long as a PC.
 START_LIMIT_S = 60.0
 STOP_LIMIT_S = 10.0
 # How often the children are looked after while nothing is on the buses.
 LISTEN_STEP_S = 0.1
-
-
-class DriveError(Exception):
-    """The drive could not be made; the message says which part failed and how."""
 
 
 @dataclass(frozen=True)

@@ -41,9 +41,11 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
     return {name: Port(name, bus, ignore) for name, bus in deployment.config.buses.items()}
 
 
-def run_plant(deployment: Deployment, parameters: CraneParameters) -> None:
+def run_plant(
+    deployment: Deployment, parameters: CraneParameters, machine: str | None = None
+) -> None:
     """Be the crane until stopped: valve frames in, feedback frames out every 20 ms."""
-    node = PlantNode(deployment, parameters)
+    node = PlantNode(deployment, parameters, machine)
     ports = open_ports(deployment)
     stop = StopFlag()
     steps_to_feedback = 0

@@ -1,4 +1,9 @@
-"""From the frames on the buses to a recording: what was asked, sent, and what the crane did."""
+"""From the frames on the buses to a recording: what was asked, sent, and what the crane did.
+
+Sway of an axis: slewing swings the grapple across the boom (perpendicular), near_far and the joints
+lift_cylinder, knuckle and extension swing it along the boom (parallel), lift by the tip excites
+none. With joint commands the three boom joints thus show the same sway, each with its own strokes.
+"""
 
 from typing import Any
 
@@ -8,10 +13,25 @@ from canshaper.can.signals import VelocitySignal, find_signal
 from canshaper.report.recording import AxisTrace, Recording
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
-from canshaper_sim.crane import LIFT, NEAR_FAR, SLEW, CraneParameters
+from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.crane import CraneParameters
 
-_SPEED_SIGNAL = {SLEW: "SlewRate", NEAR_FAR: "RadialSpeed", LIFT: "VerticalSpeed"}
-_SWAY_SIGNAL = {SLEW: "SwayPerpendicular", NEAR_FAR: "SwayParallel"}
+# Slewing is told by both; a machine moved by its tip need not send JointVelocity.
+_SPEED_SIGNALS = {
+    "TipVelocity": {SLEW: "SlewRate", NEAR_FAR: "RadialSpeed", LIFT: "VerticalSpeed"},
+    "JointVelocity": {
+        LIFT_CYLINDER: "LiftRate",
+        KNUCKLE: "KnuckleRate",
+        EXTENSION: "ExtensionSpeed",
+    },
+}
+_SWAY_SIGNAL = {
+    SLEW: "SwayPerpendicular",
+    NEAR_FAR: "SwayParallel",
+    LIFT_CYLINDER: "SwayParallel",
+    KNUCKLE: "SwayParallel",
+    EXTENSION: "SwayParallel",
+}
 
 
 class Recorder:
@@ -23,6 +43,9 @@ class Recorder:
             SLEW: crane.slew_full_speed_rad_s,
             NEAR_FAR: crane.near_far_full_speed_m_s,
             LIFT: crane.lift_full_speed_m_s,
+            LIFT_CYLINDER: crane.joints.lift_cylinder_full_speed_rad_s,
+            KNUCKLE: crane.joints.knuckle_full_speed_rad_s,
+            EXTENSION: crane.joints.extension_full_speed_m_s,
         }
         self._axes = deployment.axes
         self._handlers: dict[tuple[str, int, bool], Any] = {}
@@ -45,6 +68,7 @@ class Recorder:
             self._valves[message.name] = name
         for message_name, handler in (
             ("TipVelocity", self._speed),
+            ("JointVelocity", self._speed),
             ("GrappleSway", self._sway),
             ("ShaperStatus", self._status),
         ):
@@ -100,8 +124,9 @@ class Recorder:
 
     def _speed(self, message: Any, data: bytes, _time_s: float) -> None:
         values = message.decode(data)
-        for name, now in self._now.items():
-            now[2] = values[_SPEED_SIGNAL[name]] / self._full[name]
+        for name, signal in _SPEED_SIGNALS[message.name].items():
+            if name in self._now:
+                self._now[name][2] = values[signal] / self._full[name]
 
     def _sway(self, message: Any, data: bytes, time_s: float) -> None:
         if self._start_s is None:

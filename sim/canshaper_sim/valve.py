@@ -10,6 +10,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from canshaper_sim.ranges import check_ranges
+
 # Command changes nearer than this to the present are taken as present: rounding of summed steps.
 _SAME_TIME_S = 1e-9
 
@@ -34,10 +36,7 @@ class ValveParameters:
     lag_s: float = 0.1  # time constant; 0.05 .. 0.15 s is usual
 
     def __post_init__(self) -> None:
-        for name, (low, high) in _ALLOWED.items():
-            value = getattr(self, name)
-            if not low <= value <= high:
-                raise ValueError(f"valve: {name} = {value}, allowed {low} .. {high}")
+        check_ranges("valve", self, _ALLOWED)
 
     def flow(self, command: float) -> float:
         """Speed in the steady state for a command, both as fractions: deadband and flow limit.

@@ -72,7 +72,7 @@ def test_grapple_period_and_decay_describe_the_same_mode(period_s: float, decay:
         (lambda: SwayMode(0.49, 0.0), r"natural frequency is 0\.49 rad/s, allowed is 0\.5 to 50"),
         (lambda: SwayMode(50.1, 0.0), r"natural frequency is 50\.1"),
         (lambda: SwayMode(math.nan, 0.0), "natural frequency is nan"),
-        (lambda: SwayMode(3.0, -0.01), r"damping ratio is -0\.01 ?, allowed is 0 to 0\.95"),
+        (lambda: SwayMode(3.0, -0.01), r"damping ratio is -0\.01, allowed is 0 to 0\.95"),
         (lambda: SwayMode(3.0, 1.0), "damping ratio is 1"),
         (lambda: SwayMode(3.0, math.inf), "damping ratio is inf"),
         (lambda: SwayMode.from_grapple(0.0, 0.0, 300.0), r"pendulum length is 0 m, allowed is 0"),

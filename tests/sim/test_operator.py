@@ -102,12 +102,12 @@ def test_demo_shows_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
         return all(demo.stick(axis, t) == value for t in times)
 
     assert all(stick_is(axis, 0.0, 0.5, 0.0) for axis in AXES)
-    assert stick_is("near_far", 0.62, 3.5, 1.0)
-    assert all(stick_is(axis, 3.64, 7.48, 0.0) for axis in AXES)
-    assert stick_is("slew", 7.64, 10.48, 1.0)
-    assert all(stick_is(axis, 10.64, 14.48, 0.0) for axis in AXES)
-    assert all(stick_is(axis, 18.0, 19.5, 0.0) for axis in AXES)
-    work = {a: [demo.stick(a, 14.5 + i * TICK_S) for i in range(175)] for a in AXES}
+    assert stick_is("slew", 0.62, 3.5, 1.0)
+    assert all(stick_is(axis, 3.64, 8.0, 0.0) for axis in AXES)
+    assert stick_is("near_far", 8.14, 11.0, 1.0)
+    assert all(stick_is(axis, 11.14, 15.0, 0.0) for axis in AXES)
+    assert all(stick_is(axis, 18.5, 19.5, 0.0) for axis in AXES)
+    work = {a: [demo.stick(a, 15.0 + i * TICK_S) for i in range(175)] for a in AXES}
     assert min(work["near_far"]) < -0.5
     overlap = sum(sum(abs(work[a][i]) > 0.05 for a in AXES) >= 2 for i in range(175)) * TICK_S
     assert overlap > 1.0
@@ -190,5 +190,5 @@ def test_scripts_by_name() -> None:
     assert script_named("demo") is SCRIPTS["demo"]
     assert script_named("random-12") == random_script(12)
     for name in ("demos", "random", "random-", "random-x", "random--1"):
-        with pytest.raises(ValueError, match=r"pulse-near_far, .*loading, random-<seed>"):
+        with pytest.raises(ValueError, match=r"pulse-near_far, .*loading.*, random-<seed>"):
             script_named(name)

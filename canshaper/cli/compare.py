@@ -1,0 +1,123 @@
+"""``canshaper compare``: every filter on the same work."""
+
+import json
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from canshaper.cli.common import fail, loader
+
+if TYPE_CHECKING:
+    from canshaper_sim.comparison.summary import Row
+
+
+def compare(
+    file: str = typer.Argument("forwarder.yaml", help="Deployment file; by default a shipped one."),
+    axis: str = typer.Option("near_far", "--axis", help="Axis that is driven."),
+    out: Path = typer.Option(Path("out/compare"), "--out", help="Directory for picture and data."),
+    as_json: bool = typer.Option(False, "--json", help="Print the rows as JSON, no table."),
+    processes: int | None = typer.Option(
+        None, "--processes", min=1, help="Processes; by default one a processor."
+    ),
+) -> None:
+    """Drive every filter through the same manoeuvres and say which to take.
+
+    Pulse, partial stroke, early release, reversal, double tap and loading cycle at -30 to +30 %
+    pendulum length, random sticks of twelve seeds and a start with swing, on the simulated crane
+    with the valves' lag, deadband, rate limit and resolution, under the output limits of the
+    file. Writes compare-AXIS.png and compare-AXIS.json. Takes about a minute.
+
+    Examples:
+
+      canshaper compare
+
+      canshaper compare config/forwarder.yaml --axis slew
+
+      canshaper compare --json --processes 1
+    """
+    from canshaper.config.source import DeploymentError
+    from canshaper_sim.comparison.candidates import candidates, nominal_mode
+    from canshaper_sim.comparison.limits import limits_for
+    from canshaper_sim.comparison.manoeuvres import manoeuvres
+    from canshaper_sim.comparison.measure import measure_all
+    from canshaper_sim.comparison.summary import recommendations, rows
+
+    console = Console(stderr=as_json)
+    try:
+        load = loader(file)
+        deployment = load()
+        found = candidates(deployment, axis)
+        tasks = manoeuvres(axis)
+    except (DeploymentError, ValueError) as error:
+        raise fail(error) from None
+    try:
+        with Progress(
+            TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console
+        ) as progress:
+            task = progress.add_task(f"{len(found)} filters, {len(tasks)} manoeuvres")
+
+            def tell(done: int, total: int) -> None:
+                progress.update(task, completed=done, total=total)
+
+            outcomes = measure_all(
+                deployment.path, axis, found, tasks, progress=tell, processes=processes
+            )
+    except KeyboardInterrupt:
+        typer.echo("interrupted", err=True)
+        raise typer.Exit(130) from None
+    table = rows(found, outcomes)
+    mode = nominal_mode(deployment, axis)
+    advice = recommendations(table, mode.period_s)
+    data = {
+        "axis": axis,
+        "rows": [asdict(row) for row in table],
+        "recommendations": {k: {"filter": r.name, "why": why} for k, (r, why) in advice.items()},
+        "outcomes": [asdict(o) for o in outcomes],
+    }
+    out.mkdir(parents=True, exist_ok=True)
+    text = json.dumps(data, indent=2)
+    (out / f"compare-{axis}.json").write_text(text + "\n", encoding="utf-8")
+    if as_json:
+        typer.echo(json.dumps({k: v for k, v in data.items() if k != "outcomes"}, indent=2))
+    else:
+        console.print(_table(table, slew=axis == "slew"))
+        for _, why in advice.values():
+            console.print(f"- {why}.", highlight=False)
+    off = next(row for row in table if row.name == "off")
+    best = advice["calm"][0]
+    try:
+        from canshaper.report.pareto import Point, draw
+    except ImportError:
+        console.print("No picture: matplotlib is missing; pip install 'canshaper[tools]'")
+        return
+    points = [Point(r.name, r.ours, r.stop_s, r.worst_30_deg) for r in table]
+    title = (
+        f"{axis.replace('_', '-').capitalize()}: {best.name} leaves {best.worst_30_deg:.1f}°"
+        f" of {off.worst_30_deg:.1f}° in the worst case"
+    )
+    picture = out / f"compare-{axis}.png"
+    draw(points, limits_for(deployment, axis, off.worst_30_deg), title, picture)
+    console.print(f"Picture: {picture}", highlight=False)
+
+
+def _table(table: "list[Row]", *, slew: bool) -> Table:
+    drawn = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    drawn.add_column("filter", no_wrap=True)
+    heads = ["stop\ns", "rise\ns", "resid.\ndeg", "±15 %\ndeg", "±30 %\ndeg", "random\ndeg"]
+    heads += ["other\ndeg"] if slew else []
+    heads += ["peak\ndeg", "dip\n%", "re-rise\n%"]
+    for head in heads:
+        drawn.add_column(head, justify="right", no_wrap=True)
+    for row in table:
+        cells = [f"{row.stop_s:.2f}", f"{row.rise_s:.2f}", f"{row.residual_deg:.2f}"]
+        cells += [f"{row.worst_15_deg:.2f}", f"{row.worst_30_deg:.2f}", f"{row.random_deg:.2f}"]
+        cells += [f"{row.cross_deg:.2f}"] if slew else []
+        cells += [f"{row.peak_deg:.1f}", f"{100 * row.dip:.0f}", f"{100 * row.re_rise:.0f}"]
+        drawn.add_row(row.name, *cells, style="bold" if row.ours else None)
+    return drawn

@@ -1,0 +1,56 @@
+"""A linear shaper made aware of the limits that cut its output.
+
+While nothing cuts it, a shaper leaves the swing that it was designed to leave. What a limit changes
+is a second input, (sent - asked), and the swing it makes is the difference between the axis' sway
+model, driven by what was sent, and a twin driven by what the shaper asked for. That difference is
+damped by the same state feedback as in G_FF, with command zero:
+
+    v* = y - K1 (angle - angle_twin) - K2 (rate - rate_twin)
+
+With no limit acting the difference is zero, and the shaper is itself.
+"""
+
+from typing import Protocol
+
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.sway import SwayModel
+
+# Both poles of the feedback, in natural frequencies: quicker than the swing, and slow enough for a
+# valve that takes a fifth of a second to full speed.
+POLE_PER_OMEGA = -1.4
+
+
+class _Shaper(Protocol):
+    def wanted(self, command: float) -> float: ...
+
+
+class LimitAware:
+    """A shaper with feedback of the swing that limits made.
+
+    Args:
+        sway: sway model of the axis; its owner steps it with what was sent.
+        shaper: the shaper, such as a ``Fir``.
+    """
+
+    __slots__ = ("_asked", "_gff", "_shaper", "_sway", "_twin")
+
+    def __init__(self, sway: SwayModel, shaper: _Shaper) -> None:
+        pole = POLE_PER_OMEGA * sway.mode.omega_rad_s
+        self._gff = Gff(sway, (pole, pole))
+        self._sway = sway
+        self._twin = SwayModel(sway.mode, sway.tick_s)
+        self._shaper = shaper
+        self._asked = 0.0
+
+    def wanted(self, command: float) -> float:
+        """Output for this tick's command, before limits."""
+        sway, twin = self._sway, self._twin
+        twin.step(self._asked)
+        if sway.angle == 0.0 == sway.rate:  # never moved, or started anew after a fault
+            twin.angle = twin.rate = 0.0
+        self._asked = asked = self._shaper.wanted(command)
+        return (
+            asked
+            - self._gff.k1 * (sway.angle - twin.angle)
+            - self._gff.k2 * (sway.rate - twin.rate)
+        )

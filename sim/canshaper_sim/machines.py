@@ -1,0 +1,128 @@
+"""The machines a plant can be: which axes their valves have, and how these move the crane.
+
+- ``tip``: one valve a tip coordinate; the tip follows its commands exactly.
+- ``tip-controller``: tip commands go to the machine's tip controller, which drives the joints.
+- ``joints``: one valve a joint; the operator drives the joints.
+"""
+
+import math
+from collections.abc import Mapping
+from typing import Final, Protocol
+
+from canshaper_sim.axes import JOINT_AXES, SLEW, TIP_AXES
+from canshaper_sim.crane import Crane, CraneParameters, joint_crane
+from canshaper_sim.grapple import Sway
+from canshaper_sim.joints import JointBoom
+from canshaper_sim.tip_controller import TipController
+
+TIP: Final = "tip"
+TIP_CONTROLLER: Final = "tip-controller"
+JOINTS: Final = "joints"
+AXES_OF: Final[Mapping[str, tuple[str, ...]]] = {
+    TIP: TIP_AXES,
+    TIP_CONTROLLER: TIP_AXES,
+    JOINTS: JOINT_AXES,
+}
+MACHINES: Final = tuple(AXES_OF)
+
+# Instants nearer than this are the same: rounding of summed steps.
+_SAME_TIME_S = 1e-9
+
+
+class Machine(Protocol):
+    """A crane behind its valve frames."""
+
+    @property
+    def crane(self) -> Crane:
+        """Crane and grapple."""
+
+    def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
+        """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds."""
+
+
+class ValveDrivenCrane:
+    """A crane whose valves take the commands themselves."""
+
+    def __init__(self, crane: Crane) -> None:
+        self.crane = crane
+
+    def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
+        """Hold the commands for dt_s seconds (see `Crane.step`)."""
+        self.crane.step(dt_s, commands)
+
+
+class TipControlledCrane:
+    """A crane driven joint by joint, with a tip controller before its valves."""
+
+    def __init__(self, parameters: CraneParameters | None = None, sway: Sway | None = None) -> None:
+        self.crane = joint_crane(parameters, sway)
+        boom = self.crane.boom
+        assert isinstance(boom, JointBoom)
+        self._boom = boom
+        p = self.crane.parameters
+        self._controller = TipController(
+            p.tip_controller,
+            p.joints,
+            (p.slew_full_speed_rad_s, p.near_far_full_speed_m_s, p.lift_full_speed_m_s),
+        )
+        self._commands = dict.fromkeys(TIP_AXES, 0.0)
+        self._joint_commands: dict[str, float] = {}
+        self._to_tick_s = 0.0
+
+    def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
+        """Hold the tip commands for dt_s seconds; the controller ticks when it is time.
+
+        An axis that is not in `commands` keeps its last one.
+        Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
+        """
+        if not 0.0 < dt_s < math.inf:
+            raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
+        for name, command in commands.items():
+            if name not in self._commands:
+                raise ValueError(f"crane: axis {name!r}, allowed {', '.join(TIP_AXES)}")
+            if not math.isfinite(command):
+                raise ValueError(f"tip controller: command = {command}, allowed finite values")
+            self._commands[name] = command
+        rest_s = dt_s
+        while rest_s > _SAME_TIME_S:
+            if self._to_tick_s <= _SAME_TIME_S:
+                self._joint_commands = self._controller.tick(self._commands, self._boom.joints)
+                self._to_tick_s += self._controller.period_s
+            part_s = min(rest_s, self._to_tick_s)
+            self.crane.step(part_s, self._joint_commands)
+            rest_s -= part_s
+            self._to_tick_s -= part_s
+
+
+def build_machine(
+    name: str, parameters: CraneParameters | None = None, sway: Sway | None = None
+) -> Machine:
+    """The machine of that name, standing in its start pose, the grapple with this initial sway.
+
+    Raises:
+        ValueError: no such machine, or the joints do not reach the start pose.
+    """
+    if name == TIP:
+        return ValveDrivenCrane(Crane(parameters, sway))
+    if name == TIP_CONTROLLER:
+        return TipControlledCrane(parameters, sway)
+    if name == JOINTS:
+        return ValveDrivenCrane(joint_crane(parameters, sway))
+    raise ValueError(f"machine {name!r}, allowed {', '.join(MACHINES)}")
+
+
+def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
+    """The machine for a deployment with these axes; `wish` may name one.
+
+    Without a wish a deployment with a joint of the boom is driven joint by joint, every other one
+    moves the tip.
+
+    Raises:
+        ValueError: no such machine.
+    """
+    if wish is None:
+        joints = {*JOINT_AXES} - {SLEW}
+        return JOINTS if joints & axes.keys() else TIP
+    if wish not in AXES_OF:
+        raise ValueError(f"machine {wish!r}, allowed {', '.join(MACHINES)}")
+    return wish

@@ -1,0 +1,114 @@
+"""Built-in operator scripts: pulses, a demonstration, loading; for tip and for joint commands."""
+
+from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.strokes import Script, Stroke
+
+_PULSE_RAMP_S = 0.10
+
+
+def _pulse(axis: str, level: float = 1.0) -> Script:
+    # 3 s of full stick and 5 s of rest: the test input of the paper's section 4.
+    return Script(f"pulse-{axis}", (Stroke(axis, 0.5, 3.0, level, _PULSE_RAMP_S),), 8.5)
+
+
+_DEMO = Script(
+    "demo",
+    (
+        # Slewing comes first, close to the pillar: swing grows with the radius.
+        Stroke(SLEW, 0.5, 3.0, 1.0),
+        Stroke(NEAR_FAR, 8.0, 3.0, 1.0),
+        # A piece of a loading cycle: back over the bunk, in and down, with corrections.
+        Stroke(SLEW, 15.0, 1.5, -0.4),
+        Stroke(NEAR_FAR, 15.3, 1.5, -0.6),
+        Stroke(LIFT, 15.5, 0.5, 0.6),
+        Stroke(LIFT, 16.0, 0.9, -0.8),
+        Stroke(SLEW, 16.8, 0.5, -0.3),
+        Stroke(SLEW, 17.3, 0.4, 0.3),
+        Stroke(NEAR_FAR, 17.0, 0.5, 0.3),
+        Stroke(LIFT, 17.4, 0.7, -0.4),
+        Stroke(NEAR_FAR, 17.8, 0.5, -0.4),
+    ),
+    19.5,
+)
+
+_LOADING = Script(
+    "loading",
+    (
+        # Out to the pile, the boom a little down on the way, a correction at the log.
+        Stroke(SLEW, 0.5, 3.0, 0.6),
+        Stroke(NEAR_FAR, 1.0, 2.9, 0.7),
+        Stroke(LIFT, 2.5, 1.8, -0.7),
+        Stroke(NEAR_FAR, 4.4, 0.6, -0.4),
+        Stroke(NEAR_FAR, 5.2, 0.4, 0.3),
+        Stroke(LIFT, 5.0, 0.9, -0.5),
+        # Gripping: sticks neutral. Then up, in, and back over the bunk.
+        Stroke(LIFT, 8.0, 2.4, 0.9),
+        Stroke(NEAR_FAR, 9.0, 2.2, -0.6),
+        Stroke(SLEW, 10.0, 2.8, -0.6),
+        Stroke(SLEW, 13.0, 0.4, -0.35),
+        Stroke(SLEW, 13.4, 0.4, 0.25),
+        # Lower the log into the bunk, a correction, release, up again.
+        Stroke(LIFT, 14.0, 1.6, -0.6),
+        Stroke(NEAR_FAR, 14.6, 0.5, 0.4),
+        Stroke(LIFT, 17.5, 1.5, 0.8),
+        # The second log lies farther out; a reversal in the middle of the slew.
+        Stroke(SLEW, 18.5, 2.4, 0.6),
+        Stroke(SLEW, 20.9, 0.6, -0.3),
+        Stroke(NEAR_FAR, 18.8, 3.2, 0.7),
+        Stroke(LIFT, 21.0, 1.6, -0.8),
+        Stroke(NEAR_FAR, 22.6, 0.5, -0.3),
+        Stroke(LIFT, 23.4, 0.7, -0.4),
+        Stroke(LIFT, 26.0, 2.0, 1.0),
+        Stroke(NEAR_FAR, 26.8, 3.0, -0.6),
+        Stroke(SLEW, 27.6, 2.8, -0.5),
+        Stroke(SLEW, 31.0, 0.5, -0.3),
+        Stroke(LIFT, 31.4, 1.4, -0.7),
+        Stroke(NEAR_FAR, 32.0, 0.6, -0.35),
+        Stroke(LIFT, 34.5, 1.2, 0.8),
+        Stroke(NEAR_FAR, 35.5, 0.8, 0.5),
+        Stroke(SLEW, 36.5, 0.8, 0.6),
+    ),
+    40.0,
+)
+
+# The same work with a lever for each joint: three of them make what near_far and lift do above.
+_LOADING_JOINTS = Script(
+    "loading-joints",
+    (
+        # Out to the pile: outer boom out, main boom down, telescope; a correction at the log.
+        Stroke(SLEW, 0.5, 3.0, 0.6),
+        Stroke(KNUCKLE, 1.0, 2.0, 0.6),
+        Stroke(LIFT_CYLINDER, 1.4, 2.5, -0.6),
+        Stroke(EXTENSION, 2.2, 1.5, 0.7),
+        Stroke(KNUCKLE, 4.2, 0.5, -0.3),
+        Stroke(KNUCKLE, 4.9, 0.5, 0.3),
+        Stroke(LIFT_CYLINDER, 4.8, 1.2, -0.5),
+        # Gripping: sticks neutral. Then up, in, and back over the bunk.
+        Stroke(LIFT_CYLINDER, 8.5, 2.0, 0.9),
+        Stroke(EXTENSION, 9.2, 1.4, -0.7),
+        Stroke(KNUCKLE, 9.6, 2.4, -0.6),
+        Stroke(SLEW, 10.4, 2.8, -0.6),
+        Stroke(SLEW, 13.4, 0.4, -0.35),
+        Stroke(SLEW, 13.8, 0.4, 0.25),
+        # Lower the log into the bunk, a correction, release, up again.
+        Stroke(LIFT_CYLINDER, 14.4, 1.4, -0.4),
+        Stroke(KNUCKLE, 15.0, 0.5, 0.3),
+        Stroke(LIFT_CYLINDER, 18.0, 1.2, 0.6),
+    ),
+    23.0,
+)
+
+# From the start pose of the default boom each joint stays clear of its stops.
+_JOINT_PULSES = ((LIFT_CYLINDER, -0.6), (KNUCKLE, 0.8), (EXTENSION, 0.9))
+
+SCRIPTS: dict[str, Script] = {
+    script.name: script
+    for script in (
+        _pulse(NEAR_FAR),
+        _pulse(SLEW),
+        _DEMO,
+        _LOADING,
+        *(_pulse(axis, level) for axis, level in _JOINT_PULSES),
+        _LOADING_JOINTS,
+    )
+}

@@ -1,0 +1,105 @@
+"""Joystick strokes over time, repeatable to the last bit.
+
+A stroke is a trapezoid: the stick leaves neutral at its start, reaches its level one ramp later,
+is let go at start + duration and is neutral one ramp after that. Strokes of one axis add up, so
+two that follow each other without a pause make one straight movement from level to level, a
+reversal included. The area under a stroke is level times duration, whatever the ramp.
+"""
+
+import math
+from dataclasses import dataclass, field
+
+from canshaper_sim.axes import ALL_AXES
+
+_HUMAN_RAMP_S = 0.12  # a trained hand moves a stick from neutral to full in 0.1 .. 0.15 s
+
+# name -> (lowest, highest) value of a stroke.
+_ALLOWED = {
+    "start_s": (0.0, math.inf),
+    "duration_s": (0.0, math.inf),
+    "level": (-1.0, 1.0),
+    "ramp_s": (0.0, 5.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Stroke:
+    """One movement of one stick axis from neutral to `level` (-1 .. 1) and back."""
+
+    axis: str
+    start_s: float
+    duration_s: float  # from leaving neutral to letting go; not shorter than the ramp
+    level: float
+    ramp_s: float = _HUMAN_RAMP_S
+
+    def __post_init__(self) -> None:
+        if self.axis not in ALL_AXES:
+            raise ValueError(f"stroke: axis {self.axis!r}, allowed {', '.join(ALL_AXES)}")
+        for name, (low, high) in _ALLOWED.items():
+            value = getattr(self, name)
+            if not (low <= value <= high and math.isfinite(value)):
+                raise ValueError(f"stroke: {name} = {value}, allowed {low} .. {high}")
+        if self.duration_s < self.ramp_s:
+            raise ValueError(
+                f"stroke: duration_s = {self.duration_s}, allowed from ramp_s = {self.ramp_s} on"
+            )
+
+    @property
+    def end_s(self) -> float:
+        """When the stick is neutral again."""
+        return self.start_s + self.duration_s + self.ramp_s
+
+    def stick(self, time_s: float) -> float:
+        """Stick value of this stroke alone."""
+        since_press = time_s - self.start_s
+        if since_press < 0.0:
+            return 0.0
+        since_release = since_press - self.duration_s
+        if since_release >= self.ramp_s:
+            return 0.0
+        if since_release > 0.0:
+            return self.level * (1.0 - since_release / self.ramp_s)
+        if since_press < self.ramp_s:
+            return self.level * since_press / self.ramp_s
+        return self.level
+
+
+@dataclass(frozen=True, slots=True)
+class Script:
+    """What the operator does in duration_s seconds; neutral before, between and after."""
+
+    name: str
+    strokes: tuple[Stroke, ...]
+    duration_s: float
+    _by_axis: dict[str, tuple[Stroke, ...]] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        for stroke in self.strokes:
+            # The margin forgives rounding of start + duration + ramp.
+            if stroke.end_s > self.duration_s + 1e-9:
+                raise ValueError(
+                    f"script {self.name}: a {stroke.axis} stroke ends at {stroke.end_s} s, "
+                    f"allowed up to duration_s = {self.duration_s}"
+                )
+        by_axis = {
+            axis: tuple(
+                sorted((s for s in self.strokes if s.axis == axis), key=lambda s: s.start_s)
+            )
+            for axis in self.axes
+        }
+        object.__setattr__(self, "_by_axis", by_axis)
+
+    @property
+    def axes(self) -> tuple[str, ...]:
+        """The axes this script moves, in the order of ALL_AXES."""
+        moved = {stroke.axis for stroke in self.strokes}
+        return tuple(axis for axis in ALL_AXES if axis in moved)
+
+    def stick(self, axis: str, time_s: float) -> float:
+        """Stick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
+        value = 0.0
+        for stroke in self._by_axis.get(axis, ()):
+            if time_s < stroke.start_s:
+                break
+            value += stroke.stick(time_s)
+        return max(-1.0, min(1.0, value))

@@ -1,0 +1,174 @@
+"""Which machine a deployment gets, its feedback, and its parameters by name."""
+
+import math
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.frame import Frame
+from canshaper.cli.app import app
+from canshaper.config.source import DeploymentError
+from canshaper_sim.axes import JOINT_AXES, TIP_AXES
+from canshaper_sim.joints import JointBoom
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.lockstep import DriveError, drive
+from canshaper_sim.machines import MACHINES, TipControlledCrane, build_machine, machine_for
+from canshaper_sim.operator import SCRIPTS
+from canshaper_sim.parameters import changed_parameters, parameter_names
+from canshaper_sim.plant import FEEDBACK, JOINT_FEEDBACK, PlantNode
+
+ROOT = Path(__file__).resolve().parents[2]
+TIP_FILE = ROOT / "config" / "forwarder.yaml"
+JOINT_FILE = ROOT / "config" / "forwarder-joints.yaml"
+
+
+def renamed(tmp_path: Path, file: Path, *changes: tuple[str, str]) -> Deployment:
+    text = file.read_text().replace("../dbc", str(ROOT / "dbc"))
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new)
+    changed = tmp_path / file.name
+    changed.write_text(text)
+    return load_deployment(changed)
+
+
+def decoded(deployment: Deployment, frames: list[Frame]) -> dict[str, dict[str, Any]]:
+    found: dict[str, Any] = {}
+    for frame in frames:
+        for name in (*FEEDBACK, *JOINT_FEEDBACK):
+            entry = deployment.messages.find(name)
+            assert not isinstance(entry, str)
+            if entry[1].frame_id == frame.can_id:
+                found[name] = entry[1].decode(frame.data)
+    return found
+
+
+def test_axes_choose_the_machine() -> None:
+    assert machine_for(dict.fromkeys(TIP_AXES)) == "tip"
+    assert machine_for({"slew": None}) == "tip"
+    assert machine_for(dict.fromkeys(JOINT_AXES)) == "joints"
+    assert machine_for({"knuckle": None}) == "joints"
+    assert machine_for(dict.fromkeys(TIP_AXES), "tip-controller") == "tip-controller"
+    with pytest.raises(ValueError, match="machine 'crab', allowed tip, tip-controller, joints"):
+        machine_for({}, "crab")
+    with pytest.raises(ValueError, match="machine 'crab', allowed tip, tip-controller, joints"):
+        build_machine("crab")
+    assert [type(build_machine(name).crane.boom).__name__ for name in MACHINES] == [
+        "TipBoom",
+        "JointBoom",
+        "JointBoom",
+    ]
+
+
+def test_axes_that_the_machine_lacks_are_told(tmp_path: Path) -> None:
+    deployment = renamed(tmp_path, TIP_FILE, ("\n  near_far:", "\n  boom:"))
+    expected = (
+        r"axes.boom: the crane has slew, near_far, lift, or joint by joint"
+        r" slew, lift_cylinder, knuckle, extension"
+    )
+    with pytest.raises(DeploymentError, match=expected):
+        PlantNode(deployment)
+    mixed = renamed(tmp_path, TIP_FILE, ("\n  near_far:", "\n  knuckle:"))
+    with pytest.raises(DeploymentError, match=r"axes.lift: the crane has slew, lift_cylinder"):
+        PlantNode(mixed)
+    with pytest.raises(DeploymentError, match=r"axes.knuckle: machine tip-controller has slew"):
+        PlantNode(load_deployment(JOINT_FILE), machine="tip-controller")
+
+
+def test_joints_need_their_feedback_messages(tmp_path: Path) -> None:
+    dbc = tmp_path / "old.dbc"
+    text = (ROOT / "dbc" / "forwarder.dbc").read_text()
+    dbc.write_text(text.replace("1027 JointPosition", "1027 Other"))
+    deployment = renamed(tmp_path, TIP_FILE, (str(ROOT / "dbc" / "forwarder.dbc"), str(dbc)))
+    PlantNode(deployment)
+    with pytest.raises(DeploymentError, match="'JointPosition', messages of the DBC files are"):
+        PlantNode(deployment, machine="tip-controller")
+
+
+@pytest.mark.parametrize(("file", "machine"), [(TIP_FILE, "tip-controller"), (JOINT_FILE, None)])
+def test_joint_feedback(file: Path, machine: str | None) -> None:
+    deployment = load_deployment(file)
+    plant = PlantNode(deployment, machine=machine)
+    plant.advance(0.02)
+    found = decoded(deployment, plant.feedback())
+    assert [*found] == [*JOINT_FEEDBACK, *FEEDBACK]  # closes with the sway
+    boom = plant.crane.boom
+    assert isinstance(boom, JointBoom)
+    slew, lift, knuckle, extension = boom.joints
+    position = found["JointPosition"]
+    assert position["SlewAngle"] == pytest.approx(math.degrees(slew), abs=0.01)
+    assert position["LiftAngle"] == pytest.approx(math.degrees(lift), abs=0.01)
+    assert position["KnuckleAngle"] == pytest.approx(math.degrees(knuckle), abs=0.01)
+    assert position["Extension"] == pytest.approx(extension, abs=0.001)
+    assert found["TipPosition"]["Radius"] == pytest.approx(3.0, abs=0.001)
+    assert found["TipPosition"]["Height"] == pytest.approx(4.0, abs=0.001)
+
+
+def test_the_tip_machine_sends_what_it_did() -> None:
+    deployment = load_deployment(TIP_FILE)
+    assert [*decoded(deployment, PlantNode(deployment).feedback())] == [*FEEDBACK]
+
+
+def test_parameters_by_name() -> None:
+    names = parameter_names()
+    assert names["joints.main_boom_m"] == 3.7
+    assert names["joints.knuckle.lag_s"] == 0.1
+    assert names["tip_controller.lead_s"] == 0.12
+    changed = changed_parameters(
+        ["joints.main_boom_m=4.2", "joints.knuckle.lag_s=0.15", "slew.deadband=0.1"]
+    )
+    assert changed.joints.main_boom_m == 4.2
+    assert changed.joints.knuckle.lag_s == 0.15
+    assert changed.joints.lift_cylinder.lag_s == 0.1
+    assert changed.slew.deadband == 0.1
+    machine = TipControlledCrane(changed)
+    boom = machine.crane.boom
+    assert isinstance(boom, JointBoom)
+    assert changed.joints.boom.tip(*boom.joints[1:]) == pytest.approx((3.0, 4.0), abs=1e-12)
+    for change in ("joints.boom_m=1", "joints=1", "joints.knuckle=1", "joints.knuckle.lag_s.x=1"):
+        with pytest.raises(ValueError, match=f"no parameter '{change[:-2]}'"):
+            changed_parameters([change])
+    with pytest.raises(ValueError, match=r"joints: main_boom_m = 99.0, allowed"):
+        changed_parameters(["joints.main_boom_m=99"])
+
+
+def test_a_script_for_the_other_kind_of_crane_is_refused() -> None:
+    tip, joints = load_deployment(TIP_FILE), load_deployment(JOINT_FILE)
+    LeverNode(tip, SCRIPTS["pulse-slew"])
+    LeverNode(joints, SCRIPTS["pulse-slew"])
+    with pytest.raises(ValueError, match="script demo moves slew, near_far, lift; the deployment"):
+        LeverNode(joints, SCRIPTS["demo"])
+    with pytest.raises(DriveError, match="script pulse-knuckle moves knuckle; the deployment has"):
+        drive(tip, SCRIPTS["pulse-knuckle"])
+    with pytest.raises(DriveError, match="machine 'crab'"):
+        drive(tip, SCRIPTS["pulse-slew"], machine="crab")
+
+
+def test_an_axis_that_the_deployment_merely_lacks_is_left_out(tmp_path: Path) -> None:
+    text = TIP_FILE.read_text()
+    lift = text[text.index("\n  lift:") : text.index("\nstatus:")]
+    LeverNode(renamed(tmp_path, TIP_FILE, (lift, "\n")), SCRIPTS["demo"])
+
+
+@pytest.mark.parametrize("file", [TIP_FILE, JOINT_FILE])
+def test_shipped_deployments_are_good(file: Path) -> None:
+    done = CliRunner().invoke(app, ["check", str(file)])
+    assert done.exit_code == 0
+    assert "good" in done.output
+
+
+@pytest.mark.parametrize(
+    ("arguments", "text"),
+    [
+        (["sim", str(JOINT_FILE), "--machine", "tip"], "axes.knuckle: machine tip has slew"),
+        (["sim", str(TIP_FILE), "--machine", "crab"], "machine 'crab', allowed tip, tip-contr"),
+        (["operator", str(JOINT_FILE), "--script", "loading"], "script loading moves slew, near"),
+    ],
+)
+def test_commands_tell_what_does_not_fit(arguments: list[str], text: str) -> None:
+    done = CliRunner().invoke(app, arguments)
+    assert done.exit_code == 2
+    assert text in done.output
