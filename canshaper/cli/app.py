@@ -3,7 +3,7 @@
 import typer
 
 from canshaper import __version__
-from canshaper.cli import check, config_schema, demo, run, sim
+from canshaper.cli import check, compare, config_schema, demo, run, sim, tune
 
 app = typer.Typer(
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
@@ -35,6 +35,8 @@ app.command("check")(check.check)
 app.command("demo")(demo.demo)
 app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)
+app.command("compare")(compare.compare)
+app.command("tune")(tune.tune)
 app.command("config-schema")(config_schema.config_schema)
 
 

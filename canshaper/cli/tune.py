@@ -1,0 +1,300 @@
+"""``canshaper tune``: the optimal filter of an axis, told, drawn and written on request."""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from canshaper.cli.common import FILE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import BoundAxis, Deployment
+    from canshaper.tuning.deploy import Setting
+    from canshaper.tuning.evaluate import Machine
+    from canshaper.tuning.formulation import Task
+    from canshaper.tuning.optimal import Tuning
+
+
+def tune(
+    file: str = FILE,
+    axis: str = typer.Option(..., "--axis", help="Axis to tune."),
+    method: str = typer.Option("optimal", "--method", help="optimal, or the paper's manual rule."),
+    q: float = typer.Option(1.0, "--q", help="Weight Q of swing angle and rate."),
+    r: float = typer.Option(1.0, "--r", help="Weight R of the rise to 95 %."),
+    s: float = typer.Option(3.0, "--s", help="Weight S of the distance from the stick."),
+    p: float = typer.Option(1.0, "--p", help="Weight P of changes of the output."),
+    states: str = typer.Option(
+        "sway", "--states", help="What Q weighs: sway, deviation, companion, none."
+    ),
+    horizon_s: float = typer.Option(3.0, "--horizon", help="Seconds that a step is watched."),
+    pole_distance: str = typer.Option(
+        "text", "--pole-distance", help="Eq. 14e: text (at least 5 times), printed (at most), off."
+    ),
+    within_command: bool | None = typer.Option(
+        None,
+        "--within-command/--beyond-command",
+        help="Output never above the command. Default: as allow_faster of the axis says.",
+    ),
+    max_jump: float | None = typer.Option(
+        None, "--max-jump", help="Largest part of a step that comes out at once."
+    ),
+    max_rate: float | None = typer.Option(
+        None,
+        "--max-rate",
+        help="Rate of the valve, full speeds/s, inf for none. Default: rise and fall of the axis.",
+    ),
+    third_pole: bool = typer.Option(
+        False, "--third-pole", help="A third pole, so that no part of a step comes out at once."
+    ),
+    max_run_on_s: float | None = typer.Option(
+        None, "--max-run-on", help="Seconds until a step has settled to 5 %."
+    ),
+    length_range_pct: float | None = typer.Option(
+        None,
+        "--length-range",
+        help="Instead of Eq. 15: least worst swing for lengths of -X to +X %. Run-on: tail_s.",
+    ),
+    starts: int = typer.Option(3, "--starts", help="Starts of the solver."),
+    out: Path = typer.Option(Path("out/tune"), "--out", help="Directory for the picture."),
+    write: bool = typer.Option(False, "--write", help="Write the result into the file."),
+    as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
+) -> None:
+    """Find the best poles of an axis' G_FF, show what they do, write them on request.
+
+    Prints the setting beside the one in the file, how much swing is left when the pendulum is up
+    to 30 % longer or shorter, and what holds the optimum; draws OUT/AXIS.png. Exit code 2 where
+    nothing fits, with what conflicts.
+
+    Examples:
+
+      canshaper tune config/forwarder.yaml --axis slew
+
+      canshaper tune config/forwarder.yaml --axis near_far --third-pole --write
+
+      canshaper tune config/forwarder.yaml --axis slew --length-range 15 --max-run-on 1.9
+
+      canshaper tune config/forwarder.yaml --axis near_far --q 1 --r 2 --s 0 --p 0.03
+
+      canshaper tune config/forwarder.yaml --axis slew --method manual
+    """
+    from canshaper.config.source import DeploymentError
+
+    console = Console()
+    try:
+        deployment = loader(file)()
+        bound = _axis(deployment, axis)
+        if write and not Path(file).exists():
+            raise ValueError(f"{file}: shipped with the package; copy it, then write to the copy")
+        asked: dict[str, Any] = {
+            "max_jump": max_jump,
+            "max_rate_per_s": max_rate,
+            "max_run_on_s": max_run_on_s,
+            "third_pole": third_pole,
+        }
+        beyond = length_range_pct is not None or any(asked.values())
+        asked |= {"pole_distance": pole_distance, "within_command": within_command}
+        task = _task(
+            deployment,
+            bound,
+            (q, r, s, p),
+            asked,
+            states=states,
+            horizon_s=horizon_s,
+            length_range_pct=length_range_pct,
+        )
+        with _progress(axis) as tell:
+            tuning = _solve(task, method, starts, tell, beyond=beyond)
+        _report(deployment, bound, task, tuning, out, console, write=write, as_json=as_json)
+    except DeploymentError as error:
+        raise fail(error) from None
+    except (OSError, ValueError) as error:
+        raise fail(ValueError(f"axis {axis}: {error}")) from None
+
+
+def _axis(deployment: "Deployment", name: str) -> "BoundAxis":
+    """The axis, which has sway data."""
+    if name not in deployment.axes:
+        raise ValueError(f"not in {deployment.path}; allowed are {', '.join(deployment.axes)}")
+    bound = deployment.axes[name]
+    if bound.config.sway is None:
+        having = [n for n, a in deployment.axes.items() if a.config.sway is not None]
+        raise ValueError(
+            "found no sway data, without which there is nothing to tune for;"
+            f" allowed are axes with a section sway ({', '.join(having) or 'none here'})"
+        )
+    return bound
+
+
+def _task(
+    deployment: "Deployment",
+    bound: "BoundAxis",
+    weights: tuple[float, float, float, float],
+    asked: dict[str, Any],
+    **options: Any,
+) -> "Task":
+    """What the options ask, with what the deployment says of the axis where they say nothing."""
+    from canshaper.tuning.formulation import Requirements, Task, Weights
+
+    assert bound.config.sway is not None
+    limits = bound.config.limits
+    if asked["max_rate_per_s"] is None:
+        asked["max_rate_per_s"] = min(limits.rise_per_s, limits.fall_per_s)
+    elif asked["max_rate_per_s"] == float("inf"):
+        asked["max_rate_per_s"] = None
+    if asked["within_command"] is None:
+        asked["within_command"] = not limits.allow_faster
+    if options["length_range_pct"] is not None and asked["max_run_on_s"] is None:
+        asked["max_run_on_s"] = limits.tail_s
+    q, r, s, p = weights
+    return Task(
+        mode=bound.config.sway.mode(),
+        tick_s=deployment.config.tick_ms / 1000.0 * bound.period_ticks,
+        weights=Weights((q, q), r, s, p),
+        require=Requirements(**asked),
+        **options,
+    )
+
+
+def _solve(
+    task: "Task", method: str, starts: int, tell: Callable[[str, float], None], *, beyond: bool
+) -> "Tuning":
+    from canshaper.tuning.manual import manual
+
+    if method == "manual":
+        if beyond:
+            raise ValueError(
+                "the manual rule knows the damping of the sway only; limits, a third pole and"
+                " a length range are for --method optimal"
+            )
+        return manual(task.mode)
+    if method != "optimal":
+        raise ValueError(f"method is {method}, allowed are optimal, manual")
+    tell("loading the solver", 0.0)
+    try:
+        from canshaper.tuning.optimal import tune as optimal
+    except ImportError as error:
+        raise ValueError(f"{error.name} is missing; pip install 'canshaper[tools]'") from None
+    return optimal(task, starts, tell)
+
+
+@contextmanager
+def _progress(axis: str) -> Iterator[Callable[[str, float], None]]:
+    """A bar on the terminal, beside the output; gone when done."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        console=console,
+        transient=True,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(axis, total=1.0)
+        yield lambda what, done: bar.update(task, completed=done, description=f"{axis}: {what}")
+
+
+def _report(
+    deployment: "Deployment",
+    bound: "BoundAxis",
+    task: "Task",
+    tuning: "Tuning",
+    out: Path,
+    console: Console,
+    *,
+    write: bool,
+    as_json: bool,
+) -> None:
+    """Measure, draw, write, tell."""
+    from canshaper.tuning import deploy
+    from canshaper.tuning.evaluate import Machine
+    from canshaper.tuning.table import table
+
+    config = bound.config
+    machine = Machine(
+        limits=config.limits.output_limits(),
+        neutral_band=config.stick.neutral_pct / 100.0,
+        stop_s=config.limits.stop_s,
+        grid_steps=bound.valve.steps,
+    )
+    found = deploy.deployed(tuning, task.mode, task.tick_s, machine)
+    before = None
+    if config.filter.kind == "gff":
+        parameters = config.filter.parameters()
+        before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
+    tail = deploy.tail_needed(found, task.mode, task.tick_s, machine)
+    sentence = deploy.recommendation(bound.name, found, tail)
+    picture = _draw(bound, task, found, before, machine, out)
+    if write:
+        _write(deployment.path, bound, found)
+    if as_json:
+        result = deploy.as_dict(tuning, found) | {
+            "axis": bound.name,
+            "in_file": deploy.measures_dict(before.measures) if before else None,
+            "recommendation": sentence,
+            "tail_needed_s": tail[0] if tail else None,
+            "picture": str(picture) if picture else None,
+            "written": str(deployment.path) if write else None,
+        }
+        typer.echo(json.dumps(result, indent=2))
+        return
+    console.print(table(found, before, tuning.method))
+    if tuning.method == "optimal":
+        held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
+        console.print(f"Held by: {held}", highlight=False)
+        console.print(f"Flat: poles of {deploy.flatness(tuning)}", highlight=False)
+        console.print(
+            f"Solver: {tuning.converged} of {tuning.starts} starts ended here,"
+            f" {tuning.build_s + tuning.solve_s:.2f} s",
+            highlight=False,
+        )
+    console.print(f"\n[b]{sentence}[/b]", highlight=False)
+    none = "none, matplotlib is missing; pip install 'canshaper[tools]'"
+    console.print(f"Picture: {picture or none}", highlight=False, markup=False)
+    if write:
+        console.print(
+            f"Written to {deployment.path}; a running daemon takes it with SIGHUP.", highlight=False
+        )
+
+
+def _draw(
+    bound: "BoundAxis",
+    task: "Task",
+    found: "Setting",
+    before: "Setting | None",
+    machine: "Machine",
+    out: Path,
+) -> Path | None:
+    """Draw the picture; None where matplotlib is missing."""
+    try:
+        from canshaper.tuning.plot import draw
+    except ImportError:
+        return None
+    assert bound.config.sway is not None
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / f"{bound.name}.png"
+    speed = bound.config.sway.full_speed_m_s
+    draw(
+        path,
+        axis=bound.name,
+        found=found,
+        mode=task.mode,
+        tick_s=task.tick_s,
+        machine=machine,
+        full_speed_m_s=speed,
+        before=before,
+    )
+    return path
+
+
+def _write(path: Path, bound: "BoundAxis", found: "Setting") -> None:
+    from canshaper.config.edit import Value, set_values
+
+    values: dict[str, Value] = {**found.values()}
+    if bound.config.filter.kind != "gff":
+        gone = bound.config.filter.model_dump(exclude_none=True).keys()
+        values = {"kind": "gff", **dict.fromkeys(gone - {"kind"}), **values}
+    set_values(path, ("axes", bound.name, "filter"), values)

@@ -1,0 +1,196 @@
+"""What is asked of the tuner: weights, requirements and the grid of time of Eq. 14-15.
+
+    minimise   1/N sum_k  x'Q x + R (y - 0.95)^2 + S (y - 1)^2 + P (y_k - y_(k-1))^2        (Eq. 15)
+    over       the real poles of G_FF (14d), at a distance from the imaginary axis (14e)
+
+for a unit step on the stick, k = 0 ... N-1, y_(-1) = 0, so that the first jump counts. Commands are
+fractions of full speed; u_max cancels, because the cost grows with its square.
+"""
+
+import math
+from dataclasses import dataclass, field
+from typing import Literal, get_args
+
+from canshaper.shaping.sway import SwayMode
+
+PoleDistance = Literal["text", "printed", "off"]
+"""Sense of Eq. 14e: "text", at least five times as far out as the sway pole; "printed", at most."""
+
+States = Literal["sway", "deviation", "companion", "none"]
+"""What Q weighs, of v = u / (a2 s^2 + a1 s + 1): "sway" (v'/w, v''/w^2), which is swing angle and
+rate in units of full speed times w/g; "deviation" (v - u, v'); "companion" (a2 v, a2 v'); or
+nothing."""
+
+# The paper's word for "sufficiently far from the imaginary axis".
+POLE_DISTANCE = 5.0
+# Fastest pole is this times sqrt(rate of the valve x sway frequency): 6 rad/s at 5 full speeds per
+# second and 2.86 rad/s. Faster ones make the limit-aware filter chase a valve that cannot follow;
+# docs/tuning.md shows where it breaks.
+POLE_PER_RATE = 1.6
+# The schema of the deployment file.
+SLOWEST_RAD_S, FASTEST_RAD_S = 0.1, 100.0
+# Part of full speed that the output must stay within for the run-on to be over.
+SETTLED = 0.05
+# What the response of a filter with three poles may pass the command by: no valve frame shows it.
+OVER_COMMAND = 1e-4
+
+
+def in_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
+    """ValueError with the value found and the range allowed, unless finite and in [low, high]."""
+    if not (math.isfinite(value) and low <= value <= high):
+        text = f"{name} is {value:g} {unit}".rstrip()
+        raise ValueError(f"{text}, allowed is {low:g} to {high:g} {unit}".rstrip())
+
+
+@dataclass(frozen=True, slots=True)
+class Weights:
+    """Weights of Eq. 15; the defaults are those of the paper's slewing axis.
+
+    Attributes:
+        q: diagonal of Q.
+        r: weight R of the distance from 95 % of the command (rise time).
+        s: weight S of the distance from the command.
+        p: weight P of the change of the output from sample to sample.
+
+    Raises:
+        ValueError: a weight is negative or no number, or R and S are both zero (then the best
+            filter would be one that never moves).
+    """
+
+    q: tuple[float, float] = (1.0, 1.0)
+    r: float = 1.0
+    s: float = 3.0
+    p: float = 1.0
+
+    def __post_init__(self) -> None:
+        named = (("Q", self.q[0]), ("Q", self.q[1]), ("R", self.r), ("S", self.s), ("P", self.p))
+        for name, value in named:
+            in_range(f"weight {name}", value, 0.0, 1e6)
+        if self.r + self.s == 0.0:
+            raise ValueError("weights R and S are both 0, allowed is at least one above 0")
+
+
+PAPER_SLEW = Weights()
+PAPER_NEAR_FAR = Weights(r=2.0, s=0.0, p=0.03)
+
+
+@dataclass(frozen=True, slots=True)
+class Requirements:
+    """What every setting has to keep, besides real poles (14d).
+
+    Attributes:
+        pole_distance: sense of Eq. 14e.
+        within_command: the response to a step never passes the command.
+        max_jump: largest part of a step that may come out at once.
+        max_rate_per_s: rate of the valve, full speeds per second. It bounds the poles
+            (``POLE_PER_RATE``) and, with a third pole, the slope of the response to a full step.
+        max_run_on_s: until then the response to a step is within 5 % of full speed for good.
+        third_pole: a third real pole, so that nothing comes out at once.
+
+    Raises:
+        ValueError: a value is out of range.
+    """
+
+    pole_distance: PoleDistance = "text"
+    within_command: bool = True
+    max_jump: float | None = None
+    max_rate_per_s: float | None = None
+    max_run_on_s: float | None = None
+    third_pole: bool = False
+
+    def __post_init__(self) -> None:
+        if self.pole_distance not in get_args(PoleDistance):
+            allowed = ", ".join(get_args(PoleDistance))
+            raise ValueError(f"pole distance is {self.pole_distance}, allowed are {allowed}")
+        if self.max_jump is not None:
+            in_range("first jump", self.max_jump, 0.01, 100.0, "of the command")
+        if self.max_rate_per_s is not None:
+            in_range("rate of the valve", self.max_rate_per_s, 0.1, 1000.0, "full speeds/s")
+        if self.max_run_on_s is not None:
+            in_range("run-on", self.max_run_on_s, 0.05, 20.0, "s")
+
+
+@dataclass(frozen=True, slots=True)
+class Task:
+    """One tuning: sway mode, sampling, what to minimise and what to keep.
+
+    Attributes:
+        mode: sway mode of the axis.
+        tick_s: Ts, the period at which the axis is sent.
+        horizon_s: N Ts, how long the step is watched.
+        weights: weights of Eq. 15; without meaning where ``length_range_pct`` is set.
+        states: what Q weighs.
+        require: what every setting has to keep.
+        length_range_pct: instead of Eq. 15, minimise the worst residual sway over pendulum lengths
+            of -range ... +range percent. Slow filters leave less, so a run-on has to be required.
+
+    Raises:
+        ValueError: a value is out of range.
+    """
+
+    mode: SwayMode
+    tick_s: float = 0.02
+    horizon_s: float = 3.0
+    weights: Weights = field(default_factory=Weights)
+    states: States = "sway"
+    require: Requirements = field(default_factory=Requirements)
+    length_range_pct: float | None = None
+
+    def __post_init__(self) -> None:
+        in_range("tick", self.tick_s, 1e-3, 0.2, "s")
+        in_range("horizon", self.horizon_s, max(0.2, 5.0 * self.tick_s), 60.0, "s")
+        if self.states not in get_args(States):
+            allowed = ", ".join(get_args(States))
+            raise ValueError(f"states are {self.states}, allowed are {allowed}")
+        if self.length_range_pct is not None:
+            in_range("length range", self.length_range_pct, 1.0, 60.0, "%")
+            if self.require.max_run_on_s is None:
+                raise ValueError(
+                    "length range without a run-on: slower is always more robust, so the longest"
+                    " run-on has to be given"
+                )
+
+    @property
+    def samples(self) -> int:
+        """N, the samples of the horizon."""
+        return max(5, round(self.horizon_s / self.tick_s))
+
+    @property
+    def pole_count(self) -> int:
+        """Poles of the filter, 2 or 3."""
+        return 3 if self.require.third_pole else 2
+
+    def slowest(self) -> tuple[float, str]:
+        """Smallest |pole| allowed, rad/s, and why."""
+        far = POLE_DISTANCE * -self.mode.pole.real
+        if self.require.pole_distance == "text" and far > SLOWEST_RAD_S:
+            return far, "pole distance (14e)"
+        return SLOWEST_RAD_S, "slowest pole of a deployment"
+
+    def fastest(self) -> tuple[float, str]:
+        """Largest |pole| allowed, rad/s, and why."""
+        bounds = [
+            (FASTEST_RAD_S, "fastest pole of a deployment"),
+            (1.0 / self.tick_s, "fastest pole of the tick"),
+        ]
+        if self.require.max_rate_per_s is not None:
+            at_rate = math.sqrt(self.require.max_rate_per_s * self.mode.omega_rad_s)
+            bounds.append((POLE_PER_RATE * at_rate, "rate of the valve"))
+        if self.require.pole_distance == "printed":
+            bounds.append((POLE_DISTANCE * -self.mode.pole.real, "pole distance (14e, printed)"))
+        return min(bounds)
+
+
+def lengths(range_pct: float, count: int) -> list[float]:
+    """Lengths over -range ... +range percent, as factors of the nominal one."""
+    return [1.0 + range_pct / 100.0 * (2.0 * i / (count - 1) - 1.0) for i in range(count)]
+
+
+def at_length(mode: SwayMode, factor: float) -> SwayMode:
+    """Mode of the same joint and mass on a pendulum ``factor`` times as long.
+
+    w^2 ~ 1/l and, the damping of the joint being what it is, 2 zeta w = c/(m l^2) ~ 1/l^2.
+    """
+    return SwayMode(
+        mode.omega_rad_s / math.sqrt(factor), min(0.95, mode.damping_ratio * factor**-1.5)
+    )
