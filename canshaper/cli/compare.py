@@ -107,16 +107,16 @@ def compare(
 
 
 def _table(table: "list[Row]", *, slew: bool) -> Table:
-    drawn = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    drawn = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
     drawn.add_column("filter", no_wrap=True)
-    heads = ["stop\ns", "rise\ns", "resid.\ndeg", "±15 %\ndeg", "±30 %\ndeg", "random\ndeg"]
+    heads = ["stop\ns", "rise\ns", "res.\ndeg", "15 %\ndeg", "30 %\ndeg", "rand.\ndeg"]
     heads += ["other\ndeg"] if slew else []
-    heads += ["peak\ndeg", "dip\n%", "re-rise\n%"]
+    heads += ["peak\ndeg", "dip\n%", "re-\nrise"]
     for head in heads:
         drawn.add_column(head, justify="right", no_wrap=True)
     for row in table:
         cells = [f"{row.stop_s:.2f}", f"{row.rise_s:.2f}", f"{row.residual_deg:.2f}"]
-        cells += [f"{row.worst_15_deg:.2f}", f"{row.worst_30_deg:.2f}", f"{row.random_deg:.2f}"]
+        cells += [f"{row.worst_15_deg:.1f}", f"{row.worst_30_deg:.1f}", f"{row.random_deg:.2f}"]
         cells += [f"{row.cross_deg:.2f}"] if slew else []
         cells += [f"{row.peak_deg:.1f}", f"{100 * row.dip:.0f}", f"{100 * row.re_rise:.0f}"]
         drawn.add_row(row.name, *cells, style="bold" if row.ours else None)

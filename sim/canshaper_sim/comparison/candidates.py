@@ -7,11 +7,14 @@ from pydantic import TypeAdapter
 from canshaper.can.binding import BoundRadial, Deployment
 from canshaper.config.filters import Filter, RobustFilter
 from canshaper.config.schema import RadialConfig
+from canshaper.shaping.fir import zv_taps
 from canshaper.shaping.sway import SwayMode
 from canshaper.tuning.robust import RobustShaper, least_residual
 
 # Time of the run-on that every filter is given: longer than the longest of them takes.
 TAIL_S = 3.0
+# Impulse responses: duration in swings, and the range of pendulum length they are made for.
+DESIGNS = ((0.41, 30.0), (0.7, 30.0), (0.73, 15.0), (0.77, 15.0), (0.82, 15.0), (1.0, 30.0))
 
 
 @dataclass(frozen=True)
@@ -64,8 +67,15 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
         Candidate("G_FF third pole -4", _third_pole(-4.0), ours=True),
         Candidate("G_FF third pole -5", _third_pole(-5.0), ours=True),
     ]
-    designs = [(0.5, 0.0), (0.6, 15.0), (0.73, 15.0), (0.82, 15.0), (1.0, 30.0), (1.15, 30.0)]
-    for periods, range_pct in designs:
+    zv = zv_taps(mode, tick_s)
+    found.append(
+        Candidate(
+            "limit-aware ZV",
+            RobustFilter(kind="robust", tick_ms=round(1000.0 * tick_s), taps=zv),
+            ours=True,
+        )
+    )
+    for periods, range_pct in DESIGNS:
         shaper = least_residual(
             mode,
             tick_s=tick_s,
@@ -73,12 +83,12 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
             range_pct=range_pct,
             rate_per_s=rate,
         )
-        name = f"robust {shaper.duration_s:.1f} s" + (f" ±{range_pct:g} %" if range_pct else "")
+        name = f"robust {shaper.duration_s:.1f} s ±{range_pct:g} %"
         found.append(Candidate(name, robust_filter(shaper, tick_s), ours=True))
     if radial_of(deployment, axis) is not None:
+        robust = [c for c in found if c.name.startswith("robust")]
         with_radial = [c for c in found if c.name in ("G_FF near-far poles", "G_FF third pole -4")]
-        with_radial.append(next(c for c in found if c.name.startswith("robust") and "15" in c.name))
-        with_radial += [c for c in found if c.name.startswith("robust")][3:4]
+        with_radial += robust[2:]
         found += [replace(c, name=f"{c.name} + radial", radial=True) for c in with_radial]
     return found
 

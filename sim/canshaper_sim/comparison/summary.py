@@ -19,6 +19,7 @@ class Row:
     Attributes:
         stop_s, rise_s, dip, re_rise, peak_deg, residual_deg, cross_deg: of the pulse at the right
             length.
+        pulse_15_deg: largest residual of the pulse at length errors up to 15 %.
         worst_15_deg, worst_30_deg: largest residual of all manoeuvres but random and initial sway
             at length errors up to 15 and 30 %.
         random_deg: largest residual of the random sticks.
@@ -31,6 +32,7 @@ class Row:
     rise_s: float
     residual_deg: float
     cross_deg: float
+    pulse_15_deg: float
     worst_15_deg: float
     worst_30_deg: float
     random_deg: float
@@ -46,7 +48,8 @@ def rows(found: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
 
 
 def _row(candidate: Candidate, outcomes: list[Outcome]) -> Row:
-    pulse = next(o for o in outcomes if o.manoeuvre == "pulse" and o.length_pct == 0)
+    pulses = [o for o in outcomes if o.manoeuvre == "pulse"]
+    pulse = next(o for o in pulses if o.length_pct == 0)
 
     def worst(range_pct: int) -> float:
         return max(
@@ -62,6 +65,7 @@ def _row(candidate: Candidate, outcomes: list[Outcome]) -> Row:
         pulse.rise_s if pulse.rise_s is not None else float("nan"),
         pulse.residual_deg,
         pulse.cross_deg,
+        max(o.residual_deg for o in pulses if abs(o.length_pct) <= 15),
         worst(15),
         worst(30),
         max(o.residual_deg for o in outcomes if o.manoeuvre.startswith("random")),

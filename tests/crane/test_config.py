@@ -1,0 +1,85 @@
+"""The crane file: what it accepts, and how it says what is wrong."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from canshaper.config.source import DeploymentError
+from canshaper.crane.config import CraneConfig, load_crane
+from canshaper_sim.grapple import Grapple
+
+
+def problems(path: Path, text: str) -> list[str]:
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(DeploymentError) as caught:
+        load_crane(path)
+    return [str(p).replace(str(path), path.name) for p in caught.value.problems]
+
+
+def test_the_shipped_crane_carries_the_simulated_grapple(crane: CraneConfig) -> None:
+    assert Grapple(**crane.grapple.model_dump()) == Grapple()
+    assert crane.name == "medium forwarder crane"
+
+
+# What is changed in the shipped file, into what, where that is said to be wrong, and how.
+FAULTS = [
+    (
+        "max_m: 3.4",
+        "max_m: long",
+        "max_m: 3.4",
+        "extension.max_m: found 'long', allowed is 0 to 20 m",
+    ),
+    ("m2_kg: 300", "m2_kg: 0", "m2_kg", "grapple.m2_kg: found 0, allowed is 1 to 100000 kg"),
+    ("m2_kg: 300", "m2_kg: .nan", "m2_kg", "grapple.m2_kg: found nan, allowed is 1 to 100000 kg"),
+    ("  m2_kg: 300", "  #", "grapple:", "grapple.m2_kg: missing: mass of grapple and load (kg)"),
+    (
+        "  m2_kg: 300",
+        "  m3_kg: 1\n  m2_kg: 300",
+        "m2_kg",
+        "grapple.m3_kg: unknown key; allowed are l1_m, l2_m, m1_kg, m2_kg, c5_n_m_s_rad, ",
+    ),
+    ("max_deg: 80", "max_deg: -30", "lift:", "joints.lift: min_deg is -20, allowed is below"),
+    ("max_m: 3.4", "max_m: 0", "extension:", "joints.extension: min_m is 0, allowed is below"),
+    ("alpha_deg: -90", "alpha_deg: 90", "joints:", "extension.alpha_deg is 90, allowed is -90"),
+    ("90, d_m: 0,", "90, d_m: 0.1,", "joints:", "lift.d_m is 0.1, allowed is 0"),
+    (
+        "3.7, alpha_deg: 0, d_m: 0",
+        "3.7, alpha_deg: 0, d_m: 1",
+        "joints:",
+        "knuckle.d_m is 1, allow",
+    ),
+    ("{ a_m: 0, alpha", "{ a_m: 0.5, alpha", "joints:", "slew.a_m is 0.5, allowed is 0"),
+    (
+        "2.35, theta_deg: 0",
+        "2.35, theta_deg: 5",
+        "joints:",
+        "extension.theta_deg is 5, allowed is 0",
+    ),
+]
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_faults_are_told_with_file_and_line(
+    shipped_path: Path, tmp_path: Path, fault: tuple[str, str, str, str]
+) -> None:
+    old, new, place, message = fault
+    text = shipped_path.read_text(encoding="utf-8")
+    assert text.count(old) == 1
+    (found,) = problems(tmp_path / "crane.yaml", text.replace(old, new))
+    line = 1 + text[: re.search(rf"(^|, )\s*{place}", text, re.MULTILINE).end()].count("\n")
+    assert found.startswith(f"crane.yaml:{line}: ")
+    assert message in found
+
+
+def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+    found = problems(tmp_path / "crane.yaml", "name: 7\nwheels: 8\n")
+    assert sorted(f.split(": ")[1] for f in found) == ["grapple", "joints", "name", "wheels"]
+    assert "crane.yaml:2: wheels: unknown key; allowed are name, joints, grapple" in found
+
+
+def test_the_daemon_does_not_load_casadi() -> None:
+    code = "import sys, canshaper.service.daemon; sys.exit('casadi' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0
