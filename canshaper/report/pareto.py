@@ -4,13 +4,18 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
+from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.transforms import Bbox
 
 OURS_COLOUR = "#0072B2"  # Okabe-Ito blue and vermilion: told apart by colour-blind eyes too
 OTHERS_COLOUR = "#D55E00"
 LIMIT_COLOUR = "#666666"
 _SIZE_IN = (15.0, 9.0)
+# Of the labels, at 100 dots per inch: width of a character, and heights to try beside a dot.
+_CHARACTER_PX = 8.5
+_OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -104.0)
 
 
 @dataclass(frozen=True)
@@ -40,7 +45,6 @@ class Limits:
 def draw(points: Sequence[Point], limits: Limits, title: str, path: Path) -> None:
     """Write the picture."""
     drawn = figure(points, limits, title)
-    FigureCanvasAgg(drawn)
     drawn.savefig(path)
 
 
@@ -63,11 +67,12 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         x, y = zip(*limits.curve, strict=True)
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
         axes.annotate(
-            "limit of every shaper\nthat is never clipped",
-            (x[-1], y[-1]),
-            xytext=(6, 0),
+            "limit of every shaper\nwithin the valve's rate",
+            (x[3], y[3]),
+            xytext=(-8, -6),
             textcoords="offset points",
-            va="center",
+            va="top",
+            ha="right",
             color=LIMIT_COLOUR,
             fontsize=11,
         )
@@ -83,32 +88,39 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         color=LIMIT_COLOUR,
         fontsize=11,
     )
-    _points(axes, points)
     axes.set_xlim(0.0, max(p.stop_s for p in points) * 1.18)
+    values = [p.worst_deg for p in points]
+    axes.set_ylim(0.5 * min(values), 1.5 * max(values))
+    FigureCanvasAgg(drawn)
+    drawn.draw_without_rendering()  # the layout decides where the dots are, in pixels
+    _points(axes, points)
     return drawn
 
 
-def _points(axes: "object", points: Sequence[Point]) -> None:
-    """Dots with names; names that would cover each other are moved up or down."""
-    placed: list[tuple[float, float]] = []
-    low = min(p.worst_deg for p in points)
-    span = max(p.worst_deg for p in points) / low
-    for point in sorted(points, key=lambda p: (p.stop_s, p.worst_deg)):
+def _points(axes: Axes, points: Sequence[Point]) -> None:
+    """Dots with names; a name goes where it covers neither a dot nor another name."""
+    places = [tuple(axes.transData.transform((p.stop_s, p.worst_deg))) for p in points]
+    taken = [Bbox.from_bounds(x - 7, y - 7, 14, 14) for x, y in places]
+    for point, (x, y) in sorted(zip(points, places, strict=True), key=lambda pair: pair[1]):
         colour = OURS_COLOUR if point.ours else OTHERS_COLOUR
-        axes.plot([point.stop_s], [point.worst_deg], "o", color=colour, markersize=9)  # type: ignore[attr-defined]
-        shift = 0
-        for x, y in placed:
-            near_x = abs(point.stop_s - x) < 0.35
-            near_y = abs((point.worst_deg / y) - 1.0) < 0.035 * span**0.35
-            if near_x and near_y:
-                shift = 13 if point.worst_deg >= y else -13
-        placed.append((point.stop_s, point.worst_deg))
-        axes.annotate(  # type: ignore[attr-defined]
+        axes.plot([point.stop_s], [point.worst_deg], "o", color=colour, markersize=9)
+        width = _CHARACTER_PX * len(point.name)
+        spots = [
+            (dx if dx > 0 else dx - width, dy) for dy in _OFFSETS_PX for dx in (11.0, -11.0, 34.0)
+        ]
+        boxes = [Bbox.from_bounds(x + dx, y + dy - 8, width, 16) for dx, dy in spots]
+        free = (i for i, box in enumerate(boxes) if not any(box.overlaps(t) for t in taken))
+        chosen = next(free, 0)
+        taken.append(boxes[chosen])
+        dx, dy = spots[chosen]
+        far = abs(dy) > 20 or dx > 20
+        axes.annotate(
             point.name,
             (point.stop_s, point.worst_deg),
-            xytext=(8, shift),
-            textcoords="offset points",
+            xytext=(dx, dy),
+            textcoords="offset pixels",
             va="center",
             color=colour,
             fontsize=11,
+            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6} if far else None,
         )

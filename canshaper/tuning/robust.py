@@ -8,6 +8,7 @@ optimum: it is also the limit that others are measured against.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,7 +29,7 @@ class RobustShaper:
 
     Attributes:
         taps: impulse response at the tick, sum 1.
-        residual: largest |H(p)| over the range of lengths, fraction of the swing.
+        residual: largest |H(p)| over the range of lengths, fraction of the unshaped swing.
         duration_s: from the first to the last tap.
         mean_delay_s: centre of the taps: how far the crane lags behind the stick.
     """
@@ -46,7 +47,13 @@ def modes_over_range(mode: SwayMode, range_pct: float, count: int = _LENGTHS) ->
 
 
 def least_residual(
-    mode: SwayMode, *, tick_s: float, duration_s: float, range_pct: float, rate_per_s: float
+    mode: SwayMode,
+    *,
+    tick_s: float,
+    duration_s: float,
+    range_pct: float,
+    rate_per_s: float,
+    swing: Sequence[tuple[float, float]] = ((0.0, 1.0),),
 ) -> RobustShaper:
     """Least worst residual over the range that taps within the duration and the rate can give.
 
@@ -56,6 +63,8 @@ def least_residual(
         duration_s: length of the impulse response.
         range_pct: pendulum length error covered, +- percent, 0 to 60.
         rate_per_s: rate of the valve, full speeds per second.
+        swing: unshaped swing as (length error in percent, swing), rising in the error, linear
+            between; by default the same at every length. The residual then is in its unit.
 
     Raises:
         ValueError: a value is out of range, or the rate cannot reach full speed in the duration.
@@ -67,7 +76,7 @@ def least_residual(
             f"duration is {duration_s:g} s, allowed is {1.0 / rate_per_s:g} s or more:"
             f" the valve takes that long to full speed at {rate_per_s:g} /s"
         )
-    rows = _residual_rows(mode, tick_s, count, range_pct)
+    rows = _residual_rows(mode, tick_s, count, range_pct, swing)
     # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
     delay = np.arange(count) * tick_s
     objective = np.append(1e-6 * delay, 1.0)
@@ -83,7 +92,8 @@ def least_residual(
     )
     if not solution.success:
         raise ValueError(f"no impulse response found: {solution.message}")
-    return _shaper(np.clip(solution.x[:count], 0.0, None), mode, tick_s, range_pct)
+    taps = np.clip(solution.x[:count], 0.0, None)
+    return _shaper(taps, mode, tick_s, range_pct, swing)
 
 
 def shortest(
@@ -158,30 +168,43 @@ def time_optimal_s(
     return n_high * tick_s
 
 
+Swing = Sequence[tuple[float, float]]
+
+
+def _weights(swing: Swing, range_pct: float, count: int) -> NDArray[np.float64]:
+    errors, swings = zip(*swing, strict=True)
+    weights: NDArray[np.float64] = np.interp(
+        np.linspace(-range_pct, range_pct, count), errors, swings
+    )
+    return weights
+
+
 def _residual_rows(
-    mode: SwayMode, tick_s: float, count: int, range_pct: float
+    mode: SwayMode, tick_s: float, count: int, range_pct: float, swing: Swing
 ) -> NDArray[np.float64]:
     """Rows whose product with the taps is Re(H e^(-i phi)) for every length and direction."""
     k = np.arange(count)
     turns = np.exp(-2j * np.pi * np.arange(_SIDES) / _SIDES)
     rows = []
-    for one in modes_over_range(mode, range_pct):
-        response = np.exp(-one.pole * tick_s * k)
+    weights = _weights(swing, range_pct, _LENGTHS)
+    for one, weight in zip(modes_over_range(mode, range_pct), weights, strict=True):
+        response = weight * np.exp(-one.pole * tick_s * k)
         rows.append((turns[:, None] * response[None, :]).real)
     return np.vstack(rows)
 
 
 def _shaper(
-    taps: NDArray[np.float64], mode: SwayMode, tick_s: float, range_pct: float
+    taps: NDArray[np.float64], mode: SwayMode, tick_s: float, range_pct: float, swing: Swing
 ) -> RobustShaper:
     taps = taps / taps.sum()
     k = np.arange(len(taps))
     fine = modes_over_range(mode, range_pct, 4 * _LENGTHS + 1)
-    residual = max(abs(np.sum(taps * np.exp(-m.pole * tick_s * k))) for m in fine)
+    weights = _weights(swing, range_pct, len(fine))
+    left = [abs(np.sum(taps * np.exp(-m.pole * tick_s * k))) for m in fine]
     used = np.flatnonzero(taps > 1e-9)
     return RobustShaper(
         tuple(float(t) for t in taps[: used[-1] + 1]),
-        float(residual),
+        float(np.max(np.array(left) * weights)),
         float((used[-1] - used[0]) * tick_s),
         float(np.sum(k * taps) * tick_s),
     )

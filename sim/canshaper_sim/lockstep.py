@@ -75,6 +75,7 @@ def drive(
         controller.events.clear()
         plant.advance(step_s)
         for frame in plant.feedback():
+            controller.receive(frame, now_ns + tick_ms * 1_000_000)
             recorder.receive(frame, time_s + step_s)
         if progress and time_ms % 1000 == 0:
             progress(time_s)

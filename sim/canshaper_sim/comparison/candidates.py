@@ -89,7 +89,7 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
         robust = [c for c in found if c.name.startswith("robust")]
         with_radial = [c for c in found if c.name in ("G_FF near-far poles", "G_FF third pole -4")]
         with_radial += robust[2:]
-        found += [replace(c, name=f"{c.name} + radial", radial=True) for c in with_radial]
+        found += [replace(c, name=f"{c.name} +radial", radial=True) for c in with_radial]
     return found
 
 

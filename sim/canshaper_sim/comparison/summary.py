@@ -10,6 +10,8 @@ from canshaper_sim.comparison.measure import Outcome
 FAST_LEAVES = 0.12
 # "Balanced" may stop later than the fast one, up to this share of a swing in all.
 BALANCED_PERIODS = 0.9
+# Run-on is read from feedback every 20 ms.
+HALF_TICK_S = 0.01
 
 
 @dataclass(frozen=True)
@@ -77,11 +79,11 @@ def _row(candidate: Candidate, outcomes: list[Outcome]) -> Row:
 
 
 def beaten_by(row: Row, table: list[Row]) -> Row | None:
-    """One of ours that stops at least as soon and leaves less over +-30 % length, or None."""
+    """One of ours that stops as soon, to half a tick, and leaves less over +-30 %; or None."""
     better = [
         r
         for r in table
-        if r.ours and r.stop_s <= row.stop_s + 1e-9 and r.worst_30_deg < row.worst_30_deg
+        if r.ours and r.stop_s <= row.stop_s + HALF_TICK_S and r.worst_30_deg < row.worst_30_deg
     ]
     return min(better, key=lambda r: r.worst_30_deg, default=None)
 
