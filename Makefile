@@ -26,6 +26,7 @@ lint: .venv/test-ready
 bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
 	.venv/bin/python benchmarks/startup.py
+	.venv/bin/python benchmarks/tune.py
 
 clean:
 	rm -rf .venv out dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

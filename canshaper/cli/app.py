@@ -3,7 +3,7 @@
 import typer
 
 from canshaper import __version__
-from canshaper.cli import check, compare, config_schema, demo, run, sim, tune
+from canshaper.cli import check, compare, config_schema, demo, reproduce, robust, run, sim, tune
 
 app = typer.Typer(
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
@@ -37,6 +37,8 @@ app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)
 app.command("compare")(compare.compare)
 app.command("tune")(tune.tune)
+app.command("robust")(robust.robust)
+app.command("reproduce")(reproduce.reproduce)
 app.command("config-schema")(config_schema.config_schema)
 
 

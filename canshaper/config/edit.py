@@ -9,7 +9,7 @@ import copy
 import os
 import stat
 import tempfile
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,8 +18,8 @@ import yaml
 from canshaper.config.load import load_config
 from canshaper.config.source import DeploymentError, Place, Problem, Source
 
-Value = float | str | None
-"""A value to write, a number or a plain word; None takes the key away."""
+Value = float | str | Sequence[float] | None
+"""A value to write, a number, a plain word or a list of numbers; None takes the key away."""
 
 
 def set_values(path: Path, place: Place, values: Mapping[str, Value]) -> None:
@@ -192,8 +192,12 @@ class _Edit:
         return DeploymentError([Problem(self._name, line, where, message)])
 
 
-def _written(value: float | str) -> str:
+def _written(value: float | str | Sequence[float]) -> str:
     """Plain scalar; of a number the shortest decimal form that the loader reads back as it is."""
+    if not isinstance(value, str | int | float):
+        return f"[{', '.join(_written(v) for v in value)}]"
+    if isinstance(value, int):
+        return str(value)
     if isinstance(value, str):
         if not value.isidentifier():
             raise ValueError(f"found {value!r}, allowed is a word")
@@ -213,8 +217,10 @@ def _expected(data: Any, place: Place, values: Mapping[str, Value]) -> Any:
     for name, value in values.items():
         if value is None:
             section.pop(name, None)
+        elif isinstance(value, str):
+            section[name] = value
         else:
-            section[name] = value if isinstance(value, str) else float(_written(value))
+            section[name] = yaml.safe_load(_written(value))
     return result
 
 

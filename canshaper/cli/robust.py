@@ -1,0 +1,130 @@
+"""``canshaper robust``: design the robust shaper of an axis."""
+
+from typing import TYPE_CHECKING
+
+import typer
+from rich.box import SIMPLE_HEAD
+from rich.console import Console
+from rich.table import Table
+
+from canshaper.cli.common import FILE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.tuning.evaluate import Evaluation
+
+# Digits of a tap in the file: below a thousandth of the smallest tap that matters.
+_DIGITS = 7
+
+
+def robust(
+    file: str = FILE,
+    axis: str = typer.Option(..., "--axis", help="Axis to design for."),
+    range_pct: float = typer.Option(15.0, "--range", help="Pendulum length error covered, +- %."),
+    duration_s: float | None = typer.Option(
+        None, "--duration", help="Length of the impulse response in s. Default: 0.77 of a swing."
+    ),
+    residual_pct: float | None = typer.Option(
+        None, "--residual", help="Instead: the shortest that leaves at most this % of the swing."
+    ),
+    write: bool = typer.Option(False, "--write", help="Write the filter into the file."),
+) -> None:
+    """Design the shaper that leaves least swing over a range of pendulum lengths.
+
+    A non-negative impulse response within the valve's rate, by linear programming: no shaper of
+    this kind leaves less. Prints what it does and, without --write, the lines for the file.
+
+    Examples:
+
+      canshaper robust config/forwarder.yaml --axis near_far
+
+      canshaper robust config/forwarder.yaml --axis slew --range 30 --duration 2.4 --write
+
+      canshaper robust config/forwarder.yaml --axis near_far --residual 5
+    """
+    from canshaper.config.edit import Value, set_values
+    from canshaper.config.source import DeploymentError
+    from canshaper.shaping.registry import build_shaper
+    from canshaper.tuning.evaluate import Machine, evaluate
+
+    console = Console()
+    try:
+        deployment = loader(file)()
+        bound = deployment.axes.get(axis)
+        if bound is None or bound.config.sway is None:
+            having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway)
+            raise ValueError(f"axis {axis!r}, allowed are axes with sway data: {having or 'none'}")
+        try:
+            from canshaper.tuning.robust import least_residual, shortest
+        except ImportError as error:
+            text = f"{error.name} is missing; pip install 'canshaper[tools]'"
+            raise ValueError(text) from None
+        mode = bound.config.sway.mode()
+        limits = bound.config.limits
+        tick_ms = bound.period_ticks * deployment.config.tick_ms
+        tick_s = tick_ms / 1000.0
+        rate = min(limits.rise_per_s, limits.fall_per_s)
+        if residual_pct is None:
+            seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
+            found = least_residual(
+                mode, tick_s=tick_s, duration_s=seconds, range_pct=range_pct, rate_per_s=rate
+            )
+        elif duration_s is not None:
+            raise ValueError("allowed is one of --duration and --residual")
+        else:
+            found = shortest(
+                mode,
+                tick_s=tick_s,
+                residual_pct=residual_pct,
+                range_pct=range_pct,
+                rate_per_s=rate,
+            )
+        taps = [round(tap, _DIGITS) for tap in found.taps]
+        machine = Machine(
+            limits=limits.output_limits(),
+            neutral_band=bound.config.stick.neutral_pct / 100.0,
+            stop_s=limits.stop_s,
+            grid_steps=bound.valve.steps,
+        )
+        measured = evaluate(
+            mode, tick_s, lambda sway: build_shaper("robust", tick_s, sway, taps=taps), machine
+        )
+        if write:
+            gone = bound.config.filter.model_dump(exclude_none=True).keys()
+            values: dict[str, Value] = {"kind": "robust", **dict.fromkeys(gone - {"kind"})}
+            set_values(
+                deployment.path,
+                ("axes", axis, "filter"),
+                {**values, "tick_ms": tick_ms, "taps": taps},
+            )
+    except DeploymentError as error:
+        raise fail(error) from None
+    except ValueError as error:
+        raise fail(ValueError(f"axis {axis}: {error}")) from None
+    console.print(
+        f"Robust shaper for {axis}: {found.duration_s:.2f} s, mean delay"
+        f" {found.mean_delay_s:.2f} s, at most {100.0 * found.residual:.1f} % of the swing left at"
+        f" lengths within ±{range_pct:g} %.",
+        highlight=False,
+    )
+    console.print(_table(measured))
+    if limits.tail_s < found.duration_s:
+        console.print(
+            f"tail_s is {limits.tail_s:g} s: it ends the run-on early; give {axis} at least"
+            f" tail_s: {found.duration_s + 0.1:.1f}",
+            highlight=False,
+        )
+    if write:
+        console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+    else:
+        text = ", ".join(f"{tap:g}" for tap in taps)
+        typer.echo(f"filter: {{ kind: robust, tick_ms: {tick_ms}, taps: [{text}] }}")
+
+
+def _table(measured: "Evaluation") -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    table.add_column("swing left, %", no_wrap=True)
+    for residual in measured.residuals:
+        table.add_column(f"{residual.length_pct:+g} %", justify="right", no_wrap=True)
+    table.add_row("through the machine", *(f"{100 * r.machine:.1f}" for r in measured.residuals))
+    table.add_row("shaper alone", *(f"{100 * r.linear:.1f}" for r in measured.residuals))
+    return table
