@@ -35,8 +35,8 @@ def test_demo_on_vcan0_and_its_candump_log_decodes(tmp_path: Path) -> None:
         seen.add(name)
         if name == "TipVelocity":
             fastest = max(fastest, values["RadialSpeed"])
-    everything = {m.name for m in DBC.messages}
-    assert seen == everything
+    # this crane has no joints to tell of
+    assert seen == {m.name for m in DBC.messages if not m.name.startswith("Joint")}
     assert fastest == pytest.approx(1.0, abs=0.03)
 
 
