@@ -7,6 +7,7 @@ from numpy.typing import NDArray
 
 from canshaper.crane.config import GrappleData
 from canshaper.crane.linear import LinearSway, OperatingPoint, closed_form, linearise, sway_modes
+from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.reproduction.printed import RADIUS_M
@@ -73,7 +74,7 @@ def bode() -> tuple[BodeCurve, BodeCurve]:
         values = matrix[:, i, i]
         s = 1j * omega
         twice = damping / (grapple.m2_kg * length**2)
-        printed = gain * s**2 / (s**2 + twice * s + 9.81 / length)
+        printed = gain * s**2 / (s**2 + twice * s + GRAVITY_M_S2 / length)
         found.append(
             BodeCurve(
                 name,

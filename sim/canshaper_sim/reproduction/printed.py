@@ -4,10 +4,11 @@
 brackets. As printed: a corrigendum exists, which is not taken into account.
 """
 
+import math
 from typing import Final
 
 from canshaper.shaping.gff import poles_from_denominator
-from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 # [4.1, 4.2] denominators of the two optimal filters, s and s^2, and their poles, rad/s
 DENOMINATORS: Final = {"slew": (0.42, 0.043), "near_far": (0.708, 0.12)}
@@ -19,8 +20,9 @@ LADDER: Final = ((-2.0, -2.0), (-3.0, -3.0), (-5.0, -5.0), (-10.0, -10.0))
 # Pendulum (length in m, damping ratio) for which the printed poles are the optimum of Eq. 14-15
 # with Q on the deviation, Ts = 20 ms, N = 50. Fitted to that end: they show that the printed
 # numbers are possible, not that they are right.
-FITTED: Final = {"slew": SwayMode((9.81 / 0.31831) ** 0.5, 0.148617)} | {
-    "near_far": SwayMode((9.81 / 1.15625) ** 0.5, 0.160840)
+FITTED: Final = {
+    "slew": SwayMode(math.sqrt(GRAVITY_M_S2 / 0.31831), 0.148617),
+    "near_far": SwayMode(math.sqrt(GRAVITY_M_S2 / 1.15625), 0.160840),
 }
 
 

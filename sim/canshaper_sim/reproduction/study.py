@@ -5,7 +5,7 @@ from dataclasses import asdict
 from typing import Any, Final
 
 from canshaper.can.binding import Deployment
-from canshaper.report.runs import Run
+from canshaper.report.runs import Plane, Run
 from canshaper_sim.axes import NEAR_FAR, SLEW
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.reproduction import bode, controller, reductions
@@ -15,8 +15,9 @@ from canshaper_sim.reproduction.printed import LADDER, optimal_poles
 FIGURES: Final = (3, 4, 6, 7, 8)
 AXIS_OF: Final = {3: SLEW, 4: NEAR_FAR, 7: SLEW, 8: NEAR_FAR}
 PARAMETERS: Final = (
-    "the paper publishes no lengths, masses, damping, speeds, times or sampling: assumed are"
-    " the grapple below, radius 3 m, full stick 0.5 rad/s and 1 m/s, lag 100 ms, commands at 50 Hz"
+    "the paper publishes no lengths, masses, damping, speeds, times or sampling; taken are"
+    " l1 0.2 m, l2 1.2 m, 40 and 300 kg, 120 N m s/rad in each joint, radius 3 m, full stick"
+    " 0.5 rad/s and 1 m/s, lag 100 ms, commands at 50 Hz"
 )
 
 
@@ -63,6 +64,15 @@ class Study:
         axis = AXIS_OF[figure]
         poles = optimal_poles(axis)
         return self.run(axis, poles, PLANTS[0]), self.run(axis, poles, PLANTS[1])
+
+    def claims(self, figure: int) -> list[tuple[Plane, float]]:
+        """Figures 7 and 8: plane and percentage of the paper's claims."""
+        axis = AXIS_OF[figure]
+        return [
+            (c.plane, c.more_than_pct)
+            for c in reductions.CLAIMS
+            if c.axis == axis and c.poles_of == axis
+        ]
 
     def curves(self) -> tuple[bode.BodeCurve, bode.BodeCurve]:
         """Figure 6."""

@@ -1,0 +1,88 @@
+"""Colours, panels and coloured headlines shared by the pictures of the paper's figures."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
+
+from canshaper.report.plot import MINUS, RAW_COLOUR, SHAPED_COLOUR, STICK_COLOUR, TEXT_COLOUR
+
+__all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR"]
+
+# No filter: grey. The two plants: vermilion and blue of Okabe and Ito, as in `report.plot`.
+NONE_COLOUR = "#8C8C8C"
+PLANT_COLOUR = {"linear": RAW_COLOUR, "real": SHAPED_COLOUR}
+PLANT_WORDS = {"linear": "Eq. 13 on a linear valve", "real": "canshaper on a real valve"}
+SIZE_PX, DPI = (1600, 1000), 100
+LEFT, RIGHT = 0.055, 0.985
+Words = Sequence[tuple[str, str]]
+
+
+def picture(size_px: tuple[int, int] = SIZE_PX) -> Figure:
+    """A white figure that can be drawn without a display."""
+    fig = Figure(figsize=(size_px[0] / DPI, size_px[1] / DPI), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(fig)
+    return fig
+
+
+def save(fig: Figure, path: Path) -> None:
+    """Write the picture as PNG."""
+    fig.savefig(path, dpi=DPI, format="png")
+
+
+def headline(fig: Figure, text: str) -> None:
+    """The finding, at the top."""
+    fig.suptitle(
+        text, x=LEFT, y=0.985, ha="left", va="top", fontsize=17, weight="bold", color=TEXT_COLOUR
+    )
+
+
+def key(fig: Figure, words: Words, y: float = 0.935) -> None:
+    """A line of words in the colours of the curves they name."""
+    parts: list[Artist] = [
+        TextArea(text, textprops={"color": colour, "fontsize": 13, "weight": "bold"})
+        for text, colour in words
+    ]
+    fig.add_artist(
+        AnchoredOffsetbox(
+            loc="upper left",
+            child=HPacker(children=parts, pad=0, sep=14, align="baseline"),
+            bbox_to_anchor=(LEFT, y),
+            bbox_transform=fig.transFigure,
+            frameon=False,
+            borderpad=0,
+            pad=0,
+        )
+    )
+
+
+def footnote(fig: Figure, text: str) -> None:
+    """What the reader must know of the conditions, small, at the bottom."""
+    fig.text(LEFT, 0.012, text, fontsize=10, color="#666666", ha="left", va="bottom")
+
+
+def plain(panel: Axes) -> None:
+    """Light grid, two spines, grey ticks."""
+    panel.grid(visible=True, color="#E6E6E6", linewidth=0.8)
+    panel.set_axisbelow(True)
+    panel.spines[["top", "right"]].set_visible(False)
+    panel.spines[["left", "bottom"]].set_color("#AAAAAA")
+    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
+
+
+def change(reduction_pct: float | None) -> str:
+    """A reduction as a change with its sign: 63.4 reads "−63 %"."""
+    if reduction_pct is None:
+        return "-"
+    rounded = round(-reduction_pct)
+    return f"{f'{rounded:+d}'.replace('-', MINUS) if rounded else 0} %"
+
+
+def poles(pair: tuple[float, float], digits: int = 2) -> str:
+    """Two poles, rad/s: "−2.34, −3.56", whole numbers without digits."""
+    whole = all(p == round(p) for p in pair)
+    return ", ".join(f"{p:.{0 if whole else digits}f}" for p in pair).replace("-", MINUS)
