@@ -26,6 +26,7 @@ lint: .venv/test-ready
 bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
 	.venv/bin/python benchmarks/startup.py
+	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/tune.py
 
 clean:

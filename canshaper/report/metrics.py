@@ -167,10 +167,11 @@ def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetr
     t_s, trace = recording.t_s, recording.axes[axis]
     sway = trace.sway_deg
     windows = residual_windows(recording, strokes)
+    # Joints that swing the grapple in one plane share their sway: that is no other plane.
     crossing = [
         other.sway_deg
-        for name, other in recording.axes.items()
-        if sway is not None and name != axis and other.sway_deg is not None
+        for other in recording.axes.values()
+        if sway is not None and other.sway_deg is not None and other.sway_deg != sway
     ]
     rests = [stroke for stroke in strokes if len(stroke.rest) > 1]
     alone = [stroke for stroke in rests if stroke.alone]

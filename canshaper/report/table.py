@@ -11,6 +11,7 @@ from rich.text import Text
 from canshaper.report.metrics import MIN_RAW_DEG
 
 NOTHING = "-"
+_AXES_A_TABLE = 3  # as many as fit 80 columns
 _SWAY_ROWS = (
     ("peak sway, deg", "peak"),
     ("RMS sway, deg", "rms"),
@@ -25,13 +26,15 @@ _PAIR_ROWS = (
 
 
 def print_report(report: Mapping[str, Any], console: Console) -> None:
-    """Print a report of ``metrics.report_dict``; it fits in 80 columns with three axes.
+    """Print a report of ``metrics.report_dict``; it fits in 80 columns.
 
     Sway is given in degrees, raw then shaped, the reduction below; dip and re-rise in percent of
     full command. Where an axis has no such measure there is a "-".
     """
     arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
-    console.print(_table(report["axes"], arrow))
+    axes = list(report["axes"].items())
+    for first in range(0, len(axes), _AXES_A_TABLE):
+        console.print(_table(dict(axes[first : first + _AXES_A_TABLE]), arrow))
     console.print(Text(f"raw {arrow} shaped: the same script with filters off, then on", "dim"))
     for name, axis in report["axes"].items():
         line = _cross_line(name, axis, arrow)
