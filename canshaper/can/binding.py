@@ -17,6 +17,7 @@ from canshaper.can.lookup import Lookup
 from canshaper.can.signals import (
     VelocitySignal,
     command_fault,
+    radius_range,
     status_faults,
 )
 from canshaper.config.filters import RobustFilter
@@ -152,12 +153,8 @@ class _Binder(Lookup):
         cycle = message.cycle_time
         if not cycle:
             self.problems.append(file.problem(message, "has no GenMsgCycleTime"))
-        elif lever.timeout_ms < 2 * cycle:
-            self.add(
-                (*place, "timeout_ms"),
-                f"found {lever.timeout_ms}, allowed is {2 * cycle} ms or more:"
-                f" twice the cycle of {lever.message}",
-            )
+        else:
+            self.timeout(place, lever.timeout_ms, message)
         velocities = []
         for axis_name, axis in self.config.axes.items():
             if axis.stick.lever == name:
@@ -207,6 +204,8 @@ class _Binder(Lookup):
             self.add((*place, "axis"), f"found {config.axis!r}, which has no sway data")
         elif self._cycle(target) != self._cycle(axis):
             self.add((*place, "axis"), f"found {config.axis!r}, whose valve has another cycle")
+        else:
+            self._asked_once(place, config.axis, axis)
         if axis.sway is None:
             self.add(place, "needs the sway data of its own axis; found no sway")
         radius = config.radius
@@ -217,9 +216,22 @@ class _Binder(Lookup):
         signal = self.signal((*at, "signal"), found[1], radius.signal) if found else None
         if found is None or signal is None:
             return None
-        if signal.minimum is None or signal.maximum is None or signal.maximum <= signal.minimum:
-            self.problems.append(found[0].problem(found[1], f"{signal.name} has no range"))
+        if why := radius_range(signal):
+            self.problems.append(found[0].problem(found[1], why))
+        self.timeout(at, radius.timeout_ms, found[1])
         return BoundRadial(config, found[1])
+
+    def _asked_once(self, place: Place, name: str, axis: AxisConfig) -> None:
+        """An axis is asked by one other at most, and by none when it asks itself."""
+        for other, config in self.config.axes.items():
+            radial = config.radial_compensation
+            if radial is None or config is axis:
+                continue
+            if other == name:
+                text = f"found {name!r}, which has a radial compensation itself"
+                self.add((*place, "axis"), text)
+            elif radial.axis == name:
+                self.add((*place, "axis"), f"found {name!r}, which axis {other} uses already")
 
     def _cycle(self, axis: AxisConfig) -> int | None:
         """Cycle of the axis' valve message; None where there is no such message."""

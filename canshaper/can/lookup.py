@@ -98,6 +98,16 @@ class Lookup:
             self.problems.append(file.problem(message, why))
         return not why
 
+    def timeout(self, place: Place, timeout_ms: int, message: Message) -> None:
+        """A message counts as lost only after it has missed once."""
+        least = 2 * (message.cycle_time or 0)
+        if timeout_ms < least:
+            self.add(
+                (*place, "timeout_ms"),
+                f"found {timeout_ms}, allowed is {least} ms or more:"
+                f" twice the cycle of {message.name}",
+            )
+
     def period(self, file: DbcFile, message: Message) -> int:
         """Ticks between two sendings of a message, from its GenMsgCycleTime; 0 when impossible."""
         cycle, tick = message.cycle_time, self.config.tick_ms

@@ -87,6 +87,27 @@ def status_faults(message: Message, names: Iterable[str], codes: dict[str, int])
     return faults
 
 
+def special_codes(signal: Signal) -> dict[Any, Reason]:
+    """Raw values that are no measurement by the table of the DBC."""
+    special: dict[Any, Reason] = {}
+    for raw, name in (signal.choices or {}).items():
+        if _NOT_AVAILABLE.search(str(name)):
+            special[raw] = Reason.STICK_NOT_AVAILABLE
+        elif _ERROR.search(str(name)):
+            special[raw] = Reason.STICK_ERROR
+    return special
+
+
+def radius_range(signal: Signal) -> str | None:
+    """Why the DBC range of a radius cannot serve to tell what is one, or None when it can."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        return f"{signal.name} has no range in the DBC; what lies outside is no radius"
+    if low < 0.0:
+        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is one from 0 m or more"
+    return None
+
+
 @dataclass(frozen=True, slots=True)
 class VelocitySignal:
     """Signed velocity of a stick: raw value to command or fault."""
@@ -101,13 +122,7 @@ class VelocitySignal:
     def of(cls, signal: Signal) -> "VelocitySignal":
         """Bind a DBC signal whose range is symmetrical (``symmetrical_range``)."""
         full = float(signal.maximum or 0.0)
-        special: dict[Any, Reason] = {}
-        for raw, name in (signal.choices or {}).items():
-            if _NOT_AVAILABLE.search(str(name)):
-                special[raw] = Reason.STICK_NOT_AVAILABLE
-            elif _ERROR.search(str(name)):
-                special[raw] = Reason.STICK_ERROR
-        return cls(signal.name, signal.scale, signal.offset, full, special)
+        return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal))
 
     def command(self, raw: float) -> float | Reason:
         """Command in [-1, 1], or why the raw value is none."""

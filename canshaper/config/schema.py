@@ -131,7 +131,8 @@ class RadialConfig(Section):
     @model_validator(mode="after")
     def _one_radius(self) -> Self:
         if (self.radius_m is None) == (self.radius is None):
-            raise ValueError("allowed is one of radius_m and radius")
+            found = "neither" if self.radius is None else "both"
+            raise ValueError(f"found {found}; allowed is one of radius_m and radius")
         return self
 
 

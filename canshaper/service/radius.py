@@ -1,9 +1,10 @@
 """Radius of the tip for the radial compensation: fixed, or measured by a CAN signal."""
 
-import math
+from typing import Any
 
 from canshaper.can.binding import BoundRadial
 from canshaper.can.frame import FrameFault
+from canshaper.can.signals import find_signal, special_codes
 
 
 class RadiusInput:
@@ -13,20 +14,26 @@ class RadiusInput:
         self._fixed_m = bound.config.radius_m
         self._message = bound.message
         radius = bound.config.radius
-        self._signal = radius.signal if radius else ""
+        self._signal = (
+            find_signal(bound.message, radius.signal) if bound.message and radius else None
+        )
+        self._special = special_codes(self._signal) if self._signal else {}
         self._timeout_ns = radius.timeout_ms * 1_000_000 if radius else 0
         self._received_ns: int | None = None
         self._radius_m = 0.0
 
     def receive(self, data: bytes, now_ns: int) -> FrameFault:
-        """Take a frame; a raw value outside the DBC range is none."""
-        message = self._message
-        if message is None or len(data) != message.length:
+        """Take a frame; an error code or a value outside the DBC range is no radius."""
+        message, signal = self._message, self._signal
+        if message is None or signal is None or len(data) != message.length:
             return FrameFault.WRONG_LENGTH
-        signal = message.get_signal_by_name(self._signal)
-        raw = message.decode(data, decode_choices=False, scaling=False)
-        value = float(raw[self._signal]) * signal.scale + signal.offset  # type: ignore
-        if not (signal.minimum or 0.0) <= value <= (signal.maximum or math.inf):
+        values: Any = message.decode(data, decode_choices=False, scaling=False)
+        raw = values[signal.name]
+        value = raw * signal.scale + signal.offset
+        low, high = signal.minimum, signal.maximum
+        assert low is not None  # checked with the deployment
+        assert high is not None
+        if raw in self._special or not low <= value <= high:
             return FrameFault.INVALID_SIGNAL
         self._radius_m, self._received_ns = value, now_ns
         return FrameFault.NONE

@@ -101,11 +101,11 @@ class Compensator:
     def before_slew(self) -> None:
         """Tell the slew axis what to add in this tick."""
         axis = self._slew.axis
-        self._share = 1.0
         self._slew.added = 0.0
-        if self._moving() and axis.sway is not None:
+        if axis.sway is not None:
             self._share = self._radial.tip_share(axis.sway, axis.told)
-            self._slew.added = self._radial.slew(axis.sway, axis.told)
+            if self._moving():
+                self._slew.added = self._radial.slew(axis.sway, axis.told)
 
     def after_slew(self, now_ns: int) -> None:
         """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
@@ -120,4 +120,6 @@ class Compensator:
                 self._near_far.added = added
 
     def _moving(self) -> bool:
-        return self._slew.axis.state in (State.ACTIVE, State.STOPPING)
+        """Not for ever after a swing that nobody damps: nothing may move without an operator."""
+        axis = self._slew.axis
+        return axis.asked and axis.state in (State.ACTIVE, State.STOPPING)

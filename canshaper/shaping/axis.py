@@ -116,6 +116,11 @@ class Axis:
         self._was_reset = True
 
     @property
+    def asked(self) -> bool:
+        """Whether the operator asked for motion within the tail."""
+        return self._recent.low != 0.0 or self._recent.high != 0.0
+
+    @property
     def neutral(self) -> bool:
         """Whether the axis is at rest in a state that cannot move without the operator."""
         return self.state not in MOVING
@@ -125,15 +130,17 @@ class Axis:
 
         Args:
             stick: the checked input.
-            added: velocity that another moving axis asks of this one, fraction of full speed. Its
+            added: velocity that another moving axis asks of this one, [-1, 1] of full speed. Its
                 operator answers for it; it is carried out while this axis is enabled, its stick
                 valid, and anti-sway on. The sway model is not told of it: it is there to cause no
-                swing.
+                swing. One that is no velocity trips the axis.
 
         Returns:
             The change of state of this tick, or None.
         """
         old = self.state
+        if stick.bypass:
+            added = 0.0
         self._decide(stick, added)
         if self.state is not State.ACTIVE:
             added = 0.0
@@ -142,7 +149,7 @@ class Axis:
             if self.state in (State.ACTIVE, State.BYPASS_ON):
                 command = self._deadzone(stick.command)
             self.command = command
-            wanted = self._wanted(command)
+            wanted = self._wanted(command, added)
             if self.state in MOVING:
                 self._drive(command, wanted, added)
             else:
@@ -228,7 +235,7 @@ class Axis:
                 self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
             else:
                 self._go(State.ACTIVE, Reason.STICK_MOVED)
-        elif added and not stick.bypass:
+        elif added:
             self._go(State.ACTIVE, Reason.COMPENSATING)
 
     def _moving(self, stick: StickInput, centred: bool, added: float) -> None:
@@ -259,7 +266,7 @@ class Axis:
 
     def _at_rest(self) -> bool:
         """Neutral is sent and the run-on is over: the filter can ask for nothing any more."""
-        return self.raw == 0 and self._recent.low == 0.0 and self._recent.high == 0.0
+        return self.raw == 0 and not self.asked
 
     # -- the output ----------------------------------------------------------------------------
 
@@ -268,14 +275,14 @@ class Axis:
             raise ValueError(f"command is {command}")
         return 0.0 if abs(command) <= self._neutral_band else command
 
-    def _wanted(self, command: float) -> float:
-        """What the filter asks for, joined without a step to what was sent before a change."""
+    def _wanted(self, command: float, added: float) -> float:
+        """What the filter asks for; with ``added``, no step from what was sent before a change."""
         wanted = self._shaper.wanted(command)
         if self._bypassed:
             wanted = command
         if self._rebump:
             self._rebump = False
-            self._bump = self._limited - wanted
+            self._bump = self._limited - wanted - added
         elif self._bump:
             self._bump *= self._fade
             if abs(self._bump) < 1e-6:  # far below any frame's resolution
@@ -302,11 +309,13 @@ class Axis:
         The added part is a path to be run, slow and with few steps of the grid: what rounding and
         rates leave out is owed and paid while the axis moves anyway, never by a twitch.
         """
+        if not abs(added) <= 1.0:
+            raise ValueError(f"added velocity is {added}")
         limits = self._limits
-        step = 1.0 / self._grid_steps
-        wish = within(target + added, -limits.maximum, limits.maximum, 0.5 * step)
+        least = max(limits.minimum, 0.5 / self._grid_steps)
+        wish = within(target + added, -limits.maximum, limits.maximum, least)
         paid = self._owed if wish else 0.0
-        aim = within(wish + paid, -limits.maximum, limits.maximum, 0.0)
+        aim = within(wish + paid, -limits.maximum, limits.maximum, least)
         self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
         self.raw, self.sent = on_grid(
             self._limited, -limits.maximum, limits.maximum, limits.deadband, self._grid_steps

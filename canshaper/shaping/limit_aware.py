@@ -30,12 +30,21 @@ class LimitAware:
     Args:
         sway: sway model of the axis; its owner steps it with what was sent.
         shaper: the shaper, such as a ``Fir``.
+
+    Raises:
+        ValueError: the tick is too long for the feedback.
     """
 
     __slots__ = ("_asked", "_gff", "_shaper", "_sway", "_twin")
 
     def __init__(self, sway: SwayModel, shaper: _Shaper) -> None:
-        pole = POLE_PER_OMEGA * sway.mode.omega_rad_s
+        omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
+        if omega > fastest:
+            raise ValueError(
+                f"natural frequency is {omega:g} rad/s, allowed is up to {fastest:g} rad/s"
+                f" for this filter at a tick of {sway.tick_s:g} s"
+            )
+        pole = POLE_PER_OMEGA * omega
         self._gff = Gff(sway, (pole, pole))
         self._sway = sway
         self._twin = SwayModel(sway.mode, sway.tick_s)

@@ -54,7 +54,10 @@ def _zvd(sway: SwayModel) -> Shaper:
 
 
 def _two_mode(sway: SwayModel, *, period_s: float, damping_ratio: float) -> Shaper:
-    second = SwayMode.from_period(period_s, damping_ratio)
+    try:
+        second = SwayModel(SwayMode.from_period(period_s, damping_ratio), sway.tick_s).mode
+    except ValueError as error:
+        raise ValueError(f"second mode: {error}") from None
     return Fir(convolved(zv_taps(sway.mode, sway.tick_s), zv_taps(second, sway.tick_s)))
 
 

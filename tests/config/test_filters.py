@@ -1,0 +1,248 @@
+"""Every filter of a deployment file: it loads, it builds, and what is wrong is said in one line."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+from jsonschema import Draft202012Validator
+from typer.testing import CliRunner
+
+from canshaper.can.binding import load_deployment
+from canshaper.cli.app import app
+from canshaper.config.schema import DeploymentConfig
+from canshaper.config.source import DeploymentError
+from canshaper.shaping.fir import Fir, residual_left
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limit_aware import LimitAware
+from canshaper.shaping.registry import KINDS, KINDS_OF_SWAY, Off, build_shaper
+from canshaper.shaping.smoothing import FirstOrder, SCurve
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+Load = Callable[[str], DeploymentConfig]
+Problems = Callable[[str], list[str]]
+
+ROOT = Path(__file__).parents[2]
+SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
+LIFT = "filter: { kind: off }"
+TICK_S = 0.02
+
+GOOD: list[tuple[str, type, dict[str, Any]]] = [
+    ("kind: off", Off, {}),
+    ("kind: gff, a1: 0.42, a2: 0.043", Gff, {"a1": 0.42, "a2": 0.043}),
+    ("kind: gff, poles_rad_s: [-5, -3.5]", Gff, {"poles_rad_s": [-5.0, -3.5]}),
+    (
+        "kind: gff, poles_rad_s: [-4, -4], third_pole_rad_s: -4",
+        Gff,
+        {"poles_rad_s": [-4.0, -4.0], "third_pole_rad_s": -4.0},
+    ),
+    (
+        "kind: gff, a1: 0.42, a2: 0.043, third_pole_rad_s: -6.5",
+        Gff,
+        {"a1": 0.42, "a2": 0.043, "third_pole_rad_s": -6.5},
+    ),
+    ("kind: first_order, time_constant_s: 0.7", FirstOrder, {"time_constant_s": 0.7}),
+    (
+        "kind: s_curve, rate_per_s: 1, jerk_per_s2: 7",
+        SCurve,
+        {"rate_per_s": 1.0, "jerk_per_s2": 7.0},
+    ),
+    ("kind: zv", Fir, {}),
+    ("kind: zvd", Fir, {}),
+    ("kind: ei", Fir, {"residual_pct": 5.0}),
+    ("kind: ei, residual_pct: 2", Fir, {"residual_pct": 2.0}),
+    (
+        "kind: two_mode, period_s: 0.9, damping_ratio: 0",
+        Fir,
+        {"period_s": 0.9, "damping_ratio": 0.0},
+    ),
+    ("kind: robust, tick_ms: 20, taps: [0.5, 0.25, 0.25]", LimitAware, {"taps": [0.5, 0.25, 0.25]}),
+]
+good = pytest.mark.parametrize(("text", "kind", "parameters"), GOOD, ids=[g[0] for g in GOOD])
+
+
+def slew_with(shipped: str, text: str) -> str:
+    assert SLEW in shipped
+    return shipped.replace(SLEW, f"filter: {{ {text} }}\n")
+
+
+def test_every_kind_is_here() -> None:
+    assert {yaml.safe_load(f"{{{g[0]}}}")["kind"] or "off" for g in GOOD} == set(KINDS)
+
+
+@good
+def test_it_loads_with_its_parameters_and_builds(
+    load: Load, shipped: str, text: str, kind: type, parameters: dict[str, Any]
+) -> None:
+    axis = load(slew_with(shipped, text)).axes["slew"]
+    assert axis.filter.parameters() == parameters
+    assert axis.sway is not None
+    sway = SwayModel(axis.sway.mode(), TICK_S)
+    shaper = build_shaper(axis.filter.kind, TICK_S, sway, **axis.filter.parameters())
+    assert type(shaper) is kind
+    if axis.filter.kind == "ei":
+        assert isinstance(shaper, Fir)
+        left = residual_left(shaper.taps, SwayMode(sway.mode.omega_rad_s, 0.0), TICK_S)
+        assert 100.0 * left == pytest.approx(parameters["residual_pct"], abs=1.5)
+    for _ in range(2000):  # gain one, whatever the kind
+        sway.step(wanted := shaper.wanted(0.6))
+    assert wanted == pytest.approx(0.6, abs=1e-6)
+
+
+@good
+def test_the_json_schema_accepts_it(
+    shipped: str, text: str, kind: type, parameters: dict[str, Any]
+) -> None:
+    schema = json.loads(CliRunner().invoke(app, ["config-schema"]).stdout)
+    # PyYAML takes "off" for false; editors, whose YAML is 1.2, do not
+    data = yaml.safe_load(slew_with(shipped, text).replace("kind: off", "kind: 'off'"))
+    assert [e.message for e in Draft202012Validator(schema).iter_errors(data)] == []
+
+
+BAD = [
+    ("kind: first_order", "time_constant_s: missing: time to 63 % of a step (s)"),
+    ("kind: first_order, time_constant_s: 0.001", "found 0.001, allowed is 0.01 to 5 s"),
+    ("kind: first_order, time_constant_s: .nan", "found nan, allowed is 0.01 to 5 s"),
+    ("kind: first_order, time_constant_s: 1, tau: 1", "tau: unknown key; allowed are kind, time_"),
+    ("kind: s_curve, rate_per_s: 1", "jerk_per_s2: missing: fastest change of the rate (full"),
+    (
+        "kind: s_curve, rate_per_s: 0.1, jerk_per_s2: 9",
+        "rate_per_s: found 0.1, allowed is 0.2 to 100 full speeds per s",
+    ),
+    (
+        "kind: s_curve, rate_per_s: 1, jerk_per_s2: 1001",
+        "jerk_per_s2: found 1001, allowed is 0.2 to 1000 full speeds per s^2",
+    ),
+    ("kind: zv, residual_pct: 5", "residual_pct: unknown key; allowed are kind"),
+    ("kind: zvd, a1: 0.4", "a1: unknown key; allowed are kind"),
+    ("kind: ei, residual_pct: 0", "residual_pct: found 0, allowed is 0.1 to 20 %"),
+    ("kind: ei, residual_pct: 21", "residual_pct: found 21, allowed is 0.1 to 20 %"),
+    ("kind: two_mode, period_s: 1", "damping_ratio: missing: damping ratio of the second mode"),
+    (
+        "kind: two_mode, period_s: 13, damping_ratio: 0",
+        "period_s: found 13, allowed is 0.15 to 12 s",
+    ),
+    ("kind: two_mode, period_s: 1, damping_ratio: 1", "found 1, allowed is 0 to 0.95"),
+    ("kind: gff, third_pole_rad_s: -4", "found neither; allowed are a1 and a2, or poles_rad_s"),
+    ("kind: gff, a1: 0.42", "found a1; allowed are a1 and a2, or poles_rad_s"),
+    ("kind: gff, poles_rad_s: [-4, -4], a1: 1", "found a1, poles_rad_s; allowed are a1 and a2"),
+    (
+        "kind: gff, poles_rad_s: [-4, -4], third_pole_rad_s: 4",
+        "third_pole_rad_s: found 4, allowed is -100 to -0.1 rad/s",
+    ),
+    ("kind: robust, taps: [1]", "tick_ms: missing: period of the taps: that of the valve (ms)"),
+    ("kind: robust, tick_ms: 20", "filter.taps: missing"),
+    ("kind: robust, tick_ms: 20, taps: []", "taps: found [], allowed are 1 or more entries"),
+    ("kind: robust, tick_ms: 20, taps: [0.5, 0.4]", "sum of the taps is 0.9, allowed is 1"),
+    ("kind: robust, tick_ms: 20, taps: [1.5, -0.5]", "taps.0: found 1.5, allowed is 0 to 1"),
+    ("kind: robust, tick_ms: 20, taps: [1, .nan]", "taps.1: found nan, allowed is 0 to 1"),
+    ("kind: robust, tick_ms: 0, taps: [1]", "found 0, allowed is a whole number, 1 to 200 ms"),
+    ("kind: robust, tick_ms: 20, taps: 1", "taps: found 1, allowed is a list"),
+    ("kind: zvdd", "filter.kind: found 'zvdd', allowed is 'off', 'gff', 'first_order', 's_curve'"),
+    ("taps: [1]", "filter.kind: found None, allowed is 'off', 'gff', 'first_order', 's_curve'"),
+]
+
+
+@pytest.mark.parametrize(("text", "says"), BAD, ids=[b[0] for b in BAD])
+def test_what_is_wrong_is_named_once_or_for_each_entry(
+    problems: Problems, shipped: str, text: str, says: str
+) -> None:
+    line = shipped[: shipped.index(SLEW)].count("\n") + 1
+    found = problems(slew_with(shipped, text))
+    assert says in found[0]
+    for problem in found:
+        assert problem.startswith(f"machine.yaml:{line}: axes.slew.filter")
+    # two bad taps are two problems; all else is one
+    assert len(found) == (2 if "-0.5" in text else 1)
+
+
+def test_too_many_taps_are_one_problem(problems: Problems, shipped: str) -> None:
+    taps = ", ".join(["0.0009990009990009990"] * 1001)
+    (found,) = problems(slew_with(shipped, f"kind: robust, tick_ms: 20, taps: [{taps}]"))
+    assert "taps: found [0.000" in found
+    assert "allowed are 1000 entries at most" in found
+
+
+@pytest.mark.parametrize("kind", sorted(KINDS_OF_SWAY))
+def test_an_axis_without_sway_data_has_no_filter_that_needs_them(
+    problems: Problems, shipped: str, kind: str
+) -> None:
+    text = next(g[0] for g in GOOD if g[0].split(",")[0] == f"kind: {kind}")
+    assert LIFT in shipped
+    (found,) = problems(shipped.replace(LIFT, f"filter: {{ {text} }}"))
+    assert "axes.lift" in found
+    assert f"filter {kind} needs the sway data of the axis; found no sway" in found
+
+
+# -- against the valve's period: canshaper check ---------------------------------------------------
+
+
+def checked(directory: Path, text: str, *, sway: str = "") -> list[str]:
+    """Problems of a machine whose slew valve is sent every 40 ms."""
+    file = directory / "machine.yaml"
+    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+    changed = slew_with(shipped, text).replace("../dbc/forwarder.dbc", "machine.dbc")
+    if sway:
+        changed = changed.replace("period_s: 2.356, damping_ratio: 0.038", sway)
+    file.write_text(changed, encoding="utf-8")
+    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+    cycle = 'BA_ "GenMsgCycleTime" BO_ 512 {};'
+    assert cycle.format(20) in dbc
+    (directory / "machine.dbc").write_text(
+        dbc.replace(cycle.format(20), cycle.format(40)), encoding="cp1252"
+    )
+    result = CliRunner().invoke(app, ["check", str(file)])
+    assert not isinstance(result.exception, Exception)
+    if result.exit_code == 0:
+        load_deployment(file)
+        return []
+    assert result.exit_code == 2
+    with pytest.raises(DeploymentError) as caught:
+        load_deployment(file)
+    return [str(p).removeprefix(f"{directory}/") for p in caught.value.problems]
+
+
+def test_taps_for_another_period_than_the_valves_are_refused(tmp_path: Path) -> None:
+    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+    line = shipped[: shipped.index(SLEW)].count("\n") + 1
+    assert checked(tmp_path, "kind: robust, tick_ms: 20, taps: [0.5, 0.5]") == [
+        f"machine.yaml:{line}: axes.slew.filter: tick_ms of the taps is 20 ms,"
+        " allowed is the period of the valve, 40 ms"
+    ]
+    assert checked(tmp_path, "kind: robust, tick_ms: 40, taps: [0.5, 0.5]") == []
+
+
+QUICK = "period_s: 0.31416, damping_ratio: 0"  # 20 rad/s
+
+
+@pytest.mark.parametrize(
+    ("text", "sway", "says"),
+    [
+        ("kind: robust, tick_ms: 40, taps: [1]", QUICK, "natural frequency is 20 rad/s, allowed"),
+        ("kind: zv", "period_s: 0.2, damping_ratio: 0", "natural frequency at a tick of 0.04 s"),
+        ("kind: gff, poles_rad_s: [-4, -26]", "", "pole is -26 rad/s, allowed is -25 to below 0"),
+        (
+            "kind: gff, poles_rad_s: [-4, -4], third_pole_rad_s: -26",
+            "",
+            "pole is -26 rad/s, allowed is -25 to below 0",
+        ),
+        (
+            "kind: two_mode, period_s: 0.15, damping_ratio: 0",
+            "",
+            "second mode: natural frequency at a tick of 0.04 s is 41.8879 rad/s",
+        ),
+    ],
+)
+def test_a_filter_that_its_valve_cannot_run_is_one_problem(
+    tmp_path: Path, text: str, sway: str, says: str
+) -> None:
+    (found,) = checked(tmp_path, text, sway=sway)
+    assert "axes.slew.filter: " in found
+    assert says in found
+
+
+@pytest.mark.parametrize("text", ["kind: zv", "kind: zvd", "kind: ei", "kind: gff, a1: 1, a2: 0.1"])
+def test_a_quick_swing_that_the_tick_can_follow_is_good(tmp_path: Path, text: str) -> None:
+    assert checked(tmp_path, text, sway=QUICK) == []

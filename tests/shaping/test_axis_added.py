@@ -1,0 +1,300 @@
+"""Velocity that another axis asks: what must hold whatever is asked, and when.
+
+The oracle knows inputs and outputs only. Time is in ticks, missed ones included.
+"""
+
+import copy
+import math
+from dataclasses import replace
+
+import pytest
+from hypothesis import HealthCheck, settings
+from hypothesis import strategies as st
+from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
+
+from canshaper.shaping.axis import MOST_OWED, Axis, StickInput
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.states import Reason, State
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+BAND = 0.02
+TICK_S = 0.05
+MODE = SwayMode(2.86, 0.05)
+POLES = (-5.655, -4.112)
+DRIVEN = (State.ACTIVE, State.BYPASS_ON)
+DEAF = (State.NEUTRAL_WAIT, State.TRIPPED, State.STOPPING)
+LOST = (Reason.STICK_TIMEOUT, Reason.STICK_ERROR, Reason.SWITCH_INVALID)
+TRIPS = (Reason.SEND_FAILED, Reason.LOOP_STALLED)
+SETUPS = [  # limits, and steps of the frame
+    (OutputLimits(tail_s=0.4), 125),
+    (OutputLimits(tail_s=0.2, deadband=0.05, minimum=0.1), 125),
+    (OutputLimits(rise_per_s=1.5, fall_per_s=8.0, tail_s=0.4, maximum=0.77), 125),
+    (OutputLimits(rise_per_s=8.0, fall_per_s=1.5, tail_s=0.1), 125),
+    (OutputLimits(tail_s=0.3, deadband=0.25), 10),
+    (OutputLimits(tail_s=0.0, rise_per_s=100.0, fall_per_s=100.0, maximum=0.3), 125),
+]
+
+sticks = st.sampled_from([0.0, BAND, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0]) | st.floats(-1.0, 1.0)
+velocities = st.one_of(
+    st.sampled_from([0.0, 5e-324, -1e-300, 1e-9, 0.004, -0.004, 0.0041, 0.25, -0.25, 0.5, -0.5]),
+    st.floats(-0.5, 0.5),
+)
+durations = st.sampled_from([1, 2, 3, 5, 10, 20])
+anything = st.builds(
+    StickInput,
+    command=sticks,
+    fault=st.none() | st.none() | st.sampled_from(LOST),
+    enabled=st.booleans(),
+    bypass=st.booleans(),
+    reset=st.booleans(),
+    trip=st.none() | st.none() | st.sampled_from(TRIPS),
+)
+
+
+class AskedByAnother(RuleBasedStateMachine):
+    """Drives an axis with stick and added velocity; checks every tick."""
+
+    @initialize(setup=st.sampled_from(SETUPS))
+    def build(self, setup: tuple[OutputLimits, int]) -> None:
+        limits, steps = setup
+        self.limits = limits
+        model = SwayModel(MODE, TICK_S)
+        self.axis = Axis(
+            TICK_S,
+            limits,
+            sway=model,
+            shaper=Gff(model, POLES),
+            neutral_band=BAND,
+            stop_s=0.3,
+            grid_steps=steps,
+        )
+        self.shadow = SwayModel(MODE, TICK_S)
+        self.rise, self.fall = limits.rise_per_s * TICK_S, limits.fall_per_s * TICK_S
+        # Rates act before rounding, half a step to either side; and half a one more for a bound.
+        self.slack = 1.5 / (steps * (1.0 - limits.deadband)) + 1e-12
+        self.tail = round(limits.tail_s / TICK_S)
+        self.falling = math.ceil(limits.maximum / self.fall)
+        self.stick, self.added = StickInput(), 0.0
+        self.now = 0
+        self.armed = False
+        self.asked: list[tuple[int, float]] = []  # when which command was given by a usable stick
+        self.idle = 0  # ticks for which nobody has asked for anything
+        self.keep(2)
+
+    @rule(command=sticks, added=velocities, ticks=durations)
+    def push(self, command: float, added: float, ticks: int) -> None:
+        self.stick, self.added = replace(self.stick, command=command), added
+        self.keep(ticks)
+
+    @rule(added=st.lists(velocities, min_size=1, max_size=20))
+    def ask(self, added: list[float]) -> None:
+        for self.added in added:
+            self.tick()
+
+    @rule(cause=st.sampled_from([*LOST, *TRIPS, None]), bypass=st.booleans(), ticks=durations)
+    def fail(self, cause: Reason | None, bypass: bool, ticks: int) -> None:
+        """The stick is lost, the axis trips, or the switch is released; the asking goes on."""
+        before = self.stick
+        name = {"trip": cause} if cause in TRIPS else {"fault": cause}
+        self.stick = replace(before, enabled=cause is not None, bypass=bypass, **name)
+        self.keep(ticks)
+        self.stick = before
+
+    @rule(inputs=st.lists(st.tuples(anything, velocities), min_size=1, max_size=12))
+    def chaos(self, inputs: list[tuple[StickInput, float]]) -> None:
+        before = self.stick
+        for self.stick, self.added in inputs:
+            self.tick()
+        self.stick = before
+
+    @rule()
+    def recover(self) -> None:
+        self.stick = StickInput(enabled=False)
+        self.keep(1)
+        self.stick, self.added = StickInput(), 0.0
+        self.keep(2)
+
+    @rule()
+    def let_go(self) -> None:
+        """Nothing asked any more: at rest after the tail and the time to fall from full speed."""
+        self.stick, self.added = StickInput(reset=True), 0.0
+        self.keep(self.tail + self.falling + 10)  # stop_s and the way through the states
+        assert self.axis.raw == 0
+        assert self.axis.state in (State.READY, State.TRIPPED)
+
+    @rule(ticks=st.integers(1, 5))
+    def miss(self, ticks: int) -> None:
+        self.axis.hold(ticks)
+        for _ in range(ticks):
+            self.shadow.step(self.axis.told)
+        self.now += ticks
+
+    @rule(omega=st.floats(1.0, 6.0))
+    def retune(self, omega: float) -> None:
+        mode = SwayMode(omega, 0.02)
+        self.axis.retune(mode, lambda model: Gff(model, POLES))
+        self.shadow = self.shadow.retuned(mode, self.axis.told)
+
+    @rule(bad=st.sampled_from([math.nan, math.inf, -math.inf, 1.1, -1e300]))
+    def nonsense(self, bad: float) -> None:
+        """It trips an axis that would carry it out, and is nothing to any other."""
+        self.added = bad
+        before = self.axis.state
+        self.tick()
+        if before in (*DRIVEN, State.READY) and self.usable and not self.stick.bypass:
+            assert (self.axis.state, self.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
+        self.added = 0.0
+
+    def keep(self, ticks: int) -> None:
+        for _ in range(ticks):
+            self.tick()
+
+    def tick(self) -> None:
+        stick, axis = self.stick, self.axis
+        old, before = axis.state, axis.sent
+        self.usable = stick.fault is None and stick.trip is None and stick.enabled
+        centred = stick.fault is None and abs(stick.command) <= BAND
+        other = copy.deepcopy(axis) if not self.usable or stick.bypass or old in DEAF else None
+        axis.tick(stick, self.added)
+        self.now += 1
+        if other is not None:  # nothing that may be added to
+            other.tick(stick, 0.0)
+            assert (axis.state, axis.raw, axis.sent) == (other.state, other.raw, other.sent)
+            assert axis.told == other.told == axis.sent
+
+        # what was asked
+        if self.usable and self.armed and not centred:
+            self.asked.append((self.now, stick.command))
+        self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
+        self.armed = self.usable and (self.armed or centred)
+        carried = self.added if axis.state is State.ACTIVE and not stick.bypass else 0.0
+        self.idle = 0 if self.asked or carried else self.idle + 1
+
+        # what may come of it
+        if old is State.READY and axis.state in DRIVEN and centred:
+            assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
+            assert carried
+        assert abs(axis.sent) <= self.limits.maximum
+        assert (axis.raw == 0) == (axis.sent == 0.0)
+        if axis.state not in (*DRIVEN, State.STOPPING):
+            assert axis.raw == 0
+        if axis.raw:
+            assert stick.trip is None
+            assert self.usable or axis.state is State.STOPPING
+            assert self.idle <= self.falling
+        self.check_model(carried)
+        self.check_speed(carried, before)
+        self.check_rate(before)
+
+    def check_model(self, carried: float) -> None:
+        """It hears of what was sent for the operator of this axis, and of nothing else."""
+        axis = self.axis
+        if axis.reason is Reason.OUTPUT_INVALID:
+            self.shadow.angle, self.shadow.rate = 0.0, 0.0
+            assert axis.told == 0.0
+        assert axis.told == axis.sent - carried
+        self.shadow.step(axis.told)
+        assert axis.sway is not None
+        assert (axis.sway.angle, axis.sway.rate) == (self.shadow.angle, self.shadow.rate)
+        assert math.isfinite(self.shadow.angle + self.shadow.rate)
+
+    def check_speed(self, carried: float, before: float) -> None:
+        """No faster than stick, addition and what is owed of it; except while falling."""
+        for sign in (1.0, -1.0):
+            allowed = max([0.0, *(sign * c for _, c in self.asked)])
+            if self.axis.state in DRIVEN and sign * self.axis.command < 0.0:
+                allowed = 0.0
+            if carried:
+                allowed += sign * carried + MOST_OWED + self.slack
+            falling = sign * before - (0.0 if carried else self.fall) + self.slack
+            assert sign * self.axis.sent <= max(allowed, min(falling, sign * before), 0.0) + 1e-12
+
+    def check_rate(self, before: float) -> None:
+        sent = self.axis.sent
+        if self.axis.state not in (*DRIVEN, State.STOPPING):
+            return
+        if before * sent >= 0.0:
+            assert abs(sent) - abs(before) <= self.rise + self.slack
+            assert abs(before) - abs(sent) <= self.fall + self.slack
+        else:
+            spent = max(0.0, abs(before) - self.slack) / self.fall
+            assert spent + max(0.0, abs(sent) - self.slack) / self.rise <= 1.0 + 1e-9
+
+
+AskedByAnother.TestCase.settings = settings(
+    max_examples=300, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+)
+TestAskedByAnother = AskedByAnother.TestCase
+
+
+def axis_with(limits: OutputLimits, steps: int = 125) -> Axis:
+    model = SwayModel(MODE, TICK_S)
+    axis = Axis(TICK_S, limits, sway=model, shaper=Gff(model, POLES), grid_steps=steps)
+    axis.tick(StickInput())
+    assert axis.state is State.READY
+    return axis
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.1])
+@pytest.mark.parametrize("command", [0.0, 0.5])
+def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> None:
+    axis = axis_with(OutputLimits(tail_s=0.4))
+    for _ in range(10):
+        axis.tick(StickInput(command), 0.2)
+    axis.tick(StickInput(command), bad)
+    assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
+    assert axis.sway is not None
+    assert (axis.sway.angle, axis.sway.rate, axis.told) == (0.0, 0.0, 0.0)
+    axis.tick(StickInput(enabled=False))
+    axis.tick(StickInput())
+    axis.tick(StickInput())
+    axis.tick(StickInput(), 0.2)
+    assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
+    assert axis.sent > 0.1
+
+
+@pytest.mark.parametrize("steps", [10, 125, 1000])
+def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
+    """Far below a coarse grid's step: what rounding leaves out is paid, and nothing is left."""
+    axis = axis_with(OutputLimits(deadband=0.05), steps)
+    travel = []
+    position = 0.0
+    for i in range(200):
+        axis.tick(StickInput(), 0.13 * math.sin(2.0 * math.pi * i / 200.0))
+        position += axis.sent * TICK_S
+        travel.append(position)
+    # a coarse grid leaves out the first and last part of either way, below half a step
+    assert max(travel) == pytest.approx(0.13 * 200 * TICK_S / math.pi, rel=0.08)
+    assert abs(position) <= MOST_OWED * TICK_S + 0.5 / steps * TICK_S
+
+
+def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:
+    axis = axis_with(OutputLimits(minimum=0.1, rise_per_s=100.0, fall_per_s=100.0))
+    for _ in range(50):
+        axis.tick(StickInput(), 0.05)
+        assert axis.raw == 0
+    axis.tick(StickInput(), 0.2)
+    assert axis.sent == pytest.approx(0.2 + MOST_OWED, abs=0.01)
+
+
+def test_what_was_owed_is_forgotten_at_rest() -> None:
+    limits = OutputLimits(rise_per_s=1.0, tail_s=0.0)
+    axis, fresh = axis_with(limits), axis_with(limits)
+    for added in (0.5, 0.5, 0.0, 0.0):
+        axis.tick(StickInput(), added)
+    assert axis.state is State.READY
+    for _ in range(5):
+        axis.tick(StickInput(), 0.02)
+        fresh.tick(StickInput(), 0.02)
+        assert axis.raw == fresh.raw
+
+
+def test_a_change_of_filter_in_motion_joins_with_an_addition_too() -> None:
+    axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
+    for _ in range(8):
+        axis.tick(StickInput(0.8), -0.2)
+    before = axis.sent
+    axis.retune(MODE, lambda model: Gff(model, (-1.5, -1.5)))
+    axis.tick(StickInput(0.8), -0.2)
+    assert axis.sent == pytest.approx(before, abs=0.01)
