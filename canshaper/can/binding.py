@@ -293,7 +293,13 @@ def _filter_fault(axis: AxisConfig, period_s: float) -> str | None:
         )
     try:
         sway = SwayModel(axis.sway.mode(), period_s) if axis.sway else None
-        build_shaper(chosen.kind, period_s, sway, **chosen.parameters())
+        build_shaper(
+            chosen.kind,
+            period_s,
+            sway,
+            valve_rate_per_s=axis.limits.slowest_per_s,
+            **chosen.parameters(),
+        )
     except ValueError as error:
         return str(error)
     return None

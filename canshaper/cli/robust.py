@@ -62,7 +62,7 @@ def robust(
         limits = bound.config.limits
         tick_ms = bound.period_ticks * deployment.config.tick_ms
         tick_s = tick_ms / 1000.0
-        rate = min(limits.rise_per_s, limits.fall_per_s)
+        rate = limits.slowest_per_s
         if residual_pct is None:
             seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
             found = least_residual(
@@ -86,7 +86,10 @@ def robust(
             grid_steps=bound.valve.steps,
         )
         measured = evaluate(
-            mode, tick_s, lambda sway: build_shaper("robust", tick_s, sway, taps=taps), machine
+            mode,
+            tick_s,
+            lambda sway: build_shaper("robust", tick_s, sway, valve_rate_per_s=rate, taps=taps),
+            machine,
         )
         if write:
             gone = bound.config.filter.model_dump(exclude_none=True).keys()

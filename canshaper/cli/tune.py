@@ -143,7 +143,7 @@ def _task(
     assert bound.config.sway is not None
     limits = bound.config.limits
     if asked["max_rate_per_s"] is None:
-        asked["max_rate_per_s"] = min(limits.rise_per_s, limits.fall_per_s)
+        asked["max_rate_per_s"] = limits.slowest_per_s
     elif asked["max_rate_per_s"] == float("inf"):
         asked["max_rate_per_s"] = None
     if asked["within_command"] is None:

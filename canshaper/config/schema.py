@@ -165,6 +165,11 @@ class Limits(Section):
             raise ValueError(f"min_pct is {self.min_pct:g}, allowed is below max_pct")
         return self
 
+    @property
+    def slowest_per_s(self) -> float:
+        """The slower of both rates: what the valve follows in either direction."""
+        return min(self.rise_per_s, self.fall_per_s)
+
     def output_limits(self) -> OutputLimits:
         """The same in fractions of full scale."""
         return OutputLimits(

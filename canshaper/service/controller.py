@@ -10,8 +10,7 @@ from canshaper.can.frame import Frame, FrameFault
 from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
-from canshaper.shaping.axis import Transition
-from canshaper.shaping.states import Reason
+from canshaper.shaping.states import Reason, Transition
 
 
 @dataclass(frozen=True, slots=True)

@@ -5,8 +5,7 @@ from typing import Any
 from canshaper.can.binding import BoundLever
 from canshaper.can.codecs import WrongLengthError
 from canshaper.can.frame import FrameFault
-from canshaper.shaping.axis import StickInput
-from canshaper.shaping.states import Reason
+from canshaper.shaping.states import Reason, StickInput
 
 
 class LeverInput:

@@ -6,10 +6,10 @@ from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
 from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
-from canshaper.shaping.axis import Axis, StickInput, Transition
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.radial import RadialCompensation
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 
 
@@ -34,7 +34,13 @@ class AxisRunner:
             period_s,
             config.limits.output_limits(),
             sway=sway,
-            shaper=build_shaper(config.filter.kind, period_s, sway, **config.filter.parameters()),
+            shaper=build_shaper(
+                config.filter.kind,
+                period_s,
+                sway,
+                valve_rate_per_s=config.limits.slowest_per_s,
+                **config.filter.parameters(),
+            ),
             neutral_band=config.stick.neutral_pct / 100.0,
             stop_s=config.limits.stop_s,
             grid_steps=bound.valve.steps,

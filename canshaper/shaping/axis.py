@@ -7,7 +7,6 @@ from READY, which takes a fresh, valid, enabled stick seen in neutral.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
 from canshaper.shaping.limits import (
     OutputLimits,
@@ -18,7 +17,7 @@ from canshaper.shaping.limits import (
     within,
 )
 from canshaper.shaping.registry import Shaper
-from canshaper.shaping.states import MOVING, Reason, State
+from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 # Time constant with which the difference at a change of filter fades: quick against a swing of
@@ -26,37 +25,6 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 BLEND_S = 0.3
 # Most that may be owed of an added velocity, full speed times ticks: a few steps of a coarse grid.
 MOST_OWED = 0.1
-
-
-@dataclass(frozen=True, slots=True)
-class StickInput:
-    """Input of one axis at one tick, already checked.
-
-    Attributes:
-        command: stick in [-1, 1]; not looked at while ``fault`` is set.
-        fault: why the stick (or a switch it needs) cannot be used; None when fresh and valid.
-        enabled: enable switch; not looked at while ``fault`` is set, so that a lost frame gives
-            a shaped stop and a released switch an immediate one.
-        bypass: the operator asks for the unshaped stick.
-        reset: reset switch (its rising edge counts).
-        trip: a cause for neutral at once that is there now.
-    """
-
-    command: float = 0.0
-    fault: Reason | None = None
-    enabled: bool = True
-    bypass: bool = False
-    reset: bool = False
-    trip: Reason | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Transition:
-    """A change of state, with its reason."""
-
-    old: State
-    new: State
-    reason: Reason
 
 
 class Axis:

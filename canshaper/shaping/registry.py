@@ -1,5 +1,6 @@
 """Every filter that an axis may run, by the name it has in a deployment file."""
 
+import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
@@ -68,7 +69,7 @@ _OF_SWAY: dict[str, Callable[..., Shaper]] = {
     "zvd": _zvd,
     "ei": lambda sway, *, residual_pct: Fir(ei_taps(sway.mode, sway.tick_s, residual_pct / 100.0)),
     "two_mode": _two_mode,
-    "robust": lambda sway, *, taps: LimitAware(sway, Fir(taps)),
+    "robust": lambda sway, *, taps, rate_per_s: LimitAware(sway, Fir(taps), rate_per_s),
 }
 # Filters that need the tick only.
 _OF_TICK: dict[str, Callable[..., Shaper]] = {
@@ -80,13 +81,21 @@ KINDS_OF_SWAY = frozenset(_OF_SWAY)
 KINDS = (*_OF_TICK, *_OF_SWAY)
 
 
-def build_shaper(kind: str, tick_s: float, sway: SwayModel | None, **parameters: object) -> Shaper:
+def build_shaper(
+    kind: str,
+    tick_s: float,
+    sway: SwayModel | None,
+    *,
+    valve_rate_per_s: float = math.inf,
+    **parameters: object,
+) -> Shaper:
     """Make a filter.
 
     Args:
         kind: its name, one of ``KINDS``.
         tick_s: time between two ticks of the axis.
         sway: sway model of the axis; the filter may keep it, its owner steps it.
+        valve_rate_per_s: rate of the valve, full speeds per second, for filters that feed back.
         parameters: those of the filter, by their names in the deployment file.
 
     Raises:
@@ -96,4 +105,6 @@ def build_shaper(kind: str, tick_s: float, sway: SwayModel | None, **parameters:
         return _OF_TICK[kind](tick_s, **parameters)
     if sway is None:
         raise ValueError(f"filter {kind} needs the sway data of the axis; found no sway")
+    if kind == "robust":
+        parameters["rate_per_s"] = valve_rate_per_s
     return _OF_SWAY[kind](sway, **parameters)

@@ -1,9 +1,10 @@
-"""States of an axis, and the reasons for which it enters them.
+"""States of an axis, the reasons for which it enters them, and what it decides on.
 
 The numbers are those of the status frames; the DBC files carry the same tables. State names follow
 OPC 40020-1 where it has one (BYPASS_ON).
 """
 
+from dataclasses import dataclass
 from enum import IntEnum
 
 
@@ -54,3 +55,34 @@ class Reason(IntEnum):
     OUTPUT_INVALID = 65
     SEND_FAILED = 66
     LOOP_STALLED = 67
+
+
+@dataclass(frozen=True, slots=True)
+class StickInput:
+    """Input of one axis at one tick, already checked.
+
+    Attributes:
+        command: stick in [-1, 1]; not looked at while ``fault`` is set.
+        fault: why the stick (or a switch it needs) cannot be used; None when fresh and valid.
+        enabled: enable switch; not looked at while ``fault`` is set, so that a lost frame gives
+            a shaped stop and a released switch an immediate one.
+        bypass: the operator asks for the unshaped stick.
+        reset: reset switch (its rising edge counts).
+        trip: a cause for neutral at once that is there now.
+    """
+
+    command: float = 0.0
+    fault: Reason | None = None
+    enabled: bool = True
+    bypass: bool = False
+    reset: bool = False
+    trip: Reason | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class Transition:
+    """A change of state, with its reason."""
+
+    old: State
+    new: State
+    reason: Reason

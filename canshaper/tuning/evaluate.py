@@ -10,10 +10,11 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from canshaper.shaping.axis import Axis, StickInput
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.states import StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.tuning.formulation import SETTLED, at_length
 

@@ -1,10 +1,10 @@
 import pytest
 
-from canshaper.shaping.axis import Axis, StickInput, Transition
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Shaper
-from canshaper.shaping.states import State
+from canshaper.shaping.states import State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02

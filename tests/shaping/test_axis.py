@@ -6,10 +6,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import StickInput, Transition
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off
-from canshaper.shaping.states import MOVING, Reason, State
+from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 
 Drive = Any  # the class of conftest.py

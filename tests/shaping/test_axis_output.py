@@ -8,11 +8,11 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import BLEND_S, Axis, StickInput
+from canshaper.shaping.axis import BLEND_S, Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 Drive = Any  # the class of conftest.py

@@ -10,11 +10,11 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from canshaper.shaping.axis import Axis, StickInput, Transition
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, Shaper
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 BAND = 0.02

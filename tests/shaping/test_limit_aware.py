@@ -5,12 +5,12 @@ import random
 
 import pytest
 
-from canshaper.shaping.axis import Axis, StickInput
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.fir import Fir, zv_taps
 from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, Shaper, build_shaper
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -73,6 +73,24 @@ def test_residual_swing_where_a_limit_acts(
     print(f"residual: off {off:.3f}, bare ZV {bare:.4f}, limit-aware {aware:.5f}")
     assert bare > 0.04
     assert aware < most_of_bare * bare
+
+
+@modes
+@pytest.mark.parametrize("rate", [0.7, 1.0, 1.5, 2.0, 5.0])
+def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: float) -> None:
+    """Poles too quick for the valve would add swing: worse than no feedback at 1/s and below."""
+    limits = OutputLimits(rise_per_s=rate, fall_per_s=max(1.0, rate), tail_s=3.0)
+
+    def residual(*, aware: bool) -> float:
+        sway = SwayModel(mode, TICK_S)
+        fir = Fir(zv_taps(mode, TICK_S))
+        shaper: Shaper = LimitAware(sway, fir, rate) if aware else fir
+        axis = Axis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
+        for command in [0.0, *REVERSAL]:
+            axis.tick(StickInput(command))
+        return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
+
+    assert residual(aware=True) < 0.8 * residual(aware=False)
 
 
 @modes

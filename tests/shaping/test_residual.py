@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from canshaper.shaping.axis import Axis, StickInput
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.gff import Gff, poles_from_denominator
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, Shaper
-from canshaper.shaping.states import State
+from canshaper.shaping.states import State, StickInput
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode, SwayModel
 
 TICK_S = 0.01

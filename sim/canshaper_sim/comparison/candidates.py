@@ -48,7 +48,7 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
         raise ValueError(f"axis {axis} has no sway data: nothing to compare")
     mode = config.sway.mode()
     tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
-    rate = min(config.limits.rise_per_s, config.limits.fall_per_s)
+    rate = config.limits.slowest_per_s
     omega, period = mode.omega_rad_s, mode.period_s
     one = {"a1": 2.0000001 / omega, "a2": 1.0 / omega**2}
     found = [

@@ -29,7 +29,7 @@ def limits_for(deployment: Deployment, axis: str, outcomes: Sequence[Outcome]) -
     bound = deployment.axes[axis]
     mode = nominal_mode(deployment, axis)
     tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
-    rate = min(bound.config.limits.rise_per_s, bound.config.limits.fall_per_s)
+    rate = bound.config.limits.slowest_per_s
     lag_s = _LAGS_TO_STOP * getattr(CraneParameters(), axis).lag_s
     curve = []
     for periods in _DURATIONS_IN_PERIODS:
