@@ -105,7 +105,10 @@ def _drive_line(report: Mapping[str, Any]) -> Text:
 def _change(reduction_pct: float) -> tuple[str, str]:
     """Return the change with its sign, and a style: a reduction of 97 % reads -97 %."""
     change = round(-reduction_pct)
-    return f"{change:+d} %" if change else "0 %", "bold red" if change > 0 else "bold green"
+    text = f"{change:+d} %" if change else "0 %"
+    if change == -100 and reduction_pct < 100.0:  # not quite all of it
+        text = f"{-reduction_pct:+.1f} %" if reduction_pct < 99.95 else "-99.9 %"
+    return text, "bold red" if change > 0 else "bold green"
 
 
 def _number(value: float | None, digits: int) -> str:

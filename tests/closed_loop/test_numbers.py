@@ -59,6 +59,17 @@ def test_demo_drive_reaches_its_numbers() -> None:
     assert slew.residual_reduction_pct >= 90.0
 
 
+def test_recommended_deployment_leaves_next_to_nothing_in_both_planes() -> None:
+    deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
+    script = SCRIPTS["demo"]
+    raw = drive(deployment, script, bypass=True)
+    report = compare(raw, drive(deployment, script))
+    for name in ("near_far", "slew"):
+        assert report[name].residual_reduction_pct >= 98.5
+        assert report[name].cross_residual_reduction_pct >= 97.0
+    assert report["near_far"].peak_reduction_pct >= 70.0
+
+
 def residual_left_pct(deployment: Deployment, prepare: Any = None) -> float:
     """Of the swing after a full-stick step of 3 s out and back."""
     script = Script("step", (Stroke("near_far", 0.5, 3.0, 1.0, ramp_s=0.0),), 8.5)

@@ -86,3 +86,12 @@ def test_a_measure_of_one_drive_only(report: dict[str, Any]) -> None:
 
 def test_a_terminal_without_unicode(report: dict[str, Any]) -> None:
     assert "->" in printed(report, encoding="ascii")
+
+
+@pytest.mark.parametrize(
+    ("reduction", "told"),
+    [(99.4, "-99 %"), (99.6, "-99.6 %"), (99.97, "-99.9 %"), (100.0, "-100 %")],
+)
+def test_nearly_all_is_not_all(report: dict[str, Any], reduction: float, told: str) -> None:
+    report["axes"]["slew"]["residual_reduction_pct"] = reduction
+    assert told in printed(report)
