@@ -98,7 +98,7 @@ def compare(
         f"{axis.replace('_', '-').capitalize()}: {calm.name} leaves {calm.worst_30_deg:.1f}°"
         f" of {off.worst_30_deg:.1f}° in the worst case"
     )
-    points = [Point(r.name, r.ours, r.stop_s, r.worst_30_deg) for r in table]
+    points = [Point(r.name, r.ours, r.stop_s, r.rise_s, r.worst_30_deg) for r in table]
     picture = out / f"compare-{axis}.png"
     draw(points, limits_for(deployment, axis, outcomes), title, picture)
     console.print(f"Picture: {picture}", highlight=False)

@@ -7,12 +7,13 @@ from pathlib import Path
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
 OURS_COLOUR = "#0072B2"  # Okabe-Ito blue and vermilion: told apart by colour-blind eyes too
 OTHERS_COLOUR = "#D55E00"
 LIMIT_COLOUR = "#666666"
-_SIZE_IN = (15.0, 9.0)
+_SIZE_IN = (20.0, 9.5)
 # Of the labels, at 100 dots per inch: width of a character, and heights to try beside a dot.
 _CHARACTER_PX = 8.5
 _OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -104.0)
@@ -20,11 +21,12 @@ _OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -
 
 @dataclass(frozen=True)
 class Point:
-    """A filter: seconds to stop after release, and degrees left in the worst case."""
+    """A filter: seconds to stop after release, seconds to 95 % speed, degrees left at worst."""
 
     name: str
     ours: bool
     stop_s: float
+    rise_s: float
     worst_deg: float
 
 
@@ -49,20 +51,44 @@ def draw(points: Sequence[Point], limits: Limits, title: str, path: Path) -> Non
 
 
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
-    """The picture as a figure; direct labels, swing on a logarithmic axis."""
+    """The picture as a figure: run-on at the left, rise at the right; direct labels."""
     drawn = Figure(figsize=_SIZE_IN, dpi=100, layout="constrained")
-    axes = drawn.add_subplot()
+    FigureCanvasAgg(drawn)
     drawn.suptitle(title, x=0.01, ha="left", fontsize=17, fontweight="bold")
-    axes.set_title(
+    panels = drawn.subplots(1, 2, sharey=True)
+    panels[0].set_title(
         "blue: ours, orange: the others; further down and left is better", loc="left", fontsize=12
     )
-    axes.set_yscale("log")
-    axes.set_xlabel("run-on of the tip after release, s", fontsize=12)
-    axes.set_ylabel("largest residual swing at ±30 % pendulum length, degrees", fontsize=12)
-    axes.grid(True, which="both", color="#E5E5E5", linewidth=0.8)
-    axes.set_axisbelow(True)
-    for side in ("top", "right"):
-        axes.spines[side].set_visible(False)
+    panels[0].set_ylabel("largest residual swing at ±30 % pendulum length, degrees", fontsize=12)
+    values = [p.worst_deg for p in points]
+    for axes, label, seconds in (
+        (panels[0], "run-on of the tip after release, s", [p.stop_s for p in points]),
+        (
+            panels[1],
+            "time to 95 % of the asked speed after the press, s",
+            [p.rise_s for p in points],
+        ),
+    ):
+        axes.set_yscale("log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter(NullFormatter())
+        axes.set_xlabel(label, fontsize=12)
+        axes.grid(True, which="both", color="#E5E5E5", linewidth=0.8)
+        axes.set_axisbelow(True)
+        for side in ("top", "right"):
+            axes.spines[side].set_visible(False)
+        axes.set_xlim(0.0, max(seconds) * 1.3)
+        axes.set_ylim(0.5 * min(values), 1.5 * max(values))
+    _limits(panels[0], limits)
+    drawn.draw_without_rendering()  # the layout decides where the dots are, in pixels
+    _points(panels[0], points, [p.stop_s for p in points])
+    _points(panels[1], points, [p.rise_s for p in points])
+    return drawn
+
+
+def _limits(axes: Axes, limits: Limits) -> None:
+    """The computed limits as lines with their names."""
     if limits.curve:
         x, y = zip(*limits.curve, strict=True)
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
@@ -81,29 +107,25 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         "time-optimal limit",
         (limits.time_optimal_s, 1.0),
         xycoords=("data", "axes fraction"),
-        xytext=(4, -4),
+        xytext=(-4, -4),
         textcoords="offset points",
         va="top",
+        ha="right",
         rotation=90,
         color=LIMIT_COLOUR,
         fontsize=11,
     )
-    axes.set_xlim(0.0, max(p.stop_s for p in points) * 1.18)
-    values = [p.worst_deg for p in points]
-    axes.set_ylim(0.5 * min(values), 1.5 * max(values))
-    FigureCanvasAgg(drawn)
-    drawn.draw_without_rendering()  # the layout decides where the dots are, in pixels
-    _points(axes, points)
-    return drawn
 
 
-def _points(axes: Axes, points: Sequence[Point]) -> None:
+def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> None:
     """Dots with names; a name goes where it covers neither a dot nor another name."""
-    places = [tuple(axes.transData.transform((p.stop_s, p.worst_deg))) for p in points]
+    spots_s = [(s, p.worst_deg) for s, p in zip(seconds, points, strict=True)]
+    places = [tuple(axes.transData.transform(spot)) for spot in spots_s]
     taken = [Bbox.from_bounds(x - 7, y - 7, 14, 14) for x, y in places]
-    for point, (x, y) in sorted(zip(points, places, strict=True), key=lambda pair: pair[1]):
+    order = sorted(range(len(points)), key=lambda i: places[i])
+    for point, spot, (x, y) in ((points[i], spots_s[i], places[i]) for i in order):
         colour = OURS_COLOUR if point.ours else OTHERS_COLOUR
-        axes.plot([point.stop_s], [point.worst_deg], "o", color=colour, markersize=9)
+        axes.plot(*spot, "o", color=colour, markersize=9)
         width = _CHARACTER_PX * len(point.name)
         spots = [
             (dx if dx > 0 else dx - width, dy) for dy in _OFFSETS_PX for dx in (11.0, -11.0, 34.0)
@@ -116,7 +138,7 @@ def _points(axes: Axes, points: Sequence[Point]) -> None:
         far = abs(dy) > 20 or dx > 20
         axes.annotate(
             point.name,
-            (point.stop_s, point.worst_deg),
+            spot,
             xytext=(dx, dy),
             textcoords="offset pixels",
             va="center",
