@@ -4,16 +4,22 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.artist import Artist
-from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
-from canshaper.report.plot import MINUS, RAW_COLOUR, SHAPED_COLOUR, STICK_COLOUR, TEXT_COLOUR
+from canshaper.report.style import (
+    MINUS,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    plain,
+)
 
-__all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR"]
+__all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR", "plain"]
 
-# No filter: grey. The two plants: vermilion and blue of Okabe and Ito, as in `report.plot`.
+# No filter: grey. The two plants: vermilion and blue of Okabe and Ito, as in `report.style`.
 NONE_COLOUR = "#8C8C8C"
 PLANT_COLOUR = {"linear": RAW_COLOUR, "real": SHAPED_COLOUR}
 PLANT_WORDS = {"linear": "Eq. 13 on a linear valve", "real": "canshaper on a real valve"}
@@ -63,15 +69,6 @@ def key(fig: Figure, words: Words, y: float = 0.935) -> None:
 def footnote(fig: Figure, text: str) -> None:
     """What the reader must know of the conditions, small, at the bottom."""
     fig.text(LEFT, 0.012, text, fontsize=10, color="#666666", ha="left", va="bottom")
-
-
-def plain(panel: Axes) -> None:
-    """Light grid, two spines, grey ticks."""
-    panel.grid(visible=True, color="#E6E6E6", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color("#AAAAAA")
-    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
 
 
 def change(reduction_pct: float | None) -> str:

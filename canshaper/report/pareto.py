@@ -10,8 +10,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-OURS_COLOUR = "#0072B2"  # Okabe-Ito blue and vermilion: told apart by colour-blind eyes too
-OTHERS_COLOUR = "#D55E00"
+from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, plain
+
 LIMIT_COLOUR = "#666666"
 _SIZE_IN = (20.0, 9.5)
 # Of the labels, at 100 dots per inch: width of a character, and heights to try beside a dot.
@@ -74,10 +74,7 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter(NullFormatter())
         axes.set_xlabel(label, fontsize=12)
-        axes.grid(True, which="both", color="#E5E5E5", linewidth=0.8)
-        axes.set_axisbelow(True)
-        for side in ("top", "right"):
-            axes.spines[side].set_visible(False)
+        plain(axes)
         axes.set_xlim(0.0, max(seconds) * 1.3)
         axes.set_ylim(0.5 * min(values), 1.5 * max(values))
     _limits(panels[0], limits)
@@ -124,7 +121,7 @@ def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> No
     taken = [Bbox.from_bounds(x - 7, y - 7, 14, 14) for x, y in places]
     order = sorted(range(len(points)), key=lambda i: places[i])
     for point, spot, (x, y) in ((points[i], spots_s[i], places[i]) for i in order):
-        colour = OURS_COLOUR if point.ours else OTHERS_COLOUR
+        colour = SHAPED_COLOUR if point.ours else RAW_COLOUR
         axes.plot(*spot, "o", color=colour, markersize=9)
         width = _CHARACTER_PX * len(point.name)
         spots = [

@@ -22,12 +22,17 @@ from canshaper.report.strokes import (
     find_strokes,
     residual_windows,
 )
+from canshaper.report.style import (
+    MINUS,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    plain,
+)
 from canshaper.report.table import NOTHING, axis_title
 
-# Vermilion and blue of Okabe and Ito: told apart with any colour vision, and in grey print.
-RAW_COLOUR, SHAPED_COLOUR = "#D55E00", "#0072B2"
-STICK_COLOUR, TEXT_COLOUR, WINDOW_COLOUR = "#D5D5D5", "#333333", "#FFF1BF"
-MINUS = "\N{MINUS SIGN}"
+WINDOW_COLOUR = "#FFF1BF"
 SIZE_PX, DPI = (1600, 1000), 100
 _LEFT, _RIGHT = 0.052, 0.988  # of the figure: room for the units at the left
 
@@ -74,7 +79,8 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
         title = finding(name, report["axes"][name])
         command.set_title(title, loc="left", fontsize=15, weight="bold", color=TEXT_COLOUR, pad=8)
         for panel in (command, sway):
-            _plain(panel)
+            plain(panel)
+            panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
             _shade_windows(panel, raw, strokes[name])
         _draw_command(command, raw, shaped, name, strokes[name])
         _draw_sway(sway, raw, shaped, name)
@@ -146,15 +152,6 @@ def _explain_shade(fig: Figure) -> None:
         color=TEXT_COLOUR,
         bbox={"facecolor": WINDOW_COLOUR, "edgecolor": "none", "pad": 4.0},
     )
-
-
-def _plain(panel: Axes) -> None:
-    panel.grid(visible=True, color="#E6E6E6", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color("#AAAAAA")
-    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
-    panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
 
 
 def _shade_windows(panel: Axes, drive: Recording, strokes: list[Stroke]) -> None:

@@ -11,7 +11,14 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from canshaper.report.plot import MINUS, RAW_COLOUR, SHAPED_COLOUR, STICK_COLOUR, TEXT_COLOUR
+from canshaper.report.style import (
+    MINUS,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    plain,
+)
 from canshaper.report.table import axis_title
 from canshaper.shaping.sway import SwayMode
 from canshaper.tuning.deploy import Setting
@@ -59,7 +66,7 @@ def draw(
     swing = fig.add_subplot(left[1], sharex=command)
     length = fig.add_subplot(halves[1])
     for panel in (command, swing, length):
-        _plain(panel)
+        plain(panel)
     _draw_command(command, traces, found.measures)
     to_deg = math.degrees(mode.angle_per_speed_rad * full_speed_m_s)
     _draw_swing(swing, traces, to_deg)
@@ -84,14 +91,6 @@ def _poles(found: Setting) -> str:
     poles = [*found.poles_rad_s, *([found.third_pole_rad_s] if found.third_pole_rad_s else [])]
     text = ", ".join(f"{p:.2f}".replace("-", MINUS) for p in poles)
     return f"G_FF with poles {text} rad/s (a1 = {found.a1:g} s, a2 = {found.a2:g} s²)"
-
-
-def _plain(panel: Axes) -> None:
-    panel.grid(visible=True, color="#E6E6E6", linewidth=0.8)
-    panel.set_axisbelow(True)
-    panel.spines[["top", "right"]].set_visible(False)
-    panel.spines[["left", "bottom"]].set_color("#AAAAAA")
-    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
 
 
 def _draw_command(panel: Axes, traces: Traces, measures: Evaluation) -> None:

@@ -10,8 +10,9 @@ pytest.importorskip("matplotlib")
 from matplotlib.figure import Figure
 
 from canshaper.report.metrics import report_dict
-from canshaper.report.plot import RAW_COLOUR, SHAPED_COLOUR, draw, figure
+from canshaper.report.plot import draw, figure
 from canshaper.report.recording import Recording
+from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR
 
 Pair = tuple[Recording, Recording]
 
