@@ -3,10 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from matplotlib.artist import Artist
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
 from canshaper.report.style import (
     MINUS,
@@ -14,8 +12,10 @@ from canshaper.report.style import (
     SHAPED_COLOUR,
     STICK_COLOUR,
     TEXT_COLOUR,
+    coloured_words,
     plain,
 )
+from canshaper.report.table import change_text
 
 __all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR", "plain"]
 
@@ -49,21 +49,7 @@ def headline(fig: Figure, text: str) -> None:
 
 def key(fig: Figure, words: Words, y: float = 0.935) -> None:
     """A line of words in the colours of the curves they name."""
-    parts: list[Artist] = [
-        TextArea(text, textprops={"color": colour, "fontsize": 13, "weight": "bold"})
-        for text, colour in words
-    ]
-    fig.add_artist(
-        AnchoredOffsetbox(
-            loc="upper left",
-            child=HPacker(children=parts, pad=0, sep=14, align="baseline"),
-            bbox_to_anchor=(LEFT, y),
-            bbox_transform=fig.transFigure,
-            frameon=False,
-            borderpad=0,
-            pad=0,
-        )
-    )
+    coloured_words(fig, words, (LEFT, y), size=13, sep=14)
 
 
 def footnote(fig: Figure, text: str) -> None:
@@ -75,8 +61,7 @@ def change(reduction_pct: float | None) -> str:
     """A reduction as a change with its sign: 63.4 reads "−63 %"."""
     if reduction_pct is None:
         return "-"
-    rounded = round(-reduction_pct)
-    return f"{f'{rounded:+d}'.replace('-', MINUS) if rounded else 0} %"
+    return change_text(reduction_pct).replace("-", MINUS)
 
 
 def poles(pair: tuple[float, float], digits: int = 2) -> str:

@@ -8,11 +8,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
 from canshaper.report.recording import Recording
 from canshaper.report.strokes import (
@@ -28,9 +26,10 @@ from canshaper.report.style import (
     SHAPED_COLOUR,
     STICK_COLOUR,
     TEXT_COLOUR,
+    coloured_words,
     plain,
 )
-from canshaper.report.table import NOTHING, axis_title
+from canshaper.report.table import NOTHING, axis_title, change_text
 
 WINDOW_COLOUR = "#FFF1BF"
 SIZE_PX, DPI = (1600, 1000), 100
@@ -112,8 +111,7 @@ def _change(axis: Mapping[str, Any], measure: str) -> str:
     reduction = axis[f"{measure}_reduction_pct"]
     if reduction is None:
         return values
-    change = round(-reduction)
-    return f"{values} ({f'{change:+d}'.replace('-', MINUS) if change else 0} %)"
+    return f"{values} ({change_text(reduction).replace('-', MINUS)})"
 
 
 def _head(fig: Figure) -> None:
@@ -124,21 +122,7 @@ def _head(fig: Figure) -> None:
         ("and", TEXT_COLOUR),
         ("filters on", SHAPED_COLOUR),
     )
-    parts: list[Artist] = [
-        TextArea(text, textprops={"color": colour, "fontsize": 18, "weight": "bold"})
-        for text, colour in words
-    ]
-    fig.add_artist(
-        AnchoredOffsetbox(
-            loc="upper left",
-            child=HPacker(children=parts, pad=0, sep=7, align="baseline"),
-            bbox_to_anchor=(_LEFT, 0.988),
-            bbox_transform=fig.transFigure,
-            frameon=False,
-            borderpad=0,
-            pad=0,
-        )
-    )
+    coloured_words(fig, words, (_LEFT, 0.988), size=18, sep=7)
 
 
 def _explain_shade(fig: Figure) -> None:

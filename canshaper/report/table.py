@@ -102,13 +102,17 @@ def _drive_line(report: Mapping[str, Any]) -> Text:
     return line
 
 
-def _change(reduction_pct: float) -> tuple[str, str]:
-    """Return the change with its sign, and a style: a reduction of 97 % reads -97 %."""
+def change_text(reduction_pct: float) -> str:
+    """A reduction as a change with its sign: of 97 % it reads "-97 %", nearly all is not all."""
     change = round(-reduction_pct)
-    text = f"{change:+d} %" if change else "0 %"
-    if change == -100 and reduction_pct < 100.0:  # not quite all of it
-        text = f"{-reduction_pct:+.1f} %" if reduction_pct < 99.95 else "-99.9 %"
-    return text, "bold red" if change > 0 else "bold green"
+    if change == -100 and reduction_pct < 100.0:
+        return f"{-reduction_pct:+.1f} %" if reduction_pct < 99.95 else "-99.9 %"
+    return f"{change:+d} %" if change else "0 %"
+
+
+def _change(reduction_pct: float) -> tuple[str, str]:
+    """Return the change, and a style that says whether it is one for the better."""
+    return change_text(reduction_pct), "bold red" if round(-reduction_pct) > 0 else "bold green"
 
 
 def _number(value: float | None, digits: int) -> str:

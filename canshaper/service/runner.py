@@ -45,10 +45,7 @@ class AxisRunner:
             stop_s=config.limits.stop_s,
             grid_steps=bound.valve.steps,
         )
-        self._sway_deg = 0.0
-        if config.sway:
-            model = config.sway.mode().angle_per_speed_rad
-            self._sway_deg = math.degrees(model * config.sway.full_speed_m_s)
+        self._full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
         self.trip: Reason | None = None
         self.lost = False
         self.added = 0.0
@@ -76,7 +73,8 @@ class AxisRunner:
         if self.bound.status is None:
             return None
         axis = self.axis
-        sway_deg = axis.sway.angle * self._sway_deg if axis.sway else 0.0
+        sway_rad = axis.sway.sway_rad(self._full_speed_m_s) if axis.sway else 0.0
+        sway_deg = math.degrees(sway_rad)
         return self.bound.status.frame(axis.state, axis.reason, axis.command, axis.sent, sway_deg)
 
 

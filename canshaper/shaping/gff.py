@@ -68,9 +68,11 @@ class Gff:
         self.k1 = (sway.f11 + sway.f22 * dc - d1 - d2) / sway.f12
 
     @classmethod
-    def from_denominator(cls, sway: SwayModel, a1: float, a2: float) -> Self:
+    def from_denominator(
+        cls, sway: SwayModel, a1: float, a2: float, third_pole_rad_s: float | None = None
+    ) -> Self:
         """Gains from the denominator a2 s^2 + a1 s + 1 of Eq. 13 (a1 in s, a2 in s^2)."""
-        return cls(sway, poles_from_denominator(a1, a2))
+        return cls(sway, poles_from_denominator(a1, a2), third_pole_rad_s)
 
     def wanted(self, command: float) -> float:
         """Output the filter asks for, before limits; ``command`` in [-1, 1]."""

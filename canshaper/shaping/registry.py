@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from typing import Protocol
 
 from canshaper.shaping.fir import Fir, convolved, ei_taps, zv_taps
-from canshaper.shaping.gff import Gff, poles_from_denominator
+from canshaper.shaping.gff import Gff
 from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.smoothing import FirstOrder, SCurve
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -41,12 +41,10 @@ def _gff(
     third_pole_rad_s: float | None = None,
 ) -> Shaper:
     if poles_rad_s is not None:
-        poles = poles_rad_s[0], poles_rad_s[1]
-    elif a1 is not None and a2 is not None:
-        poles = poles_from_denominator(a1, a2)
-    else:
-        raise ValueError("allowed are a1 and a2, or poles_rad_s")
-    return Gff(sway, poles, third_pole_rad_s)
+        return Gff(sway, (poles_rad_s[0], poles_rad_s[1]), third_pole_rad_s)
+    if a1 is not None and a2 is not None:
+        return Gff.from_denominator(sway, a1, a2, third_pole_rad_s)
+    raise ValueError("allowed are a1 and a2, or poles_rad_s")
 
 
 def _zvd(sway: SwayModel) -> Shaper:
