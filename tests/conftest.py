@@ -7,4 +7,6 @@ from hypothesis import settings
 # No time limit per example: machines are noisy. On a build machine the examples are the same every
 # time, so that a red run can be repeated; elsewhere every run tries new ones.
 settings.register_profile("canshaper", deadline=None, derandomize="CI" in os.environ)
+# For the coverage gate and the mutation run: few examples, always the same.
+settings.register_profile("few", deadline=None, derandomize=True, max_examples=10)
 settings.load_profile("canshaper")

@@ -7,25 +7,23 @@ from cantools.database.can import Message
 
 from canshaper.can.codecs import (
     AxisStatusCodec,
-    LeverCodec,
     Sender,
     ServiceStatusCodec,
     ValveCodec,
 )
 from canshaper.can.database import Messages
-from canshaper.can.lookup import Lookup
+from canshaper.can.inputs import BoundLever, BoundStop, InputBinder
 from canshaper.can.signals import (
-    VelocitySignal,
     command_fault,
     radius_range,
     status_faults,
 )
+from canshaper.can.socketcan import Ids
 from canshaper.config.filters import RobustFilter
 from canshaper.config.load import load_config
 from canshaper.config.schema import (
     AxisConfig,
     DeploymentConfig,
-    Lever,
     RadialConfig,
     Status,
     Valve,
@@ -36,21 +34,6 @@ from canshaper.shaping.sway import SwayModel
 
 # A valve hears of a stop no sooner than with its next frame.
 SLOWEST_VALVE_MS = 200
-
-
-@dataclass(frozen=True)
-class BoundLever:
-    """A lever with its message; ``key`` is (bus, id, extended)."""
-
-    name: str
-    config: Lever
-    message: Message
-    codec: LeverCodec
-
-    @property
-    def key(self) -> tuple[str, int, bool]:
-        """Where its frames are found."""
-        return self.config.bus, self.message.frame_id, self.message.is_extended_frame
 
 
 @dataclass(frozen=True)
@@ -91,8 +74,26 @@ class Deployment:
     messages: Messages
     levers: dict[str, BoundLever]
     axes: dict[str, BoundAxis]
+    emergency_stop: BoundStop | None
     status: ServiceStatusCodec | None
     status_ticks: int
+
+    def ids(self, bus: str) -> Ids:
+        """Messages that matter on a bus."""
+        inputs = [*self.levers.values(), *([self.emergency_stop] if self.emergency_stop else [])]
+        radials = [a.radial.key for a in self.axes.values() if a.radial and a.radial.key]
+        taken = [i.key for i in inputs] + radials
+        valves = [a.valve.sender.key for a in self.axes.values()]
+        sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
+        return Ids(
+            frozenset(key[1:] for key in taken if key[0] == bus),
+            frozenset(key[1:] for key in sent if key[0] == bus),
+            frozenset(key[1:] for key in valves if key[0] == bus),
+            frozenset(self.messages.ids()),
+        )
+
+    def _axis_status(self) -> list[AxisStatusCodec | None]:
+        return [axis.status for axis in self.axes.values()]
 
 
 def load_deployment(path: Path) -> Deployment:
@@ -105,7 +106,7 @@ def load_deployment(path: Path) -> Deployment:
     return _Binder(config, source).deployment(path)
 
 
-class _Binder(Lookup):
+class _Binder(InputBinder):
     """Binds part by part; with any problem there is no deployment."""
 
     def deployment(self, path: Path) -> Deployment:
@@ -114,8 +115,9 @@ class _Binder(Lookup):
         messages = self.load(path.parent)
         if messages is None:
             raise DeploymentError(self.problems)
-        levers = {n: self._lever(n, lever) for n, lever in config.levers.items()}
+        levers = {n: self.lever(n, lever) for n, lever in config.levers.items()}
         axes = {n: self._axis(n, axis) for n, axis in config.axes.items()}
+        stop = self.stop(config.emergency_stop) if config.emergency_stop else None
         service = self._status(("status",), config.status, ServiceStatusCodec)
         if self.problems:
             raise DeploymentError(self.problems)
@@ -125,6 +127,7 @@ class _Binder(Lookup):
             messages,
             {n: lever for n, lever in levers.items() if lever},
             {n: axis for n, axis in axes.items() if axis},
+            stop,
             ServiceStatusCodec(service[0]) if service else None,
             service[1] if service else 0,
         )
@@ -136,36 +139,6 @@ class _Binder(Lookup):
             if key in seen:
                 self.add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
             seen[key] = name
-
-    def _lever(self, name: str, lever: Lever) -> BoundLever | None:
-        place: Place = ("levers", name)
-        found = self.message(place, lever.bus, lever.message, takes=True)
-        if not found:
-            return None
-        file, message = found
-        before = len(self.problems)
-        use: dict[str, str] = {}
-        for key in ("enable", "reset", "anti_sway_off", "alive_counter"):
-            if signal := self.signal((*place, key), message, getattr(lever, key)):
-                self.integer((*place, key), signal)
-                self.alone((*place, key), signal, use)
-                use[signal.name] = key
-        cycle = message.cycle_time
-        if not cycle:
-            self.problems.append(file.problem(message, "has no GenMsgCycleTime"))
-        else:
-            self.timeout(place, lever.timeout_ms, message)
-        velocities = []
-        for axis_name, axis in self.config.axes.items():
-            if axis.stick.lever == name:
-                at = ("axes", axis_name, "stick", "signal")
-                signal = self.signal(at, message, axis.stick.signal)
-                if signal and self.full_scale(file, message, signal):
-                    self.alone(at, signal, use)
-                    velocities.append(VelocitySignal.of(signal))
-        if len(self.problems) > before:
-            return None
-        return BoundLever(name, lever, message, LeverCodec(message, velocities))
 
     def _axis(self, name: str, axis: AxisConfig) -> BoundAxis | None:
         place: Place = ("axes", name)

@@ -1,24 +1,22 @@
-"""CAN buses through python-can, without its Notifier: one exception ends that thread for good.
+"""CAN buses of a deployment: SocketCAN by raw sockets, everything else through python-can.
 
 Every error of a bus is counted and told, none leaves this module; reading and sending go on with
 the next tick, so an interface that comes back is used again.
 """
 
-import socket
+import errno
 from collections import deque
 from collections.abc import Callable, Iterator
-from typing import Any
+from functools import partial
+from typing import Any, Protocol
 
 import can
 
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.can.raw import MOST_FRAMES, RawPort
+from canshaper.can.socketcan import Ids, open_sockets
 from canshaper.config.schema import Bus
 
-# Frames taken from one bus in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms;
-# ten times that empties any backlog and still cannot hold up the tick for ever.
-MOST_FRAMES = 2000
-# Room for the backlog of a long stall; python-can leaves the default of about 300 frames.
-RECEIVE_BUFFER_BYTES = 1 << 20
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
 
@@ -27,43 +25,81 @@ class BusError(Exception):
     """A bus could not be opened."""
 
 
-class Port:
-    """One open bus.
+class Port(Protocol):
+    """One open bus."""
+
+    name: str
+    state: BusState
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits, in order; ends when there is none or the bus fails."""
+
+    def others(self) -> Iterator[Frame]:
+        """What can wait until the valves have been told: other senders with our ids, and so on."""
+
+    def send(self, frame: Frame) -> bool:
+        """Send now or not at all; False when the frame did not go out."""
+
+    def watch(self, name: str, ids: Ids) -> None:
+        """Serve another deployment: its name of the bus, its messages."""
+
+    def fileno(self) -> int:
+        """File descriptor to wait on; -1 where there is none."""
+
+    def close(self) -> None:
+        """Close the bus; errors of a bus that is gone do not matter any more."""
+
+
+def open_port(
+    name: str, config: Bus, on_fault: Callable[[FrameFault], None], ids: Ids | None = None
+) -> Port:
+    """Open a bus.
 
     Args:
         name: name of the bus in the deployment file.
         config: its section.
         on_fault: called with every fault of the bus.
+        ids: the messages that matter; None takes all frames.
 
     Raises:
         BusError: the bus cannot be opened; the message says which and why.
     """
+    try:
+        if config.interface != "socketcan":
+            return PythonCanPort(name, config, on_fault)
+        return RawPort(
+            name, partial(open_sockets, config.channel), ids, on_fault, confirms=ids is not None
+        )
+    except Exception as error:  # each interface raises its own kinds
+        text = (error.strerror if isinstance(error, OSError) else None) or str(error)
+        if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
+            text = "this kernel has no CAN, or its module can_raw is not loaded"
+        where = f"{config.interface} channel {config.channel}"
+        raise BusError(
+            f"bus {name}: cannot open {where}: {text or type(error).__name__}"
+        ) from error
+
+
+class PythonCanPort:
+    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
 
     def __init__(self, name: str, config: Bus, on_fault: Callable[[FrameFault], None]) -> None:
         self.name = name
+        self.state = BusState.UP
         self._on_fault = on_fault
         options: dict[str, Any] = {} if config.bitrate is None else {"bitrate": config.bitrate}
-        try:
-            # ignore_config: files and variables of the environment must not change the bus
-            self._bus = can.Bus(
-                interface=config.interface,
-                channel=config.channel,
-                ignore_config=True,
-                receive_own_messages=False,
-                **options,
-            )
-        except Exception as error:  # each interface raises its own kinds
-            text = str(error) or type(error).__name__
-            raise BusError(
-                f"bus {name}: cannot open {config.interface} channel {config.channel}: {text}"
-            ) from error
-        # Multicast brings back what this process sent; SocketCAN does not.
+        # ignore_config: files and variables of the environment must not change the bus
+        self._bus = can.Bus(
+            interface=config.interface,
+            channel=config.channel,
+            ignore_config=True,
+            receive_own_messages=False,
+            **options,
+        )
+        # Multicast brings back what this process sent; the others do not.
         self._echoes: deque[Frame] | None = (
             deque(maxlen=MOST_ECHOES) if config.interface == "udp_multicast" else None
         )
-        raw = getattr(self._bus, "socket", None)
-        if isinstance(raw, socket.socket):
-            raw.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -72,10 +108,12 @@ class Port:
             try:
                 message = receive(0)
             except (can.CanError, OSError):
+                self.state = BusState.FAILED
                 self._on_fault(FrameFault.BUS_ERROR)
                 return
             if message is None:
                 return
+            self.state = BusState.UP
             if message.is_error_frame:  # first: its id is an error class, and could match
                 self._on_fault(FrameFault.ERROR_FRAME)
             elif message.is_remote_frame or message.is_fd:
@@ -89,6 +127,10 @@ class Port:
                 else:
                     yield frame
 
+    def others(self) -> Iterator[Frame]:
+        """Nothing: ``frames`` hands out everything."""
+        return iter(())
+
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
         message = can.Message(
@@ -97,10 +139,15 @@ class Port:
         try:
             self._bus.send(message)
         except (can.CanError, OSError):
+            self.state = BusState.FAILED
             return False
         if self._echoes is not None:
             self._echoes.append(frame)
         return True
+
+    def watch(self, name: str, ids: Ids) -> None:
+        """Serve another deployment: its name of the bus."""
+        self.name = name
 
     def fileno(self) -> int:
         """File descriptor to wait on; -1 where the interface has none."""

@@ -1,13 +1,14 @@
-"""Codecs of one lever, one valve and the status messages. Decode and encode through cantools."""
+"""Codecs of one lever, one valve and the status messages."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from bitstruct import Error as BitstructError
-from cantools.database import DecodeError
 from cantools.database.can import Message
 
+from canshaper.can.flags import FlaggedVelocity
 from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.layout import Layout
 from canshaper.can.signals import FieldSet, VelocitySignal, valve_steps
 from canshaper.shaping.states import Reason, State
 
@@ -19,8 +20,11 @@ class WrongLengthError(Exception):
 class LeverCodec:
     """Joystick message to raw values and switches."""
 
-    def __init__(self, message: Message, velocities: list[VelocitySignal]) -> None:
-        self._message = message
+    def __init__(
+        self, message: Message, velocities: Sequence[VelocitySignal | FlaggedVelocity]
+    ) -> None:
+        self._length = message.length
+        self._layout = Layout(message)
         self._velocities = velocities
 
     def decode(self, data: bytes) -> tuple[dict[str, Any], dict[str, float | Reason]]:
@@ -30,17 +34,12 @@ class LeverCodec:
             (raw values of all signals, command or fault of every velocity signal).
 
         Raises:
-            WrongLengthError: the length is not that of the message. cantools would read a longer
-                frame without a word.
+            WrongLengthError: the length is not that of the message.
         """
-        if len(data) != self._message.length:
+        if len(data) != self._length:
             raise WrongLengthError
-        try:
-            raw = self._message.decode(data, decode_choices=False, scaling=False)
-        except (DecodeError, BitstructError):
-            raise WrongLengthError from None
-        values: dict[str, Any] = raw  # type: ignore[assignment]  # plain numbers: no choices asked
-        return values, {v.name: v.command(values[v.name]) for v in self._velocities}
+        raw = self._layout.decode(data)
+        return raw, {v.name: v.read(raw) for v in self._velocities}
 
 
 class Sender:
@@ -52,6 +51,11 @@ class Sender:
         self._extended = message.is_extended_frame
         self.fields = FieldSet(message)
 
+    @property
+    def key(self) -> tuple[str, int, bool]:
+        """Bus, id and whether that is extended."""
+        return self._bus, self._id, self._extended
+
     def frame(self, raw: dict[str, int]) -> Frame:
         """Frame with these raw values."""
         return Frame(self._bus, self._id, self._extended, self.fields.encode(raw))
@@ -61,7 +65,7 @@ class ValveCodec:
     """Grid steps of an axis to the valve's frame."""
 
     def __init__(self, sender: Sender, signal: str, alive_counter: str | None) -> None:
-        self._sender = sender
+        self.sender = sender
         self._signal = signal
         self._alive = alive_counter
         message = sender.fields.message
@@ -81,7 +85,7 @@ class ValveCodec:
         if self._alive is not None:
             self._count = (self._count + 1) % self._counter_range
             raw[self._alive] = self._count
-        return self._sender.frame(raw)
+        return self.sender.frame(raw)
 
     def velocity_steps(self, raw: int) -> int:
         """Grid steps for a raw value of the signal."""

@@ -8,6 +8,7 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database, Message
 
+from canshaper.can.layout import layout_fault
 from canshaper.config.source import Problem
 
 
@@ -64,7 +65,9 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
             text = f"has the id {message.frame_id:#x} of {seen[key]}"
             problems.append(loaded.problem(message, text))
         seen[key] = message.name
-    return loaded, problems
+    faults = [(m, fault) for m in database.messages if (fault := layout_fault(m))]
+    problems += [loaded.problem(*fault) for fault in faults]
+    return None if faults else loaded, problems
 
 
 class Messages:

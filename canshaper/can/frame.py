@@ -1,6 +1,6 @@
 """A CAN frame as the pure part of canshaper sees it."""
 
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import NamedTuple
 
 
@@ -24,3 +24,31 @@ class FrameFault(IntEnum):
     SEND_FAILED = 5
     MISSED_DEADLINE = 6
     BUS_ERROR = 7
+    CHECKSUM = 8
+    COUNTER_REPEATED = 9
+    COUNTER_JUMP = 10
+    SECOND_SENDER = 11
+    BUS_OFF = 12
+    BUS_PASSIVE = 13
+    FRAMES_LOST = 14
+    NOT_CONFIRMED = 15
+    BUS_GONE = 16
+    BUS_DOWN = 17
+
+
+class BusState(Enum):
+    """State of a bus, as far as it is seen from our sockets."""
+
+    UP = "up"
+    PASSIVE = "passive"
+    """The controller counts many errors."""
+    BUS_OFF = "bus-off"
+    """The controller has left the bus."""
+    NOT_CONFIRMED = "not-confirmed"
+    """Our frames do not get onto the bus: nobody listens, or it is blocked."""
+    DOWN = "down"
+    """The interface is set down."""
+    GONE = "gone"
+    """The interface is removed."""
+    FAILED = "failed"
+    """Reading or sending failed in another way."""

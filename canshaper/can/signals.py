@@ -1,7 +1,7 @@
 """Signals of a DBC message: raw codes are tested first, then scaled.
 
 cantools scales whatever it finds: an error code of 1022 at 0.1 % per bit becomes 102.2 %. So
-everything here is decoded raw (``decode_choices=False, scaling=False``) and judged raw.
+everything here is decoded raw (``Layout``) and judged raw.
 """
 
 import math
@@ -12,6 +12,7 @@ from typing import Any
 
 from cantools.database.can import Message, Signal
 
+from canshaper.can.layout import Layout
 from canshaper.shaping.states import Reason
 
 # Names that the tables of a DBC give to raw values that are no measurement.
@@ -34,21 +35,45 @@ def raw_limits(signal: Signal) -> tuple[int, int]:
 def symmetrical_range(signal: Signal) -> str | None:
     """Why the DBC range of a velocity signal cannot serve as full scale, or None when it can."""
     low, high = signal.minimum, signal.maximum
+    if fault := _no_range(signal):
+        return fault
+    if not math.isclose(-(low or 0.0), high or 0.0):
+        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is a symmetrical one"
+    return _not_reached(signal)
+
+
+def magnitude_range(signal: Signal) -> str | None:
+    """The same for a velocity whose direction is told by flags: its range begins at 0."""
+    if fault := _no_range(signal):
+        return fault
+    if signal.minimum != 0.0:
+        found = f"[{signal.minimum:g}|{signal.maximum:g}]"
+        return f"{signal.name} has the range {found}; allowed with direction flags is one from 0"
+    return _not_reached(signal)
+
+
+def _no_range(signal: Signal) -> str | None:
+    low, high = signal.minimum, signal.maximum
     if not signal.scale:
         return f"{signal.name} has a scale of 0, allowed is any other"
     if low is None or high is None or high <= low:
         return f"{signal.name} has no range in the DBC; full speed is taken from it"
-    if not math.isclose(-low, high):
-        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is a symmetrical one"
-    if not signal.is_float:
-        raw_low, raw_high = raw_limits(signal)
-        ends = [(v - signal.offset) / signal.scale for v in (low, high)]
-        # A millionth of a step: scale and range are decimals, 88.9 / 0.7 is a little above 127.
-        if min(ends) < raw_low - 1e-6 or max(ends) > raw_high + 1e-6:
-            return (
-                f"{signal.name} cannot reach its range [{low:g}|{high:g}] with {signal.length}"
-                f" bits at {signal.scale:g} per bit"
-            )
+    return None
+
+
+def _not_reached(signal: Signal) -> str | None:
+    """Why the bits of a signal do not reach the ends of its range."""
+    if signal.is_float:
+        return None
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
+    raw_low, raw_high = raw_limits(signal)
+    ends = [(v - signal.offset) / signal.scale for v in (low, high)]
+    # A millionth of a step: scale and range are decimals, 88.9 / 0.7 is a little above 127.
+    if min(ends) < raw_low - 1e-6 or max(ends) > raw_high + 1e-6:
+        return (
+            f"{signal.name} cannot reach its range [{low:g}|{high:g}] with {signal.length}"
+            f" bits at {signal.scale:g} per bit"
+        )
     return None
 
 
@@ -108,6 +133,10 @@ def radius_range(signal: Signal) -> str | None:
     return None
 
 
+# Of full scale; covers the rounding of scale and offset, and is less than any resolution.
+ROUNDING = 1e-6
+
+
 @dataclass(frozen=True, slots=True)
 class VelocitySignal:
     """Signed velocity of a stick: raw value to command or fault."""
@@ -120,22 +149,27 @@ class VelocitySignal:
 
     @classmethod
     def of(cls, signal: Signal) -> "VelocitySignal":
-        """Bind a DBC signal whose range is symmetrical (``symmetrical_range``)."""
+        """Bind a DBC signal with a ``symmetrical_range``, or a ``magnitude_range``."""
         full = float(signal.maximum or 0.0)
         return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal))
 
     def command(self, raw: float) -> float | Reason:
-        """Command in [-1, 1], or why the raw value is none."""
+        """Part of full scale in [-1, 1], or why the raw value is no velocity."""
         fault = self.special.get(raw)
         if fault is not None:
             return fault
         value = (raw * self.scale + self.offset) / self.full
+        if -1.0 <= value <= 1.0:
+            return value
         if not math.isfinite(value):
             return Reason.STICK_NOT_A_NUMBER
-        # A millionth covers the rounding of scale and offset, less than any resolution.
-        if abs(value) > 1.000001:
+        if abs(value) > 1.0 + ROUNDING:
             return Reason.STICK_OUT_OF_RANGE
-        return min(max(value, -1.0), 1.0)
+        return math.copysign(1.0, value)
+
+    def read(self, raw: dict[str, Any]) -> float | Reason:
+        """Command of a frame, from the raw values of its signals."""
+        return self.command(raw[self.name])
 
 
 class FieldSet:
@@ -143,6 +177,7 @@ class FieldSet:
 
     def __init__(self, message: Message) -> None:
         self.message = message
+        self._layout = Layout(message)
         self._base: dict[str, Any] = {s.name: self._start(s) for s in message.signals}
         self._fields = {
             s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
@@ -165,5 +200,9 @@ class FieldSet:
         return min(max(round((value - offset) / scale), low), high)
 
     def encode(self, raw: dict[str, int]) -> bytes:
-        """Data of the message with these raw values."""
-        return self.message.encode({**self._base, **raw}, scaling=False, strict=False)
+        """Data of the message with these raw values.
+
+        Raises:
+            OverflowError: a value is not within the bits of its signal.
+        """
+        return self._layout.encode({**self._base, **raw})

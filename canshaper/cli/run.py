@@ -1,8 +1,5 @@
 """``canshaper run``: the daemon."""
 
-import logging
-import sys
-
 from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
 
 
@@ -23,12 +20,10 @@ def run(
     """
     from canshaper.can.bus import BusError
     from canshaper.config.source import DeploymentError
+    from canshaper.service import journal
     from canshaper.service.daemon import Daemon
 
-    logging.basicConfig(
-        stream=sys.stderr, level=logging.WARNING, format="%(asctime)s %(levelname)s %(message)s"
-    )
-    logging.getLogger("canshaper").setLevel(logging.INFO)
+    journal.set_up()
     try:
         daemon = Daemon(loader(file, interface, channel))
     except (DeploymentError, BusError) as error:

@@ -63,6 +63,8 @@ def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Prob
         number = context["min_length" if kind == "too_short" else "max_length"]
         most = "or more entries" if kind == "too_short" else "entries at most"
         text = f"found {_short(found)}, allowed are {number} {most}"
+    elif kind == "literal_error":
+        text = f"found {_short(found)}, allowed is {context['expected']}"
     else:
         text = f"found {_short(found)}, allowed is {place.allowed or error['msg']}"
     return source.problem(place.path, text)

@@ -1,6 +1,6 @@
 """Schema of the deployment file. Unknown keys are errors; every number has a range and a unit."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -20,23 +20,67 @@ class Bus(Section):
     """Only for interfaces that set it; SocketCAN takes it from the system."""
 
 
-class Lever(Section):
-    """A joystick message and the switches in it."""
+class Checksum(Section):
+    """Checksum of a message, over all its bytes but the one that holds it."""
+
+    signal: str = Field(description="signal that holds it: 8 bits that fill a byte")
+    kind: Literal["xor", "sum", "crc8_sae_j1850", "crc8_autosar"] = Field(
+        description="how it is computed"
+    )
+
+
+class Input(Section):
+    """A message that is taken, with its age limit and its protection."""
 
     bus: str = Field(description="name of the bus the message arrives on")
     message: str = Field(description="message in the DBC files")
     timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
+    alive_counter: str | None = Field(None, description="signal counted up with every message")
+    alive_max_step: (
+        Annotated[
+            int, number(1, 255, "", "largest step of the alive counter that is still the next one")
+        ]
+        | None
+    ) = None
+    """3, or half of the counter's range where that is less."""
+    checksum: Checksum | None = None
+    qualify: Annotated[
+        int, number(1, 20, "messages", "good ones in a row that are needed after a wrong one")
+    ] = 1
+
+
+class Lever(Input):
+    """A joystick message and the switches in it."""
+
     enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(None, description="signal that asks for the unshaped stick")
-    alive_counter: str | None = Field(None, description="signal that changes with every message")
+    frozen_s: Annotated[
+        float, number(1, 3600, "s", "a stick deflected for so long without change is broken")
+    ] = 20.0
+
+
+class EmergencyStop(Input):
+    """An emergency stop that is told on the bus. It is no replacement for the one that is wired."""
+
+    signal: str = Field(description="signal of the stop: 0 free, all else stops")
+
+
+class DirectionFlags(Section):
+    """Signals that tell the direction of a stick, as in J1939-71: 1 yes, 0 no, all else invalid."""
+
+    neutral: str = Field(description="signal that the stick is in neutral")
+    negative: str = Field(description="signal that the velocity is negative")
+    positive: str = Field(description="signal that the velocity is positive")
 
 
 class Stick(Section):
     """Where an axis gets its command from."""
 
     lever: str = Field(description="name of a lever")
-    signal: str = Field(description="signal with the signed velocity; its DBC range is full stick")
+    signal: str = Field(description="signal with the velocity; its DBC range is full stick")
+    flags: DirectionFlags | None = None
+    """Only where the velocity has no sign of its own."""
     neutral_pct: Annotated[
         float, number(0.1, 20, "% of full stick", "deflection that still counts as neutral")
     ] = 2.0
@@ -212,4 +256,5 @@ class DeploymentConfig(Section):
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     levers: dict[str, Lever] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
+    emergency_stop: EmergencyStop | None = None
     status: Status | None = None

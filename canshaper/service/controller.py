@@ -3,14 +3,21 @@
 The same object runs in the daemon, in lock-step simulation and in replay of a log.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame, FrameFault
+from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
 from canshaper.shaping.states import Reason, Transition
+
+# A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
+# than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
+LATE_WEIGHT = 5
+LATE_LIMIT = 50
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,6 +40,12 @@ class Counters:
         FrameFault.INVALID_SIGNAL: "InvalidSignals",
         FrameFault.SEND_FAILED: "SendFailures",
         FrameFault.MISSED_DEADLINE: "MissedDeadlines",
+        FrameFault.CHECKSUM: "InvalidSignals",
+        FrameFault.COUNTER_REPEATED: "InvalidSignals",
+        FrameFault.COUNTER_JUMP: "InvalidSignals",
+        FrameFault.BUS_OFF: "ErrorFrames",
+        FrameFault.BUS_PASSIVE: "ErrorFrames",
+        FrameFault.NOT_CONFIRMED: "SendFailures",
     }
 
     def __init__(self) -> None:
@@ -64,18 +77,21 @@ class Controller:
         self.counters = Counters()
         self.events: list[Event] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
-        self._inputs: dict[tuple[str, int, bool], LeverInput | RadiusInput] = {
+        self._inputs: dict[tuple[str, int, bool], Input | RadiusInput] = {
             lever.key: levers[name] for name, lever in deployment.levers.items()
         }
+        self._stop: EmergencyStopInput | None = None
+        if stop := deployment.emergency_stop:
+            self._stop = EmergencyStopInput(stop, stop.config.signal)
+            self._inputs[stop.key] = self._stop
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
             name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
             for name, bound in deployment.axes.items()
         }
-        self._by_message = {
-            (a.bound.config.valve.bus, m.frame_id, m.is_extended_frame): a
-            for a in self.axes.values()
-            for m in [a.bound.valve_message]
+        self._by_message = {a.bound.valve.sender.key: a for a in self.axes.values()}
+        self._sent = {
+            (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
         }
         for runner in self.axes.values():
             if runner.bound.radial is not None:
@@ -85,11 +101,13 @@ class Controller:
                 target = self.axes[runner.bound.radial.config.axis]
                 runner.compensator = Compensator(runner, target, radius)
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
-        used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._by_message)}
+        used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._sent)}
         self._others = deployment.messages.ids() - used
         # An axis that asks something of another one goes first.
         self._order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
         self._last = -1  # number of the last deadline
+        self._late = 0
+        self._overrun = False
 
     @property
     def neutral(self) -> bool:
@@ -98,48 +116,68 @@ class Controller:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception."""
-        entry = self._inputs.get((frame.bus, frame.can_id, frame.extended))
+        key = frame[:3]
+        entry = self._inputs.get(key)
         if entry is not None:
             fault = entry.receive(frame.data, now_ns)
-        elif (frame.can_id, frame.extended) in self._others:
+        elif key in self._sent:  # a bus never hands back what was sent by us
+            fault = FrameFault.SECOND_SENDER
+            if runner := self._by_message.get(key):
+                runner.contested_ns = now_ns
+        elif key[1:] in self._others:
             return
         else:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
 
-    def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
+    def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run every axis that is due.
+
+        The frames come one by one, each valve's as soon as its axis has moved and all of them
+        before any status, to be sent at once; all have to be taken.
 
         Args:
             now_ns: monotonic time of this tick.
             missed: deadlines missed since the last tick; the last output was held meanwhile.
 
-        Returns:
-            The frames to send now, valve frames first. A frame that could not be sent is to be
-            told to ``send_failed``, and never sent later.
+        Yields:
+            The frames to send now. One that could not be sent is to be told to ``send_failed``,
+            and never sent later.
         """
-        frames: list[Frame] = []
-        status: list[Frame] = []
         last, now = self._last, self._last + 1 + missed
         self._last = now
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
+        overrun = self._overruns(missed)
+        changed = []
         for name, runner in self._order:
-            transition = None
             if passed := _passed(last, now, runner.bound.period_ticks):
-                runner.axis.hold(passed - 1)
-                transition = runner.tick(now_ns)
-                frames.append(runner.valve_frame())
+                if passed > 1:
+                    runner.axis.hold(passed - 1)
+                transition = runner.tick(now_ns, self._stop, overrun)
+                yield runner.valve_frame()
                 if transition is not None:
                     self.events.append(Event(name, transition))
-            due = transition is not None or _passed(last, now, runner.bound.status_ticks)
-            if due and (frame := runner.status_frame()):
-                status.append(frame)
+                    changed.append(runner)
+        for runner in self.axes.values():
+            if runner in changed or _passed(last, now, runner.bound.status_ticks):
+                frame = runner.status_frame()
+                if frame:
+                    yield frame
         service = self.deployment.status
         if service and _passed(last, now, self.deployment.status_ticks):
-            status.append(service.frame(self.counters.status()))
-        return frames + status
+            yield service.frame(self.counters.status())
+
+    def _overruns(self, missed: int) -> bool:
+        """Whether so many ticks came late that the filter no longer does what it was tuned for."""
+        if missed:
+            self._late = min(self._late + LATE_WEIGHT, LATE_LIMIT)
+            self._overrun |= self._late == LATE_LIMIT
+        elif self._late:
+            self._late -= 1
+            self._overrun &= self._late > 0
+        return self._overrun
 
     def stalled(self) -> None:
         """The loop stood still for longer than any input may be old: nothing known still holds."""

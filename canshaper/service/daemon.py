@@ -1,22 +1,26 @@
-"""The daemon: buses, controller and loop together; signals; what is logged."""
+"""The daemon: buses, controller and loop together; signals; what is told to people."""
 
 import logging
 import signal
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from types import FrameType
 
 from canshaper.can.binding import Deployment
-from canshaper.can.bus import BusError, Port
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.bus import BusError, Port, open_port
+from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.config.schema import Bus, Input
 from canshaper.config.source import DeploymentError
 from canshaper.service.controller import Controller
 from canshaper.service.loop import run_at_deadlines
+from canshaper.service.notify import ServiceManager
+from canshaper.service.realtime import Collector, lock_memory
 
 log = logging.getLogger("canshaper")
 
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
+SECOND_NS = 1_000_000_000
 
 
 class Daemon:
@@ -34,10 +38,15 @@ class Daemon:
         self._load = load
         self._stop = False
         self._reload = False
+        self._reload_told = False
+        self._manager = ServiceManager()
+        self._collector = Collector()
         self._logged_fault = FrameFault.NONE
         self._log_again_ns = 0
+        self._told_ns = 0
+        self._latest_ns = 0
         deployment = load()
-        self._ports = self._open(deployment)
+        self._ports = self._open(deployment, {})
         self._use(deployment)
 
     def run(self) -> None:
@@ -45,40 +54,52 @@ class Daemon:
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         names = ",".join(self._controller.axes)
+        why = lock_memory()
+        log.info("memory=%s", f"not-locked ({why})" if why else "locked")
+        self._collector.freeze()
+        self._send_neutral()  # most valves want to see it before they listen to anything else
         log.info("started file=%s axes=%s", self._controller.deployment.path, names)
+        self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
                 run_at_deadlines(self._tick_ns, self._body)
                 if self._reload and not self._stop:
                     self._apply_reload()
         finally:
+            self._manager.stopping()
             self._send_neutral()
-            self._close(self._ports)
+            self._close(self._ports.values())
         log.info("stopped valves=neutral")
 
     # -- one tick ------------------------------------------------------------------------------
 
-    def _body(self, now_ns: int, missed: int) -> bool:
+    def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
         """Take all waiting frames, tick the axes, send, then housekeeping."""
         controller = self._controller
+        ports = self._ports
         if missed * self._tick_ns > self._stall_ns:
             # What waits in the sockets is as old as the stall; it must not look fresh.
-            for port in self._ports.values():
+            for port in ports.values():
                 for _ in port.frames():
                     pass
             controller.stalled()
-        for port in self._ports.values():
+        for port in ports.values():
             for frame in port.frames():
                 controller.receive(frame, now_ns)
         for frame in controller.tick(now_ns, missed):
-            if not self._ports[frame.bus].send(frame):
+            if not ports[frame.bus].send(frame):
                 controller.send_failed(frame)
+        for port in ports.values():
+            for frame in port.others():
+                controller.receive(frame, now_ns)
+        self._latest_ns = max(self._latest_ns, late_ns)
         self._housekeeping(now_ns)
         return not (self._stop or (self._reload and controller.neutral))
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""
         controller = self._controller
+        self._manager.ping(now_ns)
         for event in controller.events:
             t = event.transition
             log.info(
@@ -89,27 +110,58 @@ class Daemon:
                 t.reason.name,
             )
         controller.events.clear()
+        for name, port in self._ports.items():
+            if port.state is not self._bus_states[name]:
+                self._bus_states[name] = port.state
+                level = logging.INFO if port.state is BusState.UP else logging.WARNING
+                log.log(level, "bus=%s state=%s", name, port.state.value)
         fault = controller.counters.last_fault
         if fault is not self._logged_fault and now_ns >= self._log_again_ns:
             self._logged_fault = fault
-            self._log_again_ns = now_ns + 1_000_000_000  # two faults in turn must not flood the log
+            self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
             log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
+        if self._reload and not self._reload_told:
+            self._reload_told = True
+            self._manager.reloading()
+            if not controller.neutral:
+                log.info("reload=waiting until every axis is neutral")
+        elif now_ns >= self._told_ns:
+            self._told_ns = now_ns + SECOND_NS
+            self._manager.status(self._summary())
+            self._latest_ns = 0
+            for handler in logging.getLogger().handlers:
+                handler.flush()  # a reader that was slow may be back
+        self._collector.pause(now_ns)
+
+    def _summary(self) -> str:
+        """One line for people: axes, buses, lateness of the last second, deadlines missed."""
+        axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
+        buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
+        missed = self._controller.counters.values["MissedDeadlines"]
+        return ", ".join(
+            [*axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
+        )
 
     # -- deployments ---------------------------------------------------------------------------
 
     def _use(self, deployment: Deployment) -> None:
         self._controller = Controller(deployment)
+        self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        shortest_ms = min(lever.config.timeout_ms for lever in deployment.levers.values())
-        self._stall_ns = shortest_ms * 1_000_000
+        inputs: list[Input] = [lever.config for lever in deployment.levers.values()]
+        if deployment.emergency_stop:
+            inputs.append(deployment.emergency_stop.config)
+        self._stall_ns = min(i.timeout_ms for i in inputs) * 1_000_000
 
-    def _open(self, deployment: Deployment) -> dict[str, Port]:
+    def _open(self, deployment: Deployment, opened: dict[Bus, Port]) -> dict[str, Port]:
+        """Ports of a deployment by name, those among them that are open already included."""
         ports: dict[str, Port] = {}
         try:
             for name, bus in deployment.config.buses.items():
-                ports[name] = Port(name, bus, self._on_fault)
+                port = opened.get(bus)
+                ports[name] = port or open_port(name, bus, self._on_fault, deployment.ids(name))
         except BusError:
-            self._close(ports)
+            self._close(port for port in ports.values() if port not in opened.values())
             raise
         return ports
 
@@ -118,21 +170,28 @@ class Daemon:
 
         Called with every axis neutral and no tick running, so it may take its time.
         """
-        self._reload = False
+        self._reload = self._reload_told = False
+        config = self._controller.deployment.config
+        opened = {bus: self._ports[name] for name, bus in config.buses.items()}
         try:
             deployment = self._load()
-            same = deployment.config.buses == self._controller.deployment.config.buses
-            ports = self._ports if same else self._open(deployment)
+            ports = self._open(deployment, opened)
         except (DeploymentError, BusError) as error:
-            for line in str(error).splitlines():
+            lines = str(error).splitlines()
+            for line in lines:
                 log.error("reload=refused %s", line)
-            return
-        self._send_neutral()
-        if not same:
-            self._close(self._ports)
-        self._ports = ports
-        self._use(deployment)
-        log.info("reload=applied file=%s", deployment.path)
+            self._manager.ready(f"reload refused: {lines[0]}")
+        else:
+            self._send_neutral()
+            self._close(port for port in opened.values() if port not in ports.values())
+            for name, port in ports.items():
+                port.watch(name, deployment.ids(name))
+            self._ports = ports
+            self._use(deployment)
+            log.info("reload=applied file=%s", deployment.path)
+            self._manager.ready("reload applied")
+        self._told_ns = time.monotonic_ns() + SECOND_NS
+        self._collector.freeze()
 
     # -- ends ----------------------------------------------------------------------------------
 
@@ -149,8 +208,8 @@ class Daemon:
         for frame in waiting:
             log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
 
-    def _close(self, ports: dict[str, Port]) -> None:
-        for port in ports.values():
+    def _close(self, ports: Iterable[Port]) -> None:
+        for port in ports:
             port.close()
 
     def _on_fault(self, fault: FrameFault) -> None:

@@ -1,59 +1,81 @@
-"""What is known of one lever now: its last good frame, and whether it still counts."""
+"""What is known of one lever now: its last good frame, and what an axis may use of it."""
 
 from typing import Any
 
-from canshaper.can.binding import BoundLever
-from canshaper.can.codecs import WrongLengthError
 from canshaper.can.frame import FrameFault
+from canshaper.can.inputs import BoundLever
+from canshaper.service.input import Input
 from canshaper.shaping.states import Reason, StickInput
 
 
-class LeverInput:
+class LeverInput(Input):
     """Takes the frames of one lever; answers what an axis may use of them at a moment."""
 
     def __init__(self, lever: BoundLever) -> None:
+        super().__init__(lever)
         config = lever.config
-        self._codec = lever.codec
-        self._timeout_ns = config.timeout_ms * 1_000_000
         self._enable = config.enable
         self._reset = config.reset
         self._off = config.anti_sway_off
-        self._alive = config.alive_counter
-        self._received_ns: int | None = None
-        self._raw: dict[str, Any] = {}
-        self._commands: dict[str, float | Reason] = {}
+        self._frozen_ns = round(config.frozen_s * 1e9)
+        self._changed_ns: dict[str, int] = {}
+        self._released_ns = -1
+        self._released = False
 
-    def receive(self, data: bytes, now_ns: int) -> FrameFault:
-        """Take a frame. One with the alive counter of the last is no news and refreshes nothing."""
-        try:
-            raw, commands = self._codec.decode(data)
-        except WrongLengthError:
-            return FrameFault.WRONG_LENGTH
-        if self._alive and self._raw and raw[self._alive] == self._raw[self._alive]:
-            return FrameFault.NONE
-        self._raw, self._commands, self._received_ns = raw, commands, now_ns
-        invalid = any(isinstance(c, Reason) for c in commands.values())
-        if invalid or raw[self._enable] not in (0, 1):
-            return FrameFault.INVALID_SIGNAL
-        return FrameFault.NONE
+    def heard(self, raw: dict[str, Any], now_ns: int) -> None:
+        """A released enable needs no trust, and counts however short it is."""
+        if raw[self._enable] == 0:
+            self._released_ns = now_ns
+            self._released = True
 
-    def forget(self) -> None:
-        """Nothing received so far counts any more."""
-        self._received_ns = None
+    def accepted(
+        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int
+    ) -> None:
+        """Note since when each stick is where it is."""
+        self._released = raw[self._enable] == 0
+        for name, command in commands.items():
+            if command != self.commands.get(name):
+                self._changed_ns[name] = now_ns
 
-    def stick(self, signal: str, now_ns: int, trip: Reason | None) -> StickInput:
-        """Input of the axis that this signal drives."""
-        if self._received_ns is None or now_ns - self._received_ns > self._timeout_ns:
-            return StickInput(fault=Reason.STICK_TIMEOUT, trip=trip)
-        raw = self._raw
-        command = self._commands[signal]
+    def content_fault(self) -> FrameFault:
+        """Codes that are no measurement."""
+        for command in self.commands.values():
+            if isinstance(command, Reason):
+                return FrameFault.INVALID_SIGNAL
+        valid = self.raw[self._enable] in (0, 1)
+        return FrameFault.NONE if valid else FrameFault.INVALID_SIGNAL
+
+    def stick(
+        self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
+    ) -> StickInput:
+        """Input of the axis that this signal drives.
+
+        Args:
+            signal: name of its velocity signal.
+            now_ns: monotonic time.
+            since_ns: when this axis asked last.
+            trip: a cause for neutral at once, handed through.
+            neutral_band: |stick| up to which it counts as neutral and may stand still for ever.
+        """
+        lost = self.lost(now_ns)
+        released = self._released or self._released_ns > since_ns
+        if lost is not None:
+            # Seen released is more than lost: an immediate stop, not the shaped one.
+            released = released and lost is Reason.STICK_UNTRUSTED
+            return StickInput(fault=None if released else lost, enabled=not released, trip=trip)
+        raw = self.raw
+        command = self.commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
-        enable = raw[self._enable]
+        enable = 0 if released else raw[self._enable]
         if isinstance(command, Reason):
-            if enable == 0:  # seen released: an immediate stop, not the shaped one of a lost stick
-                return StickInput(enabled=False, bypass=bypass, trip=trip)
-            return StickInput(fault=command, bypass=bypass, trip=trip)
-        if enable not in (0, 1):
-            return StickInput(fault=Reason.SWITCH_INVALID, bypass=bypass, trip=trip)
-        return StickInput(command, None, enable == 1, bypass, reset, trip)
+            fault: Reason | None = command
+        elif enable not in (0, 1):
+            fault = Reason.SWITCH_INVALID
+        elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
+            fault = Reason.STICK_FROZEN
+        else:
+            return StickInput(command, None, enable == 1, bypass, reset, trip)
+        if enable == 0:
+            return StickInput(enabled=False, bypass=bypass, trip=trip)
+        return StickInput(fault=fault, bypass=bypass, trip=trip)

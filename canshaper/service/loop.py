@@ -4,7 +4,7 @@ import time
 from collections.abc import Callable
 
 
-def run_at_deadlines(period_ns: int, body: Callable[[int, int], bool]) -> None:
+def run_at_deadlines(period_ns: int, body: Callable[[int, int, int], bool]) -> None:
     """Call ``body`` at every deadline until it returns False.
 
     The deadlines are fixed in advance, so lateness does not add up. Deadlines that have passed
@@ -12,18 +12,19 @@ def run_at_deadlines(period_ns: int, body: Callable[[int, int], bool]) -> None:
 
     Args:
         period_ns: time between two deadlines.
-        body: called with the monotonic time and the number of deadlines missed since its last
-            call.
+        body: called with the monotonic time, the number of deadlines missed since its last call,
+            and how late it is, in ns after the first deadline it has not yet been called for.
     """
     clock = time.monotonic_ns
-    deadline = clock()
-    missed = 0
-    while body(clock(), missed):
+    deadline = now = clock()
+    while True:
+        late = now - deadline
+        missed = max(0, late) // period_ns
+        deadline += missed * period_ns
+        if not body(now, missed, late):
+            return
         deadline += period_ns
         left = deadline - clock()
         if left > 0:
             time.sleep(left / 1e9)
-            missed = 0
-        else:
-            missed = -left // period_ns
-            deadline += missed * period_ns
+        now = clock()

@@ -1,9 +1,8 @@
 """Radius of the tip for the radial compensation: fixed, or measured by a CAN signal."""
 
-from typing import Any
-
 from canshaper.can.binding import BoundRadial
 from canshaper.can.frame import FrameFault
+from canshaper.can.layout import Layout
 from canshaper.can.signals import find_signal, special_codes
 
 
@@ -12,7 +11,8 @@ class RadiusInput:
 
     def __init__(self, bound: BoundRadial) -> None:
         self._fixed_m = bound.config.radius_m
-        self._message = bound.message
+        self._layout = Layout(bound.message) if bound.message else None
+        self._length = bound.message.length if bound.message else 0
         radius = bound.config.radius
         self._signal = (
             find_signal(bound.message, radius.signal) if bound.message and radius else None
@@ -24,11 +24,10 @@ class RadiusInput:
 
     def receive(self, data: bytes, now_ns: int) -> FrameFault:
         """Take a frame; an error code or a value outside the DBC range is no radius."""
-        message, signal = self._message, self._signal
-        if message is None or signal is None or len(data) != message.length:
+        layout, signal = self._layout, self._signal
+        if layout is None or signal is None or len(data) != self._length:
             return FrameFault.WRONG_LENGTH
-        values: Any = message.decode(data, decode_choices=False, scaling=False)
-        raw = values[signal.name]
+        raw = layout.decode(data)[signal.name]
         value = raw * signal.scale + signal.offset
         low, high = signal.minimum, signal.maximum
         assert low is not None  # checked with the deployment

@@ -4,6 +4,7 @@ import math
 
 from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
+from canshaper.service.input import EmergencyStopInput
 from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
 from canshaper.shaping.axis import Axis
@@ -12,6 +13,10 @@ from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 
+# How long another sender must be silent before a trip for it can be reset: ten periods of a slow
+# valve message.
+CONTESTED_NS = 1_000_000_000
+
 
 class AxisRunner:
     """One axis with its codecs: when it is due, what it sends.
@@ -19,6 +24,7 @@ class AxisRunner:
     Attributes:
         trip: a cause for neutral at once, noted since the last tick.
         lost: the input was lost since the last tick, though it may be back: neutral comes first.
+        contested_ns: when a frame of another sender with the id of this valve was last seen.
         added: velocity that another axis asks of this one, fraction of full speed.
         compensator: what this axis asks of another one, where it slews.
     """
@@ -27,7 +33,9 @@ class AxisRunner:
         config = bound.config
         self.bound = bound
         self._lever = lever
+        self._ticked_ns = -1
         self._signal = config.stick.signal
+        self._neutral_band = config.stick.neutral_pct / 100.0
         period_s = tick_s * bound.period_ticks
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         self.axis = Axis(
@@ -41,28 +49,55 @@ class AxisRunner:
                 valve_rate_per_s=config.limits.slowest_per_s,
                 **config.filter.parameters(),
             ),
-            neutral_band=config.stick.neutral_pct / 100.0,
+            neutral_band=self._neutral_band,
             stop_s=config.limits.stop_s,
             grid_steps=bound.valve.steps,
         )
         self._full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
         self.trip: Reason | None = None
         self.lost = False
+        self.contested_ns: int | None = None
         self.added = 0.0
         self.compensator: Compensator | None = None
 
-    def tick(self, now_ns: int) -> Transition | None:
-        """One step of the axis; a trip cause noted since the last one acts now."""
-        stick = self._lever.stick(self._signal, now_ns, self.trip)
-        if self.lost:
-            stick = StickInput(fault=Reason.STICK_TIMEOUT, trip=self.trip)
-        self.trip, self.lost = None, False
+    def tick(
+        self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
+    ) -> Transition | None:
+        """One step of the axis; a trip cause noted since the last one acts now.
+
+        Args:
+            now_ns: monotonic time.
+            emergency: the emergency stop, where there is one.
+            overrun: too many deadlines were missed lately.
+        """
+        stick = self._stick(now_ns, emergency)
+        self._ticked_ns = now_ns
+        if overrun and stick.enabled and stick.fault is None:
+            stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
         if self.compensator is None:
             return self.axis.tick(stick, self.added)
         self.compensator.before_slew()
         transition = self.axis.tick(stick, self.added)
         self.compensator.after_slew(now_ns)
         return transition
+
+    def _stick(self, now_ns: int, emergency: EmergencyStopInput | None) -> StickInput:
+        since_ns = self._ticked_ns
+        trip, lost = self.trip, self.lost
+        self.trip, self.lost = None, False
+        if self.contested_ns is not None:
+            if now_ns - self.contested_ns <= CONTESTED_NS:
+                trip = trip or Reason.SECOND_SENDER
+            else:
+                self.contested_ns = None
+        stop = emergency.stop(now_ns, since_ns) if emergency else None
+        if stop is Reason.EMERGENCY_STOP or (stop and not self.axis.neutral):
+            trip = trip or stop
+        elif stop is not None:  # not heard of yet: nothing to trip, but nothing may begin
+            return StickInput(fault=stop, trip=trip)
+        if lost:
+            return StickInput(fault=Reason.STICK_TIMEOUT, trip=trip)
+        return self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
 
     def valve_frame(self) -> Frame:
         """The frame for what the axis sends now."""

@@ -165,7 +165,8 @@ class Axis:
         rising = (stick.reset and not self._was_reset) or (
             valid and stick.enabled and not self._was_enabled
         )
-        self._was_reset = stick.reset
+        # A switch that is held while its frames fail is no new press.
+        self._was_reset = stick.reset or (self._was_reset and not valid)
         if valid:
             self._was_enabled = stick.enabled
         centred = valid and abs(stick.command) <= self._neutral_band

@@ -6,6 +6,7 @@ OPC 40020-1 where it has one (BYPASS_ON).
 
 from dataclasses import dataclass
 from enum import IntEnum
+from typing import NamedTuple
 
 
 class State(IntEnum):
@@ -50,15 +51,21 @@ class Reason(IntEnum):
     STICK_OUT_OF_RANGE = 35
     STICK_NOT_A_NUMBER = 36
     SWITCH_INVALID = 37
+    STICK_CONTRADICTORY = 38
+    STICK_FROZEN = 39
+    STICK_UNTRUSTED = 40
+    LOOP_OVERRUN = 41
     # Neutral at once, latched.
     ENABLE_LOST = 64
     OUTPUT_INVALID = 65
     SEND_FAILED = 66
     LOOP_STALLED = 67
+    EMERGENCY_STOP = 68
+    EMERGENCY_STOP_LOST = 69
+    SECOND_SENDER = 70
 
 
-@dataclass(frozen=True, slots=True)
-class StickInput:
+class StickInput(NamedTuple):
     """Input of one axis at one tick, already checked.
 
     Attributes:

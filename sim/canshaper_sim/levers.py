@@ -1,22 +1,56 @@
 """The operator's levers as a node on CAN: a script in, joystick frames out."""
 
-from canshaper.can.binding import BoundLever, Deployment
+import math
+
+from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
-from canshaper.can.signals import find_signal
+from canshaper.can.inputs import BoundInput, BoundLever, BoundStop
+from canshaper.can.protection import CHECKSUMS
 from canshaper_sim.axes import JOINT_AXES, SLEW
 from canshaper_sim.strokes import Script
 
 
-class _Lever:
-    """One joystick message with its alive counter."""
+class _Message:
+    """A message with its alive counter and its checksum."""
+
+    def __init__(self, bound: BoundInput) -> None:
+        config = bound.config
+        self.cycle_ms = bound.message.cycle_time or 20
+        self._sender = Sender(config.bus, bound.message)
+        self._alive = config.alive_counter
+        self._range = bound.counter_range
+        self._checksum = bound.checksum
+        self._count = 0
+        self._base: dict[str, int] = {}
+
+    def frame(self, script: Script, time_s: float) -> Frame:
+        """The next frame, at a time of the script."""
+        raw = {**self._base, **self.sticks(script, time_s)}
+        if self._alive:
+            self._count = (self._count + 1) % self._range
+            raw[self._alive] = self._count
+        frame = self._sender.frame(raw)
+        if self._checksum is None:
+            return frame
+        kind, at = self._checksum
+        data = bytearray(frame.data)
+        data[at] = CHECKSUMS[kind](frame.data[:at] + frame.data[at + 1 :])
+        return frame._replace(data=bytes(data))
+
+    def sticks(self, script: Script, time_s: float) -> dict[str, int]:
+        """Raw values that the script moves."""
+        return {}
+
+
+class _Lever(_Message):
+    """One joystick message."""
 
     def __init__(self, lever: BoundLever, deployment: Deployment, *, bypass: bool) -> None:
+        super().__init__(lever)
         config = lever.config
-        self.cycle_ms = lever.message.cycle_time or 20
-        self._sender = Sender(config.bus, lever.message)
-        self._axes = {
-            axis.config.stick.signal: name
+        self._sticks = {
+            name: axis.config.stick
             for name, axis in deployment.axes.items()
             if axis.config.stick.lever == lever.name
         }
@@ -30,20 +64,27 @@ class _Lever:
         self._base[config.enable] = 1
         if config.anti_sway_off:
             self._base[config.anti_sway_off] = int(bypass)
-        self._alive = config.alive_counter
-        counter = find_signal(lever.message, config.alive_counter) if config.alive_counter else None
-        self._range = 1 << counter.length if counter else 1
-        self._count = 0
 
-    def frame(self, script: Script, time_s: float) -> Frame:
-        raw = dict(self._base)
-        fields = self._sender.fields
-        for signal, axis in self._axes.items():
-            raw[signal] = fields.raw(signal, self._full[signal] * script.stick(axis, time_s))
-        if self._alive:
-            self._count = (self._count + 1) % self._range
-            raw[self._alive] = self._count
-        return self._sender.frame(raw)
+    def sticks(self, script: Script, time_s: float) -> dict[str, int]:
+        """Raw values of the sticks."""
+        fields, raw = self._sender.fields, {}
+        for axis, stick in self._sticks.items():
+            command = script.stick(axis, time_s)
+            if flags := stick.flags:
+                raw[flags.neutral] = int(command == 0.0)
+                raw[flags.negative] = int(command < 0.0)
+                raw[flags.positive] = int(command > 0.0)
+                command = abs(command)
+            raw[stick.signal] = fields.raw(stick.signal, self._full[stick.signal] * command)
+        return raw
+
+
+class _Stop(_Message):
+    """The emergency stop, never pressed."""
+
+    def __init__(self, stop: BoundStop) -> None:
+        super().__init__(stop)
+        self._base = {stop.config.signal: 0}
 
 
 class LeverNode:
@@ -68,13 +109,17 @@ class LeverNode:
                 f" the deployment has {', '.join(deployment.axes)}"
             )
         self.script = script
-        self._levers = [_Lever(v, deployment, bypass=bypass) for v in deployment.levers.values()]
-        self.cycle_ms = min(lever.cycle_ms for lever in self._levers)
+        self._messages: list[_Message] = [
+            _Lever(lever, deployment, bypass=bypass) for lever in deployment.levers.values()
+        ]
+        if deployment.emergency_stop:
+            self._messages.append(_Stop(deployment.emergency_stop))
+        self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
 
     def frames(self, time_ms: int) -> list[Frame]:
         """Frames that are due at this time of the script."""
         return [
-            lever.frame(self.script, time_ms / 1000.0)
-            for lever in self._levers
-            if time_ms % lever.cycle_ms == 0
+            message.frame(self.script, time_ms / 1000.0)
+            for message in self._messages
+            if time_ms % message.cycle_ms == 0
         ]

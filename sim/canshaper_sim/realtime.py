@@ -4,7 +4,7 @@ import signal
 from types import FrameType
 
 from canshaper.can.binding import Deployment
-from canshaper.can.bus import Port
+from canshaper.can.bus import Port, open_port
 from canshaper.can.frame import FrameFault
 from canshaper.service.loop import run_at_deadlines
 from canshaper_sim.crane import CraneParameters
@@ -38,7 +38,7 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
     def ignore(_fault: FrameFault) -> None:
         pass
 
-    return {name: Port(name, bus, ignore) for name, bus in deployment.config.buses.items()}
+    return {name: open_port(name, bus, ignore) for name, bus in deployment.config.buses.items()}
 
 
 def run_plant(
@@ -50,7 +50,7 @@ def run_plant(
     stop = StopFlag()
     steps_to_feedback = 0
 
-    def body(_now_ns: int, missed: int) -> bool:
+    def body(_now_ns: int, missed: int, _late_ns: int) -> bool:
         nonlocal steps_to_feedback
         for port in ports.values():
             for frame in port.frames():
@@ -77,7 +77,7 @@ def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> Non
     cycle_ms = node.cycle_ms
     time_ms = 0
 
-    def body(_now_ns: int, missed: int) -> bool:
+    def body(_now_ns: int, missed: int, _late_ns: int) -> bool:
         nonlocal time_ms
         time_ms += missed * cycle_ms
         for frame in node.frames(time_ms):

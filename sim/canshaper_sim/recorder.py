@@ -9,7 +9,7 @@ from typing import Any
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame
-from canshaper.can.signals import VelocitySignal, find_signal
+from canshaper.can.inputs import BoundLever
 from canshaper.report.recording import AxisTrace, Recording
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
@@ -49,15 +49,10 @@ class Recorder:
         }
         self._axes = deployment.axes
         self._handlers: dict[tuple[str, int, bool], Any] = {}
-        self._sticks: dict[str, list[tuple[str, VelocitySignal]]] = {}
+        self._levers: dict[str, BoundLever] = {}
         for lever in deployment.levers.values():
             self._handlers[lever.key] = (self._stick, lever.message)
-            self._sticks[lever.message.name] = [
-                (name, VelocitySignal.of(signal))
-                for name, axis in deployment.axes.items()
-                if axis.config.stick.lever == lever.name
-                and (signal := find_signal(lever.message, axis.config.stick.signal))
-            ]
+            self._levers[lever.message.name] = lever
         self._valves: dict[str, str] = {}
         for name, axis in deployment.axes.items():
             bus, message = axis.config.valve.bus, axis.valve_message
@@ -110,10 +105,12 @@ class Recorder:
     def _stick(self, message: Any, data: bytes, time_s: float) -> None:
         if self._start_s is None:
             self._start_s = time_s
-        raw = self._raw(message, data)
-        for name, signal in self._sticks[message.name]:
-            command = signal.command(raw[signal.name])
-            self._now[name][0] = 0.0 if isinstance(command, Reason) else command
+        lever = self._levers[message.name]
+        _, commands = lever.codec.decode(data)
+        for name, axis in self._axes.items():
+            if axis.config.stick.lever == lever.name:
+                command = commands[axis.config.stick.signal]
+                self._now[name][0] = 0.0 if isinstance(command, Reason) else command
 
     def _valve(self, message: Any, data: bytes, _time_s: float) -> None:
         name = self._valves[message.name]

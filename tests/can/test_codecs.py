@@ -159,6 +159,12 @@ def test_float_sticks(value: float, command: float | Reason) -> None:
     assert commands == {"Stick": command}
 
 
+@pytest.mark.parametrize(("raw", "command"), [(3, 1.0), (-3, -1.0)])
+def test_full_stick_is_full_in_spite_of_rounding(raw: int, command: float) -> None:
+    """3 steps of 0.1 are a little more than 0.3 in floating point."""
+    assert VelocitySignal("S", 0.1, 0.0, 0.3, {}).command(raw) == command
+
+
 @pytest.mark.parametrize("length", [0, 1, 7, 9, 64])
 def test_another_length_is_refused(length: int) -> None:
     with pytest.raises(WrongLengthError):

@@ -207,8 +207,8 @@ def test_messages_of_another_kind(
         ("BO_ 768 100;", "BO_ 768 110;", "SlewStatus", "has GenMsgCycleTime 110 ms"),
         # status
         ("State : 0|4@1+", "State : 0|2@1+", "SlewStatus", "State cannot carry 5 with 2 bits"),
-        ("Reason : 8|8", "Reason : 8|6", "SlewStatus", "Reason cannot carry 67 with 6 bits"),
-        ("LastFault : 0|8", "LastFault : 0|2", "ShaperStatus", "LastFault cannot carry 7"),
+        ("Reason : 8|8", "Reason : 8|6", "SlewStatus", "Reason cannot carry 70 with 6 bits"),
+        ("LastFault : 0|8", "LastFault : 0|2", "ShaperStatus", "LastFault cannot carry 17"),
         (
             "PredictedSway : 48|16@1- (0.01,0)",
             "PredictedSway : 48|16@1- (0,0)",
@@ -264,7 +264,7 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
                 ("Counter : 56|8@1+", "Counter : 32|32@1-"),
             ],
             "272 AliveCounter",
-            "levers.left.alive_counter: AliveCounter is a float, allowed is an integer signal",
+            "levers.left.alive_counter: AliveCounter is a float, allowed is an unsigned",
         ),
     ],
 )

@@ -168,7 +168,8 @@ def test_reload_refuses_a_broken_file_and_applies_a_good_one_in_neutral(
         file.write_text(text.replace("deadband_pct: 5", "deadband_pct: 90", 1))
         daemon.process.send_signal(signal.SIGHUP)
         wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 90.0)  # goes on in motion
-        assert "reload=" not in daemon.text()
+        assert "reload=waiting" in daemon.text()
+        assert "reload=refused" not in daemon.text()
         levers.values["Slew"] = 0.0
         daemon.wait_log(r"reload=refused .*machine\.yaml:\d+: axes\.slew\.limits\.deadband_pct")
         file.write_text(text.replace("deadband_pct: 5", "max_pct: 40, deadband_pct: 5", 1))

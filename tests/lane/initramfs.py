@@ -13,6 +13,7 @@ import tempfile
 from collections.abc import Mapping
 from pathlib import Path
 
+from . import systemd
 from .job import Job, can_names, ip_batch
 from .kernel import Kernel, module_order, read_module
 from .outcome import NoLane
@@ -22,7 +23,7 @@ SCRIPTS = Path(__file__).parent / "scripts"
 # What booting and the interfaces need; everything else is there for modprobe.
 MODULES = (
     *("virtio_pci", "virtio_console", "9pnet_virtio", "9p", "overlay"),
-    *("can", "can_raw", "can_dev", "vcan", "kvaser_pci"),
+    *("can", "can_raw", "can_dev", "vcan", "vxcan", "kvaser_pci"),
 )
 FOLDER, SCRIPT, PLAIN = stat.S_IFDIR | 0o755, stat.S_IFREG | 0o755, stat.S_IFREG | 0o644
 CONSOLE, CONSOLE_NUMBER = stat.S_IFCHR | 0o600, (5, 1)
@@ -99,6 +100,7 @@ def for_run(job: Job, kernel: Kernel, ports: Mapping[str, str]) -> bytes:
         raise NoLane("ip not found (Debian package iproute2)")
     can = can_names(job.kvaser)
     settings = {"MODULES": str(kernel.modules.resolve()), "IP": ip, **ports}
+    settings["NEXT"] = "systemd.sh" if job.systemd else "run.sh"
     command = 'echo "$$" >/run/lane/pid\n' + job.script("tcg", can)
     files = {
         "settings": "".join(f"{name}={shlex.quote(value)}\n" for name, value in settings.items()),
@@ -109,6 +111,8 @@ def for_run(job: Job, kernel: Kernel, ports: Mapping[str, str]) -> bytes:
     archive = Archive()
     for name, text in files.items():
         archive.add(f"lane/{name}", os.fsencode(text))
-    for name in ("root.sh", "run.sh"):
+    for name, data in systemd.files().items() if job.systemd else ():
+        archive.add(f"lane/{name}", data)
+    for name in ("root.sh", "systemd.sh", "run.sh"):
         archive.add(f"lane/{name}", (SCRIPTS / name).read_bytes())
     return archive.close()

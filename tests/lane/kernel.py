@@ -7,14 +7,17 @@ import shutil
 import struct
 import subprocess
 import tempfile
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from .outcome import NoLane, say
 from .packages import cache, install, missing, output, with_fresh_lists
 
-META_PACKAGES = ("linux-image-amd64", "linux-image-generic")  # Debian, Ubuntu
+META_PACKAGES = {
+    "std": ("linux-image-amd64", "linux-image-generic"),  # Debian, Ubuntu
+    "rt": ("linux-image-rt-amd64",),  # PREEMPT_RT, Debian only
+}
 CONCRETE = re.compile(r"Depends: (linux-(?:image|binary|modules|modules-extra)-\d\S+)")
 # 470 MB -> 219 MB: drivers of hardware that the machine does not have
 UNUSED = (
@@ -40,20 +43,26 @@ class Kernel:
         """Return the kernel release, as ``uname -r`` says it."""
         return self.modules.name
 
+    @property
+    def flavour(self) -> str:
+        """Return the key in META_PACKAGES that leads to such a kernel."""
+        return "rt" if "-rt-" in self.version else "std"
 
-def cached() -> Kernel | None:
-    """Return the newest kernel in the cache; what is there is whole (made by one rename)."""
-    found = [
+
+def cached(flavour: str) -> Kernel | None:
+    """Return the newest such kernel in the cache; what is there is whole (made by one rename)."""
+    kernels = (
         Kernel(image, modules)
         for image in cache().glob("kernels/[0-9]*/vmlinu[xz]")
         for modules in image.parent.glob("lib/modules/*")
-    ]
+    )
+    found = [kernel for kernel in kernels if kernel.flavour == flavour]
     return max(found, key=lambda k: [int(n) for n in re.findall(r"\d+", k.version)], default=None)
 
 
-def obtain() -> Kernel:
+def obtain(flavour: str) -> Kernel:
     """Return the cached kernel; download one first if there is none (no root needed for that)."""
-    kernel = cached()
+    kernel = cached(flavour)
     if kernel is not None:
         return kernel
     kernels = cache() / "kernels"
@@ -65,24 +74,24 @@ def obtain() -> Kernel:
         debs = work / "debs"
         debs.mkdir()
         # lists may be absent, or name a version that has left the mirror
-        with_fresh_lists(lambda: _download(debs))
+        with_fresh_lists(lambda: _download(debs, META_PACKAGES[flavour]))
         ready = _arrange(work)
         ready.rename(kernels / ready.name)
-    kernel = cached()
+    kernel = cached(flavour)
     if kernel is None:
         raise NoLane("the downloaded kernel package has no kernel where one was expected")
     return kernel
 
 
-def _download(folder: Path) -> None:
-    packages = _concrete_packages()
+def _download(folder: Path, metas: Sequence[str]) -> None:
+    packages = _concrete_packages(metas)
     say("downloading", *packages)
     output("apt-get", "-q", "download", *packages, cwd=folder)
 
 
-def _concrete_packages() -> list[str]:
+def _concrete_packages(metas: Sequence[str]) -> list[str]:
     """Return the versioned packages behind the distribution's kernel, modules included."""
-    for meta in META_PACKAGES:
+    for meta in metas:
         try:
             todo = CONCRETE.findall(output("apt-cache", "depends", meta))
         except NoLane:
@@ -95,7 +104,7 @@ def _concrete_packages() -> list[str]:
                 todo += CONCRETE.findall(output("apt-cache", "depends", package))
         if found:
             return sorted(found)
-    raise NoLane(f"apt knows none of the packages {', '.join(META_PACKAGES)}")
+    raise NoLane(f"apt knows none of the packages {', '.join(metas)}")
 
 
 def _arrange(work: Path) -> Path:

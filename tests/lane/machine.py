@@ -12,7 +12,7 @@ import tempfile
 import time
 from pathlib import Path
 
-from . import initramfs, kernel
+from . import initramfs, kernel, systemd
 from .job import Job
 from .outcome import LaneError, NoLane, say
 from .owned import owned
@@ -36,35 +36,42 @@ POLL_S = 0.2  # how soon the time limits are seen
 POWER_OFF_S = 5.0  # from EXIT to the end of qemu; it takes some 10 ms
 
 
-def obstacle() -> str | None:
-    """Return why this machine cannot have a tcg lane, or None if it can (perhaps by installing)."""
+def obstacle(flavour: str, with_systemd: bool) -> str | None:
+    """Return why this machine cannot have a tcg lane, or None if it can (perhaps by installing).
+
+    ``flavour`` is that of the kernel, std or rt.
+    """
     if platform.system() != "Linux" or platform.machine() != "x86_64":
         return f"it is for Linux on x86_64, this is {platform.system()} on {platform.machine()}"
-    absent = missing(MACHINE_TOOLS)
+    absent = missing(_tools(with_systemd))
     reason = cannot_install()
     if absent and reason:
         return f"please install {' '.join(absent)} ({reason})"
-    if kernel.cached() is None and not (which("apt-get") and which("dpkg-deb")):
+    if kernel.cached(flavour) is None and not (which("apt-get") and which("dpkg-deb")):
         return "a kernel can be fetched on Debian and Ubuntu only (apt-get, dpkg-deb)"
     return None
 
 
-def prepare() -> tuple[kernel.Kernel, Path]:
+def _tools(with_systemd: bool) -> dict[str, str]:
+    return {**MACHINE_TOOLS, **(systemd.TOOLS if with_systemd else {})}
+
+
+def prepare(flavour: str, with_systemd: bool) -> tuple[kernel.Kernel, Path]:
     """Install and download what is missing; return the kernel and the shared initramfs."""
-    reason = obstacle()
+    reason = obstacle(flavour, with_systemd)
     if reason:
         raise NoLane(reason)
     with cache_lock():
-        install(missing(MACHINE_TOOLS))
+        install(missing(_tools(with_systemd)))
         install_test_tools()
-        image = kernel.obtain()
+        image = kernel.obtain(flavour)
         return image, initramfs.base(image)
 
 
 def run(job: Job) -> int:
     """Run the job in this lane; return its exit status."""
     begin = time.monotonic()
-    image, base = prepare()
+    image, base = prepare(job.kernel, job.systemd)
     machine = Machine(job)
     with contextlib.ExitStack() as stack:
         watch = stack.enter_context(Watch(job.timeout_s, job.grace_s))

@@ -14,7 +14,10 @@ from .packages import which
 from .watch import Watch
 
 POLL_S = 0.2  # how soon the time limit and the end of the grace are seen
-PROBE = "ip link add lane0 type vcan && ip link set lane0 up && ip link del lane0"
+PROBE = (
+    "ip link add lane0 type vcan && ip link set lane0 up && ip link del lane0"
+    " && ip link add lane0 type vxcan peer name lane1 && ip link del lane0"
+)
 
 
 def namespace() -> list[str]:
@@ -41,7 +44,7 @@ def obstacle() -> str | None:
         check=False,
     )
     if probe.returncode:
-        return f"no vcan in a private network namespace ({probe.stderr.strip()})"
+        return f"no vcan or vxcan in a private network namespace ({probe.stderr.strip()})"
     return None
 
 

@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from . import systemd
 from .job import Job
 from .kernel import Kernel
 from .packages import which
@@ -19,6 +20,9 @@ MACHINE = "q35,usb=off,vmport=off,sata=off"
 PROCESSOR = "Nehalem-v1,+rdrand"
 # One CPU: two emulated ones on a busy two-core host wait for each other's time slices.
 ACCELERATOR = "tcg,thread=single,tb-size=512"
+# One instruction takes 1 ns and idle time none, whatever else the host does; no random addresses.
+BENCH = ("-icount", "shift=0,sleep=off", "-rtc", "base=2026-01-01T00:00:00,clock=vm")
+BENCH_KERNEL_ARGS = ("norandmaps", "nokaslr", "clocksource=tsc")
 SHARE = "local,security_model=none,multidevs=remap"
 
 
@@ -32,9 +36,9 @@ def command_line(
     words = [which("qemu-system-x86_64") or "qemu-system-x86_64"]
     words += ["-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"]
     words += ["-M", MACHINE, "-cpu", PROCESSOR, "-accel", ACCELERATOR]
-    words += ["-m", str(job.memory_mib), "-rtc", "base=utc"]
+    words += ["-m", str(job.memory_mib), *(BENCH if job.bench else ("-rtc", "base=utc"))]
     words += ["-kernel", str(kernel.image), "-initrd", str(initramfs)]
-    words += ["-append", " ".join([*KERNEL_ARGS, *job.kernel_args])]
+    words += ["-append", " ".join(_kernel_args(job))]
     words += ["-chardev", f"file,id=console,path={_escaped(console)}"]
     words += ["-serial", "chardev:console"]
     # before other virtio devices, so that its ports are numbered vport0
@@ -50,6 +54,15 @@ def command_line(
     for number in range(job.kvaser):
         words += ["-device", f"kvaser_pci,canbus=bus{number // 2}"]
     return words
+
+
+def _kernel_args(job: Job) -> list[str]:
+    args = list(KERNEL_ARGS)
+    if job.systemd:
+        args += systemd.KERNEL_ARGS
+    if job.bench:
+        args += BENCH_KERNEL_ARGS
+    return [*args, *job.kernel_args]
 
 
 def _share(tag: str, folder: Path, more: str) -> list[str]:

@@ -7,11 +7,12 @@ import signal
 import struct
 import subprocess
 import sys
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from . import cli, hil, job, kernel, native
+from . import cli, hil, job, kernel, machine, native, packages, services
 from .outcome import LANE_FAILED, NO_LANE, TIME_LIMIT
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -27,21 +28,36 @@ pause()
 """
 
 
-@pytest.fixture(scope="module")
-def lane() -> str:
-    """Return the lane that this machine gets; skip where there is none."""
+# The command below systemd: what it finds, then one status of a unit that is not its own.
+BOOTED = """
+systemctl is-system-running
+systemctl is-active sys-subsystem-net-devices-can0.device
+systemd-detect-virt
+echo "$CANSHAPER_SYSTEMD|$JOURNAL_STREAM|$INVOCATION_ID"
+grep SigIgn /proc/self/status
+echo to stderr >&2
+systemd-run --quiet --pipe --wait -p DynamicUser=yes -p StateDirectory=lane sh -c '
+    id -u >$STATE_DIRECTORY/uid || exit 1
+    echo "wrote $(($(cat $STATE_DIRECTORY/uid) > 60000))"
+    exit 5
+'
+"""
+
+
+def prepared(*options: str) -> None:
+    """Get the lane with these options ready; skip where it cannot be had."""
     if "CANSHAPER_LANE" in os.environ:
         pytest.skip("already in a lane")
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.lane", "--prepare"],
-        cwd=ROOT,
-        stderr=subprocess.PIPE,
-        text=True,
-        check=False,
-    )
+    done = run("--prepare", *options)
     if done.returncode == NO_LANE:
         pytest.skip(done.stderr)
     assert done.returncode == 0, done.stderr
+
+
+@pytest.fixture(scope="module")
+def lane() -> str:
+    """Return the lane that this machine gets; skip where there is none."""
+    prepared()
     return "native" if native.obstacle() is None else "tcg"
 
 
@@ -114,6 +130,26 @@ def test_signal_reaches_the_command_and_kill_leaves_nothing(lane: str) -> None:
             os.close(descriptor)
 
 
+def test_systemd_has_booted_and_runs_the_command() -> None:
+    prepared("--systemd")
+    done = run("--systemd", "--", "sh", "-c", BOOTED)
+    assert done.returncode == 5, done.stderr
+    assert done.stderr == "to stderr\n"
+    running, device, virtual, env, ignored, unit = done.stdout.splitlines()
+    assert (running, device, virtual) == ("running", "active", "qemu")
+    assert env == "1||"
+    assert int(ignored.split()[1], 16) & 1 << signal.SIGPIPE - 1 == 0
+    assert unit == "wrote 1"
+
+
+def test_bench_counts_instructions_instead_of_time() -> None:
+    prepared("--bench")
+    script = "sleep 3600; date -u +%F; echo $PYTHONHASHSEED"
+    done = run("--bench", "--timeout", "300", "--", "sh", "-c", script)
+    assert done.returncode == 0, done.stderr
+    assert done.stdout == "2026-01-01\n0\n"
+
+
 def no_lane(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(native, "obstacle", lambda: "no vcan")
     monkeypatch.setattr(platform, "machine", lambda: "riscv64")
@@ -129,13 +165,83 @@ def test_no_lane_has_a_status_and_reasons(
     assert "riscv64" in error
 
 
-def test_hil_without_a_lane_is_not_a_failure(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+@pytest.mark.parametrize(
+    ("main", "folder"), [(hil.main, "tests/hil"), (services.main, "tests/systemd")]
+)
+def test_suite_without_a_lane_is_not_a_failure(
+    main: Callable[[list[str]], int],
+    folder: str,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     no_lane(monkeypatch)
     monkeypatch.chdir(ROOT)
-    assert hil.main([]) == 0
-    assert "NOT run" in capsys.readouterr().err
+    assert main([]) == 0
+    assert f"{folder} NOT run" in capsys.readouterr().err
+
+
+SPECIAL = [["--systemd"], ["--bench"], ["--kernel", "rt"], ["--append", "quiet"]]
+
+
+@pytest.mark.parametrize("options", SPECIAL)
+def test_special_machine_is_never_the_native_lane(
+    options: list[str], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(native, "obstacle", lambda: None)
+    monkeypatch.setattr(machine, "obstacle", lambda _flavour, _systemd: None)
+    assert cli.main(["--detect"]) == 0
+    assert capsys.readouterr().out.endswith("lane: native\n")
+    assert cli.main(["--detect", *options]) == 0
+    assert capsys.readouterr().out.endswith("lane: tcg\n")
+    with pytest.raises(SystemExit):
+        cli.main(["--lane", "native", *options, "--", "true"])
+    assert "boots no kernel" in capsys.readouterr().err
+
+
+def test_absent_udev_is_named_only_where_it_is_needed(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def which(program: str) -> str | None:
+        return None if program == "udevadm" else "/dev/null"
+
+    monkeypatch.setattr(packages, "which", which)
+    monkeypatch.setattr(machine, "which", which)
+    monkeypatch.setattr(machine, "cannot_install", lambda: "only root can install them")
+    monkeypatch.setattr(platform, "machine", lambda: "x86_64")
+    assert cli.main(["--systemd", "--", "true"]) == NO_LANE
+    assert "please install udev (only root" in capsys.readouterr().err
+    assert "udev" not in (machine.obstacle("std", False) or "")
+
+
+def test_kernels_of_both_flavours_lie_side_by_side(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path))
+    for version in ("6.1.0-9-amd64", "6.1.0-50-amd64", "6.1.0-56-rt-amd64"):
+        folder = packages.cache() / "kernels" / version
+        (folder / "lib/modules" / version).mkdir(parents=True)
+        (folder / "vmlinux").touch()
+    found = {flavour: kernel.cached(flavour) for flavour in kernel.META_PACKAGES}
+    versions = {flavour: image.version for flavour, image in found.items() if image}
+    assert versions == {"std": "6.1.0-50-amd64", "rt": "6.1.0-56-rt-amd64"}
+
+
+def test_rt_is_another_package(monkeypatch: pytest.MonkeyPatch) -> None:
+    depends = {
+        "linux-image-amd64": "  Depends: linux-image-6.1.0-50-amd64\n",
+        "linux-image-rt-amd64": "  Depends: linux-image-6.1.0-50-rt-amd64\n",
+    }
+    downloaded = []
+
+    def output(program: str, *words: str, cwd: Path | None = None) -> str:
+        if program == "apt-get":
+            downloaded.append(words[-1])
+        return depends.get(words[-1], "")
+
+    monkeypatch.setattr(kernel, "output", output)
+    for metas in kernel.META_PACKAGES.values():
+        kernel._download(ROOT, metas)
+    assert downloaded == ["linux-image-6.1.0-50-amd64", "linux-image-6.1.0-50-rt-amd64"]
 
 
 def test_host_only_variables_stay_outside() -> None:
@@ -146,6 +252,7 @@ def test_host_only_variables_stay_outside() -> None:
         "HOME": "/h",
         "CANSHAPER_LANE": "tcg",
         "CANSHAPER_VCAN": "vcan0 vcan1",
+        "CANSHAPER_VXCAN": "vxcan0 vxcan1",
         "CANSHAPER_CAN": "can0 can1",
     }
 

@@ -35,7 +35,7 @@ def calls(clock: Clock, work_ns: list[int], late_ns: int = 0) -> list[tuple[int,
     seen: list[tuple[int, int]] = []
     durations: Iterator[int] = iter(work_ns)
 
-    def body(now_ns: int, missed: int) -> bool:
+    def body(now_ns: int, missed: int, late_ns: int) -> bool:
         assert now_ns == clock.now_ns
         seen.append((now_ns - START_NS, missed))
         work = next(durations, None)
@@ -83,7 +83,7 @@ def test_ending_on_a_deadline_misses_nothing() -> None:
 
 
 def test_an_exception_of_the_body_ends_the_loop() -> None:
-    def body(_now_ns: int, _missed: int) -> bool:
+    def body(_now_ns: int, _missed: int, _late_ns: int) -> bool:
         raise RuntimeError("broken")
 
     with pytest.raises(RuntimeError, match="broken"):

@@ -5,7 +5,6 @@ The oracle knows inputs and outputs only. Time is in ticks, missed ones included
 
 import copy
 import math
-from dataclasses import replace
 
 import pytest
 from hypothesis import HealthCheck, settings
@@ -84,7 +83,7 @@ class AskedByAnother(RuleBasedStateMachine):
 
     @rule(command=sticks, added=velocities, ticks=durations)
     def push(self, command: float, added: float, ticks: int) -> None:
-        self.stick, self.added = replace(self.stick, command=command), added
+        self.stick, self.added = self.stick._replace(command=command), added
         self.keep(ticks)
 
     @rule(added=st.lists(velocities, min_size=1, max_size=20))
@@ -97,7 +96,7 @@ class AskedByAnother(RuleBasedStateMachine):
         """The stick is lost, the axis trips, or the switch is released; the asking goes on."""
         before = self.stick
         name = {"trip": cause} if cause in TRIPS else {"fault": cause}
-        self.stick = replace(before, enabled=cause is not None, bypass=bypass, **name)
+        self.stick = before._replace(enabled=cause is not None, bypass=bypass, **name)
         self.keep(ticks)
         self.stick = before
 
@@ -223,7 +222,9 @@ class AskedByAnother(RuleBasedStateMachine):
 
 
 AskedByAnother.TestCase.settings = settings(
-    max_examples=300, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=3 * settings().max_examples,
+    stateful_step_count=25,
+    suppress_health_check=list(HealthCheck),
 )
 TestAskedByAnother = AskedByAnother.TestCase
 

@@ -4,7 +4,7 @@ It knows inputs and outputs, nothing of the axis' inside. Time is in ticks, miss
 """
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
@@ -125,7 +125,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     @rule(command=sticks, ticks=durations)
     def push(self, command: float, ticks: int) -> None:
-        self.keep(replace(self.stick, command=command), ticks)
+        self.keep(self.stick._replace(command=command), ticks)
 
     @rule(command=sticks, ticks=durations, then=durations)
     def stroke(self, command: float, ticks: int, then: int) -> None:
@@ -139,19 +139,19 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def recover(self) -> None:
         """What an operator does when nothing moves: let go, switch off and on."""
         self.stick = StickInput(bypass=self.stick.bypass)
-        self.keep(replace(self.stick, enabled=False), 1)
+        self.keep(self.stick._replace(enabled=False), 1)
         self.keep(self.stick, 2)
 
     @rule(cause=st.sampled_from(CAUSES), ticks=durations, then=st.lists(anything, max_size=5))
     def fail(self, cause: tuple[str, Reason], ticks: int, then: list[StickInput]) -> None:
         name, reason = cause
-        self.keep(replace(self.stick, **{name: reason}), ticks)
-        self.stick = replace(self.stick, **{name: None})
+        self.keep(self.stick._replace(**{name: reason}), ticks)
+        self.stick = self.stick._replace(**{name: None})
         self.chaos(then)
 
     @rule(name=st.sampled_from(SWITCHES), on=st.booleans(), ticks=durations)
     def switch(self, name: str, on: bool, ticks: int) -> None:
-        self.keep(replace(self.stick, **{name: on}), ticks)
+        self.keep(self.stick._replace(**{name: on}), ticks)
 
     @rule(inputs=st.lists(anything, min_size=1, max_size=12))
     def chaos(self, inputs: list[StickInput]) -> None:
@@ -239,7 +239,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
             assert stick.trip is None
             reset = stick.reset and not self.reset_before
             assert reset or (stick.enabled and not self.enabled_before)
-        self.reset_before = stick.reset
+        held = self.reset_before and stick.fault is not None
+        self.reset_before = stick.reset or held
         if stick.fault is None:
             self.enabled_before = stick.enabled
         self.stop_from = self.stop_from if old is State.STOPPING else self.now
@@ -295,6 +296,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
 
 AxisUnderWatch.TestCase.settings = settings(
-    max_examples=800, stateful_step_count=25, deadline=None, suppress_health_check=list(HealthCheck)
+    max_examples=8 * settings().max_examples,
+    stateful_step_count=25,
+    suppress_health_check=list(HealthCheck),
 )
 TestAxisUnderWatch = AxisUnderWatch.TestCase

@@ -91,6 +91,7 @@ BOTH = OutputLimits(allow_faster=True, allow_reverse=True)
         (FASTER, 0.2, (0.0, 0.2), (0.0, 1.0)),
         (FASTER, 0.2, (-0.3, 0.2), (0.0, 1.0)),
         (FASTER, 0.0, (-0.3, 0.0), (-1.0, 0.0)),
+        (FASTER, 0.0, (0.0, 0.2), (0.0, 1.0)),  # run-on: only to the side that was asked for
         (FASTER, 0.0, (0.0, 0.0), (0.0, 0.0)),  # nothing asked: nothing moves
         (REVERSE, 0.5, (0.0, 0.5), (-0.5, 0.5)),
         (REVERSE, 0.0, (-0.3, 0.8), (-0.8, 0.8)),
@@ -228,6 +229,14 @@ def test_rounding_to_ten_steps(
 
 
 # -- recent commands -------------------------------------------------------------------------------
+
+
+def test_before_the_first_command_nothing_was_asked() -> None:
+    recent = RecentCommand(5)
+    assert (recent.low, recent.high) == (0.0, 0.0)
+    recent.age(3)
+    assert (recent.low, recent.high) == (0.0, 0.0)
+
 
 events = st.lists(
     st.one_of(velocities, st.sampled_from([0.0, 0.5, -0.5]), st.sampled_from(["clear", 1, 4, 30])),

@@ -17,4 +17,4 @@ if ! $IP -batch /run/lane/ip.batch; then
 	$B sleep 0.2
 	$B reboot -f
 fi
-. /run/lane/run.sh
+. "/run/lane/$NEXT"

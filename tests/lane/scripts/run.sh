@@ -2,6 +2,8 @@
 # and hears SIG <name>, to be sent to the command's process group.
 B=/run/lane/busybox
 . /run/lane/settings
+# the command finds a system that has finished booting
+[ "$NEXT" = run.sh ] || systemctl is-system-running --wait >/dev/null
 exec 3<>"$CTL"
 read -r up _ </proc/uptime
 echo "READY $up" >&3

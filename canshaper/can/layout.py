@@ -1,0 +1,85 @@
+"""Raw values of a message from and to bytes, compiled once for the control loop.
+
+cantools reads the DBC files. Its own decode and encode reach the compiled part of bitstruct through
+several layers of Python for every frame; here bitstruct is called directly.
+"""
+
+from typing import Any
+
+from cantools.database.can import Message, Signal
+
+try:
+    from bitstruct.c import compile as compile_format
+except ImportError:  # no compiled part for this machine: the same in Python, and slower
+    from bitstruct import compile as compile_format
+
+
+def layout_fault(message: Message) -> str | None:
+    """Why the bits of a message cannot be read, or None; cantools tells with a frame only."""
+    for signal in message.signals:
+        if signal.is_float and signal.length not in (16, 32, 64):
+            return f"{signal.name} is a float of {signal.length} bits, allowed are 16, 32 and 64"
+    return None
+
+
+class Layout:
+    """Where the signals of a message lie.
+
+    For messages that were loaded strictly, so that no signals overlap, that are not multiplexed and
+    have no ``layout_fault``.
+    """
+
+    def __init__(self, message: Message) -> None:
+        bits = 8 * message.length
+        intel: dict[int, Signal] = {}
+        motorola: dict[int, Signal] = {}
+        for signal in message.signals:
+            if signal.byte_order == "little_endian":
+                # ``start`` is the lowest bit; the bytes will be reversed.
+                intel[bits - signal.start - signal.length] = signal
+            else:
+                # ``start`` is the highest bit, counted from the right within its byte.
+                motorola[signal.start // 8 * 8 + 7 - signal.start % 8] = signal
+        self._intel = _compiled(intel, bits)
+        self._motorola = _compiled(motorola, bits) if motorola else None
+
+    def decode(self, data: bytes) -> dict[str, Any]:
+        """Raw value of every signal, by name.
+
+        Args:
+            data: exactly as many bytes as the message has.
+        """
+        values: dict[str, Any] = self._intel.unpack(data[::-1])
+        if self._motorola is not None:
+            values.update(self._motorola.unpack(data))
+        return values
+
+    def encode(self, raw: dict[str, Any]) -> bytes:
+        """Bytes of the message; bits that no signal has are 0.
+
+        Args:
+            raw: raw value of every signal, by name; a whole number where the signal is no float.
+
+        Raises:
+            OverflowError: a value is not within the bits of its signal (bitstruct.Error where
+                bitstruct has no compiled part).
+        """
+        data: bytes = self._intel.pack(raw)[::-1]
+        if self._motorola is not None:
+            data = bytes(a | b for a, b in zip(data, self._motorola.pack(raw), strict=True))
+        return data
+
+
+def _compiled(places: dict[int, Signal], bits: int) -> Any:
+    """Format of bitstruct for the signals at their first bits; the bits between are padding."""
+    text, names, at = "", [], 0
+    for first, signal in sorted(places.items()):
+        if first > at:
+            text += f"p{first - at}"
+        kind = "f" if signal.is_float else "s" if signal.is_signed else "u"
+        text += f"{kind}{signal.length}"
+        names.append(signal.name)
+        at = first + signal.length
+    if bits > at:
+        text += f"p{bits - at}"
+    return compile_format(text, names)

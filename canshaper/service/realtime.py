@@ -1,0 +1,54 @@
+"""What a control loop asks of the interpreter and the kernel: no surprises from memory.
+
+The scheduling policy is set from outside (``CPUSchedulingPolicy=`` of the unit, ``chrt``).
+"""
+
+import ctypes
+import gc
+import os
+import resource
+
+# sys/mman.h of Linux
+MCL_CURRENT, MCL_FUTURE = 1, 2
+
+
+class Collector:
+    """The garbage collector under control: never by itself, and never over the whole heap.
+
+    What is there at the start is frozen; what the loop leaves behind is little and looked through
+    in a pause of the loop.
+    """
+
+    # The loop makes no cycles, only faults do, some kB each.
+    PERIOD_NS = 5_000_000_000
+
+    def __init__(self) -> None:
+        self._next_ns = 0
+
+    def freeze(self) -> None:
+        """Collect everything once, and let it be from now on."""
+        gc.unfreeze()
+        gc.collect()
+        gc.freeze()
+        gc.disable()
+
+    def pause(self, now_ns: int) -> None:
+        """The loop has time: collect what came since the start, now and then."""
+        if now_ns >= self._next_ns:
+            self._next_ns = now_ns + self.PERIOD_NS
+            gc.collect()
+            gc.disable()  # a library may have switched it on
+
+
+def lock_memory() -> str | None:
+    """Keep all memory of the process in RAM; None, or why it could not be done.
+
+    Not tried below an unlimited RLIMIT_MEMLOCK: memory needed later would then be refused.
+    """
+    soft, _hard = resource.getrlimit(resource.RLIMIT_MEMLOCK)
+    if soft != resource.RLIM_INFINITY and os.geteuid() != 0:
+        return "RLIMIT_MEMLOCK is not unlimited"
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.mlockall(MCL_CURRENT | MCL_FUTURE) == 0:
+        return None
+    return os.strerror(ctypes.get_errno())

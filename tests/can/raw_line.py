@@ -1,0 +1,136 @@
+"""A port on raw sockets and the far end of its bus, without CAN.
+
+Socket pairs carry the kernel's ``struct can_frame``; python-can makes the frames. Where this kernel
+cannot do it, a thin wrapper of the socket does: it sets the flag MSG_CONFIRM on frames that are
+marked, and raises the errors of a network device.
+"""
+
+import socket
+from typing import Any
+
+import can
+from can.interfaces.socketcan.socketcan import build_can_frame
+
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.raw import RawPort
+from canshaper.can.socketcan import Ids
+
+TICK_NS = 20_000_000
+MARK_AT = 5  # a byte of the structure that is padding
+
+VALVE = Frame("crane", 0x200, False, b"\x05\x01")
+OTHER = Frame("crane", 0x201, False, b"\x00\x01")
+STATUS = Frame("crane", 0x300, False, bytes(8))
+SENT = frozenset((f.can_id, f.extended) for f in (VALVE, OTHER, STATUS))
+IDS = Ids(frozenset(), SENT, SENT - {(STATUS.can_id, STATUS.extended)}, frozenset())
+# The sockets of a port that is told its ids, by what they hear.
+TAKEN, SENT_BACK, UNKNOWN = range(3)
+
+
+class Near(socket.socket):
+    """The port's end of a pair."""
+
+    fail: OSError | None = None
+
+    def recvmsg(self, *arguments: int) -> Any:
+        self._fail()
+        data, ancillary, flags, sender = super().recvmsg(*arguments)
+        if data[MARK_AT : MARK_AT + 1] == b"\1":
+            flags |= socket.MSG_CONFIRM
+        return data, ancillary, flags, sender
+
+    def recv(self, *arguments: int) -> bytes:
+        self._fail()
+        return super().recv(*arguments)
+
+    def send(self, *arguments: Any) -> int:
+        self._fail()
+        return super().send(*arguments)
+
+    def _fail(self) -> None:
+        if self.fail:
+            raise self.fail
+
+
+class Line:
+    """A bus and the port on it.
+
+    Args:
+        ids: the messages of the port, which then has three sockets; without, it has one.
+    """
+
+    def __init__(self, ids: Ids | None = IDS) -> None:
+        self.faults: list[FrameFault] = []
+        self.asked: list[Ids | None] = []
+        self.refuse: OSError | None = None
+        self.near: list[Near] = []
+        self.far: list[socket.socket] = []
+        self.now_ns = 10**12
+        self.port = RawPort(
+            "crane", self._open, ids, self.faults.append, confirms=ids is not None
+        )
+
+    def _open(self, ids: Ids | None) -> list[socket.socket]:
+        self.asked.append(ids)
+        if self.refuse:
+            raise self.refuse
+        self.end()
+        for _ in range(3 if ids else 1):
+            near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+            self.near.append(Near(fileno=near.detach()))
+            self.far.append(far)
+        for one in (*self.near, *self.far):
+            one.setblocking(False)
+        return [*self.near]
+
+    def monotonic_ns(self) -> int:
+        return self.now_ns
+
+    def put(self, message: can.Message, number: int = TAKEN) -> None:
+        """A frame comes from the bus."""
+        self.far[number].send(build_can_frame(message))
+
+    def error(self, kind: int, controller: int = 0) -> None:
+        data = bytes([0, controller, 0, 0, 0, 0, 0, 0])
+        message = can.Message(arbitration_id=kind, is_error_frame=True, dlc=8, data=data)
+        self.put(message, len(self.far) // 2)
+
+    def confirm(self, frame: Frame) -> None:
+        """One of our own frames comes back."""
+        message = can.Message(
+            arbitration_id=frame.can_id, is_extended_id=frame.extended, data=frame.data
+        )
+        data = bytearray(build_can_frame(message))
+        data[MARK_AT] = 1
+        self.far[SENT_BACK].send(data)
+
+    def heard(self) -> list[Frame]:
+        """What the port hands out in a tick."""
+        return [*self.port.frames(), *self.port.others()]
+
+    def sent(self) -> list[bytes]:
+        """What went out since the last call."""
+        found = []
+        while True:
+            try:
+                found.append(self.far[len(self.far) // 2].recv(100))
+            except BlockingIOError:
+                return found
+
+    def unconfirmed(self, frame: Frame = VALVE, most: int = 10) -> int:
+        """Send it every 20 ms until it is refused; how many were sent."""
+        for count in range(most):
+            self.now_ns += TICK_NS
+            if not self.port.send(frame):
+                return count
+            self.sent()
+        return most
+
+    def end(self) -> None:
+        for one in (*self.near, *self.far):
+            one.close()
+        self.near, self.far = [], []
+
+
+def message(can_id: int, data: bytes = b"", *, extended: bool = False) -> can.Message:
+    return can.Message(arbitration_id=can_id, is_extended_id=extended, data=data)

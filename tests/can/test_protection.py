@@ -1,0 +1,245 @@
+"""Checksum and alive counter of a message: published values, and every sequence one may meet."""
+
+from typing import Any
+
+import pytest
+from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.can.frame import FrameFault
+from canshaper.can.protection import CHECKSUMS, Guard
+
+GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
+REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
+
+BODY = bytes(range(1, 8))
+
+
+def guard(
+    bits: int = 8, max_step: int = 3, qualify: int = 1, checksum: tuple[str, int] | None = None
+) -> Guard:
+    return Guard(1 << bits if bits else 0, max_step, checksum, qualify)
+
+
+def faults(judge: Guard, *counts: int) -> list[FrameFault]:
+    return [judge.judge(b"", count) for count in counts]
+
+
+# -- checksums -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("kind", "value"),
+    [
+        ("crc8_sae_j1850", 0x4B),  # check values of the catalogue of parametrised CRC algorithms
+        ("crc8_autosar", 0xDF),
+        ("xor", 0x31),
+        ("sum", 0xDD),
+    ],
+)
+def test_published_check_values(kind: str, value: int) -> None:
+    assert CHECKSUMS[kind](b"123456789") == value
+
+
+@given(data=st.binary(max_size=8))
+def test_the_table_gives_what_the_library_computes_bit_by_bit(data: bytes) -> None:
+    for kind, library in (("crc8_sae_j1850", Crc8SaeJ1850), ("crc8_autosar", Crc8Autosar)):
+        assert CHECKSUMS[kind](data) == library.calc(data)
+
+
+@pytest.mark.parametrize(
+    ("data", "exclusive_or", "total"),
+    [(b"", 0, 0), (b"\xff", 0xFF, 0xFF), (b"\xff\xff", 0, 0xFE), (b"\x80\x80\x01", 0x01, 0x01)],
+)
+def test_plain_checksums_stay_in_a_byte(data: bytes, exclusive_or: int, total: int) -> None:
+    assert CHECKSUMS["xor"](data) == exclusive_or
+    assert CHECKSUMS["sum"](data) == total
+
+
+@pytest.mark.parametrize("kind", CHECKSUMS)
+@pytest.mark.parametrize("at", [0, 3, 7])
+def test_every_bit_of_a_frame_is_covered_and_its_own_byte_is_not(kind: str, at: int) -> None:
+    value = CHECKSUMS[kind](BODY)
+    frame = BODY[:at] + bytes([value]) + BODY[at:]
+    judge = guard(bits=0, checksum=(kind, at))
+    assert judge.judge(frame, 0) is GOOD
+    for bit in range(64):
+        wrong = bytearray(frame)
+        wrong[bit // 8] ^= 1 << bit % 8
+        assert judge.judge(bytes(wrong), 0) is WRONG
+        assert not judge.qualified
+    assert judge.judge(frame, 0) is GOOD
+    assert judge.qualified
+
+
+@pytest.mark.parametrize("kind", CHECKSUMS)
+def test_a_frame_that_is_the_checksum_alone(kind: str) -> None:
+    judge = guard(bits=0, checksum=(kind, 0))
+    nothing = CHECKSUMS[kind](b"")
+    found = [judge.judge(bytes([value]), 0) for value in range(256)]
+    assert found == [GOOD if value == nothing else WRONG for value in range(256)]
+
+
+# -- the alive counter -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("bits", "max_step", "counts", "found"),
+    [
+        (8, 1, [7, 8, 9, 10], [GOOD] * 4),
+        (8, 3, [7, 10, 11, 13], [GOOD] * 4),  # some were lost
+        (8, 3, [7, 11, 12], [GOOD, JUMP, GOOD]),
+        (8, 1, [7, 9, 10], [GOOD, JUMP, GOOD]),
+        (8, 3, [7, 6, 7], [GOOD, JUMP, GOOD]),  # one back is 255 on
+        (8, 3, [7, 7, 7, 8], [GOOD, REPEATED, REPEATED, GOOD]),
+        (8, 3, [7, 7, 11], [GOOD, REPEATED, JUMP]),  # frames that were no news count no step
+        (8, 3, [254, 255, 0, 3], [GOOD] * 4),
+        (8, 3, [254, 2, 3], [GOOD, JUMP, GOOD]),
+        (4, 3, [14, 15, 0, 1], [GOOD] * 4),
+        (4, 3, [14, 0, 3, 7], [GOOD, GOOD, GOOD, JUMP]),  # E2E profile 1 has no 15
+        (4, 8, [0, 8, 0, 9], [GOOD, GOOD, GOOD, JUMP]),
+        (2, 2, [0, 2, 1], [GOOD, GOOD, JUMP]),
+        (1, 1, [0, 1, 0, 0, 1], [GOOD, GOOD, GOOD, REPEATED, GOOD]),
+        (16, 255, [65535, 254, 510], [GOOD, GOOD, JUMP]),
+    ],
+)
+def test_steps_of_the_counter(
+    bits: int, max_step: int, counts: list[int], found: list[FrameFault]
+) -> None:
+    assert faults(guard(bits, max_step), *counts) == found
+
+
+def test_without_a_counter_every_frame_is_news() -> None:
+    judge = guard(bits=0)
+    assert faults(judge, 0, 0, 0) == [GOOD] * 3
+    assert judge.qualified
+
+
+def test_two_senders_with_counters_of_their_own_are_never_trusted() -> None:
+    judge = guard()
+    counts = [c % 256 for i in range(50) for c in (i, i + 100)]
+    assert faults(judge, *counts) == [GOOD] + [JUMP] * 99
+
+
+def test_a_frozen_counter_is_no_news_however_often_its_sender_was_silent() -> None:
+    judge = guard()
+    faults(judge, 7)
+    for _ in range(5):
+        judge.begin_anew()
+        assert faults(judge, 7, 7, 7) == [REPEATED] * 3
+        assert not judge.qualified
+
+
+def test_after_silence_any_counter_but_the_last_begins_anew_once() -> None:
+    for restart in range(256):
+        judge = guard()
+        faults(judge, 100)
+        judge.begin_anew()
+        first, second = faults(judge, restart, (restart + 50) % 256)
+        assert first is (REPEATED if restart == 100 else GOOD)
+        # what was repeated has not begun anew yet
+        assert second is (GOOD if restart == 100 else JUMP)
+
+
+def test_a_restart_on_the_last_counter_loses_one_frame_only() -> None:
+    judge = guard()
+    faults(judge, 100)
+    judge.begin_anew()
+    assert faults(judge, 100, 101, 102) == [REPEATED, GOOD, GOOD]
+    assert judge.qualified
+
+
+def test_a_wrong_checksum_says_nothing_about_the_sequence() -> None:
+    """Not even its counter is believed: it may be the one that was hit."""
+    kind = CHECKSUMS["xor"]
+
+    def frame(count: int, error: int = 0) -> bytes:
+        return bytes([count, kind(bytes([count])) ^ error])
+
+    judge = guard(checksum=("xor", 1))
+    assert judge.judge(frame(7), 7) is GOOD
+    assert judge.judge(frame(90, error=1), 90) is WRONG
+    assert judge.judge(frame(7, error=1), 7) is WRONG
+    assert judge.judge(frame(8), 8) is GOOD
+
+
+# -- qualification ---------------------------------------------------------------------------------
+
+
+def qualified(judge: Guard, counts: list[int]) -> list[bool]:
+    """Whether each frame may be used."""
+    return [judge.judge(b"", count) is GOOD and judge.qualified for count in counts]
+
+
+def test_one_good_frame_is_enough_unless_told() -> None:
+    assert qualified(guard(), [1, 9, 10]) == [True, False, True]
+
+
+@pytest.mark.parametrize("qualify", [2, 5, 20])
+def test_so_many_good_frames_in_a_row_at_the_start_and_after_a_wrong_one(qualify: int) -> None:
+    judge = guard(qualify=qualify)
+    counts = list(range(qualify + 3))
+    wanted = [False] * (qualify - 1) + [True] * 4
+    assert qualified(judge, counts) == wanted
+    jump = [counts[-1] + 50]
+    assert qualified(judge, jump) == [False]
+    assert qualified(judge, [jump[0] + 1 + i for i in counts]) == wanted
+
+
+def test_silence_begins_the_count_again() -> None:
+    judge = guard(qualify=3)
+    assert qualified(judge, [0, 1, 2]) == [False, False, True]
+    judge.begin_anew()
+    assert not judge.qualified
+    assert qualified(judge, [3, 4, 5]) == [False, False, True]
+
+
+def test_a_repeated_frame_neither_counts_as_good_nor_breaks_the_row() -> None:
+    judge = guard(qualify=3)
+    assert qualified(judge, [0, 0, 0, 1, 1, 2, 2, 3]) == [False] * 5 + [True, False, True]
+
+
+def test_a_wrong_checksum_breaks_the_row() -> None:
+    judge = guard(bits=0, qualify=2, checksum=("sum", 0))
+    good, wrong = b"\x05\x05", b"\x05\x06"
+    results: list[tuple[Any, bool]] = []
+    for frame in (good, wrong, good, good, wrong, good):
+        results.append((judge.judge(frame, 0), judge.qualified))
+    assert results == [
+        (GOOD, False),
+        (WRONG, False),
+        (GOOD, False),
+        (GOOD, True),
+        (WRONG, False),
+        (GOOD, False),
+    ]
+
+
+@given(
+    counts=st.lists(st.tuples(st.integers(0, 15), st.booleans()), max_size=60),
+    max_step=st.integers(1, 8),
+    qualify=st.integers(1, 4),
+)
+def test_what_is_used_is_always_the_end_of_a_row(
+    counts: list[tuple[int, bool]], max_step: int, qualify: int
+) -> None:
+    """Whatever comes: a used frame ends ``qualify`` frames that each followed the one before."""
+    judge = guard(4, max_step, qualify)
+    row: list[int] = []  # steps since the last wrong frame or silence, as far as they are good
+    last: int | None = None
+    rested = True
+    for count, silent in counts:
+        if silent:
+            judge.begin_anew()
+            rested, row = True, []
+        step = (count - last) % 16 if last is not None else None
+        fault = judge.judge(b"", count)
+        if step == 0:
+            assert fault is REPEATED
+            continue
+        follows = rested or step is None or step <= max_step
+        assert fault is (GOOD if follows else JUMP)
+        row = [*row, count] if follows else []
+        assert judge.qualified is (len(row) >= qualify)
+        last, rested = count, False

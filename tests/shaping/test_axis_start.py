@@ -1,0 +1,123 @@
+"""An axis that has just been made, with nothing said but what has to be."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off
+from canshaper.shaping.states import Reason, State, StickInput, Transition
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+Drive = Any  # the class of conftest.py
+DriveWith = Callable[..., Any]
+
+TICK_S = 0.02
+MODE = SwayMode(2.86, 0.05)
+OTHER = SwayMode(2.2, 0.02)
+CENTRED = StickInput()
+
+
+class Stubborn:
+    """A filter that never lets go."""
+
+    def wanted(self, command: float) -> float:
+        return 1.0
+
+
+def new_axis() -> Axis:
+    model = SwayModel(MODE, TICK_S)
+    return Axis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-5.0, -4.0)))
+
+
+def test_before_the_first_tick_an_axis_carries_neutral() -> None:
+    """A frame may go out before the first tick: the first one sent is that of a neutral valve."""
+    axis = new_axis()
+    assert (axis.state, axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
+    assert (axis.raw, axis.sent, axis.told, axis.command) == (0, 0.0, 0.0, 0.0)
+    assert isinstance(axis.raw, int)
+    assert axis.asked is False
+    assert axis.neutral is True
+
+
+def test_ticks_missed_before_the_first_one_swing_nothing() -> None:
+    axis = new_axis()
+    axis.hold(5)
+    assert axis.sway is not None
+    assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
+
+
+def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None:
+    model = SwayModel(OTHER, TICK_S)
+    right = Axis(TICK_S, OutputLimits(), sway=model, shaper=Gff(model, (-2.0, -2.5)))
+    axis = new_axis()
+    axis.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
+    assert axis.sway is not None
+    assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
+    for stick in [CENTRED, CENTRED, *[StickInput(0.7)] * 60, *[CENTRED] * 60]:
+        assert axis.tick(stick) == right.tick(stick)
+        assert (axis.raw, axis.told) == (right.raw, right.told)
+    assert axis.sway.angle == model.angle
+
+
+def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
+    """Tripped before the first valid frame: enabled from the first one on is no rising edge."""
+    drive.tick(StickInput(trip=Reason.SEND_FAILED, fault=Reason.STICK_TIMEOUT))
+    drive.run(CENTRED, 0.2)
+    assert drive.state is State.TRIPPED
+    drive.tick(StickInput(enabled=False))
+    assert drive.tick(CENTRED) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
+
+
+def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
+    axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn())
+    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
+        axis.tick(stick)
+    stopping = 0
+    while axis.raw:
+        axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+        stopping += 1
+    assert stopping == round(2.0 / TICK_S) + 1
+    assert axis.reason is Reason.STOP_DONE
+
+
+def test_a_stop_shorter_than_a_tick_is_one_tick() -> None:
+    axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn(), stop_s=0.001)
+    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
+        axis.tick(stick)
+    axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+    assert (axis.state, axis.raw) == (State.STOPPING, 125)
+    axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+    assert (axis.state, axis.raw) == (State.NEUTRAL_WAIT, 0)
+
+
+def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
+    """The frame of ISO 11783-7: 125 steps to either side."""
+    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
+        axis.tick(stick)
+    assert axis.raw == 125
+
+
+# -- what it says ----------------------------------------------------------------------------------
+
+
+def test_the_anti_sway_switch_is_named_as_the_reason(drive: Drive) -> None:
+    drive.to_ready()
+    requested, released = Reason.BYPASS_REQUESTED, Reason.BYPASS_RELEASED
+    bypassed = StickInput(0.8, bypass=True)
+    assert drive.tick(bypassed) == Transition(State.READY, State.BYPASS_ON, requested)
+    assert drive.axis.reason is requested
+    assert drive.tick(StickInput(0.8)) == Transition(State.BYPASS_ON, State.ACTIVE, released)
+    assert drive.tick(bypassed) == Transition(State.ACTIVE, State.BYPASS_ON, requested)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_full_speed_may_be_asked_by_another_axis(drive_with: DriveWith, sign: float) -> None:
+    axis = drive_with(limits=OutputLimits(rise_per_s=100.0)).to_ready().axis
+    axis.tick(CENTRED, sign)
+    assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
+    assert axis.sent == sign
