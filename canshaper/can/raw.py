@@ -38,6 +38,7 @@ OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.FAILED))
 # The device is no more; the socket would have to be bound to a new one.
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
+LOST = frozenset((BusState.DOWN, BusState.FAILED))
 UP = BusState.UP
 
 
@@ -100,6 +101,8 @@ class RawPort:
                 return
             frame = self._frame(name, data)
             if frame is not None:
+                if self.state in LOST:
+                    self._up()
                 yield frame
 
     def others(self) -> Iterator[Frame]:
@@ -183,8 +186,7 @@ class RawPort:
         return True
 
     def _confirmed(self, word: int) -> None:
-        left = self._unconfirmed.get(word, 1) - 1
-        self._unconfirmed[word] = left
+        self._unconfirmed[word] = max(0, self._unconfirmed.get(word, 0) - 1)
         self._since_ns.pop(word, None)
         if self.state in SILENT:
             self._up()
@@ -196,8 +198,11 @@ class RawPort:
         if under_way < MOST_UNCONFIRMED or now_ns - since_ns < UNCONFIRMED_NS:
             return False
         self._on_fault(FrameFault.NOT_CONFIRMED)
-        if word in self._valves:  # a status message may starve where valves get through
+        if word in self._valves:
             self._block(BusState.NOT_CONFIRMED)
+        elif now_ns - since_ns > PROBE_NS:  # a status message may starve where valves get through
+            self._unconfirmed[word] = 0
+            del self._since_ns[word]
         return True
 
     def _block(self, state: BusState) -> None:

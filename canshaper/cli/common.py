@@ -10,6 +10,7 @@ from canshaper.can.binding import Deployment, load_deployment
 from canshaper.config.source import DeploymentError, Problem
 
 EXIT_BAD_DEPLOYMENT = 2
+EXIT_NO_BUS = 3  # the file is good; the service manager tries again until the interface is there
 
 FILE = typer.Argument(..., help="Deployment file (YAML), or the name of a shipped one.")
 INTERFACE = typer.Option(None, "--interface", help="python-can interface instead of the file's.")
@@ -65,7 +66,7 @@ def loader(
     return load
 
 
-def fail(error: Exception) -> typer.Exit:
-    """Print an error as it is and give the exit of a bad deployment."""
+def fail(error: Exception, code: int = EXIT_BAD_DEPLOYMENT) -> typer.Exit:
+    """Print an error as it is and give the exit, that of a bad deployment unless told."""
     typer.echo(str(error), err=True)
-    return typer.Exit(EXIT_BAD_DEPLOYMENT)
+    return typer.Exit(code)

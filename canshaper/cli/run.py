@@ -1,6 +1,6 @@
 """``canshaper run``: the daemon."""
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
 
 
 def run(
@@ -10,7 +10,10 @@ def run(
 ) -> None:
     """Shape the joystick commands of a deployment until SIGTERM or Ctrl-C.
 
-    SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral.
+    SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral. An
+    interface that goes away is used again when it is back.
+
+    Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened.
 
     Examples:
 
@@ -26,6 +29,8 @@ def run(
     journal.set_up()
     try:
         daemon = Daemon(loader(file, interface, channel))
-    except (DeploymentError, BusError) as error:
+    except DeploymentError as error:
         raise fail(error) from None
+    except BusError as error:
+        raise fail(error, EXIT_NO_BUS) from None
     daemon.run()

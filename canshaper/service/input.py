@@ -78,11 +78,19 @@ class EmergencyStopInput(Input):
         super().__init__(bound)
         self._signal = signal
         self._pressed_ns = -1
+        self._pressed = False
 
     def heard(self, raw: dict[str, Any], now_ns: int) -> None:
         """A stop needs no trust, and counts however short it is pressed."""
         if raw[self._signal] != 0:
             self._pressed_ns = now_ns
+            self._pressed = True
+
+    def accepted(
+        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int
+    ) -> None:
+        """Only a frame that counts frees it."""
+        self._pressed = raw[self._signal] != 0
 
     def stop(self, now_ns: int, since_ns: int) -> Reason | None:
         """Why nothing may move now, or None.
@@ -91,6 +99,6 @@ class EmergencyStopInput(Input):
             now_ns: monotonic time.
             since_ns: when this was asked last.
         """
-        if self._pressed_ns > since_ns:
+        if self._pressed or self._pressed_ns > since_ns:
             return Reason.EMERGENCY_STOP
         return Reason.EMERGENCY_STOP_LOST if self.lost(now_ns) else None

@@ -61,7 +61,9 @@ class LeverInput(Input):
         released = self._released or self._released_ns > since_ns
         if lost is not None:
             # Seen released is more than lost: an immediate stop, not the shaped one.
-            released = released and lost is Reason.STICK_UNTRUSTED
+            released = self._released_ns > since_ns or (
+                self._released and lost is Reason.STICK_UNTRUSTED
+            )
             return StickInput(fault=None if released else lost, enabled=not released, trip=trip)
         raw = self.raw
         command = self.commands[signal]

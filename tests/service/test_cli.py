@@ -120,7 +120,7 @@ def test_run_of_a_broken_file_opens_no_bus(broken: Path, opened: list[dict[str, 
 
 def test_run_without_its_bus_says_which(opened: list[dict[str, Any]]) -> None:
     result = invoke("run", str(SHIPPED), "--channel", "can7")
-    assert result.exit_code == 2
+    assert result.exit_code == 3
     assert "bus crane: cannot open socketcan channel can7: " in result.stderr
     result = invoke("run", str(SHIPPED), "--interface", "virtual", "--channel", "can7")
     assert "bus crane: cannot open virtual channel can7: no such device" in result.stderr

@@ -1,0 +1,50 @@
+"""The doctor beside real interfaces: it sees them, hears the levers, and sends nothing."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from tests.hil.machine import FILE, candump, levers_on, logged
+
+
+def doctor(file: Path, *arguments: str) -> dict[str, dict[str, Any]]:
+    """Findings of ``canshaper doctor`` by their subject."""
+    command = [sys.executable, "-m", "canshaper", "doctor", str(FILE), *arguments]
+    command += ["--seconds", "1", "--json", str(file)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode in (0, 1), done.stderr
+    findings = json.loads(file.read_text())["findings"]
+    return {finding["subject"]: finding for finding in findings}
+
+
+def test_nothing_is_sent_on_the_bus_of_the_deployment(tmp_path: Path) -> None:
+    with candump(tmp_path / "vcan0.log", "vcan0"):
+        found = doctor(tmp_path / "doctor.json", "--load", "--listen", "1")
+    assert logged(tmp_path / "vcan0.log") == []
+    assert found["vcan0"]["found"] == "up; a virtual bus, nothing else to check"
+    assert found["lever left"]["level"] == "bad"
+    assert found["lever left"]["found"] == "0 frames heard"
+
+
+def test_the_levers_are_heard(tmp_path: Path) -> None:
+    with levers_on("vcan0"):
+        found = doctor(tmp_path / "doctor.json", "--no-load", "--listen", "1")
+    for name in ("lever left", "lever right"):
+        assert "frames, a period of" in found[name]["found"]
+        assert "(DBC: 20 ms)" in found[name]["found"]
+
+
+def test_the_set_up_of_a_controller_is_seen(tmp_path: Path, can_pair: tuple[str, str]) -> None:
+    name = can_pair[0]
+    found = doctor(tmp_path / "doctor.json", "--no-load", "--channel", name)
+    assert found[f"{name} bit rate"]["found"] == "250000 bit/s"
+    assert found[f"{name} restart"]["level"] == "warning"
+    assert found[f"{name} queue"]["level"] == "ok"
+
+
+def test_an_interface_that_is_not_there_cannot_be_listened_to(tmp_path: Path) -> None:
+    found = doctor(tmp_path / "doctor.json", "--no-load", "--channel", "can7", "--listen", "1")
+    assert found["can7"]["found"] == "there is no such interface"
+    assert found["levers"]["found"] == "cannot listen: No such device"

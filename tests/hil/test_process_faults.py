@@ -1,0 +1,280 @@
+"""Faults around the daemon on real SocketCAN: process, clock, log, queues and interfaces.
+
+Adapters that the emulation cannot make (no acknowledge, a controller that goes bus-off by itself)
+are made by the closest real means: a queue whose frames do not get out (netem), a bus that takes no
+more (tbf), and error frames as a driver writes them.
+"""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import can
+import pytest
+
+from tests.hil.machine import (
+    FILE,
+    Levers,
+    Service,
+    candump,
+    levers_on,
+    logged,
+    open_bus,
+    service,
+    wait_for,
+)
+
+SLEW = 0x200
+
+
+@pytest.fixture
+def levers() -> Iterator[Levers]:
+    with levers_on("vcan0") as running:
+        yield running
+
+
+@pytest.fixture
+def bus() -> Iterator[can.BusABC]:
+    with open_bus("vcan0") as opened:
+        yield opened
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Service]:
+    with service(tmp_path / "daemon.log", "run", str(FILE)) as running:
+        running.wait_log("started file=")
+        yield running
+
+
+def state(*names: str) -> Callable[[dict], bool]:
+    return lambda status: str(status["State"]) in names
+
+
+def drive(bus: can.BusABC, levers: Levers) -> None:
+    ready(bus, levers)
+    levers.values["Slew"] = 100.0
+    wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 90.0)
+
+
+def ready(bus: can.BusABC, levers: Levers) -> None:
+    """Neutral, and presses of reset until one counts."""
+    levers.values["Slew"] = 0.0
+    levers.silent = False
+    until = time.monotonic() + 60.0
+    while time.monotonic() < until:
+        levers.switches["Reset"] ^= 1
+        for _ in range(3):
+            status = wait_for(bus, "SlewStatus", lambda s: True)
+        if str(status["State"]) == "READY" and status["RawCommand"] == 0:
+            levers.switches["Reset"] = 0
+            return
+    raise AssertionError(f"not ready: {status}")
+
+
+def ip(*words: str) -> None:
+    subprocess.run(["ip", *words], check=True)
+
+
+def tc(*words: str) -> None:
+    subprocess.run(["tc", "qdisc", *words], check=True)
+
+
+def slew_of(log: Path) -> list[int]:
+    return [m.data[0] for m in logged(log) if m.arbitration_id == SLEW]
+
+
+def test_a_process_that_was_stopped_trips_and_moves_nothing(
+    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    with candump(tmp_path / "stop.log", "vcan0"):
+        daemon.process.send_signal(signal.SIGSTOP)
+        levers.values["Slew"] = -100.0  # waits in the sockets as if it were fresh
+        for _ in range(100):
+            wait_for(bus, "LeverLeft", lambda v: True)
+        daemon.process.send_signal(signal.SIGCONT)
+        status = wait_for(bus, "SlewStatus", state("TRIPPED"))
+        assert str(status["Reason"]) == "LOOP_STALLED"
+    values = slew_of(tmp_path / "stop.log")
+    stopped = values.index(0)
+    assert not any(values[stopped:])
+    assert all(v < 128 for v in values), "moved the other way"
+    drive(bus, levers)
+
+
+def test_repeated_overruns_stop_the_axis_and_a_single_one_does_not(
+    bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    def hold_up(times: int) -> None:
+        for _ in range(times):
+            daemon.process.send_signal(signal.SIGSTOP)
+            wait_for(bus, "LeverLeft", lambda v: True)
+            wait_for(bus, "LeverLeft", lambda v: True)
+            daemon.process.send_signal(signal.SIGCONT)
+            wait_for(bus, "SlewCommand", lambda v: True)
+
+    drive(bus, levers)
+    hold_up(1)
+    assert str(wait_for(bus, "SlewStatus", lambda s: True)["State"]) == "ACTIVE"
+    hold_up(40)
+    # An emulated machine may hold the process up for longer than that.
+    status = wait_for(bus, "SlewStatus", state("STOPPING", "NEUTRAL_WAIT", "TRIPPED"))
+    assert str(status["Reason"]) in ("LOOP_OVERRUN", "STOP_DONE", "LOOP_STALLED")
+    assert "reason=LOOP_OVERRUN" in daemon.text() or "reason=LOOP_STALLED" in daemon.text()
+    drive(bus, levers)
+
+
+def test_steps_of_the_clock_change_nothing(
+    bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    drive(bus, levers)
+    now = time.clock_gettime(time.CLOCK_REALTIME)
+    try:
+        for hours in (1, -1):
+            time.clock_settime(time.CLOCK_REALTIME, now + 3600 * hours)
+            for slew in (90.0, 80.0, 100.0):
+                levers.values["Slew"] = slew
+                wait_for(bus, "SlewStatus", lambda s, slew=slew: s["RawCommand"] == slew)
+    finally:
+        time.clock_settime(time.CLOCK_REALTIME, now)
+    assert "STOPPING" not in daemon.text()
+
+
+@pytest.mark.parametrize("error", ["20000040#0000000000000000", "20000044#0020000000000000"])
+def test_bus_off_is_seen_and_survived(
+    error: str, bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    """Error frames as a driver writes them when its controller has left the bus."""
+    drive(bus, levers)
+    subprocess.run(["cansend", "vcan0", error], check=True)
+    daemon.wait_log("bus=crane state=bus-off")
+    daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
+    subprocess.run(["cansend", "vcan0", "20000100#0000000000000000"], check=True)  # restarted
+    daemon.wait_log("bus=crane state=up")
+    drive(bus, levers)
+
+
+def test_passive_is_told_and_goes_on(bus: can.BusABC, levers: Levers, daemon: Service) -> None:
+    drive(bus, levers)
+    subprocess.run(["cansend", "vcan0", "20000004#0020000000000000"], check=True)
+    daemon.wait_log("bus=crane state=passive")
+    assert str(wait_for(bus, "SlewStatus", lambda s: True)["State"]) == "ACTIVE"
+    subprocess.run(["cansend", "vcan0", "20000004#0040000000000000"], check=True)
+    daemon.wait_log("bus=crane state=up")
+
+
+def test_an_interface_removed_and_back_is_used_again(
+    bus: can.BusABC, levers: Levers, daemon: Service
+) -> None:
+    drive(bus, levers)
+    ip("link", "del", "vcan0")
+    try:
+        daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
+        daemon.wait_log("bus=crane state=gone")
+    finally:
+        ip("link", "add", "vcan0", "type", "vcan")
+        ip("link", "set", "vcan0", "up")
+    daemon.wait_log("bus=crane state=up")
+    with open_bus("vcan0") as again, levers_on("vcan0") as new_levers:
+        drive(again, new_levers)
+    assert daemon.process.poll() is None
+
+
+def test_a_full_queue_trips_and_is_survived(tmp_path: Path) -> None:
+    """A bus that takes no more: ENOBUFS."""
+    with (
+        service(tmp_path / "d.log", "run", str(FILE), "--channel", "vxcan0") as daemon,
+        open_bus("vxcan1") as far,
+        levers_on("vxcan1") as levers,
+    ):
+        daemon.wait_log("started file=")
+        drive(far, levers)
+        # 8 bit/s: the queue of 160 bytes is full with the next ten frames
+        tc("replace", "dev", "vxcan0", "root", "tbf", "rate", "8bit", "burst", "64", "limit", "160")
+        try:
+            daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
+        finally:
+            tc("del", "dev", "vxcan0", "root")
+        drive(far, levers)
+
+
+def test_frames_that_do_not_get_onto_the_bus_are_not_piled_up(
+    can_pair: tuple[str, str], tmp_path: Path
+) -> None:
+    """As with no other node to acknowledge: what is queued goes out later, and is old by then."""
+    ours, far_end = can_pair
+    log = tmp_path / "valves.log"
+    with (
+        service(tmp_path / "d.log", "run", str(FILE), "--channel", ours) as daemon,
+        open_bus(far_end) as far,
+        levers_on(far_end) as levers,
+        candump(log, far_end),
+    ):
+        daemon.wait_log("started file=")
+        drive(far, levers)
+        tc("replace", "dev", ours, "root", "netem", "delay", "3s", "limit", "1000")
+        try:
+            daemon.wait_log("bus=crane state=not-confirmed")
+            daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
+            far.send(can.Message(arbitration_id=0x7F0, is_extended_id=False))  # a mark in the log
+            daemon.wait_log("bus=crane state=up")  # the first of them are out
+        finally:
+            tc("del", "dev", ours, "root")
+        drive(far, levers)
+    messages = logged(log)
+    mark = next(i for i, m in enumerate(messages) if m.arbitration_id == 0x7F0)
+    late = [m.data[0] for m in messages[mark:] if m.arbitration_id == SLEW]
+    neutral = late.index(0)
+    # Three were under way when it was seen; none is added to them.
+    assert sum(v != 0 for v in late[:neutral]) <= 4
+    assert not any(late[neutral : neutral + 3])
+
+
+@contextmanager
+def running(stderr: int) -> Iterator[subprocess.Popen]:
+    """The daemon with that standard error, killed at the end of the block where it still runs."""
+    command = [sys.executable, "-m", "canshaper", "run", str(FILE)]
+    with subprocess.Popen(command, stderr=stderr) as process:
+        try:
+            yield process
+        finally:
+            process.kill()
+
+
+def test_a_full_disk_and_a_reader_that_has_gone_change_nothing(
+    bus: can.BusABC, levers: Levers
+) -> None:
+    reading, writing = os.pipe()
+    os.close(reading)
+    for stderr in (os.open("/dev/full", os.O_WRONLY), writing):
+        with running(stderr) as process:
+            drive(bus, levers)
+            for slew in (90.0, 80.0, 100.0):
+                levers.values["Slew"] = slew
+                wait_for(bus, "SlewStatus", lambda s, slew=slew: s["RawCommand"] == slew)
+            levers.values["Slew"] = 0.0
+            process.send_signal(signal.SIGTERM)
+            assert process.wait(120) == 0
+        os.close(stderr)
+
+
+def test_a_log_reader_that_hangs_holds_up_nothing(bus: can.BusABC, levers: Levers) -> None:
+    reading, writing = os.pipe()
+    os.set_blocking(writing, False)
+    try:
+        while True:
+            os.write(writing, b"x" * 4096)
+    except BlockingIOError:
+        os.set_blocking(writing, True)  # as the daemon gets it: a write would wait for ever
+    with running(writing) as process:
+        drive(bus, levers)
+        levers.values["Slew"] = 0.0
+        process.send_signal(signal.SIGTERM)
+        assert process.wait(120) == 0
+    os.close(reading)
+    os.close(writing)

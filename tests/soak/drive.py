@@ -1,0 +1,222 @@
+"""One daemon, one plant, one hand: sequences of a drive, a fault, the way back.
+
+The judge is an independent candump log. Marks, frames of an id of their own, divide it.
+"""
+
+import random
+import signal
+import subprocess
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+import can
+
+from tests.hil.frame_faults import AT_ONCE, FAULTS
+from tests.hil.hand import Hand
+from tests.hil.machine import Service, message_name, wait_for
+
+MARK = 0x7E0
+VALVES = {"Slew": 0x200, "Lift": 0x202}
+STOPPED = ("NEUTRAL_WAIT", "TRIPPED")
+FOREIGN = bytes.fromhex("7DEE")
+# Valve frames between the mark and the fault: the hand's next frame, and what an emulated machine
+# makes of the order of its processes.
+SLACK = 5
+
+
+class WrongMove(AssertionError):
+    """A valve frame moved that must not."""
+
+
+class Witness:
+    """The growing log of candump, read from mark to mark."""
+
+    def __init__(self, log: Path, bus: can.BusABC) -> None:
+        self._file = log.open()
+        self._bus = bus
+        self._count = 0
+        self._rest = ""
+
+    def mark(self) -> None:
+        """Put a mark into the log."""
+        self._count += 1
+        data = self._count.to_bytes(4, "big")
+        self._bus.send(can.Message(arbitration_id=MARK, is_extended_id=False, data=data))
+
+    def until_mark(self) -> list[tuple[int, bytes]]:
+        """Frames (id, data) up to the next mark, which is waited for."""
+        frames: list[tuple[int, bytes]] = []
+        until = time.monotonic() + 120.0
+        while True:
+            line = self._file.readline()
+            if not line.endswith("\n"):
+                self._rest += line
+                if time.monotonic() > until:
+                    raise AssertionError("candump writes nothing")
+                time.sleep(0.02)
+                continue
+            line, self._rest = self._rest + line, ""
+            key, _, data = line.split()[2].partition("#")
+            if len(key) > 3 or data.startswith("R"):  # error frames, remote frames
+                continue
+            if int(key, 16) == MARK:
+                return frames
+            frames.append((int(key, 16), bytes.fromhex(data)))
+
+
+class Soak:
+    """Runs sequences and counts.
+
+    Attributes:
+        counts: sequences, faults by name, valve frames and so on.
+    """
+
+    def __init__(self, daemon: Service, hand: Hand, bus: can.BusABC, log: Path, seed: int) -> None:
+        self._daemon = daemon
+        self._hand = hand
+        self._bus = bus
+        self._witness = Witness(log, bus)
+        self._random = random.Random(seed)
+        self.counts: Counter[str] = Counter()
+        self._others: dict[str, tuple[Callable[[], None], int]] = {
+            "process stopped": (self._stop_process, AT_ONCE),
+            "second sender": (lambda: self._send(f"200#{FOREIGN.hex().upper()}"), AT_ONCE),
+            "bus-off": (lambda: self._send("20000040#0000000000000000"), AT_ONCE),
+            "interface down": (self._interface_down, AT_ONCE),
+        }
+        self._harmless: dict[str, Callable[[], None]] = {
+            "clock stepped": self._step_clock,
+            "flood": self._flood,
+            "reload of a broken file": self._break_file,
+            "reload of the good file": lambda: self._daemon.process.send_signal(signal.SIGHUP),
+            "error passive": lambda: self._send("20000004#0020000000000000"),
+        }
+
+    def sequence(self) -> None:
+        """Ready, drive, fault, stop, way back; a wrong move raises."""
+        pick = self._random
+        kind = pick.choice([*FAULTS, *self._others, *self._harmless])
+        axis = FAULTS[kind].axis if kind in FAULTS else "Slew"
+        self._ready(axis)
+        value = pick.choice((-1, 1)) * pick.uniform(30.0, 100.0)
+        setattr(self._hand, axis.lower(), round(value, 1))
+        self._frames(axis, pick.randrange(5, 120))
+        self._witness.mark()
+        self._witness.until_mark()
+        if kind in self._harmless:
+            self._harmless[kind]()
+            self._frames(axis, 60)
+            state = str(self._status(axis)["State"])
+            if state not in ("ACTIVE", "STOPPING", *STOPPED):
+                raise WrongMove(f"{kind}: {state}")
+            self.counts["harmless: still active"] += state == "ACTIVE"
+        else:
+            self._fault(kind, axis)
+        self.counts[kind] += 1
+        self.counts["sequences"] += 1
+
+    def _fault(self, kind: str, axis: str) -> None:
+        make, moving = self._others.get(kind, (lambda: FAULTS[kind].make(self._hand), 0))
+        make()
+        wait_for(self._bus, f"{axis}Status", lambda s: str(s["State"]) in STOPPED)
+        # The fault goes away with the stick still deflected: nothing may move.
+        self._hand.spoil = lambda _id, data: [data]
+        self._hand.enable, self._hand.stop = 1, 0
+        self._frames(axis, self._random.randrange(5, 40))
+        self._witness.mark()
+        frames = self._witness.until_mark()
+        if kind in FAULTS:
+            frames, moving = frames[_begin(kind, frames) :], FAULTS[kind].moving
+        valves = [data for key, data in frames if key == VALVES[axis]]
+        ours = [data[0] for data in valves if data != FOREIGN]
+        self._judge(kind, ours, moving + SLACK)
+        self.counts["valve frames judged"] += len(ours)
+
+    def _judge(self, kind: str, valves: list[int], moving: int) -> None:
+        if 0 not in valves:
+            raise WrongMove(f"{kind}: never neutral in {len(valves)} frames")
+        first = valves.index(0)
+        if first > moving:
+            raise WrongMove(f"{kind}: {first} frames moved, allowed are {moving}")
+        if any(valves[first:]):
+            raise WrongMove(f"{kind}: moved again after neutral: {valves}")
+
+    # -- parts ---------------------------------------------------------------------------------
+
+    def _status(self, axis: str) -> dict:
+        while self._bus.recv(0):
+            pass
+        return wait_for(self._bus, f"{axis}Status", lambda s: True)
+
+    def _frames(self, axis: str, count: int) -> None:
+        """Let so many valve frames pass."""
+        for _ in range(count):
+            wait_for(self._bus, f"{axis}Command", lambda v: True)
+
+    def _ready(self, axis: str) -> None:
+        """The stated way back, at most 60 presses of the reset."""
+        self._hand.rest()
+        self._send("20000100#0000000000000000")  # the controller has restarted
+        for i in range(60):
+            self._hand.reset = i % 2
+            status = self._status(axis)
+            if str(status["State"]) == "READY" and status["RawCommand"] == 0:
+                self._hand.reset = 0
+                self.counts["ways back"] += 1
+                return
+        raise AssertionError(f"no way back: {status}\n{self._daemon.text()[-2000:]}")
+
+    def _send(self, frame: str) -> None:
+        subprocess.run(["cansend", "vcan0", frame], check=True)
+
+    def _stop_process(self) -> None:
+        self._daemon.process.send_signal(signal.SIGSTOP)
+        for _ in range(self._random.randrange(15, 60)):  # more than the levers' timeout
+            wait_for(self._bus, "LeverLeft", lambda v: True)
+        self._daemon.process.send_signal(signal.SIGCONT)
+
+    def _interface_down(self) -> None:
+        subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
+        time.sleep(self._random.uniform(0.05, 0.5))
+        subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
+
+    def _step_clock(self) -> None:
+        now = time.clock_gettime(time.CLOCK_REALTIME)
+        step = self._random.choice((-3600.0, 3600.0))
+        time.clock_settime(time.CLOCK_REALTIME, now + step)
+
+    def _flood(self) -> None:
+        subprocess.run(["cangen", "vcan0", "-g", "2", "-n", "500", "-I", "7A0"], check=True)
+
+    def _break_file(self) -> None:
+        file = Path(self._daemon.process.args[-1])  # type: ignore[index]
+        good = file.read_text()
+        file.write_text(good.replace("deadband_pct: 5", "deadband_pct: 90", 1))
+        self._daemon.process.send_signal(signal.SIGHUP)
+        self._hand.rest()
+        before = self._daemon.text().count("reload=refused")
+        until = time.monotonic() + 60.0
+        while self._daemon.text().count("reload=refused") == before:
+            assert time.monotonic() < until, "no reload=refused in the log"
+            time.sleep(0.02)
+        file.write_text(good)
+
+
+def _begin(kind: str, frames: list[tuple[int, bytes]]) -> int:
+    """Place of the first frame that shows the fault; 0 where the mark is as near."""
+    begins = FAULTS[kind].begins
+    for place, (key, data) in enumerate(frames):
+        if begins(key.to_bytes(2, "big"), data):
+            return place
+    return 0
+
+
+def count_frames(log: Path) -> Counter[str]:
+    """Frames of the whole log by message."""
+    names: Counter[str] = Counter()
+    with can.CanutilsLogReader(log) as reader:
+        for message in reader:
+            names[message_name(message) or "other"] += 1
+    return names
