@@ -35,17 +35,26 @@ def message_name(message: can.Message) -> str | None:
         return None
 
 
-def wait_for(bus: can.BusABC, name: str, accept: Callable[[dict], bool]) -> dict:
+Accept = Callable[[dict], bool]
+
+
+def wait_for(bus: can.BusABC, name: str, accept: Accept) -> dict:
     """The first message of that name whose decoded signals are accepted."""
+    return wait_for_one(bus, {name: accept})[1]
+
+
+def wait_for_one(bus: can.BusABC, wanted: dict[str, Accept]) -> tuple[str, dict]:
+    """The first message of these names that is accepted: its name and its decoded signals."""
     until = time.monotonic() + ANSWER_S
-    last: dict = {}
+    last: dict[str, dict] = {}
     while time.monotonic() < until:
         message = bus.recv(1.0)
-        if message is not None and message_name(message) == name:
-            last = dict(DBC.decode_message(name, message.data))
-            if accept(last):
-                return last
-    raise AssertionError(f"no such {name} within {ANSWER_S:g} s; the last was {last}")
+        name = message_name(message) if message is not None else None
+        if message is not None and name in wanted:
+            last[name] = dict(DBC.decode_message(name, message.data))
+            if wanted[name](last[name]):
+                return name, last[name]
+    raise AssertionError(f"none of {list(wanted)} within {ANSWER_S:g} s; the last were {last}")
 
 
 class Levers(threading.Thread):
