@@ -66,9 +66,7 @@ class Line:
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
-        self.port = RawPort(
-            "crane", self._open, ids, self.faults.append, confirms=ids is not None
-        )
+        self.port = RawPort("crane", self._open, ids, self.faults.append, confirms=ids is not None)
 
     def _open(self, ids: Ids | None) -> list[socket.socket]:
         self.asked.append(ids)

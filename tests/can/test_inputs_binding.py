@@ -6,6 +6,7 @@ from typing import Protocol
 import pytest
 
 from canshaper.can.binding import Deployment
+from canshaper.can.frame import FrameFault
 from canshaper.service.controller import Controller
 
 COUNTER = "alive_counter: AliveCounter"
@@ -73,7 +74,7 @@ def test_a_lever_without_protection(machine: Machine) -> None:
     bound = machine.load().levers["left"]
     assert (bound.counter_range, bound.checksum) == (0, None)
     config = bound.config
-    assert (config.alive_max_step, config.qualify, config.frozen_s) == (3, 1, 20.0)
+    assert (config.alive_max_step, config.qualify, config.frozen_s) == (None, 1, 20.0)
 
 
 @pytest.mark.parametrize("kind", ["xor", "sum", "crc8_sae_j1850", "crc8_autosar"])
@@ -153,6 +154,19 @@ def test_what_a_lever_may_not_say(protected: Machine, text: str, says: str) -> N
     line = lever(protected, text)
     (problem,) = protected.problems()
     assert problem.startswith(f"machine.yaml:{line}: {says}")
+
+
+@pytest.mark.parametrize(
+    ("counter", "usual"), [("Count1", 1), ("Count2", 2), ("Half", 3), ("AliveCounter", 3)]
+)
+def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, usual: int) -> None:
+    protected.in_yaml(COUNTER, f"alive_counter: {counter}")
+    bound = protected.load().levers["left"]
+    for step in range(1, bound.counter_range):
+        guard = bound.guard()
+        assert guard.judge(b"", 0) is FrameFault.NONE
+        wanted = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
+        assert guard.judge(b"", step) is wanted
 
 
 @pytest.mark.parametrize(

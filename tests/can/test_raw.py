@@ -14,11 +14,9 @@ from hypothesis import strategies as st
 
 from canshaper.can import raw
 from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.can.raw import MOST_FRAMES, MOST_UNKNOWN, RawPort
-from canshaper.can.socketcan import CAN_INV_FILTER, MOST_FILTERS, SO_RXQ_OVFL, Ids, set_filters
-from tests.can.raw_line import VALVE, Line, message
-
-NO_ACKNOWLEDGE = 0x20  # linux/can/error.h
+from canshaper.can.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
+from canshaper.can.socketcan import CAN_INV_FILTER, MOST_FILTERS, Ids, set_filters
+from tests.can.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
 
 
 @pytest.fixture
@@ -42,26 +40,37 @@ def line(make_line: Callable[..., Line]) -> Line:
 
 # -- frames ----------------------------------------------------------------------------------------
 
+# A port that is told its ids has three sockets, one that is not has one.
+EITHER = pytest.mark.parametrize("ids", [IDS, None])
 
-def test_frames_come_in_order_and_a_call_ends_when_there_is_none(line: Line) -> None:
-    assert list(line.port.frames()) == []
+
+@EITHER
+def test_frames_come_in_order_and_a_call_ends_when_there_is_none(
+    make_line: Callable[..., Line], ids: Ids | None
+) -> None:
+    line = make_line(ids)
+    assert line.heard() == []
     for length in range(9):
         line.put(message(0x100 + length, bytes(range(1, length + 1))))
     assert list(line.port.frames()) == [
         Frame("crane", 0x100 + n, False, bytes(range(1, n + 1))) for n in range(9)
     ]
-    assert list(line.port.frames()) == []
+    assert line.heard() == []
     assert line.faults == []
 
 
+@EITHER
 @pytest.mark.parametrize(
     ("can_id", "extended"),
     [(0, False), (0x7FF, False), (0, True), (0x110, True), (2**29 - 1, True)],
 )
-def test_ids_of_both_widths_both_ways(line: Line, can_id: int, extended: bool) -> None:
+def test_ids_of_both_widths_both_ways(
+    make_line: Callable[..., Line], ids: Ids | None, can_id: int, extended: bool
+) -> None:
+    line = make_line(ids)
     line.put(message(can_id, b"\1\2\3", extended=extended))
     frame = Frame("crane", can_id, extended, b"\1\2\3")
-    assert list(line.port.frames()) == [frame]
+    assert line.heard() == [frame]
     assert line.port.send(frame)
     (data,) = line.sent()
     flag = socket.CAN_EFF_FLAG if extended else 0
@@ -69,63 +78,86 @@ def test_ids_of_both_widths_both_ways(line: Line, can_id: int, extended: bool) -
     assert len(data) == 16
 
 
-def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line) -> None:
-    line.put(can.Message(arbitration_id=0x110, is_remote_frame=True, dlc=8, is_extended_id=False))
-    line.far[0].send(build_can_frame(message(0x110, bytes(8)))[:15])
-    line.far[0].send(b"")
-    line.far[0].send(struct.pack("=IB3x8s", 0x110, 9, bytes(8)))
-    line.error(NO_ACKNOWLEDGE)
-    line.put(message(0x111))
-    assert [f.can_id for f in line.port.frames()] == [0x111]
-    assert line.faults == [FrameFault.WRONG_LENGTH] * 4 + [FrameFault.ERROR_FRAME]
+@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: int) -> None:
+    for can_id, extended in ((0x110, False), (0x110, True)):
+        line.put(
+            can.Message(
+                arbitration_id=can_id, is_remote_frame=True, dlc=8, is_extended_id=extended
+            ),
+            number,
+        )
+        word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
+        line.far[number].send(struct.pack("=IB3x8s", word, 9, bytes(8)))
+    line.far[number].send(build_can_frame(message(0x110, bytes(8)))[:15])
+    line.far[number].send(b"")
+    line.put(message(0x111), number)
+    assert [f.can_id for f in line.heard()] == [0x111]
+    assert line.faults == [FrameFault.WRONG_LENGTH] * 6
 
 
-def test_an_error_frame_is_none_whatever_its_class_looks_like(line: Line) -> None:
-    """The class of an error stands where the id stands: 0x110 would be a lever."""
-    line.error(0x110)
-    assert list(line.port.frames()) == []
+@EITHER
+@pytest.mark.parametrize("kind", [0x20, 0x110, 0x200, 0x300])  # linux/can/error.h
+def test_an_error_frame_is_none_whatever_its_class_looks_like(
+    make_line: Callable[..., Line], ids: Ids | None, kind: int
+) -> None:
+    """The classes of errors stand where the id stands: 0x110 would be a lever."""
+    line = make_line(ids)
+    line.error(kind)
+    assert line.heard() == []
     assert line.faults == [FrameFault.ERROR_FRAME]
 
 
-def test_a_flood_cannot_hold_up_the_tick_for_ever(make_line: Callable[..., Line]) -> None:
-    line = make_line(2)
-    line.put(message(0x110))
-    line.put(message(0x7F0), 1)
+def test_a_flood_cannot_hold_up_the_tick_for_ever(line: Line) -> None:
+    """Each frame that is taken is followed by another one."""
+    for number in (TAKEN, SENT_BACK, UNKNOWN):
+        line.put(message(number), number)
     seen: list[int] = []
-    for frame in line.port.frames():
-        seen.append(frame.can_id)
-        line.put(message(frame.can_id), 0 if frame.can_id == 0x110 else 1)
-    assert seen == [0x110] * MOST_FRAMES + [0x7F0] * MOST_UNKNOWN
+    for source in (line.port.frames, line.port.others):
+        for frame in source():
+            seen.append(frame.can_id)
+            line.put(message(frame.can_id), frame.can_id)
+    most = [TAKEN] * MOST_FRAMES + [SENT_BACK] * MOST_FRAMES + [UNKNOWN] * MOST_UNKNOWN
+    assert seen == most
 
 
-def test_unknown_ids_come_after_those_that_matter(make_line: Callable[..., Line]) -> None:
-    line = make_line(2)
-    for can_id in range(5):
-        line.put(message(0x7F0 + can_id), 1)
+def test_what_can_wait_does_not_come_with_the_levers(line: Line) -> None:
+    line.put(message(0x7F0), UNKNOWN)
+    line.put(message(0x200), SENT_BACK)
     line.put(message(0x110))
-    assert [f.can_id for f in line.port.frames()] == [0x110, *range(0x7F0, 0x7F5)]
+    assert [f.can_id for f in line.port.frames()] == [0x110]
+    assert [f.can_id for f in line.port.others()] == [0x200, 0x7F0]
 
 
-def test_a_queue_that_has_run_over_is_told_once_for_each_time() -> None:
-    """On UDP, whose queue overflows as that of a CAN socket does and tells it the same way."""
+@pytest.mark.parametrize("number", [TAKEN, SENT_BACK])
+def test_a_queue_that_has_run_over_is_told_once_for_each_time(number: int) -> None:
+    """On UDP, whose queue overflows as that of a CAN socket does."""
     faults: list[FrameFault] = []
-    near = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    pairs = [udp_pair() for _ in range(3)]
+    near = [near for near, _ in pairs]
+    port = RawPort("crane", lambda _ids: near, IDS, faults.append, confirms=True)
+    frame = build_can_frame(message(0x110))
+    far = pairs[number][1]
+    for overflows in (1, 2):
+        for _ in range(100):
+            far.send(frame)
+        assert 0 < len([*port.frames(), *port.others()]) < 100
+        for _ in range(3):
+            far.send(frame)
+            assert len([*port.frames(), *port.others()]) == 1
+        assert faults == [FrameFault.FRAMES_LOST] * overflows
+    for one in (*near, *(far for _, far in pairs)):
+        one.close()
+
+
+def udp_pair() -> tuple[socket.socket, socket.socket]:
+    """A socket with a short queue, and one that sends to it."""
+    near, far = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
     near.setblocking(False)
     near.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 2048)
-    near.setsockopt(socket.SOL_SOCKET, SO_RXQ_OVFL, 1)
     near.bind(("127.0.0.1", 0))
-    port = RawPort("crane", lambda _ids: [near], None, faults.append, confirms=False)
-    frame = build_can_frame(message(0x110))
-    with near, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as far:
-        far.connect(near.getsockname())
-        for overflows in (1, 2):
-            for _ in range(100):
-                far.send(frame)
-            assert 0 < len(list(port.frames())) < 100
-            for _ in range(3):  # the count comes with every frame that was queued afterwards
-                far.send(frame)
-                assert len(list(port.frames())) == 1
-            assert faults == [FrameFault.FRAMES_LOST] * overflows
+    far.connect(near.getsockname())
+    return near, far
 
 
 # -- sending ---------------------------------------------------------------------------------------
@@ -147,22 +179,53 @@ def test_a_full_queue_is_no_reason_to_wait(line: Line) -> None:
 
 @pytest.mark.parametrize("code", [errno.ENOBUFS, errno.EAGAIN])
 def test_a_full_queue_of_the_interface_is_a_failed_send_and_no_more(line: Line, code: int) -> None:
-    line.near[0].fail = OSError(code, "full")
+    line.near[SENT_BACK].fail = OSError(code, "full")
     for _ in range(10):
+        line.now_ns += PROBE_NS
         assert not line.port.send(VALVE)
-    line.near[0].fail = None
+    line.near[SENT_BACK].fail = None
     assert line.faults == []
     assert line.port.send(VALVE)
 
 
-def test_another_error_is_told_and_sending_goes_on(line: Line) -> None:
+def test_another_error_is_told_until_a_frame_gets_through(line: Line) -> None:
+    line.near[SENT_BACK].fail = OSError(errno.EINVAL, "other")
+    for _ in range(3):
+        assert not line.port.send(VALVE)
+    assert line.port.state is BusState.FAILED
+    assert line.faults == [FrameFault.BUS_ERROR] * 3
+    line.near[SENT_BACK].fail = None
+    assert line.port.send(VALVE)
+    line.confirm(VALVE)
+    assert line.heard() == []
+    assert line.port.state is BusState.UP
+
+
+@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+def test_an_error_of_one_socket_keeps_the_others_working(line: Line, number: int) -> None:
+    for other in range(3):
+        line.put(message(other), other)
+    line.near[number].fail = OSError(errno.EINVAL, "other")
+    assert [f.can_id for f in line.heard()] == [n for n in range(3) if n != number]
+    assert line.faults == [FrameFault.BUS_ERROR]
+    line.near[number].fail = None
+    assert [f.can_id for f in line.heard()] == [number]
+
+
+def test_a_far_end_that_is_gone_is_an_error_as_any_other(make_line: Callable[..., Line]) -> None:
+    """The real thing: the kernel answers ECONNREFUSED."""
+    line = make_line(None)
     line.far[0].close()
     assert not line.port.send(VALVE)
     assert line.faults == [FrameFault.BUS_ERROR]
-    line.near[0].fail = OSError(errno.EINVAL, "other")
-    assert list(line.port.frames()) == []
-    assert line.faults == [FrameFault.BUS_ERROR] * 2
-    assert line.port.fileno() == line.near[0].fileno()
+
+
+def test_without_confirmations_nothing_is_said_about_the_bus(
+    make_line: Callable[..., Line],
+) -> None:
+    line = make_line(None)
+    assert line.unconfirmed(most=500) == 500
+    assert line.port.state is BusState.UP
 
 
 # -- filters ---------------------------------------------------------------------------------------
@@ -195,31 +258,40 @@ MESSAGES = st.frozensets(
 
 
 @given(taken=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
-def test_one_socket_hears_what_matters_the_other_what_nobody_knows(
+def test_each_message_is_heard_by_the_socket_that_is_for_it(
     taken: frozenset[tuple[int, bool]],
     sent: frozenset[tuple[int, bool]],
     known: frozenset[tuple[int, bool]],
     others: frozenset[tuple[int, bool]],
 ) -> None:
-    """Every message goes to one of them at most, whatever ids of the two widths are alike."""
-    with Filtered() as main, Filtered() as rest:
-        set_filters([main, rest], Ids(taken, sent, known))
+    """And by no other one, whatever ids of the two widths are alike."""
+    sent -= taken  # checked with the deployment
+    with Filtered() as first, Filtered() as second, Filtered() as third:
+        set_filters([first, second, third], Ids(taken, sent, sent, known))
         everything = taken | sent | known | others
         for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
             word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
-            here = (can_id, extended) in taken | sent
-            assert main.hears(word, join=False) is here
-            unknown = (can_id, extended) not in taken | sent | known
-            assert rest.hears(word, join=True) is unknown
+            heard = [
+                first.hears(word, join=False),
+                second.hears(word, join=False),
+                third.hears(word, join=True),
+            ]
+            message = (can_id, extended)
+            assert heard == [
+                message in taken,
+                message in sent,
+                message not in taken | sent | known,
+            ]
 
 
 def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
     taken = frozenset({(0x110, False)})
     for size, heard in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
         known = frozenset((0x1000 + i, True) for i in range(size))
-        with Filtered() as main, Filtered() as rest:
-            set_filters([main, rest], Ids(taken, frozenset(), known))
-            assert len(rest.filters) <= MOST_FILTERS
-            assert rest.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
-            assert rest.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
-            assert not rest.hears(0x110, join=True)
+        with Filtered() as first, Filtered() as second, Filtered() as third:
+            ids = Ids(taken, frozenset(), frozenset(), known)
+            set_filters([first, second, third], ids)
+            assert len(third.filters) <= MOST_FILTERS
+            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
+            assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
+            assert not third.hears(0x110, join=True)

@@ -21,7 +21,7 @@ def doctor(file: Path, *arguments: str) -> dict[str, dict[str, Any]]:
 
 def test_nothing_is_sent_on_the_bus_of_the_deployment(tmp_path: Path) -> None:
     with candump(tmp_path / "vcan0.log", "vcan0"):
-        found = doctor(tmp_path / "doctor.json", "--load", "--listen", "1")
+        found = doctor(tmp_path / "doctor.json", "--no-load", "--listen", "1")
     assert logged(tmp_path / "vcan0.log") == []
     assert found["vcan0"]["found"] == "up; a virtual bus, nothing else to check"
     assert found["lever left"]["level"] == "bad"

@@ -159,7 +159,7 @@ def test_steps_of_the_clock_change_nothing(
 def test_bus_off_is_seen_and_survived(
     error: str, can_pair: tuple[str, str], tmp_path: Path
 ) -> None:
-    """Frames that stay in the queue, and the error frame that a driver writes when it is bus-off."""
+    """Frames that stay in the queue, and the error frame that a driver writes in bus-off."""
     ours, far_end = can_pair
     with (
         service(tmp_path / "d.log", "run", str(FILE), "--channel", ours) as daemon,

@@ -125,7 +125,7 @@ def left(stick: int, count: int) -> Frame:
     return Frame("crane", 0x110, False, struct.pack("<hhBBBB", stick, 0, 1, 0, 0, count))
 
 
-@settings(max_examples=400, deadline=None)
+@settings(max_examples=4 * settings().max_examples)
 @given(script=st.lists(steps, max_size=25), armed=st.booleans())
 def test_no_frames_move_a_valve_unasked(
     script: list[tuple[list[Frame], int, int]], armed: bool
@@ -134,7 +134,7 @@ def test_no_frames_move_a_valve_unasked(
     event("moved" if drive(start + script) else "still")
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=2 * settings().max_examples)
 @given(script=st.lists(st.tuples(st.lists(any_frames), st.just(0), st.just(1)), max_size=60))
 def test_noise_moves_nothing_that_is_not_asked(
     script: list[tuple[list[Frame], int, int]],
@@ -142,7 +142,7 @@ def test_noise_moves_nothing_that_is_not_asked(
     drive(script)
 
 
-@settings(max_examples=200, deadline=None)
+@settings(max_examples=2 * settings().max_examples)
 @given(script=st.lists(steps, max_size=25), switch=st.sampled_from([0, 2, 3]))
 def test_nothing_moves_while_no_lever_is_enabled(
     script: list[tuple[list[Frame], int, int]], switch: int

@@ -13,12 +13,16 @@ START_NS = 1_000_000_000_000
 
 
 class Clock:
-    """A clock that stands still but for sleeping and working."""
+    """A clock that stands still but for sleeping and working.
 
-    def __init__(self) -> None:
+    Args:
+        late_ns: how late each sleep ends; the last one stands for all further ones.
+    """
+
+    def __init__(self, *late_ns: int) -> None:
         self.now_ns = START_NS
-        self.late_ns = 0
         self.slept: list[float] = []
+        self._late_ns = [*late_ns] or [0]
 
     def monotonic_ns(self) -> int:
         return self.now_ns
@@ -26,18 +30,18 @@ class Clock:
     def sleep(self, seconds: float) -> None:
         assert seconds > 0
         self.slept.append(seconds)
-        self.now_ns += round(seconds * 1e9) + self.late_ns
+        late_ns = self._late_ns.pop(0) if len(self._late_ns) > 1 else self._late_ns[0]
+        self.now_ns += round(seconds * 1e9) + late_ns
 
 
-def calls(clock: Clock, work_ns: list[int], late_ns: int = 0) -> list[tuple[int, int]]:
-    """(time since the start, missed) of every call, while each call takes its time to work."""
-    clock.late_ns = late_ns
-    seen: list[tuple[int, int]] = []
+def calls(clock: Clock, work_ns: list[int]) -> list[tuple[int, int, int]]:
+    """(time since the start, missed, late) of every call, while each takes its time to work."""
+    seen: list[tuple[int, int, int]] = []
     durations: Iterator[int] = iter(work_ns)
 
     def body(now_ns: int, missed: int, late_ns: int) -> bool:
         assert now_ns == clock.now_ns
-        seen.append((now_ns - START_NS, missed))
+        seen.append((now_ns - START_NS, missed, late_ns))
         work = next(durations, None)
         clock.now_ns += work or 0
         return work is not None
@@ -50,36 +54,79 @@ def calls(clock: Clock, work_ns: list[int], late_ns: int = 0) -> list[tuple[int,
 
 def test_the_first_call_is_at_once_and_the_others_at_their_deadlines() -> None:
     seen = calls(Clock(), [0, 5_000_000, 19_000_000, 0])
-    assert seen == [(i * PERIOD_NS, 0) for i in range(5)]
+    assert seen == [(i * PERIOD_NS, 0, 0) for i in range(5)]
 
 
 def test_it_ends_when_told_to_without_another_sleep() -> None:
     clock = Clock()
-    assert calls(clock, []) == [(0, 0)]
+    assert calls(clock, []) == [(0, 0, 0)]
     assert clock.slept == []
 
 
 def test_lateness_of_the_clock_does_not_add_up() -> None:
     late = 3_000_000
-    seen = calls(Clock(), [1_000_000] * 500, late_ns=late)
-    assert seen[1:] == [(i * PERIOD_NS + late, 0) for i in range(1, 501)]
+    seen = calls(Clock(late), [1_000_000] * 500)
+    assert seen[1:] == [(i * PERIOD_NS + late, 0, late) for i in range(1, 501)]
 
 
 def test_a_call_that_is_a_little_late_misses_nothing_and_is_caught_up() -> None:
-    seen = calls(Clock(), [PERIOD_NS + 5_000_000, 1_000_000, 0])
-    assert seen == [(0, 0), (25_000_000, 0), (40_000_000, 0), (60_000_000, 0)]
+    late = 5_000_000
+    seen = calls(Clock(), [PERIOD_NS + late, 1_000_000, 0])
+    assert seen == [(0, 0, 0), (25_000_000, 0, late), (40_000_000, 0, 0), (60_000_000, 0, 0)]
 
 
 @pytest.mark.parametrize("missed", [1, 2, 10, 5000])
-def test_deadlines_that_passed_are_counted_and_left_out(missed: int) -> None:
-    work = (1 + missed) * PERIOD_NS + 7_000_000
-    seen = calls(Clock(), [work, 0, 0])
+def test_deadlines_that_passed_during_a_call_are_counted_and_left_out(missed: int) -> None:
+    late = missed * PERIOD_NS + 7_000_000
+    seen = calls(Clock(), [PERIOD_NS + late, 0, 0])
     back = (2 + missed) * PERIOD_NS
-    assert seen == [(0, 0), (work, missed), (back, 0), (back + PERIOD_NS, 0)]
+    assert seen == [
+        (0, 0, 0),
+        (PERIOD_NS + late, missed, late),
+        (back, 0, 0),
+        (back + PERIOD_NS, 0, 0),
+    ]
+
+
+@pytest.mark.parametrize("missed", [1, 2, 10, 5000])
+def test_deadlines_that_were_slept_through_are_known_at_once(missed: int) -> None:
+    """Before the frames of that call are sent, not one call later, and never as a burst."""
+    late = missed * PERIOD_NS + 7_000_000
+    seen = calls(Clock(0, late, 0), [0] * 4)
+    woken = 2 * PERIOD_NS + late
+    back = (3 + missed) * PERIOD_NS
+    assert seen == [
+        (0, 0, 0),
+        (PERIOD_NS, 0, 0),
+        (woken, missed, late),
+        (back, 0, 0),
+        (back + PERIOD_NS, 0, 0),
+    ]
+
+
+@pytest.mark.parametrize(("late", "missed"), [(-1, 0), (0, 1), (1, 1)])
+def test_a_deadline_is_missed_when_the_next_one_has_come(late: int, missed: int) -> None:
+    seen = calls(Clock(PERIOD_NS + late), [0])
+    assert seen[1] == (2 * PERIOD_NS + late, missed, PERIOD_NS + late)
+
+
+def test_sleep_and_work_that_are_late_together_count_once() -> None:
+    """Work of one period and a half, then a sleep that ends one period late."""
+    work = PERIOD_NS * 3 // 2
+    seen = calls(Clock(PERIOD_NS), [work, 0])
+    assert [missed for _, missed, _ in seen] == [0, 0, 1]
+    assert [at for at, _, _ in seen] == [0, work, 3 * PERIOD_NS]
 
 
 def test_ending_on_a_deadline_misses_nothing() -> None:
-    assert calls(Clock(), [PERIOD_NS, 0]) == [(0, 0), (PERIOD_NS, 0), (2 * PERIOD_NS, 0)]
+    seen = calls(Clock(), [PERIOD_NS, 0])
+    assert seen == [(0, 0, 0), (PERIOD_NS, 0, 0), (2 * PERIOD_NS, 0, 0)]
+
+
+def test_a_clock_that_wakes_a_little_early_misses_nothing() -> None:
+    seen = calls(Clock(-1, 0), [0, 0])
+    assert [missed for _, missed, _ in seen] == [0, 0, 0]
+    assert seen[2][0] == 2 * PERIOD_NS
 
 
 def test_an_exception_of_the_body_ends_the_loop() -> None:
@@ -90,13 +137,16 @@ def test_an_exception_of_the_body_ends_the_loop() -> None:
         loop.run_at_deadlines(PERIOD_NS, body)
 
 
-@given(work_ms=st.lists(st.integers(0, 200), max_size=60), late_us=st.integers(0, 19_999))
-def test_time_and_count_stay_together(work_ms: list[int], late_us: int) -> None:
-    """Calls and missed deadlines together number the deadlines; never two calls in one period."""
-    seen = calls(Clock(), [ms * 1_000_000 for ms in work_ms], late_ns=late_us * 1000)
-    deadline = 0
-    for i, (at, missed) in enumerate(seen):
-        deadline += (missed + 1) if i else 0
-        late = at - deadline * PERIOD_NS
-        assert 0 <= late < PERIOD_NS
-    assert sum(1 + missed for _, missed in seen) == deadline + 1
+@given(
+    work_ms=st.lists(st.integers(0, 200), max_size=60),
+    late_us=st.lists(st.integers(0, 90_000), min_size=1, max_size=60),
+)
+def test_time_and_count_stay_together(work_ms: list[int], late_us: list[int]) -> None:
+    """Calls and missed deadlines together number the deadlines; never two calls for one of them."""
+    seen = calls(Clock(*(us * 1000 for us in late_us)), [ms * 1_000_000 for ms in work_ms])
+    deadline = -1
+    for at, missed, late in seen:
+        first = (deadline + 1) * PERIOD_NS  # not yet called for
+        assert late == at - first
+        deadline += 1 + missed
+        assert 0 <= at - deadline * PERIOD_NS < PERIOD_NS

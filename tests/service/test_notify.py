@@ -2,11 +2,13 @@
 
 import itertools
 import os
+import signal
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
@@ -16,6 +18,24 @@ TICK_NS = 20_000_000
 
 # The socket to the manager lives as long as the process.
 pytestmark = pytest.mark.filterwarnings("ignore:unclosed:ResourceWarning")
+
+
+# Only to end a test that hangs.
+ANSWER_S = 30
+
+
+@pytest.fixture(autouse=True)
+def never_wait() -> Iterator[None]:
+    """A manager that does not read must not hold up its service."""
+
+    def hung(_number: int, _frame: FrameType | None) -> None:
+        pytest.fail("the service waited for its manager")  # no OSError: those it catches
+
+    before = signal.signal(signal.SIGALRM, hung)
+    signal.alarm(ANSWER_S)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
 
 
 class Manager:
@@ -54,6 +74,16 @@ def manager(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Manager]
     abstract = f"@canshaper-test-{os.getpid()}-{time.monotonic_ns()}"
     with manager_at(str(tmp_path / "notify") if request.param == "path" else abstract) as opened:
         yield opened
+
+
+def fill(manager: Manager) -> None:
+    """Another service fills the manager's queue."""
+    address = manager.address
+    with socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as other:
+        other.setblocking(False)
+        with suppress(BlockingIOError):
+            while True:
+                other.sendto(b"STATUS=other", "\0" + address[1:] if address[0] == "@" else address)
 
 
 def test_the_life_of_a_service(manager: Manager) -> None:
@@ -116,17 +146,47 @@ def test_a_manager_that_hangs_holds_up_nothing(manager: Manager) -> None:
 
 def test_a_manager_that_is_gone_and_comes_back(tmp_path: Path) -> None:
     path = tmp_path / "notify"
-    service = ServiceManager({"NOTIFY_SOCKET": str(path), "WATCHDOG_USEC": "1000000"})
+    service = ServiceManager({"NOTIFY_SOCKET": str(path)})
     service.ready("nobody hears")
     with manager_at(str(path)) as first:
         service.ready("one")
         assert first.heard() == ["READY=1\nSTATUS=one"]
-    service.ping(0)  # refused: the address is there, nobody has it
+    service.ready("refused")  # the address is there, nobody has it
     path.unlink()
     service.status("none")
     with manager_at(str(path)) as second:
         service.status("two")
         assert second.heard() == ["STATUS=two"]
+
+
+@pytest.mark.parametrize("reload", [False, True])
+def test_what_the_manager_waits_for_is_sent_again_until_it_is_taken(
+    manager: Manager, reload: bool
+) -> None:
+    """Without READY=1 systemd would kill the service after its start or reload."""
+    service = ServiceManager({"NOTIFY_SOCKET": manager.address})
+    fill(manager)
+    if reload:
+        service.reloading()
+    else:
+        service.ready("started")
+    service.ping(0)
+    assert all(message.startswith("STATUS=") for message in manager.heard())
+    service.ping(0)
+    first = "RELOADING=1" if reload else "READY=1"
+    assert [message.split("\n")[0] for message in manager.heard()] == [first]
+    service.ping(0)
+    assert manager.heard() == []
+
+
+def test_the_end_of_a_reload_replaces_its_beginning(manager: Manager) -> None:
+    service = ServiceManager({"NOTIFY_SOCKET": manager.address})
+    fill(manager)
+    service.reloading()
+    service.ready("reload applied")
+    manager.heard()
+    service.ping(0)
+    assert manager.heard() == ["READY=1\nSTATUS=reload applied"]
 
 
 # -- watchdog --------------------------------------------------------------------------------------
@@ -169,6 +229,21 @@ def test_only_the_process_that_is_watched_pings(
     manager: Manager, environment: dict[str, str], ours: bool
 ) -> None:
     assert bool(pings(manager, 100, **environment)) is ours
+
+
+def test_a_reload_has_more_time_than_a_tick(manager: Manager) -> None:
+    """The loop stands still while files are read, and cannot ping."""
+    service = ServiceManager({"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000"})
+    service.reloading()
+    service.ready("reload applied")
+    limits = [
+        int(value)
+        for message in manager.heard()
+        for key, _, value in (line.partition("=") for line in message.split("\n"))
+        if key == "WATCHDOG_USEC"
+    ]
+    assert limits[0] >= 10_000_000
+    assert limits[1:] == [1_000_000]
 
 
 def test_a_ping_is_that_and_nothing_else(manager: Manager) -> None:

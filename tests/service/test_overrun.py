@@ -117,6 +117,14 @@ def test_it_ends_after_fifty_punctual_ticks_and_then_neutral_is_needed(rig: Rig)
     assert rig.run(50, Slew=1000)["SlewCommand"]["Velocity"] > 50
 
 
+def test_a_long_storm_is_over_as_soon_as_a_short_one(rig: Rig) -> None:
+    rig.run(3)
+    for _ in range(10):
+        overrun(rig)
+    rig.run(RECOVERY)
+    assert rig.state() is State.READY
+
+
 def test_late_ticks_on_the_way_back_lengthen_it(rig: Rig) -> None:
     rig.run(3)
     overrun(rig)
@@ -169,6 +177,19 @@ def test_a_trip_comes_before_an_overrun(rig: Rig) -> None:
     rig.receive(Frame("crane", 0x200, False, b"\x00\x00"))
     assert late(rig, Slew=1000)["SlewCommand"]["Velocity"] == 0
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")
+
+
+def test_a_reset_that_is_held_through_an_overrun_is_no_press(rig: Rig) -> None:
+    rig.moving()
+    rig.run(1, Slew=1000, Enable=0)
+    rig.run(2, Reset=1, Slew=1000)
+    assert rig.state() is State.TRIPPED
+    overrun(rig, Reset=1)
+    rig.run(RECOVERY + 5, Reset=1)
+    assert rig.state() is State.TRIPPED
+    rig.run(2)
+    rig.run(2, Reset=1)
+    assert rig.state() is State.READY
 
 
 def test_bypass_stops_through_the_limits(rig: Rig) -> None:

@@ -6,7 +6,10 @@ import sys
 import tempfile
 import time
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from typing import IO
 
 from tests.hil.hand import hand_on, write_deployment
 from tests.hil.machine import open_bus, service
@@ -26,7 +29,7 @@ def main() -> int:
     begin = told = time.monotonic()
     with (
         log.open("wb") as written,
-        subprocess.Popen(["candump", "-D", "-L", "vcan0"], stdout=written) as witness,
+        candump_into(written),
         service(folder / "daemon.log", "run", str(file)) as daemon,
         service(folder / "plant.log", "sim", str(file)),
         open_bus("vcan0") as bus,
@@ -51,12 +54,21 @@ def main() -> int:
                 )
         alive = daemon.process.poll() is None
         text = daemon.text()
-        witness.terminate()
     _report(soak.counts, count_frames(log), memory, text)
     for line in wrong:
         print("WRONG", line)
     print(f"wrong moves {len(wrong)}, the daemon {'ran on' if alive else 'ENDED'}")
     return 1 if wrong or not alive else 0
+
+
+@contextmanager
+def candump_into(file: IO[bytes]) -> Iterator[None]:
+    """An independent log that goes on when the interface is down."""
+    with subprocess.Popen(["candump", "-D", "-L", "vcan0"], stdout=file) as process:
+        try:
+            yield
+        finally:
+            process.terminate()
 
 
 def _memory_kib(pid: int) -> int:
