@@ -1,7 +1,12 @@
 # make demo   the crane, driven with anti-sway off and on
 # make test   lint, format, types and all tests, those on real SocketCAN included
 
-.PHONY: demo test lint bench clean
+# make coverage   every line and branch of what decides whether a valve moves
+# make mutation   does a test notice every small change of it? (mutation-core: within make test)
+# make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
+# make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
+
+.PHONY: demo test lint coverage mutation mutation-core fuzz soak bench deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -9,6 +14,10 @@
 
 .venv/test-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools,dev
+	@touch $@
+
+.venv/fuzz-ready: pyproject.toml tools/venv.sh
+	tools/venv.sh tools,dev,fuzz
 	@touch $@
 
 demo: .venv/demo-ready
@@ -23,11 +32,37 @@ lint: .venv/test-ready
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 
+# Tests that take seconds of pure reckoning add no line; few examples will do.
+coverage: .venv/test-ready
+	@mkdir -p out
+	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \
+		tests/shaping tests/service
+	.venv/bin/python -m coverage report
+
+mutation: .venv/test-ready
+	.venv/bin/python tools/mutation.py
+
+mutation-core: .venv/test-ready
+	.venv/bin/python tools/mutation.py core
+
+FUZZ_S ?= 60
+fuzz: .venv/fuzz-ready
+	set -e; for target in frames ports deployment dbc yaml; do \
+		.venv/bin/python -m tests.fuzz $$target --seconds $(FUZZ_S); done
+
+MINUTES ?= 30
+soak: .venv/test-ready
+	.venv/bin/python -m tests.lane --timeout 0 -- .venv/bin/python -m tests.soak --minutes $(MINUTES)
+
 bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/tune.py
+
+# dist/canshaper_VERSION_ARCH.deb: docs/service.md
+deb:
+	tools/deb.sh
 
 clean:
 	rm -rf .venv out dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

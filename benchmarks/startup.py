@@ -15,7 +15,7 @@ import subprocess
 import sys
 import time
 
-from canshaper.can.bus import Port
+from canshaper.can.bus import Port, open_port
 from canshaper.cli.common import data_directory
 from canshaper.config.schema import Bus
 
@@ -52,7 +52,7 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=7)
     runs = parser.parse_args().runs
     group = f"239.77.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
-    port = Port("crane", Bus(interface="udp_multicast", channel=group), lambda _fault: None)
+    port = open_port("crane", Bus(interface="udp_multicast", channel=group), lambda _fault: None)
     options = ["--interface", "udp_multicast", "--channel", group]
     commands = {
         "canshaper run": [sys.executable, "-m", "canshaper", "run", "forwarder.yaml", *options],

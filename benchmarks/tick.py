@@ -18,7 +18,7 @@ from pathlib import Path
 import can
 
 from canshaper.can.binding import Deployment, load_deployment
-from canshaper.can.bus import Port
+from canshaper.can.bus import Port, open_port
 from canshaper.can.frame import Frame
 from canshaper.cli.common import data_directory
 from canshaper.config.schema import Bus
@@ -101,7 +101,7 @@ def main() -> None:
     controller = Controller(deployment)
     levers = LeverNode(deployment, random_script(1, ticks * 0.02 + 1.0))
     hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "bare")}
-    port = Port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
+    port = open_port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
     bare = can.Bus(interface="virtual", channel="bare")
     bodies = {"ours": daemon(controller, port), "bare": gateway(deployment, bare)}
     spent: dict[str, list[int]] = {n: [] for n in bodies}
@@ -123,7 +123,8 @@ def main() -> None:
         for f in levers.frames(i * 20):
             twin.receive(f, i * 20_000_000)
         start = time.perf_counter_ns()
-        twin.tick(i * 20_000_000)
+        for _ in twin.tick(i * 20_000_000):
+            pass
         pure.append(time.perf_counter_ns() - start)
     for bus in (*hands.values(), bare):
         bus.shutdown()

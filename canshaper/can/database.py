@@ -11,6 +11,12 @@ from cantools.database.can import Database, Message
 from canshaper.can.layout import layout_fault
 from canshaper.config.source import Problem
 
+# Bytes of a message, first bit and bits of a signal: cantools makes a list of as many, and the
+# memory would not last. The longest of J1939 has 1785 bytes.
+_TOO_LARGE = re.compile(
+    r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{6,})|\bSG_\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{6,})"
+)
+
 
 @dataclass(frozen=True)
 class DbcFile:
@@ -39,6 +45,11 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
     Raises:
         OSError: the file cannot be read.
     """
+    text = path.read_text(encoding="cp1252", errors="replace")
+    if large := _TOO_LARGE.search(text):
+        line: int | None = text.count("\n", 0, large.end()) + 1
+        text = f"found {large[1] or large[2]} bytes or bits, allowed are 99999 at most"
+        return None, [Problem(str(path), line, "", f"not a DBC file that can be used: {text}")]
     # cantools only logs that of two messages with one id the first is lost; found below.
     logging.getLogger("cantools").setLevel(logging.ERROR)
     try:
@@ -49,7 +60,7 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
         cause = getattr(error, "e_dbc", None) or error  # without the names of other formats
         text = " ".join(str(cause).split()) or type(cause).__name__
         if at := re.search(r"at line (\d+)", text):
-            line: int | None = int(at.group(1))
+            line = int(at.group(1))
         elif at := re.search(r"in message (\w+)|unused VAL_ entries in DBC: (VAL_ \d+ \w+)", text):
             line = _line_of(path, rf"BO_\s+\d+\s+{at[1]}\b" if at[1] else re.escape(at[2]))
         else:

@@ -3,7 +3,18 @@
 import typer
 
 from canshaper import __version__
-from canshaper.cli import check, compare, config_schema, demo, reproduce, robust, run, sim, tune
+from canshaper.cli import (
+    check,
+    compare,
+    config_schema,
+    demo,
+    doctor,
+    reproduce,
+    robust,
+    run,
+    sim,
+    tune,
+)
 
 app = typer.Typer(
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
@@ -32,6 +43,7 @@ def _main(
 
 app.command("run")(run.run)
 app.command("check")(check.check)
+app.command("doctor")(doctor.doctor)
 app.command("demo")(demo.demo)
 app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)

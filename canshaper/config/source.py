@@ -53,8 +53,10 @@ class Source:
         self._lines: dict[Place, int] = {}
         self._problems: list[Problem] = []
         self._count = 0
+        content = ""
         try:
-            node = yaml.compose(path.read_text(encoding="utf-8"), Loader=yaml.SafeLoader)
+            content = path.read_text(encoding="utf-8")
+            node = yaml.compose(content, Loader=yaml.SafeLoader)
             self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:
             raise DeploymentError([self.problem((), error.strerror or str(error))]) from None
@@ -63,10 +65,9 @@ class Source:
             raise DeploymentError([self.problem((), text)]) from None
         # ValueError: not UTF-8; ValueError and OverflowError: an escape that is no character
         except (yaml.YAMLError, ValueError, OverflowError) as error:
-            mark = getattr(error, "problem_mark", None)
             text = getattr(error, "problem", None) or str(error).splitlines()[0]
-            line = mark.line + 1 if mark else None
-            raise DeploymentError([Problem(str(path), line, "", f"not YAML: {text}")]) from None
+            problem = Problem(str(path), _line(error, content), "", f"not YAML: {text}")
+            raise DeploymentError([problem]) from None
         if self._problems:
             raise DeploymentError(self._problems)
 
@@ -115,6 +116,16 @@ class Source:
     def _add(self, path: Place, node: yaml.Node, message: str) -> None:
         where = ".".join(str(p) for p in path)
         self._problems.append(Problem(str(self.path), node.start_mark.line + 1, where, message))
+
+
+def _line(error: Exception, content: str) -> int | None:
+    """Line of what is no YAML, where the error knows it: by a mark, or by how far it came."""
+    if isinstance(error, UnicodeDecodeError):
+        return error.object.count(b"\n", 0, error.start) + 1
+    if isinstance(error, yaml.reader.ReaderError):
+        return content.count("\n", 0, error.position) + 1
+    mark = getattr(error, "problem_mark", None)
+    return mark.line + 1 if mark else None
 
 
 def _scalar(node: yaml.ScalarNode) -> str | int | float | bool | None:

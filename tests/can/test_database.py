@@ -67,6 +67,22 @@ def test_a_dbc_file_without_messages(machine: Machine) -> None:
     assert all(p.endswith("messages of the DBC files are none") for p in found)
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "number"),
+    [
+        ("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft : 2147483920", "2147483920"),
+        ("SG_ Slew : 0|16@1-", "SG_ Slew : 100000000|16@1-", "100000000"),
+        ("SG_ Slew : 0|16@1-", "SG_ Slew m0: 0 | 100000@1-", "100000"),
+    ],
+)
+def test_sizes_that_no_memory_holds(machine: Machine, old: str, new: str, number: str) -> None:
+    line = machine.in_dbc(old, new)
+    assert machine.problems() == [
+        f"machine.dbc:{line}: not a DBC file that can be used:"
+        f" found {number} bytes or bits, allowed are 99999 at most"
+    ]
+
+
 def test_overlapping_signals_are_told_at_their_message(machine: Machine) -> None:
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 8|16@1-")
     line = machine.in_dbc("BO_ 272", "BO_ 272")

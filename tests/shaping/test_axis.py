@@ -210,6 +210,8 @@ RESET = StickInput(reset=True)
         [StickInput(reset=True, trip=Reason.SEND_FAILED)],  # the cause is there
         [StickInput(reset=True, trip=Reason.SEND_FAILED), RESET, RESET],  # held since then
         [StickInput(0.8, reset=True), RESET, RESET],
+        # held while its frames fail: no new press
+        [StickInput(0.8, reset=True), StickInput(fault=Reason.STICK_TIMEOUT), RESET],
         [StickInput(0.8, enabled=False), StickInput(0.8), CENTRED],
         [StickInput(fault=Reason.STICK_TIMEOUT, enabled=False), CENTRED],  # enable unknown
     ],
@@ -228,6 +230,8 @@ def test_no_way_out_of_a_trip(drive: Drive, inputs: list[StickInput]) -> None:
         [StickInput(reset=True, enabled=False)],
         [StickInput(enabled=False), CENTRED],
         [StickInput(0.8, reset=True), CENTRED, RESET],  # a second edge
+        [StickInput(fault=Reason.STICK_TIMEOUT), CENTRED, RESET],  # off before, seen off after
+        [CENTRED, StickInput(fault=Reason.STICK_TIMEOUT), RESET],
         [StickInput(reset=True, trip=Reason.SEND_FAILED), CENTRED, RESET],
     ],
 )

@@ -61,6 +61,10 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
         assert axis.tick(stick) == right.tick(stick)
         assert (axis.raw, axis.told) == (right.raw, right.told)
     assert axis.sway.angle == model.angle
+    waiting = new_axis()
+    waiting.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
+    assert waiting.tick(StickInput(0.5)) is None
+    assert (waiting.reason, waiting.raw) == (Reason.STICK_NOT_NEUTRAL, 0)
 
 
 def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
@@ -68,8 +72,18 @@ def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
     drive.tick(StickInput(trip=Reason.SEND_FAILED, fault=Reason.STICK_TIMEOUT))
     drive.run(CENTRED, 0.2)
     assert drive.state is State.TRIPPED
-    drive.tick(StickInput(enabled=False))
+    assert drive.tick(StickInput(enabled=False)) is None
     assert drive.tick(CENTRED) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
+
+
+def test_nor_does_a_reset_switch_that_was_pressed_in_the_first_valid_frame(drive: Drive) -> None:
+    drive.tick(StickInput(trip=Reason.SEND_FAILED, fault=Reason.STICK_TIMEOUT))
+    drive.run(StickInput(reset=True), 0.2)
+    assert drive.state is State.TRIPPED
+    assert drive.tick(CENTRED) is None
+    assert drive.tick(StickInput(reset=True)) == Transition(
+        State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET
+    )
 
 
 def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
@@ -121,3 +135,14 @@ def test_full_speed_may_be_asked_by_another_axis(drive_with: DriveWith, sign: fl
     axis.tick(CENTRED, sign)
     assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
     assert axis.sent == sign
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: float) -> None:
+    """As at rest: nobody can hold an axis in motion where nobody could have started it."""
+    drive.moving(0.8 * sign).tick(StickInput(0.02 * sign))
+    assert drive.axis.command == 0.0
+    drive.tick(StickInput(0.021 * sign))
+    assert drive.axis.command == 0.021 * sign
+    (ready,) = drive.run(StickInput(0.02 * sign), 3.0)
+    assert (ready.new, ready.reason) == (State.READY, Reason.AT_REST)

@@ -1,5 +1,6 @@
 import math
 import random
+import tracemalloc
 
 import numpy as np
 import pytest
@@ -57,6 +58,31 @@ def test_ei_leaves_its_residual_at_the_nominal_period_and_less_beside_it() -> No
     assert min(left) < 0.005
 
 
+@pytest.mark.parametrize("tick_s", [0.02, 0.03])  # 55 ticks to half a swing, and 36 2/3
+@pytest.mark.parametrize("damping", [0.0, 0.1])
+def test_ei_has_three_impulses_that_lose_what_the_swing_loses(
+    damping: float, tick_s: float
+) -> None:
+    mode, residual = SwayMode.from_period(2.2, damping), 0.05
+    taps = ei_taps(mode, tick_s, residual)
+    lost = math.exp(-math.pi * damping / math.sqrt(1.0 - damping**2))  # over half a swing
+    weights = [0.25 * (1.0 + residual), 0.5 * (1.0 - residual) * lost]
+    weights.append(weights[0] * lost**2)
+    # an impulse between two ticks is shared by them, the nearer one takes more
+    ticks = np.arange(math.ceil(2.2 / tick_s - 1e-9) + 1)
+    hats = [np.maximum(0.0, 1.0 - abs(ticks - k * 1.1 / tick_s)) for k in range(3)]
+    expected = sum(w * hat for w, hat in zip(weights, hats, strict=True)) / math.fsum(weights)
+    assert taps == pytest.approx(expected.tolist(), abs=1e-12)
+    # and at its period a swing is left as designed, in parts of the sum of the impulses
+    left = residual_left(taps, mode, tick_s)
+    assert left == pytest.approx(residual / math.fsum(weights), abs=(2.9 * tick_s) ** 2 / 8.0)
+
+
+def test_shapers_in_series_are_the_convolution_and_no_longer() -> None:
+    one, two = [0.5, 0.0, 0.5], [0.2, 0.3, 0.4, 0.1]
+    assert convolved(one, two) == pytest.approx(np.convolve(one, two).tolist(), abs=1e-15)
+
+
 def test_two_shapers_in_series_cancel_both_modes() -> None:
     one, two = SwayMode.from_period(2.2, 0.02), SwayMode.from_period(0.9, 0.01)
     taps = convolved(zv_taps(one, 0.02), zv_taps(two, 0.02))
@@ -79,3 +105,24 @@ def test_fir_is_the_convolution_of_the_newest_commands() -> None:
 def test_taps_that_are_no_shaper_are_refused(taps: list[float]) -> None:
     with pytest.raises(ValueError, match=r"sum of the taps is .*, allowed is 1"):
         Fir(taps)
+
+
+@pytest.mark.parametrize("taps", [[0.5, 0.4995], [0.5, 0.5005]])
+def test_taps_rounded_in_a_file_still_reach_the_command(taps: list[float]) -> None:
+    fir = Fir(taps)
+    assert math.fsum(fir.taps) == pytest.approx(1.0, abs=1e-15)
+    assert [fir.wanted(1.0) for _ in range(2)][-1] == pytest.approx(1.0, abs=1e-15)
+    assert fir.taps == pytest.approx([tap / math.fsum(taps) for tap in taps], abs=1e-15)
+
+
+def test_a_long_day_takes_no_memory() -> None:
+    fir = Fir([0.25] * 4)
+    fir.wanted(0.5)
+    tracemalloc.start()
+    try:
+        for _ in range(20_000):
+            fir.wanted(0.5)
+        grown, _ = tracemalloc.get_traced_memory()
+    finally:
+        tracemalloc.stop()
+    assert grown < 20_000  # a place kept for every command would take eight bytes each

@@ -7,7 +7,8 @@ import pytest
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.fir import Fir, zv_taps
-from canshaper.shaping.limit_aware import LimitAware
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limit_aware import POLE_PER_OMEGA, LimitAware
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, Shaper, build_shaper
 from canshaper.shaping.states import Reason, State, StickInput
@@ -183,3 +184,28 @@ def test_a_swing_too_quick_for_the_tick_is_refused_in_the_words_of_the_user() ->
     with pytest.raises(ValueError, match=says):
         build_shaper("robust", 0.04, SwayModel(SwayMode(20.0, 0.0), 0.04), taps=[1.0])
     build_shaper("robust", 0.04, SwayModel(SwayMode(17.8, 0.0), 0.04), taps=[1.0])
+
+
+def test_the_quickest_swing_for_a_tick_is_allowed() -> None:
+    tick_s = 0.04
+    sway = SwayModel(SwayMode(-1.0 / (POLE_PER_OMEGA * tick_s), 0.0), tick_s)
+    LimitAware(sway, Fir([1.0]))
+    with pytest.raises(ValueError, match="natural frequency is"):
+        LimitAware(
+            SwayModel(SwayMode(math.nextafter(sway.mode.omega_rad_s, 99.0), 0.0), tick_s),
+            Fir([1.0]),
+        )
+
+
+@modes
+@pytest.mark.parametrize(("rate", "times_omega"), [(math.inf, 1.4), (5.0, 1.4), (2.0, 1.126)])
+def test_made_in_full_swing_it_damps_from_the_first_tick(
+    mode: SwayMode, rate: float, times_omega: float
+) -> None:
+    """A filter changed in motion: nothing was asked by it yet, so all of the swing is to go."""
+    sway = SwayModel(mode, TICK_S)
+    sway.angle, sway.rate = 0.3, -0.2
+    pole = -times_omega * mode.omega_rad_s
+    gff = Gff(sway, (pole, pole))
+    aware = LimitAware(sway, Fir([1.0]), rate)
+    assert aware.wanted(0.0) == pytest.approx(-gff.k1 * 0.3 + gff.k2 * 0.2, rel=2e-3)

@@ -74,3 +74,76 @@ def test_what_is_added_is_bounded_and_a_number_even_for_a_senseless_model() -> N
         share = radial.tip_share(model, 0.0)
         assert abs(radial.slew(model, 0.0)) <= 0.25
         assert abs(radial.near_far(1.0, share, CIRCLE_M, TICK_S)) <= 0.25
+
+
+# -- with damping, and full speeds that are not 1 --------------------------------------------------
+
+FINE_S = 1e-4
+DAMPED = SwayMode(2.9, 0.12)
+NEAR_FAR = SwayMode(2.4, 0.2)
+
+
+def mid_slew() -> list[tuple[float, float, SwayModel]]:
+    """Three moments of a swinging slew, FINE_S apart, each with what the model was told."""
+    moments = []
+    model = SwayModel(DAMPED, FINE_S)
+    for i in range(7003):
+        told = 0.9 if i < 5000 else 0.4  # in the middle of a change of speed
+        model.step(told)
+        if i >= 7000:
+            copy = SwayModel(DAMPED, FINE_S)
+            copy.angle, copy.rate = model.angle, model.rate
+            moments.append((i * FINE_S, told, copy))
+    return moments
+
+
+def grapple(model: SwayModel, full_rad_s: float) -> tuple[float, float]:
+    """Angular speed of the grapple, and by how much the tip is ahead of it."""
+    return -model.rate * full_rad_s, model.angle * full_rad_s
+
+
+def slope(before: float, after: float) -> float:
+    return (after - before) / (2.0 * FINE_S)
+
+
+@pytest.mark.parametrize("full_rad_s", [0.5, 0.8])
+def test_slew_is_given_the_speed_of_the_lead_that_it_does_not_make_itself(
+    full_rad_s: float,
+) -> None:
+    """tan psi = L / s5 along the motion of the model: psi' - L', as differences show it."""
+    radial = RadialCompensation(NEAR_FAR, full_rad_s, 0.7, 1.0)
+    leads = []
+    for _, _, model in (moments := mid_slew()):
+        speed, lead = grapple(model, full_rad_s)
+        leads.append(math.atan2(lead, 1.0 - speed**2 / DAMPED.omega_rad_s**2) - lead)
+    _, told, now = moments[1]
+    expected = slope(leads[0], leads[2]) / full_rad_s
+    assert abs(expected) > 1e-3
+    assert radial.slew(now, told) == pytest.approx(expected, rel=1e-4)
+
+
+@pytest.mark.parametrize("full_rad_s", [0.5, 0.8])
+def test_the_damping_of_the_joint_is_answered_by_the_speed_inwards(full_rad_s: float) -> None:
+    """(2 zeta6 / w6) D', with D = (w^2 - w5^2 L^2) / w6^2 along the motion of the model."""
+    undamped = RadialCompensation(SwayMode(NEAR_FAR.omega_rad_s, 0.0), full_rad_s, 0.7, 1.0)
+    damped = RadialCompensation(NEAR_FAR, full_rad_s, 0.7, 1.0)
+    inwards = []
+    for _, _, model in (moments := mid_slew()):
+        speed, lead = grapple(model, full_rad_s)
+        inwards.append((speed**2 - (DAMPED.omega_rad_s * lead) ** 2) / NEAR_FAR.omega_rad_s**2)
+    _, told, now = moments[1]
+    answer = 2.0 * NEAR_FAR.damping_ratio / NEAR_FAR.omega_rad_s * slope(inwards[0], inwards[2])
+    assert abs(answer) > 1e-3
+    share = damped.tip_share(now, told) - undamped.tip_share(now, told)
+    assert share == pytest.approx(answer, rel=1e-4)
+
+
+def test_the_change_of_the_radius_is_a_speed_of_near_far_in_parts_of_its_full_speed() -> None:
+    radial = RadialCompensation(NEAR_FAR, 0.5, 0.7, 0.25)
+    # 4 m of 0.2 % within a tick of 50 ms are 0.16 m/s
+    assert radial.near_far(0.990, 0.992, 4.0, 0.05) == pytest.approx(0.16 / 0.7)
+    assert radial.near_far(0.992, 0.990, 4.0, 0.05) == pytest.approx(-0.16 / 0.7)
+    assert radial.near_far(0.9, 1.0, 4.0, 0.05) == 0.25
+    assert radial.near_far(1.0, 0.9, 4.0, 0.05) == -0.25
+    for bad in (math.nan, math.inf, -math.inf):
+        assert radial.near_far(bad, 1.0, 4.0, 0.05) == 0.0

@@ -39,3 +39,24 @@ def test_s_curve_on_a_restless_stick_stays_within_the_stick() -> None:
             command = source.uniform(-1.0, 1.0)
         # a turn of the stick in full motion costs one jerk-limited overshoot of what was asked
         assert abs(curve.wanted(command)) <= 1.0 + 4.0**2 / (2.0 * 20.0)
+
+
+# Numbers that a float holds exactly: a step of the slope is 1, a tick at that slope moves by 0.5.
+EXACT = {"tick_s": 0.5, "rate_per_s": 8.0, "jerk_per_s2": 2.0}
+
+
+def test_s_curve_from_rest_begins_with_one_step_of_the_slope() -> None:
+    curve = SCurve(**EXACT)
+    assert [curve.wanted(8.0) for _ in range(3)] == [0.5, 1.5, 3.0]
+
+
+def test_s_curve_that_has_arrived_is_at_rest() -> None:
+    """The next move begins from rest again, not with what the arrival was made with."""
+    curve = SCurve(**EXACT)
+    assert [curve.wanted(command) for command in (0.5, 8.0, 8.0)] == [0.5, 1.0, 2.0]
+
+
+def test_s_curve_does_not_stop_dead_where_the_stick_meets_it() -> None:
+    """The stick comes back to just where the output is, in motion: it slows down by the jerk."""
+    curve = SCurve(**EXACT)
+    assert [curve.wanted(command) for command in (8.0, 8.0, 1.5)] == [0.5, 1.5, 2.0]

@@ -41,6 +41,11 @@ def test_a_grapple_swings_as_its_differential_equation_says() -> None:
     assert mode.pole == pytest.approx(expected[np.argmax(expected.imag)], rel=1e-12)
 
 
+def test_a_seconds_pendulum_is_a_metre_long() -> None:
+    """One second to each side at 0.994 m, as anyone with a stopwatch can see."""
+    assert SwayMode.from_grapple(0.994, 0.0, 300.0).period_s == pytest.approx(2.0, abs=2e-3)
+
+
 def test_the_stopwatch_shows_the_damped_period() -> None:
     mode = SwayMode.from_period(2.2, 0.3)
     assert mode.period_s == pytest.approx(2.2, rel=1e-14)
@@ -83,6 +88,11 @@ def test_grapple_period_and_decay_describe_the_same_mode(period_s: float, decay:
         (lambda: SwayMode.from_grapple(1.0, 1e6, 1.0), "damping ratio is"),
         (lambda: SwayMode.from_period(0.0, 0.0), "period is 0 s"),
         (lambda: SwayMode.from_period(13.0, 0.0), "period is 13 s, allowed is 0.15 to 12 s"),
+        (lambda: SwayMode.from_grapple(30.5, 0.0, 300.0), r"length is 30\.5 m, .* 0\.05 to 30 m$"),
+        (lambda: SwayMode.from_grapple(30.0, 1000000.5, 1e5), r"allowed is 0 to 1e\+06 N m s/rad$"),
+        (lambda: SwayMode.from_grapple(1.0, 0.0, 100000.5), r"mass is .*, allowed is 1 to 1"),
+        (lambda: SwayMode.from_period(2.0, 0.96), r"^damping ratio is 0\.96, .* 0 to 0\.95$"),
+        (lambda: SwayMode.from_decay(2.0, 0.995), r"^decay per swing is 0\.995, .* 0 to 0\.99$"),
         (lambda: SwayMode.from_period(2.0, 1.0), "damping ratio is 1"),
         (lambda: SwayMode.from_period(0.15, 0.95), "natural frequency is"),
         (lambda: SwayMode.from_decay(2.0, 1.0), "decay per swing is 1"),
@@ -97,6 +107,23 @@ def test_nonsense_is_refused_by_name_and_range(make: object, says: str) -> None:
     assert callable(make)
     with pytest.raises(ValueError, match=says):
         make()
+
+
+def test_the_ends_of_every_range_are_allowed() -> None:
+    for mode in (
+        SwayMode(0.5, 0.0),
+        SwayMode(50.0, 0.95),
+        SwayMode.from_grapple(0.05, 0.0, 1.0),
+        SwayMode.from_grapple(30.0, 1e6, 1e5),
+        SwayMode.from_period(12.0, 0.0),
+        SwayMode.from_period(0.15, 0.0),
+        SwayMode.from_period(12.0, 0.95),
+        SwayMode.from_decay(12.0, 0.0),
+        SwayMode.from_decay(12.0, 0.99),
+    ):
+        assert 0.5 <= mode.omega_rad_s <= 50.0
+    for tick_s, omega in ((1e-4, 50.0), (0.2, 5.0), (0.125, 8.0)):
+        assert SwayModel(SwayMode(omega, 0.0), tick_s).tick_s == tick_s
 
 
 # -- the sampled model -----------------------------------------------------------------------------

@@ -1,0 +1,250 @@
+"""Joystick frame in to valve frame out, beside other gateways, in virtual time.
+
+The daemon has a tick: a joystick frame waits for the next one. "from outside" has that wait, with
+joystick frames at every phase of the tick. "processing" has not: from the last moment at which a
+tick still takes a frame to the valve frame, which is wake-up, read, decode, filter, encode, send.
+The other gateways answer every frame at once.
+
+Times are the kernel's, from the gateway's interface to the valve's. "with client" adds what one
+in Python takes to send the joystick frame and to be handed the valve frame; that is measured with
+cangw, where nothing else runs between. "CPU" is that of the gateway's process for a frame or a
+tick. Gateways have FIFO priority 40, the client 30, everything else none.
+
+    python benchmarks/frames.py                            vcan0
+    python benchmarks/frames.py --bus can --kernel rt      two controllers on a bus, PREEMPT_RT
+    python benchmarks/frames.py --load flood busy disk     again with that load beside it
+"""
+
+import argparse
+import statistics
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+from rig import (
+    DBC,
+    LOADS,
+    PEERS,
+    Row,
+    as_client,
+    compiled,
+    cpu_ns,
+    daemon,
+    in_lane,
+    load,
+    machine,
+    print_table,
+    quantile,
+    run_in_lane,
+    running,
+    shipped,
+    slew_only,
+    wait_for_text,
+)
+from wire import HIGH_PCT, LOW_PCT, Exchange, Wire, wait_for_frames
+
+WARM_UP = 100
+ECHO_PERIOD_NS = 5_000_000
+JOYSTICK_NS = 20_000_000
+PYTHON_ECHO, NOTIFIER, CANGW = "Python echo", "Notifier + cantools", "cangw, in the kernel"
+CANGW_SETS = "SET:I:200.0.0000000000000000"
+
+
+@dataclass
+class Result:
+    """What one gateway did, us."""
+
+    title: str
+    times: list[float]
+    cpu: float | None = None  # of the gateway's process, per frame or per tick
+    client: float | None = None  # what the client's own work adds
+
+
+class Answering:
+    """A gateway that answers every joystick frame at once."""
+
+    def __init__(self, title: str, wire: Wire, pid: int | None, count: int) -> None:
+        self.title, self.wire, self.pid, self.count = title, wire, pid, count
+
+    def find_phase(self) -> None:
+        """It has none."""
+
+    def measure(self) -> list[Result]:
+        """Frames at a steady rate."""
+        self._exchanges(WARM_UP)
+        before = cpu_ns(self.pid) if self.pid else 0
+        seen = self._exchanges(self.count)
+        cpu = (cpu_ns(self.pid) - before) / 1e3 / self.count if self.pid else None
+        client = statistics.median(e.client_us for e in seen)
+        return [Result(self.title, [e.gateway_us for e in seen], cpu, client)]
+
+    def _exchanges(self, count: int) -> list[Exchange]:
+        at = time.monotonic_ns()
+        pcts = (HIGH_PCT, LOW_PCT)
+        return [
+            self.wire.exchange(at + i * ECHO_PERIOD_NS, pcts[i % 2], jump=False)
+            for i in range(1, count + 1)
+        ]
+
+
+class Ticking:
+    """The daemon. Its deadlines are found by which frames just miss them."""
+
+    def __init__(self, title: str, wire: Wire, pid: int, count: int, tick_ms: int) -> None:
+        self.title, self.wire, self.pid, self.count = title, wire, pid, count
+        self.tick_ns = tick_ms * 1_000_000
+        # the shipped deployment listens to both joysticks
+        self.right_ns = self.tick_ns // 4 if tick_ms == 20 else 0
+        self._at = time.monotonic_ns()
+        self._high = False
+        self._slack_ns = 0  # from the moment asked for to the frame on the bus
+        self._grid_ns = 0  # one of the valve frames
+        self._taken_ns = 0  # from the last moment at which a tick takes a frame to its valve frame
+
+    def _settle(self) -> None:
+        """Bring the axis into steady motion about the middle of both deflections.
+
+        First into neutral, for as long as a shaped stop takes: there were no frames for a while.
+        """
+        self._at = time.monotonic_ns()
+        for count, moving in ((120, False), (150, True)):
+            for _ in range(count):
+                self._at += JOYSTICK_NS
+                self.wire.send(self._at, self._stick() if moving else 0.0, self.right_ns)
+
+    def find_phase(self) -> None:
+        """Find the last moment at which a tick takes a frame. Load does not change it."""
+        self._settle()
+        seen = self._sweep(self._at, self.tick_ns, 50)
+        self._grid_ns = seen[0].out_ns
+        for width_ns in (self.tick_ns // 10, self.tick_ns // 100 + 20_000, 8_000):
+            self._taken_ns = min(map(self._before, seen))
+            last = self._grid_ns - self._taken_ns
+            seen += self._sweep(last - width_ns * 2 // 3 - self._slack_ns, width_ns, 80)
+        self._taken_ns = min(map(self._before, seen))
+
+    def measure(self) -> list[Result]:
+        """Frames at every phase."""
+        self._settle()
+        before, begin = cpu_ns(self.pid), time.monotonic_ns()
+        seen = self._sweep(self._at, self.tick_ns, self.count)
+        ticks = (time.monotonic_ns() - begin) / self.tick_ns
+        cpu = (cpu_ns(self.pid) - before) / 1e3 / ticks
+        processing = [(self._taken_ns + self._late(e)) / 1e3 for e in seen]
+        return [
+            Result(f"{self.title}: processing", processing, cpu),
+            Result(f"{self.title}: from outside", [e.gateway_us for e in seen]),
+        ]
+
+    def _late(self, exchange: Exchange) -> int:
+        """A valve frame against the grid, ns."""
+        away = exchange.out_ns - self._grid_ns + self.tick_ns // 2
+        return away % self.tick_ns - self.tick_ns // 2
+
+    def _before(self, exchange: Exchange) -> int:
+        """From a joystick frame to the place of its answer on the grid, ns."""
+        return exchange.out_ns - self._late(exchange) - exchange.in_ns
+
+    def _stick(self) -> float:
+        self._high = not self._high
+        return HIGH_PCT if self._high else LOW_PCT
+
+    def _sweep(self, start: int, width_ns: int, count: int) -> list[Exchange]:
+        """One frame in every tick, each a step later in it."""
+        soonest = max(self._at, time.monotonic_ns() + self.tick_ns)
+        at = start + max(0, -(-(soonest - start) // self.tick_ns)) * self.tick_ns
+        seen, slack = [], []
+        for _ in range(count):
+            seen.append(self.wire.exchange(at, self._stick(), self.right_ns, jump=True))
+            slack.append(seen[-1].in_ns - at)
+            at += self.tick_ns + width_ns // count
+        self._at = at + self.tick_ns
+        self._slack_ns = round(statistics.median(slack))
+        return seen
+
+
+def each_gateway(directory: Path, wire: Wire, count: int) -> Iterator[Answering | Ticking]:
+    """Every gateway, each running while it is yielded."""
+    near, log = wire.near, directory / "log"
+    echo = compiled(PEERS / "echo.c", directory)
+    peers: dict[str, list[str | Path]] = {
+        PYTHON_ECHO: [sys.executable, PEERS / "echo.py", near],
+        NOTIFIER: [sys.executable, PEERS / "notifier.py", near, DBC],
+    }
+    if echo:
+        peers = {"C echo": [echo, near], **peers}
+    for title, command in peers.items():
+        with running(command, log) as process:
+            wait_for_text(process, log, "ready")
+            yield Answering(title, wire, process.pid, count)
+    subprocess.run(["modprobe", "can-gw"], check=True)
+    rule = ["-s", near, "-d", near, "-i", "-e", "-f", "110:C00007FF", "-m", CANGW_SETS]
+    subprocess.run(["cangw", "-A", *rule], check=True)
+    yield Answering(CANGW, wire, None, count)
+    subprocess.run(["cangw", "-F"], check=True)
+    deployments = {
+        "canshaper, 3 axes, 20 ms": (shipped(directory, near), 20),
+        "canshaper, 1 axis, 1 ms": (slew_only(directory, near, 1), 1),
+    }
+    for title, (file, tick_ms) in deployments.items():
+        with running(daemon(file), log) as process:
+            wait_for_frames(wire, process, log)
+            yield Ticking(title, wire, process.pid, count, tick_ms)
+
+
+def print_results(results: list[Result]) -> None:
+    """Print figures, and their ratios to the two peers in Python."""
+    median = {r.title: statistics.median(r.times) for r in results}
+    client = next(r.client for r in results if r.title == CANGW) or 0.0
+    rows = []
+    for r in results:
+        figures = [min(r.times), median[r.title], quantile(r.times, 0.99), max(r.times)]
+        cells = [f"{f:.1f}" for f in figures]
+        for more in (0.0, client):
+            whole = median[r.title] + more
+            cells += [f"{whole:.1f}"] if more else []
+            cells += [f"{whole / (median[peer] + more):.2f}" for peer in (PYTHON_ECHO, NOTIFIER)]
+        cells.append("" if r.cpu is None else f"{r.cpu:.0f}")
+        rows.append(Row(r.title, cells))
+    ratios = ["/ echo", "/ Notifier"]
+    heads = ["least", "median", "p99", "max", *ratios, "with client", *ratios, "CPU"]
+    print_table(heads, rows)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--bus", choices=("vcan", "can"), default="vcan")
+    parser.add_argument("--kernel", choices=("std", "rt"), default="std")
+    parser.add_argument("--load", nargs="*", choices=LOADS, default=[], help="kinds of load")
+    parser.add_argument("--count", type=int, default=300, help="joystick frames")
+    options = parser.parse_args()
+    if not in_lane():
+        raise SystemExit(run_in_lane(options.kernel))
+    near, far = ("vcan0", "vcan0") if options.bus == "vcan" else ("can0", "can1")
+    as_client()
+    idle: list[Result] = []
+    loaded: list[Result] = []
+    with tempfile.TemporaryDirectory() as name:
+        wire = Wire(near, far)
+        for gateway in each_gateway(Path(name), wire, options.count):
+            gateway.find_phase()
+            idle += gateway.measure()
+            if options.load:
+                with load(Path(name), options.load):
+                    loaded += gateway.measure()
+    print(f"joystick frame to valve frame, us; {near} and {far}; {machine()}")
+    print_results(idle)
+    if loaded:
+        print(f"\nwith {', '.join(options.load)}")
+        print_results(loaded)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,164 @@
+"""How late ticks begin and how long they take, idle and under load, in virtual time.
+
+Beside the daemon, two loops that only sleep until their next deadline, in C and in Python. Load is
+cangen without a gap on another interface, candump reading it, two busy loops, a process that writes
+and syncs; with "same", a bus full of foreign frames for the daemon too. Loops have FIFO priority
+40, the joystick 30, everything else none.
+
+    python benchmarks/lateness.py
+    python benchmarks/lateness.py --kernel rt
+    python benchmarks/lateness.py --ticks 10000 --load flood same busy disk
+"""
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from rig import (
+    GATEWAY_FIFO,
+    LOADS,
+    PEERS,
+    ROOT,
+    Row,
+    as_client,
+    compiled,
+    in_lane,
+    load,
+    machine,
+    print_table,
+    quantile,
+    run_in_lane,
+    running,
+    shipped,
+    slew_only,
+)
+from wire import HIGH_PCT, LOW_PCT, Wire, wait_for_frames
+
+MS = 1_000_000
+JOYSTICK_NS = 20 * MS
+CHANNEL = "vcan0"
+# Of ticks of 20 ms a tenth as many: a second under load takes twenty.
+SHORTER = 10
+
+
+@dataclass
+class Ticks:
+    """What a loop did in one condition: ns."""
+
+    title: str
+    late: list[int] = field(default_factory=list)
+    work: list[int] = field(default_factory=list)
+    missed: int = 0
+
+
+class Bench:
+    """Loops, each measured idle and, where load is asked for, under load."""
+
+    def __init__(self, directory: Path, count: int, kinds: list[str]) -> None:
+        self.directory, self.count, self.kinds = directory, count, kinds
+        self.results: dict[bool, list[Ticks]] = {False: [], True: []}
+        self._wire = Wire(CHANNEL, CHANNEL)
+
+    def sleeper(self, title: str, command: list[str | Path]) -> None:
+        """A loop that only sleeps, at 1 ms."""
+        log = self.directory / "lateness"
+        for loaded in self._conditions():
+            with self._load(loaded), running([*command, str(MS), str(self.count)], log) as process:
+                process.wait()
+            late = [int(line) for line in log.read_text().splitlines()]
+            self.results[loaded].append(Ticks(title, late))
+
+    def daemon(self, title: str, file: Path, tick_ms: int, fifo: int | None) -> None:
+        """The daemon with a stick that moves all the time."""
+        notes, log = self.directory / "ticks", self.directory / "log"
+        command = [sys.executable, ROOT / "benchmarks" / "observed.py", "ticks", notes, file]
+        count = self.count if tick_ms == 1 else self.count // SHORTER
+        windows = {}
+        with running(command, log, fifo) as process:
+            wait_for_frames(self._wire, process, log)
+            for loaded in self._conditions():
+                with self._load(loaded):
+                    self._drive(2 * 10**9)  # whatever happens for the first time
+                    windows[loaded] = self._drive(count * tick_ms * MS)
+        for loaded, (begin, end) in windows.items():
+            ticks = Ticks(title)
+            for line in notes.read_text().splitlines():
+                at, late, work, missed = map(int, line.split())
+                if begin <= at < end:
+                    ticks.late.append(late)
+                    ticks.work.append(work)
+                    ticks.missed += missed
+            self.results[loaded].append(ticks)
+
+    def _drive(self, duration_ns: int) -> tuple[int, int]:
+        """Move the stick for so long; begin and end."""
+        begin = at = time.monotonic_ns()
+        number = 0
+        while at < begin + duration_ns:
+            at += JOYSTICK_NS
+            number += 1
+            self._wire.send(at, HIGH_PCT if number % 2 else LOW_PCT, JOYSTICK_NS // 4)
+        self._wire.forget()
+        return begin, at
+
+    def _conditions(self) -> list[bool]:
+        return [False, True] if self.kinds else [False]
+
+    @contextmanager
+    def _load(self, loaded: bool) -> Iterator[None]:
+        with load(self.directory, self.kinds if loaded else []):
+            yield
+
+
+def print_ticks(all_ticks: list[Ticks]) -> None:
+    """Print figures in us."""
+    rows = []
+    for t in all_ticks:
+        cells = [str(len(t.late))]
+        cells += [f"{quantile(t.late, q) / 1e3:.1f}" for q in (0.5, 0.99, 0.999, 1.0)]
+        if t.work:
+            cells += [f"{quantile(t.work, q) / 1e3:.0f}" for q in (0.5, 0.99, 1.0)]
+            cells += [str(t.missed)]
+        else:
+            cells += [""] * 4
+        rows.append(Row(t.title, cells))
+    heads = ["ticks", "late p50", "p99", "p99.9", "max", "work p50", "p99", "max", "missed"]
+    print_table(heads, rows)
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--kernel", choices=("std", "rt"), default="std")
+    parser.add_argument("--ticks", type=int, default=2000, help="of 1 ms; of 20 ms a tenth of it")
+    parser.add_argument("--load", nargs="*", choices=LOADS, default=["flood", "busy", "disk"])
+    options = parser.parse_args()
+    if not in_lane():
+        raise SystemExit(run_in_lane(options.kernel))
+    as_client()
+    with tempfile.TemporaryDirectory() as name:
+        directory = Path(name)
+        bench = Bench(directory, options.ticks, options.load)
+        if program := compiled(PEERS / "sleeper.c", directory):
+            bench.sleeper("C, sleeps only, 1 ms", [program])
+        bench.sleeper("Python, sleeps only, 1 ms", [sys.executable, PEERS / "sleeper.py"])
+        one, three = slew_only(directory, CHANNEL, 1), shipped(directory, CHANNEL)
+        bench.daemon("canshaper, 1 axis, 1 ms", one, 1, GATEWAY_FIFO)
+        bench.daemon("canshaper, 3 axes, 20 ms", three, 20, GATEWAY_FIFO)
+        bench.daemon("canshaper, 1 axis, 1 ms, no FIFO", one, 1, None)
+    print(f"lateness and work of ticks, us; {machine()}")
+    print_ticks(bench.results[False])
+    if options.load:
+        print(f"\nwith {', '.join(options.load)}")
+        print_ticks(bench.results[True])
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,115 @@
+"""``canshaper doctor``: is this PC fit to run a deployment?"""
+
+import json
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
+    from canshaper.doctor.finding import Finding
+
+EXIT_NOT_FIT = 1
+
+
+def doctor(
+    file: str = FILE,
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    seconds: float = typer.Option(
+        20.0, "--seconds", min=0.5, max=86_400.0, help="Length of each run."
+    ),
+    load: bool = typer.Option(True, "--load/--no-load", help="A second run on a busy PC."),
+    listen_s: float | None = typer.Option(
+        None, "--listen", metavar="SECONDS", min=0.5, help="Listen to the levers on the real bus."
+    ),
+    as_json: Path | None = typer.Option(
+        None, "--json", metavar="FILE", help="Write all numbers to this file."
+    ),
+) -> None:
+    """Is this PC fit to run a deployment? Nothing is sent on its buses, nothing moves.
+
+    Runs the daemon's loop with moving levers on sockets of its own, once on the PC as it is and
+    once with every processor, memory and disk kept busy; shows how late the ticks come and how
+    long a joystick takes to the valve; looks at kernel, processor and CAN interfaces, and says
+    what to do about what it finds. Run it as root to measure with the service's real-time
+    priority.
+
+    Exit code 0 when the PC is fit, 1 when it is not, 2 when the deployment is wrong or nothing
+    could be measured, 130 after Ctrl-C.
+
+    Examples:
+
+      canshaper doctor config/forwarder.yaml --no-load --listen 10
+
+      sudo canshaper doctor config/forwarder.yaml
+
+      canshaper doctor config/forwarder.yaml --seconds 600 --json doctor.json
+    """
+    from canshaper.config.source import DeploymentError
+    from canshaper.doctor.finding import fit
+    from canshaper.doctor.interfaces import bus_findings
+    from canshaper.doctor.judge import IDLE, LOADED, measured_findings
+    from canshaper.doctor.machine import machine_findings
+    from canshaper.doctor.measure import measure
+    from canshaper.doctor.processes import MeasureError
+    from canshaper.doctor.report import as_dict, print_report
+
+    try:
+        deployment = loader(file, interface, channel)()
+        findings = machine_findings(deployment.config.tick_ms)
+        findings += bus_findings(deployment.config.buses)
+        if listen_s is not None:
+            findings += _listened(deployment, listen_s)
+        runs = {}
+        for name in (IDLE, LOADED) if load else (IDLE,):
+            with _progress(f"{name}, {seconds:g} s", seconds) as tell:
+                runs[name] = measure(deployment, seconds, tell, load=name == LOADED)
+        findings = measured_findings(deployment, runs) + findings
+        if as_json:
+            data = as_dict(deployment, seconds, runs, findings)
+            as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    except (DeploymentError, MeasureError, OSError) as error:
+        raise fail(error) from None
+    except KeyboardInterrupt:
+        typer.echo("interrupted", err=True)
+        raise typer.Exit(130) from None
+    print_report(deployment, seconds, runs, findings, Console())
+    if not fit(findings):
+        raise typer.Exit(EXIT_NOT_FIT)
+
+
+def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
+    from canshaper.doctor.finding import Finding, Level
+    from canshaper.doctor.listen import heard_findings, listen
+
+    try:
+        with _progress(f"listening, {seconds:g} s", seconds) as tell:
+            heard = listen(deployment, seconds, tell)
+    except OSError as error:
+        remedy = "mend the interface first"
+        return [Finding("levers", Level.BAD, f"cannot listen: {error.strerror}", remedy)]
+    return heard_findings(deployment, heard)
+
+
+@contextmanager
+def _progress(what: str, seconds: float) -> Iterator[Callable[[float], None]]:
+    """A bar on the terminal, beside the output; gone when done. Drawn seldom: it is load too."""
+    console = Console(stderr=True)
+    with Progress(
+        TextColumn("{task.description}"),
+        BarColumn(),
+        console=console,
+        transient=True,
+        refresh_per_second=1,
+        disable=not console.is_terminal,
+    ) as bar:
+        task = bar.add_task(what, total=seconds)
+        yield lambda passed: bar.update(task, completed=min(passed, seconds))

@@ -1,0 +1,357 @@
+"""One random drive with faults, in lock-step against the real controller, under the judge's eyes.
+
+Everything random comes from the seed: the machine, what the operator does, which faults come when.
+"""
+
+import random
+from collections import Counter
+from collections.abc import Callable, Iterable
+from typing import Any, Protocol
+
+from canshaper.can.frame import Frame
+from canshaper.service.controller import Controller
+from tests.faults import inject
+from tests.faults.hand import path
+from tests.faults.inject import Fault
+from tests.faults.judge import CONTESTED_NS, Judge, Violation
+from tests.faults.machine import Input, Lever, Machine
+from tests.faults.variants import NAMES, machine
+
+# Most of a drive's ticks lie under faults; the rest is the way back to normal work.
+BODY_TICKS = (50, 110)
+# Within so many ticks an axis moves that is asked to: a filter that still damps the last swing may
+# hold it for a part of a swing of 2.4 s, never against the lever.
+MOVES_WITHIN = 75
+# Punctual ticks after which an overrun of the loop is over.
+OVERRUN_TICKS = 55
+
+
+class Driven(Protocol):
+    """What a drive needs of a controller."""
+
+    def receive(self, frame: Frame, now_ns: int) -> None: ...
+    def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]: ...
+    def stalled(self) -> None: ...
+    def send_failed(self, frame: Frame) -> None: ...
+    def neutral_frames(self) -> list[Frame]: ...
+
+
+def plan(driven: Machine, rng: random.Random) -> tuple[int, list[Fault]]:
+    """How many ticks lie under faults, and the faults."""
+    ticks = rng.randint(*BODY_TICKS)
+    return ticks, inject.random_faults(driven, rng, ticks)
+
+
+class Sender:
+    """A node that sends one input in its cycle, with the counter running."""
+
+    def __init__(self, source: Input, tick_ms: int, rng: random.Random) -> None:
+        self.source = source
+        self._tick_ms = tick_ms
+        self._phase = rng.randrange(source.cycle_ms)
+        self._late = rng.choice((0.0, 0.0, 0.1, 0.3))  # how often a frame slips into the next tick
+        self._rng = rng
+        self._count = rng.randrange(256)
+        self._waiting: list[bytes] = []
+
+    def due(self, tick: int) -> int:
+        """How many frames are due in the tick that ends at this one."""
+        cycle, end = self.source.cycle_ms, tick * self._tick_ms + self._phase
+        return end // cycle - (end - self._tick_ms) // cycle
+
+    def counted(self, raw: dict[str, int]) -> dict[str, int]:
+        """Raw values with the next alive counter."""
+        self._count += 1
+        if counter := self.source.counter:
+            return {**raw, counter.name: self._count & counter.mask}
+        return raw
+
+    def passed(self, frames: list[bytes]) -> list[bytes]:
+        """What of these frames arrives now."""
+        frames = self._waiting + frames
+        self._waiting = []
+        if frames and self._rng.random() < self._late:
+            self._waiting = [frames.pop()]
+        return frames
+
+
+class Drive:
+    """A drive: what is sent, what comes back, and what the judge says of it."""
+
+    def __init__(
+        self,
+        seed: int,
+        controller_of: Callable[[Any], Driven] = Controller,
+        trace: Callable[[str], None] | None = None,
+    ) -> None:
+        self.seed = seed
+        self.rng = rng = random.Random(f"canshaper faults {seed}")
+        self.machine, deployment = machine(NAMES[seed % len(NAMES)])
+        self.ticks, self.faults = plan(self.machine, rng)
+        self.controller = controller_of(deployment)
+        self.judge = Judge(self.machine)
+        self.tick_number = 0  # ticks of the wall clock
+        self._trace = trace
+        self._untold = 0
+        tick_ms = self.machine.tick_ms
+        self.levers = {v.name: Sender(v, tick_ms, rng) for v in self.machine.levers.values()}
+        self.stop = Sender(self.machine.stop, tick_ms, rng) if self.machine.stop else None
+        self.paths = {
+            name: path(rng, self.ticks, axis.stick.full, int(axis.band * axis.stick.full))
+            for name, axis in self.machine.axes.items()
+        }
+        self.toggles = {
+            name: (rng.randrange(self.ticks), rng.randrange(self.ticks)) for name in self.levers
+        }
+        self.toggled = rng.random() < 0.2
+        self._radius = rng.randint(2000, 8000)
+        self._waiting: list[Frame] = []
+
+    @property
+    def now_ns(self) -> int:
+        return self.tick_number * self.machine.tick_ns
+
+    def run(self) -> Counter[str]:
+        """Drive; what was seen, counted.
+
+        Raises:
+            Violation: with seed, machine, time and what was allowed.
+        """
+        try:
+            self._body()
+            self._way_back()
+            self._end()
+        except Violation as violation:
+            faults = "; ".join(map(str, self.faults)) or "no faults"
+            raise Violation(
+                f"seed {self.seed}, machine {self.machine.name}, tick {self.tick_number}"
+                f" ({self.now_ns // 1_000_000} ms): {violation}\n  faults: {faults}\n"
+                f"  again, tick by tick: python -m tests.faults {self.seed} --trace"
+            ) from None
+        stats = self.judge.stats
+        stats.update({f"fault {f.kind}": 1 for f in self.faults})
+        stats.update({"drives": 1, "ticks": self.tick_number, f"machine {self.machine.name}": 1})
+        return stats
+
+    # -- under faults -----------------------------------------------------------------------------
+
+    def _body(self) -> None:
+        while self.tick_number < self.ticks:
+            active = [f for f in self.faults if f.active(self.tick_number)]
+            passed, missed, drained = self._loop(active)
+            for _ in range(passed):
+                self.tick_number += 1
+                last = self.tick_number - 1
+                sticks = {n: p[min(last, self.ticks - 1)] for n, p in self.paths.items()}
+                switches = {n: self._switches(v, last) for n, v in self.machine.levers.items()}
+                self._take(sticks, switches, active)
+            if drained:
+                # What waits in the sockets is thrown away; something may come in right after.
+                self._waiting = self._waiting[-2:] if drained > 1 else []
+                self._tell("stood still")
+                self.judge.stalled()
+                self.controller.stalled()
+            self._step(missed, active)
+
+    def _switches(self, lever: Lever, tick: int) -> dict[str, int]:
+        raw = {lever.enable.name: 1}
+        first, second = self.toggles[lever.name]
+        if self.toggled and lever.off and min(first, second) <= tick < max(first, second):
+            raw[lever.off.name] = 1
+        return raw
+
+    def _loop(self, active: list[Fault]) -> tuple[int, int, int]:
+        """How the loop does: ticks of the clock that pass, missed ones told, and how it stalled.
+
+        Returns:
+            (ticks that pass before the next call, ticks told as missed, how it stalled: 0 not,
+            1 and nothing came in since, 2 and something did).
+        """
+        if self._untold:
+            missed, self._untold = self._untold, 0
+            return 0, missed, 0
+        limit = self.machine.shortest_timeout_ns // self.machine.tick_ns
+        for fault in active:
+            once = fault.start == self.tick_number or "done" not in fault.memory
+            if fault.kind == "loop: late often":
+                missed = fault.rng.choice((0, 1, 1, 2))
+                return 1 + missed, missed, 0
+            if not once:
+                continue
+            if fault.kind == "loop: late once":
+                fault.memory["done"] = True
+                missed = fault.rng.randint(1, limit)
+                return 1 + missed, missed, 0
+            if fault.kind == "loop: late, told later":
+                # A loop that was held up in its sleep hears of it after the next body.
+                fault.memory["done"] = True
+                late = fault.rng.randint(2, limit)
+                self._untold = late - 1
+                return late, 0, 0
+            if fault.kind == "loop: stands still":
+                fault.memory["done"] = True
+                missed = limit + fault.rng.randint(1, 40)
+                return 1 + missed, missed, fault.rng.choice((1, 2))
+        return 1, 0, 0
+
+    def _take(
+        self,
+        sticks: dict[str, int],
+        switches: dict[str, dict[str, int]],
+        active: list[Fault],
+    ) -> None:
+        """Everything that is put on the buses in one tick of the clock."""
+        frames: list[Frame] = []
+        for name, lever in self.machine.levers.items():
+            sender = self.levers[name]
+            mine = [f for f in active if f.lever is lever]
+            sent = []
+            for _ in range(sender.due(self.tick_number)):
+                raw = dict(switches[name])
+                for axis in lever.axes:
+                    raw |= axis.raw(sticks[axis.name])
+                raw = sender.counted(raw)
+                for fault in mine:
+                    if act := inject.RAW.get(fault.kind):
+                        act(fault, raw)
+                sent.append(lever.data(raw))
+            for fault in mine:
+                if spoil := inject.WIRE.get(fault.kind):
+                    sent = spoil(fault, sent)
+            frames += [Frame(*lever.key, data) for data in sender.passed(sent)]
+        frames += self._stop_frames(active)
+        frames += self._radius_frames(active)
+        for fault in active:
+            if extra := inject.EXTRA.get(fault.kind):
+                frames += extra(fault)
+        self._waiting += frames
+
+    def _stop_frames(self, active: list[Fault]) -> list[Frame]:
+        stop, sender = self.machine.stop, self.stop
+        if stop is None or sender is None:
+            return []
+        frames = []
+        for _ in range(sender.due(self.tick_number)):
+            raw = sender.counted({self.machine.stop_field.name: 0})
+            data = stop.data(raw)
+            for fault in active:
+                if change := inject.STOP.get(fault.kind):
+                    data = change(fault, stop, raw)
+            if data:
+                frames.append(data)
+        return [Frame(*stop.key, data) for data in sender.passed(frames)]
+
+    def _radius_frames(self, active: list[Fault]) -> list[Frame]:
+        if self.machine.radius is None:
+            return []
+        key, length, field = self.machine.radius
+        value = self._radius
+        for fault in active:
+            if fault.kind == "radius: none":
+                return []
+            if fault.kind == "radius: jumping":
+                value = fault.rng.randint(0, field.full)
+            elif fault.kind == "radius: anything":
+                value = fault.rng.randint(field.low, field.high)
+            elif fault.kind == "radius: wrong length":
+                length += fault.rng.choice((-1, 1))
+        word = field.put(value) & ((1 << 8 * length) - 1)
+        return [Frame(*key, word.to_bytes(length, "little"))]
+
+    def _step(self, missed: int, active: list[Fault]) -> None:
+        """One body of the loop."""
+        now_ns = self.now_ns
+        for frame in self._waiting:
+            self._tell(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
+            self.judge.hear(frame, now_ns)
+            self.controller.receive(frame, now_ns)
+        self._waiting = []
+        fails = {f.axis.valve_key for f in active if f.kind == "loop: valve not sent"}
+        fails |= {f.axis.status_key for f in active if f.kind == "loop: status not sent"}
+        sent, failed = [], []
+        for frame in self.controller.tick(now_ns, missed):
+            sent.append(frame)
+            if frame[:3] in fails:
+                failed.append(frame)
+                self.controller.send_failed(frame)
+        if self._trace:
+            self._show(sent, failed, missed, active)
+        self.judge.tick(sent, failed, now_ns, missed)
+        if self._trace:
+            self._trace("      " + self.judge.words())
+
+    # -- the way back -----------------------------------------------------------------------------
+
+    def _way_back(self) -> None:
+        """All faults are over: by the rules of docs/states.md every axis works again."""
+        machine, rng = self.machine, self.rng
+        cycles = max(a.period_ticks for a in machine.axes.values())
+        # enough for frames that qualify, a state a tick, and valves that are served seldom
+        some = 4 + 3 * cycles + max(v.qualify for v in machine.levers.values())
+        kinds = {f.kind for f in self.faults}
+        patient = rng.random() < (0.5 if machine.rest_ticks < 70 else 0.05)
+        if patient:
+            self._healthy(machine.rest_ticks, enable=1)
+        if kinds & {"loop: late once", "loop: late often", "loop: late, told later"}:
+            self._healthy(OVERRUN_TICKS, enable=1)
+        if "others: our valve" in kinds:
+            self._healthy(CONTESTED_NS // machine.tick_ns, enable=1)
+        resets = patient and all(v.reset for v in machine.levers.values())
+        if resets and rng.random() < 0.5:
+            self._healthy(some, enable=1, reset=0)
+            self._healthy(some, enable=1, reset=1)
+        else:
+            self._healthy(some, enable=0)
+        self._healthy(some, enable=1)
+        for name, axis in self.judge.axes.items():
+            if axis.state != 1:
+                raise Violation(f"{name}: state {axis.state} on the way back, allowed is 1, READY")
+        sign = rng.choice((-1, 1))
+        moved: set[str] = set()
+        for _ in range(MOVES_WITHIN):
+            self._healthy(1, enable=1, deflected=sign)
+            moved.update(n for n, axis in self.judge.axes.items() if axis.raw * sign > 0)
+            if moved == self.judge.axes.keys():
+                break
+        if missing := self.judge.axes.keys() - moved:
+            raise Violation(f"{', '.join(missing)}: does not move again, with everything healthy")
+
+    def _healthy(self, ticks: int, enable: int, reset: int = 0, deflected: int = 0) -> None:
+        axes = self.machine.axes.values()
+        sticks = {a.name: deflected * a.stick.full for a in axes}
+        switches = {}
+        for name, lever in self.machine.levers.items():
+            switches[name] = {lever.enable.name: enable}
+            if lever.reset:
+                switches[name][lever.reset.name] = reset
+        for _ in range(ticks):
+            self.tick_number += 1
+            self._take(sticks, switches, [])
+            missed, self._untold = self._untold, 0
+            self._step(missed, [])
+
+    def _end(self) -> None:
+        """The last thing sent: every valve neutral."""
+        frames = {f[:3]: f for f in self.controller.neutral_frames()}
+        if frames.keys() != self.machine.valves.keys():
+            raise Violation("neutral frames at the end: not those of every valve")
+        for key, axis in self.machine.valves.items():
+            values: Any = axis.valve_message.decode(frames[key].data, decode_choices=False)
+            if values[axis.valve.name] != 0:
+                raise Violation(f"{axis.name}: the last frame is not neutral")
+
+    # -- told to a reader -------------------------------------------------------------------------
+
+    def _tell(self, text: str) -> None:
+        if self._trace:
+            self._trace(text)
+
+    def _show(
+        self, sent: list[Frame], failed: list[Frame], missed: int, active: list[Fault]
+    ) -> None:
+        names = ", ".join(f.kind for f in active)
+        late = f" missed {missed}" if missed else ""
+        self._tell(f"{self.tick_number:4d} {self.now_ns // 1_000_000:6d} ms{late} {names}")
+        for frame in sent:
+            lost = " not sent" if frame in failed else ""
+            self._tell(f"  out {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}{lost}")

@@ -1,0 +1,167 @@
+"""What was heard of the inputs, from the bytes on the bus alone."""
+
+from tests.faults.machine import Axis, Field, Input, Lever
+
+LONG_AGO = -(10**15)
+
+# Reasons by their numbers in docs/states.md.
+STICK_TIMEOUT, SWITCH_INVALID, STICK_FROZEN, STICK_UNTRUSTED = 32, 37, 39, 40
+LOOP_OVERRUN, ENABLE_LOST, SEND_FAILED, LOOP_STALLED = 41, 64, 66, 67
+EMERGENCY_STOP, EMERGENCY_STOP_LOST, SECOND_SENDER = 68, 69, 70
+
+
+class Heard:
+    """One input: its last good frame by the rules of its protection.
+
+    Attributes:
+        word: bits of the last good frame.
+        good_ns: when that came.
+        refused_ns: when the last one came that was wrong, out of sequence or not yet trusted.
+    """
+
+    def __init__(self, source: Input) -> None:
+        self.source = source
+        self.word = 0
+        self.good_ns = self.refused_ns = self._whole_ns = LONG_AGO
+        self._count: int | None = None
+        self._in_a_row = 0
+        self._any_step = True
+
+    def hear(self, data: bytes, now_ns: int) -> str:
+        """Take a frame; the counter of the service status that it adds to, or nothing."""
+        source = self.source
+        if len(data) != source.length:
+            return "WrongLength"
+        if now_ns - self._whole_ns > source.timeout_ns:  # the sender was away, or started anew
+            self._any_step = True
+            self._in_a_row = 0
+        if not source.whole(data):
+            self.refused_ns = now_ns
+            self._in_a_row = 0
+            return "InvalidSignals"
+        self._whole_ns = now_ns
+        word = int.from_bytes(data, "little")
+        self.whole(word)
+        if source.counter:
+            count = source.counter.get(word)
+            last, self._count = self._count, count
+            step = 1 if last is None else (count - last) & source.counter.mask
+            if step == 0 or (step > source.max_step and not self._any_step):
+                self.refused_ns = now_ns
+                if step:
+                    self._in_a_row = 0
+                return "InvalidSignals"
+            self._any_step = False
+        self._in_a_row += 1
+        if self._in_a_row < source.qualify:
+            self.refused_ns = now_ns
+            return ""
+        self.accepted(word, now_ns)
+        self.word, self.good_ns = word, now_ns
+        return "" if self.valid() else "InvalidSignals"
+
+    def whole(self, word: int) -> None:
+        """A frame came whole, be it in sequence or not."""
+
+    def accepted(self, word: int, now_ns: int) -> None:
+        """A frame counts; the last one still stands in ``word``."""
+
+    def valid(self) -> bool:
+        """Whether the last good frame says something."""
+        return True
+
+    def forget(self) -> None:
+        """The loop stood still: what was heard is too old."""
+        self.good_ns = self._whole_ns = LONG_AGO
+
+    def fresh(self, now_ns: int) -> bool:
+        return now_ns - self.good_ns <= self.source.timeout_ns
+
+
+class HeardStop(Heard):
+    """The emergency stop.
+
+    Attributes:
+        presses: how many frames so far said stop.
+        says_stop: whether the last one did.
+    """
+
+    def __init__(self, source: Input, signal: Field) -> None:
+        super().__init__(source)
+        self._signal = signal
+        self.presses = 0
+        self.says_stop = False
+
+    def whole(self, word: int) -> None:
+        """A stop is a stop, whoever says so."""
+        self.says_stop = self._signal.get(word) != 0
+        self.presses += self.says_stop
+
+
+class HeardLever(Heard):
+    """A lever, as its axes may use it.
+
+    Attributes:
+        releases: how many frames so far had the enable switch off.
+        resets: how many times the reset switch went from 0 to 1.
+        presses: by axis, how many times enable went from 0 to 1 in frames that it can use.
+    """
+
+    def __init__(self, source: Lever) -> None:
+        super().__init__(source)
+        self.lever = source
+        self.releases = self.resets = 0
+        self.presses = {a.name: 0 for a in source.axes}
+        self._enabled = {a.name: True for a in source.axes}
+        self._still_ns = {a.name: LONG_AGO for a in source.axes}
+        # by axis: deflection and reason why it is none, of the last good frame
+        self.sticks: dict[str, tuple[float, int]] = {a.name: (0.0, -1) for a in source.axes}
+        self._reset = 1
+
+    def whole(self, word: int) -> None:
+        if self.lever.enable.get(word) == 0:  # released is released, whoever says so
+            self.releases += 1
+            self._enabled = dict.fromkeys(self._enabled, False)
+
+    def accepted(self, word: int, now_ns: int) -> None:
+        lever = self.lever
+        enable = lever.enable.get(word)
+        if lever.reset:
+            reset = lever.reset.get(word)
+            self.resets += reset == 1 and self._reset == 0
+            if reset in (0, 1):  # the codes above say nothing
+                self._reset = reset
+        for axis in lever.axes:
+            stick = axis.read(word)
+            if stick != self.sticks[axis.name]:
+                self.sticks[axis.name], self._still_ns[axis.name] = stick, now_ns
+            if enable == 0 or (enable == 1 and not stick[1]):
+                self.presses[axis.name] += enable == 1 and not self._enabled[axis.name]
+                self._enabled[axis.name] = enable == 1
+
+    def valid(self) -> bool:
+        return self.enable() in (0, 1) and not any(why for _, why in self.sticks.values())
+
+    def bypasses(self) -> bool:
+        """Whether anti-sway is switched off."""
+        return self.lever.off is not None and self.lever.off.get(self.word) == 1
+
+    def faults(self, axis: Axis, now_ns: int) -> set[int]:
+        """Every reason why the stick of this axis cannot be used now; empty when it can."""
+        if not self.fresh(now_ns):
+            found = {STICK_TIMEOUT}
+            if now_ns - self.refused_ns <= self.source.timeout_ns:
+                found = {STICK_UNTRUSTED}
+            return found
+        stick, why = self.sticks[axis.name]
+        found = {why} if why else set()
+        if self.enable() not in (0, 1):
+            found.add(SWITCH_INVALID)
+        still_ns = now_ns - self._still_ns[axis.name]
+        if not found and still_ns > self.lever.frozen_ns and abs(stick) > axis.band:
+            found.add(STICK_FROZEN)
+        return found
+
+    def enable(self) -> int:
+        """The enable switch in the last good frame."""
+        return self.lever.enable.get(self.word)

@@ -1,0 +1,95 @@
+"""Deployment and DBC files of any content: a deployment that works, or every reason why not."""
+
+import re
+from pathlib import Path
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.frame import Frame
+from canshaper.config.source import DeploymentError
+from canshaper.service.controller import Controller
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = ("forwarder", "forwarder-robust", "forwarder-joints")
+SMALL = "small"
+
+# What the parser of DBC files says without a place, and files that cannot be read at all.
+_NO_PLACE = re.compile(r"not a DBC file that can be used|not YAML: (not UTF-8|'utf-8')")
+
+
+class Files:
+    """A deployment file and a DBC file in a directory, written anew for every try."""
+
+    def __init__(self, directory: Path) -> None:
+        self.yaml = directory / "machine.yaml"
+        self.dbc = directory / "machine.dbc"
+
+    def load(self, yaml: bytes, dbc: bytes) -> Deployment | None:
+        """Load and, where that goes well, run; None where there are problems, well told.
+
+        Raises:
+            Exception: anything but a ``DeploymentError`` with proper problems is a fault.
+        """
+        self.yaml.write_bytes(yaml)
+        self.dbc.write_bytes(dbc)
+        try:
+            deployment = load_deployment(self.yaml)
+        except DeploymentError as error:
+            self._check(error)
+            return None
+        runs(deployment)
+        return deployment
+
+    def _check(self, error: DeploymentError) -> None:
+        """Every problem has words, a file that is there, and the line where there is one."""
+        assert error.problems
+        assert str(error).splitlines()
+        for problem in error.problems:
+            assert problem.message.strip(), problem
+            assert "\n" not in str(problem), problem
+            path = Path(problem.file)
+            assert path in (self.yaml, self.dbc), problem
+            rows = path.read_bytes().count(b"\n") + 1
+            if problem.line is not None:
+                assert 1 <= problem.line <= rows + 1, (problem, rows)
+            elif path.read_bytes().strip():
+                # A file without any key has no line in which one is missing.
+                top = problem.message.startswith("missing: ") and "." not in problem.where
+                assert top or _NO_PLACE.search(problem.message), problem
+
+
+def runs(deployment: Deployment) -> None:
+    """A deployment that was found good has to work: ticks, all its inputs, its last frames."""
+    controller = Controller(deployment)
+    now_ns = 0
+    tick_ns = deployment.config.tick_ms * 1_000_000
+    messages = {lever.key: lever.message for lever in deployment.levers.values()}
+    if stop := deployment.emergency_stop:
+        messages[stop.key] = stop.message
+    for axis in deployment.axes.values():
+        if axis.radial and axis.radial.key and axis.radial.message:
+            messages[axis.radial.key] = axis.radial.message
+    for data in (0x00, 0xFF, 0x55, 0x01):
+        for key, message in messages.items():
+            controller.receive(Frame(*key, bytes([data]) * message.length), now_ns)
+            controller.receive(Frame(*key, b""), now_ns)
+        for frame in controller.tick(now_ns):
+            assert len(frame.data) <= 8
+            assert frame.bus in deployment.config.buses
+        now_ns += tick_ns
+    list(controller.tick(now_ns, missed=3))
+    controller.stalled()
+    list(controller.tick(now_ns + tick_ns))
+    for frame in controller.neutral_frames():
+        controller.send_failed(frame)
+
+
+def texts(name: str) -> tuple[str, str]:
+    """Texts of a deployment, which names machine.dbc, and of its DBC file."""
+    if name == SMALL:
+        here = Path(__file__).with_name(SMALL)
+        return here.with_suffix(".yaml").read_text(), here.with_suffix(".dbc").read_text()
+    yaml = (ROOT / "config" / f"{name}.yaml").read_text(encoding="utf-8")
+    dbc = "forwarder-joints" if name == "forwarder-joints" else "forwarder"
+    assert f"../dbc/{dbc}.dbc" in yaml
+    text = (ROOT / "dbc" / f"{dbc}.dbc").read_text(encoding="cp1252")
+    return yaml.replace(f"../dbc/{dbc}.dbc", "machine.dbc"), text

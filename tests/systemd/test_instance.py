@@ -1,0 +1,210 @@
+"""The life of an instance: start, priority, crash, hang, reload, stop."""
+
+import re
+import subprocess
+import time
+from pathlib import Path
+
+import can
+
+from tests.hil.machine import (
+    DBC,
+    VALVES,
+    Levers,
+    candump,
+    logged,
+    message_name,
+    open_bus,
+    wait_for,
+)
+from tests.systemd.unit import ANSWER_S, Unit, add_vcan, run
+
+MOST_EXPOSURE = 1.5
+
+
+def drive(bus: can.BusABC, levers: Levers, faster_than: float = 30.0) -> float:
+    """Bring slew into motion and return the command, %.
+
+    Where this machine held up a lever's frames and the axis stopped, once more from neutral.
+    """
+    until = time.monotonic() + ANSWER_S
+    while time.monotonic() < until:
+        message = bus.recv(1.0)
+        name = message_name(message) if message is not None else None
+        if message is None or name not in ("SlewStatus", "SlewCommand"):
+            continue
+        signals = dict(DBC.decode_message(name, message.data))
+        if name == "SlewStatus":
+            stopped = str(signals["State"]) in ("NEUTRAL_WAIT", "TRIPPED")
+            levers.values["Slew"] = 0.0 if stopped else 100.0
+            levers.switches["Reset"] = int(str(signals["State"]) == "TRIPPED")
+        elif signals["Velocity"] > faster_than:
+            return float(signals["Velocity"])
+    raise AssertionError(f"slew never above {faster_than} %")
+
+
+def test_started_means_that_the_valves_are_told_neutral(installed: None, tmp_path: Path) -> None:
+    unit = Unit("forwarder")
+    with candump(tmp_path / "start.log", "vcan0"):
+        unit.systemctl("start")
+    told = {message_name(m): m.data[0] for m in logged(tmp_path / "start.log")}
+    assert {name: told.get(name) for name in VALVES} == dict.fromkeys(VALVES, 0)
+    assert re.search("started file=/etc/canshaper/forwarder.yaml", unit.text())
+
+
+def test_process_is_real_time_locked_and_nobody(forwarder: Unit) -> None:
+    process = Path("/proc") / forwarder.show("MainPID")
+    scheduling = run("chrt", "--pid", process.name).stdout
+    assert "SCHED_FIFO" in scheduling
+    assert scheduling.endswith("priority: 40\n")
+    fields = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
+    assert int(fields["VmLck"].split()[0]) >= int(fields["VmRSS"].split()[0]) // 2 > 0
+    assert "0" not in fields["Uid"].split()
+    assert (fields["CapEff"].strip("\t0"), fields["CapBnd"].strip("\t0")) == ("", "")
+    assert fields["NoNewPrivs"].strip() == "1"
+    assert (process / "oom_score_adj").read_text() == "-900\n"
+    user = run("getent", "passwd", fields["Uid"].split()[0]).stdout
+    assert user.startswith("canshaper:")
+
+
+def test_exposure_of_the_loaded_unit(forwarder: Unit) -> None:
+    verdict = run("systemd-analyze", "security", "--no-pager", forwarder.name).stdout
+    found = re.search(r"Overall exposure level for \S+: ([0-9.]+)", verdict)
+    assert found, verdict
+    assert float(found[1]) <= MOST_EXPOSURE
+
+
+def test_lever_moves_the_valve_and_the_status_tells(
+    forwarder: Unit, bus: can.BusABC, levers: Levers
+) -> None:
+    drive(bus, levers)
+    forwarder.wait(StatusText=".*slew ACTIVE.*")
+
+
+def test_killed_in_motion_it_comes_back_and_waits_for_neutral(
+    forwarder: Unit, bus: can.BusABC, levers: Levers, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    before = forwarder.number("NRestarts")
+    forwarder.systemctl("kill", "--signal=KILL")
+    forwarder.wait(ActiveState="(?!active).*")  # from here on every frame is the next process's
+    with open_bus("vcan0") as later, candump(tmp_path / "after.log", "vcan0"):
+        forwarder.wait_restart(before)
+        status = wait_for(later, "SlewStatus", lambda s: str(s["Reason"]) == "STICK_NOT_NEUTRAL")
+        assert str(status["State"]) == "NEUTRAL_WAIT"
+    slew = [m.data[0] for m in logged(tmp_path / "after.log") if message_name(m) == "SlewCommand"]
+    assert set(slew) == {0}
+    with open_bus("vcan0") as later:
+        drive(later, levers)
+
+
+def test_hang_is_ended_by_the_watchdog_and_the_journal_tells_where(forwarder: Unit) -> None:
+    before, cursor = forwarder.number("NRestarts"), forwarder.cursor()
+    forwarder.systemctl("kill", "--signal=STOP")
+    forwarder.wait_restart(before)
+    text = forwarder.text(cursor)
+    assert "Watchdog timeout" in text
+    assert "in run_at_deadlines" in text
+
+
+def test_interface_gone_and_back_without_a_restart(forwarder: Unit) -> None:
+    pid, cursor = forwarder.show("MainPID"), forwarder.cursor()
+    subprocess.run(["ip", "link", "del", "vcan0"], check=True)
+    forwarder.wait_journal("bus=crane state=", cursor)
+    add_vcan("vcan0")
+    with open_bus("vcan0") as bus:
+        wait_for(bus, "SlewCommand", lambda v: v["Velocity"] == 0)
+    assert forwarder.show("MainPID") == pid
+
+
+def test_interface_missing_at_start_is_tried_until_it_is_there(forwarder: Unit) -> None:
+    forwarder.systemctl("stop")
+    subprocess.run(["ip", "link", "del", "vcan0"], check=True)
+    cursor = forwarder.cursor()
+    forwarder.systemctl("start", "--no-block")
+    forwarder.wait(NRestarts="[2-9]")
+    text = forwarder.text(cursor)
+    assert "bus crane: cannot open socketcan channel vcan0: No such device" in text
+    add_vcan("vcan0")
+    forwarder.wait(ActiveState="active")
+    with open_bus("vcan0") as bus:
+        wait_for(bus, "SlewCommand", lambda v: v["Velocity"] == 0)
+
+
+def test_wrong_file_at_start_fails_once_and_says_where(installed: None) -> None:
+    unit = Unit("broken")
+    unit.file.write_text("tick_ms: 20\nnonsense: 1\n")
+    unit.systemctl("start", status=None)
+    assert unit.show("Result") == "exit-code"
+    assert unit.show("ExecMainStatus") == "2"
+    assert unit.show("ActiveState") == "failed"  # not "activating": nothing tries again
+    assert "/etc/canshaper/broken.yaml:2: nonsense" in unit.text()
+    unit.systemctl("reset-failed")
+    unit.file.unlink()
+
+
+def test_reload_applies_a_good_file(forwarder: Unit, bus: can.BusABC, levers: Levers) -> None:
+    pid, cursor, text = forwarder.show("MainPID"), forwarder.cursor(), forwarder.file.read_text()
+    forwarder.file.write_text(text.replace("limits: {", "limits: { max_pct: 24,"))
+    try:
+        forwarder.systemctl("reload")
+        forwarder.wait_journal("reload=applied", cursor)
+    finally:
+        forwarder.file.write_text(text)
+    assert drive(bus, levers, faster_than=23.0) == 24.0
+    assert forwarder.show("MainPID") == pid
+    levers.values["Slew"] = 0.0
+    wait_for(bus, "SlewStatus", lambda s: str(s["State"]) == "READY")
+    forwarder.systemctl("restart")
+
+
+def test_reload_in_motion_waits_for_neutral(
+    forwarder: Unit, bus: can.BusABC, levers: Levers
+) -> None:
+    drive(bus, levers)
+    cursor = forwarder.cursor()
+    forwarder.systemctl("reload", "--no-block")
+    forwarder.wait_journal("reload=waiting", cursor)
+    assert "reload=applied" not in forwarder.text(cursor)
+    levers.values["Slew"] = 0.0
+    forwarder.wait_journal("reload=applied", cursor)
+
+
+def test_reload_of_a_wrong_file_fails_and_changes_nothing(
+    forwarder: Unit, bus: can.BusABC, levers: Levers
+) -> None:
+    pid, cursor, text = forwarder.show("MainPID"), forwarder.cursor(), forwarder.file.read_text()
+    forwarder.file.write_text(text + "nonsense: 1\n")
+    line = text.count("\n") + 1
+    try:
+        forwarder.systemctl("reload", status=None)
+        assert f"forwarder.yaml:{line}: nonsense" in forwarder.text(cursor)
+        assert "reload=" not in forwarder.text(cursor)  # the daemon has not even heard of it
+        cursor = forwarder.cursor()
+        forwarder.systemctl("kill", "--signal=HUP")  # past the check: the daemon's own one
+        forwarder.wait_journal(rf"reload=refused .*forwarder.yaml:{line}: nonsense", cursor)
+    finally:
+        forwarder.file.write_text(text)
+    drive(bus, levers)
+    assert forwarder.show("MainPID") == pid
+
+
+def test_stop_in_motion_ends_neutral(
+    forwarder: Unit, bus: can.BusABC, levers: Levers, tmp_path: Path
+) -> None:
+    drive(bus, levers)
+    with candump(tmp_path / "end.log", "vcan0"):
+        forwarder.systemctl("stop")
+    last = {message_name(m): m.data[0] for m in logged(tmp_path / "end.log")}
+    assert {name: last[name] for name in VALVES} == dict.fromkeys(VALVES, 0)
+    assert forwarder.show("Result") == "success"
+
+
+def test_journal_is_one_plain_line_for_each_event(forwarder: Unit) -> None:
+    entries = [e for e in forwarder.journal() if e.get("_COMM") == "canshaper"]
+    events = [e for e in entries if re.match("(axis|bus|reload|memory)=", str(e["MESSAGE"]))]
+    assert {"6", "4", "3"} >= {e["PRIORITY"] for e in events} >= {"6"}
+    for entry in entries:
+        assert isinstance(entry["MESSAGE"], str)  # a list: bytes that are no text
+        assert entry["MESSAGE"].isprintable(), entry["MESSAGE"]
+        assert not re.match(r"\d{4}-\d\d-\d\d", entry["MESSAGE"])  # the journal has its own time

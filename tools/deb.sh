@@ -1,0 +1,127 @@
+#!/bin/sh
+# Build the Debian package: tools/deb.sh [VERSION] writes dist/canshaper_VERSION_ARCH.deb and prints
+# its name.
+#
+# Everything the daemon needs but Python itself lies in /usr/lib/canshaper, so the package neither
+# uses nor disturbs Python packages of the system. It fits the Python of the machine it was built on.
+# Plain dpkg-deb with the files of tools/deb: no root, no debhelper. DEBFULLNAME and DEBEMAIL name
+# the maintainer; SOURCE_DATE_EPOCH the time, else that of the last commit.
+set -eu
+umask 022
+cd "$(dirname "$0")/.."
+
+python=/usr/bin/python3 # the system's: the package runs with it
+work=out/deb
+root=$work/root
+library=$root/usr/lib/canshaper
+documents=$root/usr/share/doc/canshaper
+
+install_missing() {
+    [ $# -gt 0 ] || return 0
+    if [ "$(id -u)" = 0 ] && command -v apt-get >/dev/null; then
+        echo "installing $*" >&2
+        apt-get -q -y install --no-install-recommends "$@" >/dev/null 2>&1 ||
+            { apt-get -q update >/dev/null && apt-get -q -y install "$@" >/dev/null; }
+    else
+        echo "building the Debian package needs, please install: $*" >&2
+        exit 1
+    fi
+}
+
+missing=
+[ -x "$python" ] || missing="$missing python3 python3-venv"
+command -v dpkg-shlibdeps >/dev/null || missing="$missing dpkg-dev"
+install_missing $missing
+"$python" -c 'import sys; sys.exit(sys.version_info < (3, 11))' || {
+    echo "canshaper needs Python 3.11 or newer as $python" >&2
+    exit 1
+}
+minor=$("$python" -c 'import sys; print(sys.version_info.minor)')
+"$python" -c 'import ensurepip' 2>/dev/null || install_missing "python3.$minor-venv"
+
+version=${1:-$("$python" -c '
+import tomllib
+print(tomllib.load(open("pyproject.toml", "rb"))["project"]["version"])')}
+architecture=$(dpkg --print-architecture)
+SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || date +%s)}
+export SOURCE_DATE_EPOCH PYTHONHASHSEED=0
+
+rm -rf "$work"
+mkdir -p "$library" "$documents" "$root/DEBIAN" "$root/usr/bin" "$root/usr/share/man/man1" \
+    "$root/usr/share/canshaper" "$root/lib/systemd/system" "$root/etc/canshaper/dbc" \
+    "$root/usr/share/lintian/overrides" dist
+
+# The daemon and what it imports. dpkg keeps the list of files; pip's own lists would name this
+# directory.
+"$python" -m venv "$work/venv"
+"$work/venv/bin/pip" install --quiet --disable-pip-version-check --no-compile \
+    --target "$library" .
+rm -rf "$library/bin" "$library"/*.dist-info/RECORD "$library"/*.dist-info/direct_url.json
+find "$library" -name '*.py[ci]' -delete
+# One copy of the shipped deployments, where an administrator looks for it.
+mv "$library/canshaper/data/config" "$library/canshaper/data/dbc" "$root/usr/share/canshaper"
+rmdir "$library/canshaper/data"
+ln -s ../../../share/canshaper "$library/canshaper/data"
+mv "$root/usr/share/canshaper/config/systemd"/*.service "$root/lib/systemd/system"
+mv "$root/usr/share/canshaper/config/networkd" "$root/usr/share/canshaper"
+rmdir "$root/usr/share/canshaper/config/systemd"
+
+# The administrator's copies: DBC files in a directory beside the deployments.
+cp "$root/usr/share/canshaper/dbc"/* "$root/etc/canshaper/dbc"
+for file in $(grep -l '^dbc:' "$root/usr/share/canshaper/config"/*.yaml); do
+    sed -e 's|\.\./dbc/|dbc/|g' -e 's|\bconfig/\(forwarder[a-z-]*\.yaml\)|/etc/canshaper/\1|g' \
+        "$file" >"$root/etc/canshaper/${file##*/}"
+done
+
+sed "s|@LIBRARY@|/usr/lib/canshaper|" tools/deb/canshaper >"$root/usr/bin/canshaper"
+chmod 755 "$root/usr/bin/canshaper"
+cp docs/service.md docs/deployment.md docs/states.md "$documents"
+gzip -9n <tools/deb/canshaper.1 >"$root/usr/share/man/man1/canshaper.1.gz"
+cp tools/deb/lintian-overrides "$root/usr/share/lintian/overrides/canshaper"
+{ cat tools/deb/copyright && "$python" tools/deb/bundled.py "$library"; } >"$documents/copyright"
+maintainer="${DEBFULLNAME:-canshaper} <${DEBEMAIL:-canshaper@example.org}>"
+gzip -9n >"$documents/changelog.gz" <<END
+canshaper ($version) unstable; urgency=medium
+
+  * Version $version of canshaper.
+
+ -- $maintainer  $(LC_ALL=C date -u -R -d "@$SOURCE_DATE_EPOCH")
+END
+
+# Same content, same package: bytecode that does not depend on times, and fixed times.
+"$python" -m compileall -q -s "$root" --invalidation-mode unchecked-hash "$library"
+# The administrator's copies must be good as they lie there.
+sed "s|@LIBRARY@|$PWD/$library|" tools/deb/canshaper >"$work/canshaper"
+for file in "$root"/etc/canshaper/*.yaml; do
+    "$python" -ISB "$work/canshaper" check "$file" >/dev/null
+done
+
+find "$root" -exec touch -h -d "@$SOURCE_DATE_EPOCH" {} +
+find "$root" -name '*.so' -exec chmod 644 {} +
+
+# C libraries that the binary parts need, from the libraries themselves.
+mkdir -p "$work/debian"
+printf 'Source: canshaper\n\nPackage: canshaper\nArchitecture: any\n' >"$work/debian/control"
+libraries=$(cd "$work" && find "$PWD/root" -name '*.so' -exec dpkg-shlibdeps -O {} + \
+    2>shlibdeps.log | sed -n 's/^shlibs:Depends=//p')
+[ -n "$libraries" ] || {
+    cat "$work/shlibdeps.log" >&2
+    exit 1
+}
+
+sed -e "s%@VERSION@%$version%" -e "s%@ARCHITECTURE@%$architecture%" \
+    -e "s%@MAINTAINER@%$maintainer%" -e "s%@LIBRARIES@%$libraries%" \
+    -e "s%@MINOR@%$minor%" -e "s%@NEXT@%$((minor + 1))%" \
+    -e "s%@SIZE@%$(du -sk --apparent-size --exclude=DEBIAN "$root" | cut -f1)%" \
+    tools/deb/control >"$root/DEBIAN/control"
+for script in postinst prerm postrm; do
+    install -m 755 "tools/deb/$script" "$root/DEBIAN"
+done
+(
+    cd "$root"
+    find etc -type f | LC_ALL=C sort | sed 's|^|/|' >DEBIAN/conffiles
+    find usr lib -type f | LC_ALL=C sort | xargs -d '\n' md5sum >DEBIAN/md5sums
+)
+package=dist/canshaper_${version}_$architecture.deb
+dpkg-deb --root-owner-group --build "$root" "$package" >/dev/null
+echo "$package"

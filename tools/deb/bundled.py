@@ -1,0 +1,21 @@
+"""One line of the copyright file for each bundled Python package: ``bundled.py DIRECTORY``."""
+
+import sys
+from importlib.metadata import Distribution, distributions
+
+LONGEST_NAME = 60  # some packages put the whole text of the licence where its name belongs
+
+
+def licence(package: Distribution) -> str:
+    """Name of the licence, from the newest of the fields that packages have used for it."""
+    classifiers = package.metadata.get_all("Classifier") or []
+    named = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith("License ::")]
+    fields = [package.metadata["License-Expression"], package.metadata["License"], *named]
+    for field in fields:
+        if field and len(field) < LONGEST_NAME and field != "UNKNOWN":
+            return str(field)
+    raise SystemExit(f"{package.name} does not say its licence")
+
+
+for package in sorted(distributions(path=[sys.argv[1]]), key=lambda p: p.name.lower()):
+    print(f" {package.name} {package.version}: {licence(package)}")

@@ -1,0 +1,98 @@
+"""Mutation run: change the code in small ways, one at a time, and see whether a test notices.
+
+    tools/mutation.py                     every module of the coverage gate: shaping, then service
+    tools/mutation.py core                what runs in `make test`: state machine and output limits
+    tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
+
+Each mutant gets the quick tests that reach its function. Survivors have to stand, with a reason, in
+tests/mutation/survivors.txt; the run fails for one that does not, and for an entry that fits no
+mutant any more. Works on copies in out/mutation.
+"""
+
+import resource
+import shutil
+import subprocess
+import sys
+import time
+import tomllib
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+SURVIVORS = ROOT / "tests/mutation/survivors.txt"
+# Not of service: tests of the daemon around the controller, which start processes and threads.
+AROUND = ("cli", "journal", "loop", "notify", "realtime")
+TESTS = {
+    "shaping": ["tests/shaping"],
+    "service": ["tests/service", *(f"--ignore=tests/service/test_{name}.py" for name in AROUND)],
+}
+CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
+CORE_TESTS = ["test_axis*.py", "test_limits.py"]
+COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
+
+
+def modules(group: str) -> list[str]:
+    """Modules of the coverage gate that belong to ``group``."""
+    config = tomllib.loads((ROOT / "pyproject.toml").read_text())
+    gate: list[str] = config["tool"]["coverage"]["run"]["source_pkgs"]
+    return [name for name in gate if name.startswith(f"canshaper.{group}")]
+
+
+def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
+    """Copy what the tests need and say there what mutmut shall do."""
+    shutil.rmtree(work, ignore_errors=True)
+    for name in (*COPIED, "tests/shaping", "tests/service"):
+        ignore = shutil.ignore_patterns("__pycache__")
+        shutil.copytree(ROOT / name, work / name, ignore=ignore)
+    shutil.copy(ROOT / "tests/conftest.py", work / "tests")
+    paths = [name.replace(".", "/") for name in mutated]
+    only = [f"{path}/*" if (ROOT / path).is_dir() else f"{path}.py" for path in paths]
+    (work / "pyproject.toml").write_text(
+        (ROOT / "pyproject.toml").read_text()
+        + f"""
+[tool.mutmut]
+source_paths = ["canshaper"]
+only_mutate = {only}
+also_copy = {COPIED[1:]}
+pytest_add_cli_args_test_selection = {tests}
+pytest_add_cli_args = [
+    "-m", "not long", "--hypothesis-profile=few", "-p", "no:cacheprovider",
+    "-p", "no:unraisableexception",  # collects garbage at the end of every run
+]
+timeout_multiplier = 5.0
+use_git_change_detection = false
+"""
+    )
+
+
+def run(group: str, patterns: list[str]) -> int:
+    """Prepare, run and judge one group."""
+    work = ROOT / "out/mutation" / group
+    start = time.monotonic()
+    if group == "core":
+        found = [path for name in CORE_TESTS for path in (ROOT / "tests/shaping").glob(name)]
+        prepare(work, CORE, sorted(str(path.relative_to(ROOT)) for path in found))
+    else:
+        prepare(work, modules(group), TESTS[group])
+    mutants = [sys.executable, str(ROOT / "tools/mutants.py")]
+    log = work / "mutmut.log"
+    with log.open("w") as out:
+        command = [*mutants, "run", str(SURVIVORS) if group == "core" else "-", *patterns]
+        ran = subprocess.run(command, cwd=work, stdout=out, stderr=subprocess.STDOUT, check=False)
+    if ran.returncode:
+        print(log.read_text()[-5000:])
+        return ran.returncode
+    command = [*mutants, "judge", str(SURVIVORS), *patterns]
+    code = subprocess.run(command, cwd=work, check=False).returncode
+    used = resource.getrusage(resource.RUSAGE_CHILDREN)
+    print(
+        f"{group}: {time.monotonic() - start:.0f} s,"
+        f" {used.ru_utime + used.ru_stime:.0f} s of processor time"
+    )
+    return code
+
+
+if __name__ == "__main__":
+    groups, chosen = sys.argv[1:2] or list(TESTS), sys.argv[2:]
+    if not set(groups) <= {*TESTS, "core"}:
+        sys.exit(__doc__)
+    sys.exit(max([run(group, chosen) for group in groups]))
