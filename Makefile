@@ -6,7 +6,7 @@
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test lint coverage mutation mutation-core fuzz soak bench deb clean
+.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak bench deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -25,18 +25,29 @@ demo: .venv/demo-ready
 
 test: lint
 	.venv/bin/python -m pytest
-	.venv/bin/python -m tests.lane.hil
+	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
+		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
+
+# Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
+test-faults: .venv/test-ready
+	.venv/bin/python -m tests.lane.hil tests/hil/test_faults.py tests/hil/test_process_faults.py
+
+# The package and its units under a real systemd.
+test-service: .venv/test-ready
+	.venv/bin/python -m tests.lane.services
 
 lint: .venv/test-ready
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
 
-# Tests that take seconds of pure reckoning add no line; few examples will do.
+# Tests that take seconds of pure reckoning add no line, nor do those of the daemon around the
+# controller, which start processes and threads; few examples will do.
+AROUND = cli journal loop notify realtime
 coverage: .venv/test-ready
 	@mkdir -p out
 	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \
-		tests/shaping tests/service
+		tests/shaping tests/service $(AROUND:%=--ignore=tests/service/test_%.py)
 	.venv/bin/python -m coverage report
 
 mutation: .venv/test-ready

@@ -21,7 +21,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -50,6 +50,7 @@ from wire import HIGH_PCT, LOW_PCT, Exchange, Wire, wait_for_frames
 WARM_UP = 100
 ECHO_PERIOD_NS = 5_000_000
 JOYSTICK_NS = 20_000_000
+AHEAD_NS = 100_000  # what the client needs from one exchange to the next
 PYTHON_ECHO, NOTIFIER, CANGW = "Python echo", "Notifier + cantools", "cangw, in the kernel"
 CANGW_SETS = "SET:I:200.0.0000000000000000"
 
@@ -73,9 +74,11 @@ class Answering:
     def find_phase(self) -> None:
         """It has none."""
 
-    def measure(self) -> list[Result]:
-        """Frames at a steady rate."""
+    def measure(self, at_work: Callable[[], bool]) -> list[Result]:
+        """Frames at a steady rate, once the load is at work."""
         self._exchanges(WARM_UP)
+        while not at_work():
+            self._exchanges(1)
         before = cpu_ns(self.pid) if self.pid else 0
         seen = self._exchanges(self.count)
         cpu = (cpu_ns(self.pid) - before) / 1e3 / self.count if self.pid else None
@@ -105,20 +108,15 @@ class Ticking:
         self._grid_ns = 0  # one of the valve frames
         self._taken_ns = 0  # from the last moment at which a tick takes a frame to its valve frame
 
-    def _settle(self) -> None:
-        """Bring the axis into steady motion about the middle of both deflections.
-
-        First into neutral, for as long as a shaped stop takes: there were no frames for a while.
-        """
-        self._at = time.monotonic_ns()
-        for count, moving in ((120, False), (150, True)):
-            for _ in range(count):
-                self._at += JOYSTICK_NS
-                self.wire.send(self._at, self._stick() if moving else 0.0, self.right_ns)
-
     def find_phase(self) -> None:
-        """Find the last moment at which a tick takes a frame. Load does not change it."""
-        self._settle()
+        """Bring the axis into steady motion; find the last moment at which a tick takes a frame.
+
+        Without load. With load, deadlines are where they were.
+        """
+        for _ in range(50):
+            self._move(0.0)
+        for _ in range(200):  # until the filter has settled about the middle
+            self._move(self._stick())
         seen = self._sweep(self._at, self.tick_ns, 50)
         self._grid_ns = seen[0].out_ns
         for width_ns in (self.tick_ns // 10, self.tick_ns // 100 + 20_000, 8_000):
@@ -127,9 +125,10 @@ class Ticking:
             seen += self._sweep(last - width_ns * 2 // 3 - self._slack_ns, width_ns, 80)
         self._taken_ns = min(map(self._before, seen))
 
-    def measure(self) -> list[Result]:
-        """Frames at every phase."""
-        self._settle()
+    def measure(self, at_work: Callable[[], bool]) -> list[Result]:
+        """Frames at every phase, once the load is at work."""
+        while not at_work():  # without frames the axis would stop
+            self._move(self._stick())
         before, begin = cpu_ns(self.pid), time.monotonic_ns()
         seen = self._sweep(self._at, self.tick_ns, self.count)
         ticks = (time.monotonic_ns() - begin) / self.tick_ns
@@ -149,20 +148,27 @@ class Ticking:
         """From a joystick frame to the place of its answer on the grid, ns."""
         return exchange.out_ns - self._late(exchange) - exchange.in_ns
 
+    def _move(self, pct: float) -> None:
+        """Send a joystick frame a joystick's cycle after the last."""
+        self._at = max(self._at + JOYSTICK_NS, time.monotonic_ns())
+        self.wire.send(self._at, pct, self.right_ns)
+
     def _stick(self) -> float:
         self._high = not self._high
         return HIGH_PCT if self._high else LOW_PCT
 
     def _sweep(self, start: int, width_ns: int, count: int) -> list[Exchange]:
         """One frame in every tick, each a step later in it."""
-        soonest = max(self._at, time.monotonic_ns() + self.tick_ns)
-        at = start + max(0, -(-(soonest - start) // self.tick_ns)) * self.tick_ns
+        at = start
+        soonest = self._at
         seen, slack = [], []
         for _ in range(count):
+            soonest = max(soonest, time.monotonic_ns() + AHEAD_NS)
+            at += max(0, -(-(soonest - at) // self.tick_ns)) * self.tick_ns
             seen.append(self.wire.exchange(at, self._stick(), self.right_ns, jump=True))
             slack.append(seen[-1].in_ns - at)
             at += self.tick_ns + width_ns // count
-        self._at = at + self.tick_ns
+        self._at = at
         self._slack_ns = round(statistics.median(slack))
         return seen
 
@@ -235,10 +241,10 @@ def main() -> None:
         wire = Wire(near, far)
         for gateway in each_gateway(Path(name), wire, options.count):
             gateway.find_phase()
-            idle += gateway.measure()
+            idle += gateway.measure(lambda: True)
             if options.load:
-                with load(Path(name), options.load):
-                    loaded += gateway.measure()
+                with load(Path(name), options.load) as at_work:
+                    loaded += gateway.measure(at_work)
     print(f"joystick frame to valve frame, us; {near} and {far}; {machine()}")
     print_results(idle)
     if loaded:

@@ -14,8 +14,8 @@ import argparse
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -63,13 +63,17 @@ class Bench:
         self.directory, self.count, self.kinds = directory, count, kinds
         self.results: dict[bool, list[Ticks]] = {False: [], True: []}
         self._wire = Wire(CHANNEL, CHANNEL)
+        self._high = False
 
     def sleeper(self, title: str, command: list[str | Path]) -> None:
         """A loop that only sleeps, at 1 ms."""
         log = self.directory / "lateness"
         for loaded in self._conditions():
-            with self._load(loaded), running([*command, str(MS), str(self.count)], log) as process:
-                process.wait()
+            with self._load(loaded) as at_work:
+                while not at_work():
+                    time.sleep(0.1)
+                with running([*command, str(MS), str(self.count)], log) as process:
+                    process.wait()
             late = [int(line) for line in log.read_text().splitlines()]
             self.results[loaded].append(Ticks(title, late))
 
@@ -81,9 +85,12 @@ class Bench:
         windows = {}
         with running(command, log, fifo) as process:
             wait_for_frames(self._wire, process, log)
+            self._drive(10**9, neutral=True)
             for loaded in self._conditions():
-                with self._load(loaded):
-                    self._drive(2 * 10**9)  # whatever happens for the first time
+                with self._load(loaded) as at_work:
+                    self._drive(10**9)  # whatever happens for the first time
+                    while not at_work():
+                        self._drive(JOYSTICK_NS)
                     windows[loaded] = self._drive(count * tick_ms * MS)
         for loaded, (begin, end) in windows.items():
             ticks = Ticks(title)
@@ -95,24 +102,22 @@ class Bench:
                     ticks.missed += missed
             self.results[loaded].append(ticks)
 
-    def _drive(self, duration_ns: int) -> tuple[int, int]:
+    def _drive(self, duration_ns: int, *, neutral: bool = False) -> tuple[int, int]:
         """Move the stick for so long; begin and end."""
         begin = at = time.monotonic_ns()
-        number = 0
         while at < begin + duration_ns:
             at += JOYSTICK_NS
-            number += 1
-            self._wire.send(at, HIGH_PCT if number % 2 else LOW_PCT, JOYSTICK_NS // 4)
+            self._high = not self._high
+            moved = HIGH_PCT if self._high else LOW_PCT
+            self._wire.send(at, 0.0 if neutral else moved, JOYSTICK_NS // 4)
         self._wire.forget()
         return begin, at
 
     def _conditions(self) -> list[bool]:
         return [False, True] if self.kinds else [False]
 
-    @contextmanager
-    def _load(self, loaded: bool) -> Iterator[None]:
-        with load(self.directory, self.kinds if loaded else []):
-            yield
+    def _load(self, loaded: bool) -> AbstractContextManager[Callable[[], bool]]:
+        return load(self.directory, self.kinds if loaded else [])
 
 
 def print_ticks(all_ticks: list[Ticks]) -> None:

@@ -12,7 +12,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +32,7 @@ CONFIG = ROOT / "config" / "forwarder.yaml"
 # is the lower one, so that the client never delays a gateway that its frame has woken.
 GATEWAY_FIFO = 40
 CLIENT_FIFO = 30
+AT_WORK_NS = 20_000_000  # CPU time of a process that has read its files and begun
 START_S = 300.0  # virtual time runs ahead while a process waits for its files
 
 
@@ -105,7 +106,7 @@ def cpu_ns(pid: int) -> int:
 
 
 @contextmanager
-def load(directory: Path, kinds: Sequence[str]) -> Iterator[None]:
+def load(directory: Path, kinds: Sequence[str]) -> Iterator[Callable[[], bool]]:
     """What else may run on a machine PC, at ordinary priority.
 
     Args:
@@ -113,6 +114,9 @@ def load(directory: Path, kinds: Sequence[str]) -> Iterator[None]:
         kinds: of ``flood`` (cangen without a gap on vcan1, candump reading it), ``same`` (a
             foreign message on vcan0, as many as fill 250 kbit/s), ``busy`` (two loops), ``disk``
             (a writer).
+
+    Yields:
+        Whether all of it is at work; until then virtual time runs ahead.
     """
     write = f"while :; do dd if=/dev/zero of={directory}/written bs=64k count=64 conv=fsync; done"
     commands = {
@@ -134,10 +138,8 @@ def load(directory: Path, kinds: Sequence[str]) -> Iterator[None]:
         for kind in kinds
         for command in commands[kind]
     ]
-    if processes:
-        time.sleep(1.0)  # all of them are at work
     try:
-        yield
+        yield lambda: all(cpu_ns(process.pid) > AT_WORK_NS for process in processes)
     finally:
         for process in processes:
             os.killpg(process.pid, signal.SIGKILL)

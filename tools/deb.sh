@@ -109,10 +109,13 @@ libraries=$(cd "$work" && find "$PWD/root" -name '*.so' -exec dpkg-shlibdeps -O 
     exit 1
 }
 
+# As dpkg counts: KiB of each file, and one for everything else.
+size=$(find "$root" -path "$root/DEBIAN" -prune -o -printf '%y %s\n' |
+    awk '{ n += $1 == "f" ? int(($2 + 1023) / 1024) : 1 } END { print n }')
 sed -e "s%@VERSION@%$version%" -e "s%@ARCHITECTURE@%$architecture%" \
     -e "s%@MAINTAINER@%$maintainer%" -e "s%@LIBRARIES@%$libraries%" \
     -e "s%@MINOR@%$minor%" -e "s%@NEXT@%$((minor + 1))%" \
-    -e "s%@SIZE@%$(du -sk --apparent-size --exclude=DEBIAN "$root" | cut -f1)%" \
+    -e "s%@SIZE@%$size%" \
     tools/deb/control >"$root/DEBIAN/control"
 for script in postinst prerm postrm; do
     install -m 755 "tools/deb/$script" "$root/DEBIAN"

@@ -17,6 +17,7 @@ from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 from mutmut.mutation.mutators import mutation_operators
 from mutmut.utils.file_utils import walk_mutatable_files
+from mutmut.workers import isolation
 
 PROCESSES = 2
 # Exit codes of mutmut's workers: a test failed, or its time was up (a loop that never ends).
@@ -58,6 +59,14 @@ MORE = (
 # -- the run, in the working directory -------------------------------------------------------------
 
 
+def patient(pid: int, timeout_s: float) -> None:
+    """Leave the limit to processor time: on a busy machine the clock would kill what survives."""
+    register_timeout(pid, 30.0 * timeout_s)
+
+
+register_timeout = isolation.register_timeout
+
+
 def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None:
     """Run mutmut.
 
@@ -67,6 +76,7 @@ def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None
             is what puts None into the code, which the type checker refuses.
     """
     mutation_operators.extend(MORE)  # type: ignore[attr-defined]
+    isolation.register_timeout = patient
     if survivors is not None:
         Path("mutants").mkdir()
         mutmut.copy_src_dir()

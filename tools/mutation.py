@@ -58,7 +58,7 @@ pytest_add_cli_args = [
     "-m", "not long", "--hypothesis-profile=few", "-p", "no:cacheprovider",
     "-p", "no:unraisableexception",  # collects garbage at the end of every run
 ]
-timeout_multiplier = 5.0
+timeout_multiplier = 2.0
 use_git_change_detection = false
 """
     )

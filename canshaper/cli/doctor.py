@@ -47,11 +47,11 @@ def doctor(
 
     Examples:
 
+      canshaper doctor config/forwarder.yaml
+
+      sudo canshaper doctor config/forwarder.yaml --seconds 600 --json doctor.json
+
       canshaper doctor config/forwarder.yaml --no-load --listen 10
-
-      sudo canshaper doctor config/forwarder.yaml
-
-      canshaper doctor config/forwarder.yaml --seconds 600 --json doctor.json
     """
     from canshaper.config.source import DeploymentError
     from canshaper.doctor.finding import fit

@@ -83,7 +83,7 @@ class HeardStop(Heard):
 
     Attributes:
         presses: how many frames so far said stop.
-        says_stop: whether the last one did.
+        says_stop: whether one did and none that counts has freed it since.
     """
 
     def __init__(self, source: Input, signal: Field) -> None:
@@ -94,8 +94,12 @@ class HeardStop(Heard):
 
     def whole(self, word: int) -> None:
         """A stop is a stop, whoever says so."""
+        if self._signal.get(word) != 0:
+            self.says_stop = True
+            self.presses += 1
+
+    def accepted(self, word: int, now_ns: int) -> None:
         self.says_stop = self._signal.get(word) != 0
-        self.presses += self.says_stop
 
 
 class HeardLever(Heard):

@@ -75,6 +75,7 @@ class AxisJudge:
         self._steady = 0
         self._count: int | None = None
         self._must_fall = False
+        self._pressed_since = False
         self._pressed_again = False  # and released between two frames of the valve
         self._told: dict[str, Any] = {}
 
@@ -97,6 +98,7 @@ class AxisJudge:
         self._releases, self._resets = lever.releases, lever.resets
         self._presses = lever.presses[axis.name]
         causes, self.causes = self.causes, set()
+        self._pressed_since = pressed or (self._pressed_since and not causes)
         in_motion = self.state in MOVING  # as it told last; ``agrees`` holds that against the valve
         if now_ns - self.contested_ns <= CONTESTED_NS:
             causes.add(heard.SECOND_SENDER)
@@ -114,7 +116,9 @@ class AxisJudge:
         if causes & ALWAYS_LATCHED or ((causes or released) and in_motion):
             self._go(LATCHED)
         elif self.mode == LATCHED:
-            if pressed and centred:
+            # A press among frames that say nothing else, or with enable off, may count later.
+            late = self._pressed_since and told == 0 and not faults and not causes
+            if (pressed and centred) or (late and abs(lever.sticks[axis.name][0]) <= axis.band):
                 self._go(WAIT)
         elif causes or released:
             self._go(WAIT)
@@ -383,7 +387,7 @@ class Judge:
             return
         stop = self.stop
         lost = not stop.fresh(now_ns)
-        pressed = stop.presses > self._presses or (stop.says_stop and not lost)
+        pressed = stop.presses > self._presses or stop.says_stop
         self._presses = stop.presses
         for axis in self.axes.values():
             if pressed:

@@ -3,6 +3,7 @@
 They change what goes in or comes out, so they stay what they are however the controller is built.
 """
 
+from collections.abc import Iterable
 from typing import Any
 
 from canshaper.can.binding import Deployment
@@ -21,10 +22,9 @@ class Honest:
     def receive(self, frame: Frame, now_ns: int) -> None:
         self.real.receive(frame, now_ns)
 
-    def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        frames = list(self.real.tick(now_ns, missed))
+    def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]:
+        yield from self.real.tick(now_ns, missed)
         self.real.events.clear()
-        return frames
 
     def stalled(self) -> None:
         self.real.stalled()
@@ -161,7 +161,7 @@ class Creeps(Honest):
     """The smallest command instead of neutral, now and then."""
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        frames = super().tick(now_ns, missed)
+        frames = list(super().tick(now_ns, missed))
         if now_ns // self.machine.tick_ns % 50 != 49:
             return frames
         return [
@@ -173,7 +173,7 @@ class CounterStands(Honest):
     """The alive counter of the valves stands still for a frame in a hundred."""
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        frames = super().tick(now_ns, missed)
+        frames = list(super().tick(now_ns, missed))
         if now_ns // self.machine.tick_ns % 100 != 99:
             return frames
         return [f if f[:3] not in self.machine.valves else _count_back(f) for f in frames]
@@ -187,7 +187,7 @@ class FrameLeftOut(Honest):
     """Leaves out a valve frame that says what the last one said, now and then."""
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        frames = super().tick(now_ns, missed)
+        frames = list(super().tick(now_ns, missed))
         return frames[1:] if now_ns // self.machine.tick_ns % 60 == 59 else frames
 
 
@@ -209,7 +209,7 @@ class NeverBack(Honest):
         self._moved = self._over = False
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
-        frames = super().tick(now_ns, missed)
+        frames = list(super().tick(now_ns, missed))
         valves = [f for f in frames if f[:3] in self.machine.valves]
         moves = any(f.data[0] for f in valves)
         self._over |= self._moved and not moves

@@ -6,77 +6,32 @@ from collections.abc import Sequence
 # A word, a number, a sign or a blank: what a change may replace.
 TOKEN = re.compile(r"[A-Za-z_]+|-?[0-9.]+|\s+|.")
 
+
+def _words(text: str) -> list[str]:
+    return text.split()
+
+
 YAML_WORDS = (
-    *("", "~", "true", "off", "0", "-1", "1", "1e999", ".nan", ".inf", "1e-9", "99999999999999"),
-    *("''", '"', "[", "]", "{", "}", ":", ",", "- ", "? ", "&a ", "*a ", "!!str ", "!x ", "|", ">"),
-    *("\n", "\t", "\r\n", "\0", "\x85", "é", "\ud7ff", "# ", "---\n", "...\n", "%YAML 1.1\n"),
-    *("crane", "left", "right", "slew", "near_far", "lift", "Slew", "NearFar", "Enable", "Reset"),
-    *("AliveCounter", "LeverLeft", "LeverRight", "SlewCommand", "ShaperStatus", "SlewStatus"),
-    *("gff", "robust", "zv", "zvd", "ei", "two_mode", "first_order", "s_curve", "kind", "taps"),
-    *("qualify: 3", "frozen_s: 1", "alive_max_step: 200", "checksum: { signal: Reset, kind: xor }"),
-    *(
-        "flags: { neutral: Enable, negative: Reset, positive: AntiSwayOff }",
-        "machine.dbc",
-        "/",
-        ".",
-    ),
-    *("emergency_stop: { bus: crane, message: TipVelocity, signal: SlewRate, timeout_ms: 100 }\n",),
+    *_words("~ true off 0 -1 1 1e999 .nan .inf 1e-9 99999999999999 '' \" [ ] { } : , | > / -"),
+    *("", "- ", "? ", "&a ", "*a ", "!!str ", "!x ", "\n", "\t", "\r\n"),
+    *("\0", "\x85", "é", "\ud7ff"),
+    *("# ", "---\n", "...\n", "%YAML 1.1\n", "qualify: 3", "frozen_s: 1", "alive_max_step: 200"),
+    *_words("crane left right slew near_far lift Slew NearFar Enable Reset AliveCounter LeverLeft"),
+    *_words("LeverRight SlewCommand ShaperStatus SlewStatus X Y Lever Stop Tip Radius Count Sum"),
+    *_words("gff robust zv zvd ei two_mode first_order s_curve kind taps machine.dbc"),
+    "checksum: { signal: Reset, kind: xor }",
+    "flags: { neutral: Enable, negative: Reset, positive: AntiSwayOff }",
+    "emergency_stop: { bus: crane, message: TipVelocity, signal: SlewRate, timeout_ms: 100 }\n",
 )
+# No number of many digits: cantools makes an entry for every bit of a message.
 DBC_WORDS = (
-    *(
-        "",
-        "0",
-        "1",
-        "2",
-        "-1",
-        "7",
-        "8",
-        "9",
-        "15",
-        "16",
-        "17",
-        "32",
-        "63",
-        "64",
-        "65",
-        "255",
-        "0.5",
-    ),
-    *(
-        "1e400",
-        "-0",
-        "nan",
-        "inf",
-        "4294967295",
-        "2147483920",
-        "536870912",
-        "99999999999",
-        "1e-400",
-    ),
-    *(
-        "@0",
-        "@1",
-        "+",
-        "-",
-        "|",
-        ":",
-        ";",
-        ",",
-        '"',
-        "(",
-        ")",
-        "[",
-        "]",
-        "\n",
-        "\r",
-        "\t",
-        " ",
-        "\0",
-    ),
-    *("é", "\xff", "m0", "M", "m1M", "LeverLeft", "Slew", "Enable", "Velocity", "State", "NearFar"),
-    *("BO_", "SG_", "VAL_", "BA_", "BA_DEF_", "CM_", "SIG_VALTYPE_ 272 Slew : 1;\n", "VAL_TABLE_"),
-    *("GenMsgCycleTime", "GenSigStartValue", "INT", "FLOAT", "STRING", "ENUM", "SG_MUL_VAL_"),
-    *("SIG_GROUP_", "EV_", "BU_SG_REL_", "BO_TX_BU_", "VFrameFormat", "Error", "NotAvailable"),
+    *_words("0 1 2 -1 7 8 9 15 16 17 32 63 64 65 255 65536 0.5 1e400 -0 nan inf 1e-400"),
+    *_words("@0 @1 + - | : ; , ( ) [ ]"),
+    *("", '"', "\n", "\r", "\t", " ", "\0", "é", "\xff", "SIG_VALTYPE_ 272 Slew : 1;\n"),
+    *_words("m0 M m1M LeverLeft Slew Enable Velocity State NearFar Lever X Y Flow Radius Stop"),
+    *_words("BO_ SG_ VAL_ BA_ BA_DEF_ CM_ VAL_TABLE_ SG_MUL_VAL_ SIG_GROUP_ EV_ BO_TX_BU_"),
+    *_words("GenMsgCycleTime GenSigStartValue INT FLOAT STRING ENUM VFrameFormat"),
+    *_words("Error NotAvailable Vector__XXX"),
 )
 
 

@@ -1,5 +1,7 @@
 """Deployment and DBC files of any content load, or say why not; what loads, runs."""
 
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 
@@ -38,6 +40,49 @@ def changes(words: tuple[str, ...]) -> st.SearchStrategy[list[tuple[int, int, st
 @pytest.mark.parametrize("name", TEXTS)
 def test_files_as_they_are_load_and_run(load: Load, name: str) -> None:
     assert load(*TEXTS[name])
+
+
+# What a process may take that loads a file: far more than any, far less than a machine has.
+MOST_MEMORY, MOST_SECONDS = 1 << 30, 30
+LOAD = """
+import resource, sys
+from pathlib import Path
+resource.setrlimit(resource.RLIMIT_AS, ({0}, {0}))
+resource.setrlimit(resource.RLIMIT_CPU, ({1}, {1}))
+from canshaper.can.binding import load_deployment
+from canshaper.config.source import DeploymentError
+try:
+    load_deployment(Path(sys.argv[1]))
+except DeploymentError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("BO_ 784 Service: 8 ", "BO_ 784 Service: 2147483920 "),
+        ("SG_ Spare : 8|8@1+", "SG_ Spare : 8|99999999999@1+"),
+        ("SG_ Spare : 8|8@1+", "SG_ Spare : 99999999999|8@1+"),
+        ("SG_ Spare : 8|8@1+", "SG_ Spare : 99999999999|8@0+"),
+    ],
+)
+def test_a_length_with_digits_too_many_is_refused(tmp_path: Path, old: str, new: str) -> None:
+    """Without taking all memory of the machine."""
+    yaml, dbc = TEXTS[SMALL]
+    assert old in dbc
+    (tmp_path / "machine.yaml").write_text(yaml)
+    (tmp_path / "machine.dbc").write_text(dbc.replace(old, new, 1))
+    load = LOAD.format(MOST_MEMORY, MOST_SECONDS)
+    done = subprocess.run(
+        [sys.executable, "-c", load, str(tmp_path / "machine.yaml")],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    line = dbc[: dbc.index(old)].count("\n") + 1
+    assert f"machine.dbc:{line}: " in done.stdout
 
 
 @many

@@ -86,6 +86,10 @@ def test_the_difference_at_a_change_fades_with_its_time_constant(drive_with: Dri
         assert drive.axis.sent == pytest.approx(expected, abs=2e-6)
 
 
+def test_the_time_constant_is_the_documented_one() -> None:
+    assert BLEND_S == 0.3  # docs/states.md
+
+
 def test_a_bypass_from_rest_gives_the_stick_at_once(drive_with: DriveWith) -> None:
     drive = drive_with(limits=FREE, grid_steps=FINE)
     for command in (0.8, -0.6):

@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.config.schema import Limits
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
@@ -264,3 +265,7 @@ def test_recent_command_is_the_window_seen_by_brute_force(
             window = [c for c in seen[-ticks - 1 :] if c is not None]
             assert recent.high == max(0.0, *window)
             assert recent.low == min(0.0, *window)
+
+
+def test_limits_where_nothing_is_said_are_those_of_a_deployment_that_says_nothing() -> None:
+    assert OutputLimits() == Limits().output_limits()

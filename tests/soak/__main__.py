@@ -43,6 +43,7 @@ def main() -> int:
                 soak.sequence()
             except WrongMove as error:
                 wrong.append(str(error))
+                print("WRONG", error, flush=True)
             if time.monotonic() - told > 60.0:
                 told = time.monotonic()
                 memory.append(_memory_kib(daemon.process.pid))
@@ -55,8 +56,6 @@ def main() -> int:
         alive = daemon.process.poll() is None
         text = daemon.text()
     _report(soak.counts, count_frames(log), memory, text)
-    for line in wrong:
-        print("WRONG", line)
     print(f"wrong moves {len(wrong)}, the daemon {'ran on' if alive else 'ENDED'}")
     return 1 if wrong or not alive else 0
 

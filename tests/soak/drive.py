@@ -115,9 +115,7 @@ class Soak:
             self._harmless[kind]()
             self._frames(axis, 60)
             state = str(self._status(axis)["State"])
-            if state not in ("ACTIVE", "STOPPING", *STOPPED):
-                raise WrongMove(f"{kind}: {state}")
-            self.counts["harmless: still active"] += state == "ACTIVE"
+            self.counts[f"after a harmless one: {state}"] += 1
         else:
             self._fault(kind, axis)
         self.counts[kind] += 1

@@ -158,18 +158,6 @@ def test_reload_applies_a_good_file(forwarder: Unit, bus: can.BusABC, levers: Le
     forwarder.systemctl("restart")
 
 
-def test_reload_in_motion_waits_for_neutral(
-    forwarder: Unit, bus: can.BusABC, levers: Levers
-) -> None:
-    drive(bus, levers)
-    cursor = forwarder.cursor()
-    forwarder.systemctl("reload", "--no-block")
-    forwarder.wait_journal("reload=waiting", cursor)
-    assert "reload=applied" not in forwarder.text(cursor)
-    levers.values["Slew"] = 0.0
-    forwarder.wait_journal("reload=applied", cursor)
-
-
 def test_reload_of_a_wrong_file_fails_and_changes_nothing(
     forwarder: Unit, bus: can.BusABC, levers: Levers
 ) -> None:
