@@ -12,8 +12,10 @@ ROOT = Path(__file__).parents[2]
 SHIPPED = ("forwarder", "forwarder-robust", "forwarder-joints")
 SMALL = "small"
 
-# What the parser of DBC files says without a place, and files that cannot be read at all.
-_NO_PLACE = re.compile(r"not a DBC file that can be used|not YAML: (not UTF-8|'utf-8')")
+# What the parser of DBC files says without a place.
+_NO_PLACE = "not a DBC file that can be used"
+# What ends a line for YAML, which counts them so.
+_BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 
 
 class Files:
@@ -48,13 +50,13 @@ class Files:
             assert "\n" not in str(problem), problem
             path = Path(problem.file)
             assert path in (self.yaml, self.dbc), problem
-            rows = path.read_bytes().count(b"\n") + 1
+            rows = len(_BREAK.findall(path.read_text(encoding="utf-8", errors="replace"))) + 1
             if problem.line is not None:
                 assert 1 <= problem.line <= rows + 1, (problem, rows)
             elif path.read_bytes().strip():
                 # A file without any key has no line in which one is missing.
                 top = problem.message.startswith("missing: ") and "." not in problem.where
-                assert top or _NO_PLACE.search(problem.message), problem
+                assert top or _NO_PLACE in problem.message, problem
 
 
 def runs(deployment: Deployment) -> None:

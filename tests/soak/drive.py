@@ -214,13 +214,21 @@ class Soak:
 
 
 def _begin(kind: str, frames: list[tuple[int, bytes]]) -> int:
-    """Place of the first frame that shows the fault; 0 where the mark is as near."""
-    for place, (key, data) in enumerate(frames):
-        if kind in FAULTS and FAULTS[kind].begins(key.to_bytes(2, "big"), data):
-            return place
-        if kind == "second sender" and data == FOREIGN:
-            return place
-    return 0
+    """Place of the first frame that shows the fault; 0 where the mark is as near.
+
+    A silence begins with the last frame before it: the last one before the valve's first neutral.
+    """
+    shows = [
+        place
+        for place, (key, data) in enumerate(frames)
+        if (kind in FAULTS and FAULTS[kind].begins(key.to_bytes(2, "big"), data))
+        or (kind == "second sender" and data == FOREIGN)
+    ]
+    if kind not in ("silent", "emergency stop lost"):
+        return shows[0] if shows else 0
+    valve = VALVES[FAULTS[kind].axis]
+    neutral = next((i for i, (key, data) in enumerate(frames) if key == valve and not data[0]), 0)
+    return max((place for place in shows if place < neutral), default=0)
 
 
 def count_frames(log: Path) -> Counter[str]:
