@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 from cantools.database.can import Message
 
 from canshaper.can.flags import FlaggedVelocity
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.frame import Frame, FrameFault, new_frame
 from canshaper.can.layout import Layout
 from canshaper.can.signals import FieldSet, VelocitySignal, valve_steps
 from canshaper.shaping.states import Reason, State
@@ -39,7 +39,10 @@ class LeverCodec:
         if len(data) != self._length:
             raise WrongLengthError
         raw = self._layout.decode(data)
-        return raw, {v.name: v.read(raw) for v in self._velocities}
+        commands: dict[str, float | Reason] = {}
+        for velocity in self._velocities:
+            commands[velocity.name] = velocity.read(raw)
+        return raw, commands
 
 
 class Sender:
@@ -66,9 +69,12 @@ class ValveCodec:
 
     def __init__(self, sender: Sender, signal: str, alive_counter: str | None) -> None:
         self.sender = sender
+        self._bus, self._id, self._extended = sender.key
         self._signal = signal
         self._alive = alive_counter
         message = sender.fields.message
+        self._layout = Layout(message)
+        self._raw = dict(sender.fields.start)
         definition = next(s for s in message.signals if s.name == signal)
         counter = next((s for s in message.signals if s.name == alive_counter), None)
         self._counter_range = 1 << counter.length if counter else 1
@@ -81,11 +87,12 @@ class ValveCodec:
         """Next frame, with the alive counter counted up."""
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
-        raw = {self._signal: self._zero + self._sign * steps}
+        raw = self._raw
+        raw[self._signal] = self._zero + self._sign * steps
         if self._alive is not None:
-            self._count = (self._count + 1) % self._counter_range
-            raw[self._alive] = self._count
-        return self.sender.frame(raw)
+            raw[self._alive] = self._count = (self._count + 1) % self._counter_range
+        data = self._layout.encode(raw)
+        return new_frame(Frame, (self._bus, self._id, self._extended, data))
 
     def velocity_steps(self, raw: int) -> int:
         """Grid steps for a raw value of the signal."""

@@ -11,7 +11,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 
-from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.can.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.can.socketcan import Ids, dropped_frames, set_filters
 
 CAN_FRAME = struct.Struct("=IB3x8s")  # linux/can.h, struct can_frame
@@ -40,6 +40,7 @@ SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, Bus
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
 UP = BusState.UP
+_EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
 
 
 class RawPort:
@@ -90,8 +91,8 @@ class RawPort:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
         if not self._sockets and not self._reopened():
             return
-        waiting, receive, name = self._poll.poll, self._sockets[0].recv, self.name
-        for _ in range(MOST_FRAMES):
+        waiting, receive = self._waiting[0], self._receive
+        for _ in _EACH_FRAME:
             if not waiting(0):  # cheaper than the exception of a socket with nothing to read
                 return
             try:
@@ -99,9 +100,9 @@ class RawPort:
             except OSError as error:
                 self._failed(error)
                 return
-            frame = self._frame(name, data)
+            frame = self._frame(data)
             if frame is not None:
-                if self.state in LOST:
+                if self.state is not UP and self.state in LOST:
                     self._up()
                 yield frame
 
@@ -120,35 +121,35 @@ class RawPort:
     def _others(self, number: int, most: int) -> Iterator[Frame]:
         if number >= len(self._sockets):
             return
-        receive = self._sockets[number].recvmsg
+        waiting, receive = self._waiting[number], self._sockets[number].recvmsg
         for _ in range(most):
+            if not waiting(0):
+                return
             try:
                 data, _ancillary, flags, _sender = receive(SIZE)
-            except BlockingIOError:
-                return
             except OSError as error:
                 self._failed(error)
                 return
             if flags & socket.MSG_CONFIRM:
                 self._confirmed(CAN_FRAME.unpack(data)[0])
-            elif (frame := self._frame(self.name, data)) is not None:
+            elif (frame := self._frame(data)) is not None:
                 yield frame
 
-    def _frame(self, name: str, data: bytes) -> Frame | None:
+    def _frame(self, data: bytes) -> Frame | None:
         """The frame, where it is one that can be taken."""
         if len(data) != SIZE:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
         word, length, payload = CAN_FRAME.unpack(data)
         if word <= socket.CAN_SFF_MASK and length <= 8:  # the most frequent kind first
-            return Frame(name, word, False, payload[:length])
+            return new_frame(Frame, (self.name, word, False, payload[:length]))
         if word & socket.CAN_ERR_FLAG:  # first: its id is an error class, and could match
             self._error_frame(word, payload)
             return None
         if word & socket.CAN_RTR_FLAG or length > 8:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
-        return Frame(name, word & socket.CAN_EFF_MASK, True, payload[:length])
+        return Frame(self.name, word & socket.CAN_EFF_MASK, True, payload[:length])
 
     def _error_frame(self, word: int, payload: bytes) -> None:
         fault = FrameFault.ERROR_FRAME
@@ -172,12 +173,14 @@ class RawPort:
         """Send now or not at all; False when the frame did not go out."""
         if not self._sockets or (self._not_before_ns and self._blocked()):
             return False
-        word = frame.can_id | socket.CAN_EFF_FLAG if frame.extended else frame.can_id
+        _bus, word, extended, data = frame
+        if extended:
+            word |= socket.CAN_EFF_FLAG
         under_way = self._unconfirmed.get(word, 0)
         if under_way and self._stuck(word, under_way):
             return False
         try:
-            self._sender.send(CAN_FRAME.pack(word, len(frame.data), frame.data))
+            self._send(CAN_FRAME.pack(word, len(data), data))
         except OSError as error:
             self._failed(error)
             return False
@@ -247,9 +250,9 @@ class RawPort:
 
     def _use(self, sockets: list[socket.socket]) -> None:
         self._sockets = sockets
-        self._sender = sockets[1] if len(sockets) > 1 else sockets[0]
-        self._poll = select.poll()
-        self._poll.register(sockets[0], select.POLLIN)
+        self._waiting = [_poll(one) for one in sockets]
+        self._receive = sockets[0].recv
+        self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
         self._forget()
         self._dropped = 0
         self._up()
@@ -285,6 +288,13 @@ class RawPort:
         for one in self._sockets:
             one.close()
         self._sockets = []
+
+
+def _poll(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
+    """Whether a socket has something to read, asked within so many ms."""
+    poll = select.poll()
+    poll.register(one, select.POLLIN)
+    return poll.poll
 
 
 def _words(ids: Ids | None) -> frozenset[int]:

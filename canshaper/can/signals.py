@@ -173,12 +173,17 @@ class VelocitySignal:
 
 
 class FieldSet:
-    """Physical values to the raw fields of one message; what is not set keeps its start value."""
+    """Physical values to the raw fields of one message; what is not set keeps its start value.
+
+    Attributes:
+        message: the message.
+        start: raw start value of every signal.
+    """
 
     def __init__(self, message: Message) -> None:
         self.message = message
         self._layout = Layout(message)
-        self._base: dict[str, Any] = {s.name: self._start(s) for s in message.signals}
+        self.start: dict[str, Any] = {s.name: self._start(s) for s in message.signals}
         self._fields = {
             s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
         }
@@ -205,4 +210,4 @@ class FieldSet:
         Raises:
             OverflowError: a value is not within the bits of its signal.
         """
-        return self._layout.encode({**self._base, **raw})
+        return self._layout.encode({**self.start, **raw})

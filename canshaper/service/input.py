@@ -7,6 +7,9 @@ from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
+# A member by way of its class takes ten times as long as a name, for every frame.
+GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
+
 
 class Input:
     """What is known of one message now.
@@ -33,30 +36,37 @@ class Input:
             raw, commands = self._codec.decode(data)
         except WrongLengthError:
             return FrameFault.WRONG_LENGTH
+        guard = self._guard
         if self._heard_ns is None or now_ns - self._heard_ns > self._timeout_ns:
-            self._guard.begin_anew()
-        fault = self._guard.judge(data, raw[self._counter] if self._counter else 0)
-        if fault is not FrameFault.CHECKSUM:
-            self._heard_ns = now_ns
-            self.heard(raw, now_ns)
-        if fault or not self._guard.qualified:
+            guard.begin_anew()
+        fault = guard.judge(data, raw[self._counter] if self._counter else 0)
+        if fault is CHECKSUM:
             self._refused_ns = now_ns
             return fault
-        self.accepted(raw, commands, now_ns)
+        self._heard_ns = now_ns
+        counts = guard.qualified and not fault
+        content = self.heard(raw, commands, now_ns, counts)
+        if not counts:
+            self._refused_ns = now_ns
+            return fault
         self.raw, self.commands, self._received_ns = raw, commands, now_ns
-        return self.content_fault()
+        return content
 
-    def heard(self, raw: dict[str, Any], now_ns: int) -> None:
-        """A frame with the right checksum came, be it in sequence or not."""
+    def heard(
+        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+    ) -> FrameFault:
+        """A frame with the right checksum came; the last one still stands in ``raw``.
 
-    def accepted(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int
-    ) -> None:
-        """A frame counts; the last one still stands in ``raw`` and ``commands``."""
+        Args:
+            raw: its raw values, by signal.
+            commands: its velocities, or why there is none, by signal.
+            now_ns: when it came.
+            counts: whether it may be used. A switch may tell something without that.
 
-    def content_fault(self) -> FrameFault:
-        """What is wrong with the content of the frame just taken."""
-        return FrameFault.NONE
+        Returns:
+            What is wrong with its content.
+        """
+        raise NotImplementedError
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""
@@ -80,17 +90,16 @@ class EmergencyStopInput(Input):
         self._pressed_ns = -1
         self._pressed = False
 
-    def heard(self, raw: dict[str, Any], now_ns: int) -> None:
-        """A stop needs no trust, and counts however short it is pressed."""
+    def heard(
+        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+    ) -> FrameFault:
+        """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
         if raw[self._signal] != 0:
             self._pressed_ns = now_ns
             self._pressed = True
-
-    def accepted(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int
-    ) -> None:
-        """Only a frame that counts frees it."""
-        self._pressed = raw[self._signal] != 0
+        elif counts:
+            self._pressed = False
+        return GOOD
 
     def stop(self, now_ns: int, since_ns: int) -> Reason | None:
         """Why nothing may move now, or None.

@@ -4,8 +4,10 @@ from typing import Any
 
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundLever
-from canshaper.service.input import Input
+from canshaper.service.input import GOOD, Input
 from canshaper.shaping.states import Reason, StickInput
+
+_new = tuple.__new__  # StickInput(...) in half the time
 
 
 class LeverInput(Input):
@@ -22,28 +24,29 @@ class LeverInput(Input):
         self._released_ns = -1
         self._released = False
 
-    def heard(self, raw: dict[str, Any], now_ns: int) -> None:
-        """A released enable needs no trust, and counts however short it is."""
-        if raw[self._enable] == 0:
+    def heard(
+        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+    ) -> FrameFault:
+        """Note since when each stick is where it is; codes that are no measurement are a fault.
+
+        A released enable needs no trust, however short it is; only a frame that counts ends it.
+        """
+        enable = raw[self._enable]
+        if enable == 0:
             self._released_ns = now_ns
             self._released = True
-
-    def accepted(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int
-    ) -> None:
-        """Note since when each stick is where it is."""
-        self._released = raw[self._enable] == 0
+        elif counts:
+            self._released = False
+        if not counts:
+            return GOOD
+        valid = enable in (0, 1)
+        last = self.commands
         for name, command in commands.items():
-            if command != self.commands.get(name):
+            if command != last.get(name):
                 self._changed_ns[name] = now_ns
-
-    def content_fault(self) -> FrameFault:
-        """Codes that are no measurement."""
-        for command in self.commands.values():
-            if isinstance(command, Reason):
-                return FrameFault.INVALID_SIGNAL
-        valid = self.raw[self._enable] in (0, 1)
-        return FrameFault.NONE if valid else FrameFault.INVALID_SIGNAL
+            if type(command) is Reason:
+                valid = False
+        return GOOD if valid else FrameFault.INVALID_SIGNAL
 
     def stick(
         self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
@@ -70,14 +73,14 @@ class LeverInput(Input):
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
         enable = 0 if released else raw[self._enable]
-        if isinstance(command, Reason):
+        if type(command) is Reason:
             fault: Reason | None = command
         elif enable not in (0, 1):
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.STICK_FROZEN
         else:
-            return StickInput(command, None, enable == 1, bypass, reset, trip)
+            return _new(StickInput, (command, None, enable == 1, bypass, reset, trip))
         if enable == 0:
             return StickInput(enabled=False, bypass=bypass, trip=trip)
         return StickInput(fault=fault, bypass=bypass, trip=trip)

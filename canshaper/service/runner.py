@@ -90,11 +90,11 @@ class AxisRunner:
                 trip = trip or Reason.SECOND_SENDER
             else:
                 self.contested_ns = None
-        stop = emergency.stop(now_ns, since_ns) if emergency else None
-        if stop is Reason.EMERGENCY_STOP or (stop and not self.axis.neutral):
-            trip = trip or stop
-        elif stop is not None:  # not heard of yet: nothing to trip, but nothing may begin
-            return StickInput(fault=stop, trip=trip)
+        if emergency is not None and (stop := emergency.stop(now_ns, since_ns)):
+            if stop is Reason.EMERGENCY_STOP or not self.axis.neutral:
+                trip = trip or stop
+            else:  # not heard of yet: nothing to trip, but nothing may begin
+                return StickInput(fault=stop, trip=trip)
         if lost:
             return StickInput(fault=Reason.STICK_TIMEOUT, trip=trip)
         return self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)

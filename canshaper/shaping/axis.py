@@ -26,6 +26,9 @@ BLEND_S = 0.3
 # Most that may be owed of an added velocity, full speed times ticks: a few steps of a coarse grid.
 MOST_OWED = 0.1
 
+# A member by way of its class takes ten times as long as a name, and a tick looks at many.
+NEUTRAL_WAIT, READY, ACTIVE, BYPASS_ON, STOPPING, TRIPPED = State
+
 
 class Axis:
     """State machine, filter and limits of one axis.
@@ -57,7 +60,7 @@ class Axis:
         stop_s: float = 2.0,
         grid_steps: int = 125,
     ) -> None:
-        self.state = State.NEUTRAL_WAIT
+        self.state = NEUTRAL_WAIT
         self.reason = Reason.START
         self.raw = 0
         self.sent = 0.0
@@ -110,21 +113,22 @@ class Axis:
         if stick.bypass:
             added = 0.0
         self._decide(stick, added)
-        if self.state is not State.ACTIVE:
+        state = self.state
+        if state is not ACTIVE:
             added = 0.0
         command = 0.0
         try:
-            if self.state in (State.ACTIVE, State.BYPASS_ON):
+            if state is ACTIVE or state is BYPASS_ON:
                 command = self._deadzone(stick.command)
             self.command = command
             wanted = self._wanted(command, added)
-            if self.state in MOVING:
+            if state in MOVING:
                 self._drive(command, wanted, added)
             else:
                 self._rest()
         except (ValueError, ArithmeticError):
             self._output_invalid()
-        self.told = self.sent - added if self.state is State.ACTIVE else self.sent
+        self.told = self.sent - added if self.state is ACTIVE else self.sent
         if self.sway is not None:
             self.sway.step(self.told)
         return None if self.state is old else Transition(old, self.state, self.reason)
@@ -161,28 +165,29 @@ class Axis:
 
     def _decide(self, stick: StickInput, added: float) -> None:
         """Move to the state that this tick's input asks for."""
-        valid = stick.fault is None
-        rising = (stick.reset and not self._was_reset) or (
-            valid and stick.enabled and not self._was_enabled
-        )
-        # A switch that is held while its frames fail is no new press.
-        self._was_reset = stick.reset or (self._was_reset and not valid)
-        if valid:
-            self._was_enabled = stick.enabled
-        centred = valid and abs(stick.command) <= self._neutral_band
+        state = self.state
+        command, fault, enabled, _bypass, reset, trip = stick
+        centred = pressed = False
+        if fault is None:
+            centred = abs(command) <= self._neutral_band
+            pressed = (reset and not self._was_reset) or (enabled and not self._was_enabled)
+            self._was_reset, self._was_enabled = reset, enabled
+        elif reset:  # a switch that is held while its frames fail is no new press
+            self._was_reset = True
 
-        if stick.trip is not None:
-            if self.state is not State.TRIPPED:
-                self._go(State.TRIPPED, stick.trip)
-        elif self.state is State.TRIPPED:
-            if rising and centred:
-                self._go(State.NEUTRAL_WAIT, Reason.RESET)
-        elif self.state is State.NEUTRAL_WAIT:
-            self._wait(stick, centred)
-        elif self.state is State.READY:
-            self._ready(stick, centred, added)
-        else:
+        if trip is not None:
+            if state is not TRIPPED:
+                self._go(TRIPPED, trip)
+        elif state is ACTIVE or state is BYPASS_ON:
             self._moving(stick, centred, added)
+        elif state is READY:
+            self._ready(stick, centred, added)
+        elif state is NEUTRAL_WAIT:
+            self._wait(stick, centred)
+        elif state is STOPPING:
+            self._stop(stick)
+        elif pressed and centred:
+            self._go(NEUTRAL_WAIT, Reason.RESET)
 
     def _wait(self, stick: StickInput, centred: bool) -> None:
         if stick.fault is not None:
@@ -192,42 +197,47 @@ class Axis:
         elif not stick.enabled:
             self.reason = Reason.ENABLE_OFF
         else:
-            self._go(State.READY, Reason.STICK_NEUTRAL)
+            self._go(READY, Reason.STICK_NEUTRAL)
 
     def _ready(self, stick: StickInput, centred: bool, added: float) -> None:
         if stick.fault is not None:
-            self._go(State.NEUTRAL_WAIT, stick.fault)
+            self._go(NEUTRAL_WAIT, stick.fault)
         elif not stick.enabled:
-            self._go(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)
+            self._go(NEUTRAL_WAIT, Reason.ENABLE_OFF)
         elif not centred:
             if stick.bypass:
-                self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
+                self._go(BYPASS_ON, Reason.BYPASS_REQUESTED)
             else:
-                self._go(State.ACTIVE, Reason.STICK_MOVED)
+                self._go(ACTIVE, Reason.STICK_MOVED)
         elif added:
-            self._go(State.ACTIVE, Reason.COMPENSATING)
+            self._go(ACTIVE, Reason.COMPENSATING)
 
     def _moving(self, stick: StickInput, centred: bool, added: float) -> None:
-        if stick.fault is None and not stick.enabled:
-            self._go(State.TRIPPED, Reason.ENABLE_LOST)
-        elif self.state is State.STOPPING:
-            self._stopping += 1
-            if self._stopping >= self._stop_ticks or self._at_rest():
-                self._go(State.NEUTRAL_WAIT, Reason.STOP_DONE)
-        elif stick.fault is not None:
+        if stick.fault is not None:
             self._stopping = 0
-            self._go(State.STOPPING, stick.fault)
+            self._go(STOPPING, stick.fault)
+        elif not stick.enabled:
+            self._go(TRIPPED, Reason.ENABLE_LOST)
         elif centred and not added and self._at_rest():
-            self._go(State.READY, Reason.AT_REST)
-        elif self.state is State.ACTIVE and stick.bypass:
-            self._go(State.BYPASS_ON, Reason.BYPASS_REQUESTED)
-        elif self.state is State.BYPASS_ON and not stick.bypass:
-            self._go(State.ACTIVE, Reason.BYPASS_RELEASED)
+            self._go(READY, Reason.AT_REST)
+        elif stick.bypass:
+            if self.state is ACTIVE:
+                self._go(BYPASS_ON, Reason.BYPASS_REQUESTED)
+        elif self.state is BYPASS_ON:
+            self._go(ACTIVE, Reason.BYPASS_RELEASED)
+
+    def _stop(self, stick: StickInput) -> None:
+        if stick.fault is None and not stick.enabled:
+            self._go(TRIPPED, Reason.ENABLE_LOST)
+            return
+        self._stopping += 1
+        if self._stopping >= self._stop_ticks or self._at_rest():
+            self._go(NEUTRAL_WAIT, Reason.STOP_DONE)
 
     def _go(self, state: State, reason: Reason) -> None:
         # A stop goes on with whatever drove the axis before.
-        if state is not State.STOPPING:
-            bypassed = state is State.BYPASS_ON
+        if state is not STOPPING:
+            bypassed = state is BYPASS_ON
             # From rest there is nothing to join to: the stick counts in full at once.
             self._rebump = self.state in MOVING and bypassed is not self._bypassed
             self._bypassed = bypassed
@@ -268,9 +278,11 @@ class Axis:
             return
         limited = rate_limited(target, self._limited, self._rise, self._fall)
         self._limited = limited
-        self.raw, self.sent = on_grid(
-            limited, min(low, limited), max(high, limited), limits.deadband, self._grid_steps
-        )
+        if limited < low:  # on its way back in
+            low = limited
+        elif limited > high:
+            high = limited
+        self.raw, self.sent = on_grid(limited, low, high, limits.deadband, self._grid_steps)
 
     def _drive_both(self, target: float, added: float) -> None:
         """Send the operator's part and the added one.
@@ -298,7 +310,7 @@ class Axis:
 
     def _output_invalid(self) -> None:
         """Neutral and latched, with a model that starts anew: its state cannot be trusted."""
-        self._go(State.TRIPPED, Reason.OUTPUT_INVALID)
+        self._go(TRIPPED, Reason.OUTPUT_INVALID)
         self._rest()
         self.command = 0.0
         if self.sway is not None:
