@@ -42,6 +42,7 @@ def _machine_needed_for(options: argparse.Namespace) -> str | None:
     asked = {
         "--systemd": options.systemd,
         "--bench": options.bench,
+        "--steady": options.steady,
         "--kernel rt": options.kernel == "rt",
         "--append": options.append,
     }
@@ -66,6 +67,7 @@ def _parser() -> argparse.ArgumentParser:
     add("--boot-timeout", type=float, default=300, metavar="S")
     add("--systemd", action="store_true", help="systemd is PID 1, the command runs as a service")
     add("--bench", action="store_true", help="repeatable latencies: 1 ns for each instruction")
+    add("--steady", action="store_true", help="as fast inside however busy the host is")
     add("--kernel", choices=tuple(kernel.META_PACKAGES), default="std", help="rt: PREEMPT_RT")
     memory = f"the machine's memory (default {MEMORY_MIB}, with --systemd {systemd.MEMORY_MIB})"
     add("--mem", type=int, metavar="MIB", help=memory)
@@ -95,6 +97,7 @@ def _job(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Job:
         kernel=options.kernel,
         systemd=options.systemd,
         bench=options.bench,
+        steady=options.steady,
         kvaser=options.kvaser,
         kernel_args=tuple(options.append),
         verbose=options.verbose,

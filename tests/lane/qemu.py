@@ -22,6 +22,8 @@ PROCESSOR = "Nehalem-v1,+rdrand"
 ACCELERATOR = "tcg,thread=single,tb-size=512"
 # One instruction takes 1 ns and idle time none, whatever else the host does; no random addresses.
 BENCH = ("-icount", "shift=0,sleep=off", "-rtc", "base=2026-01-01T00:00:00,clock=vm")
+# The same, but idle time passes as on the host: what waits for the host's files sees no jumps.
+STEADY = ("-icount", "shift=0,sleep=on", "-rtc", "base=utc,clock=vm")
 BENCH_KERNEL_ARGS = ("norandmaps", "nokaslr", "clocksource=tsc")
 SHARE = "local,security_model=none,multidevs=remap"
 
@@ -36,7 +38,7 @@ def command_line(
     words = [which("qemu-system-x86_64") or "qemu-system-x86_64"]
     words += ["-nodefaults", "-no-user-config", "-display", "none", "-no-reboot"]
     words += ["-M", MACHINE, "-cpu", PROCESSOR, "-accel", ACCELERATOR]
-    words += ["-m", str(job.memory_mib), *(BENCH if job.bench else ("-rtc", "base=utc"))]
+    words += ["-m", str(job.memory_mib), *_clock(job)]
     words += ["-kernel", str(kernel.image), "-initrd", str(initramfs)]
     words += ["-append", " ".join(_kernel_args(job))]
     words += ["-chardev", f"file,id=console,path={_escaped(console)}"]
@@ -54,6 +56,12 @@ def command_line(
     for number in range(job.kvaser):
         words += ["-device", f"kvaser_pci,canbus=bus{number // 2}"]
     return words
+
+
+def _clock(job: Job) -> tuple[str, ...]:
+    if job.bench:
+        return BENCH
+    return STEADY if job.steady else ("-rtc", "base=utc")
 
 
 def _kernel_args(job: Job) -> list[str]:

@@ -16,7 +16,7 @@ from . import cli, suite
 from .outcome import LANE_FAILED, say
 
 FOLDER = "tests/systemd"
-OPTIONS = ["--systemd"]
+OPTIONS = ["--systemd", "--steady"]
 
 
 def main(arguments: Sequence[str]) -> int:
