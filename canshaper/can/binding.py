@@ -13,6 +13,7 @@ from canshaper.can.codecs import (
 )
 from canshaper.can.database import Messages
 from canshaper.can.inputs import BoundLever, BoundStop, InputBinder
+from canshaper.can.load import BusLoad, bus_load
 from canshaper.can.signals import (
     command_fault,
     radius_range,
@@ -34,6 +35,8 @@ from canshaper.shaping.sway import SwayModel
 
 # A valve hears of a stop no sooner than with its next frame.
 SLOWEST_VALVE_MS = 200
+# Frames that a valve may miss but one before it closes by itself.
+FRAMES_PER_TIMEOUT = 3
 
 
 @dataclass(frozen=True)
@@ -77,6 +80,19 @@ class Deployment:
     emergency_stop: BoundStop | None
     status: ServiceStatusCodec | None
     status_ticks: int
+    on_bus: dict[str, list[Message]]
+
+    def load(self, bus: str) -> BusLoad | None:
+        """Load of a bus at its bit rate; None where that is not given.
+
+        By the messages of the deployment, and where there is one bus only, by all others of the DBC
+        files too.
+        """
+        bitrate = self.config.buses[bus].bitrate
+        if bitrate is None:
+            return None
+        alone = len(self.config.buses) == 1
+        return bus_load(self.messages.all() if alone else self.on_bus.get(bus, []), bitrate)
 
     def ids(self, bus: str) -> Ids:
         """Messages that matter on a bus."""
@@ -130,6 +146,7 @@ class _Binder(InputBinder):
             stop,
             ServiceStatusCodec(service[0]) if service else None,
             service[1] if service else 0,
+            self.on_bus,
         )
 
     def _check_buses(self) -> None:
@@ -217,9 +234,13 @@ class _Binder(InputBinder):
             return None
         file, message = found
         ticks = self.period(file, message)
-        if ticks * self.config.tick_ms > SLOWEST_VALVE_MS:
-            text = f"has GenMsgCycleTime {message.cycle_time} ms, allowed for a valve is up to"
+        if (cycle := ticks * self.config.tick_ms) > SLOWEST_VALVE_MS:
+            text = f"has GenMsgCycleTime {cycle} ms, allowed for a valve is up to"
             self.problems.append(file.problem(message, f"{text} {SLOWEST_VALVE_MS} ms"))
+        elif cycle * FRAMES_PER_TIMEOUT > valve.timeout_ms:
+            text = f"found {valve.timeout_ms}, allowed is {cycle * FRAMES_PER_TIMEOUT} ms or more:"
+            text += f" three cycles of {message.name}, so that two lost frames do not close it"
+            self.add((*place, "timeout_ms"), text)
         signal = self.signal((*place, "signal"), message, valve.signal)
         counter = self.signal((*place, "alive_counter"), message, valve.alive_counter)
         if counter:

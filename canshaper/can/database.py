@@ -92,8 +92,11 @@ class Messages:
 
     def ids(self) -> set[tuple[int, bool]]:
         """(id, extended) of every message."""
-        found = (message for entries in self._by_name.values() for _, message in entries)
-        return {(message.frame_id, message.is_extended_frame) for message in found}
+        return {(message.frame_id, message.is_extended_frame) for message in self.all()}
+
+    def all(self) -> list[Message]:
+        """Every message."""
+        return [message for entries in self._by_name.values() for _, message in entries]
 
     def find(self, name: str) -> tuple[DbcFile, Message] | str:
         """The message and its file, or why there is none."""

@@ -19,6 +19,7 @@ class Lookup:
     source: Source
     problems: list[Problem] = field(default_factory=list)
     messages: Messages = field(default_factory=lambda: Messages([]))
+    on_bus: dict[str, list[Message]] = field(default_factory=dict)
     _used: dict[tuple[str, int, bool], str] = field(default_factory=dict)
 
     def add(self, place: Place, text: str) -> None:
@@ -62,6 +63,7 @@ class Lookup:
                 f" by {self._used[key]}",
             )
         self._used[key] = where
+        self.on_bus.setdefault(bus, []).append(message)
         if message.length > 8:
             self.add((*place, "message"), f"{name} has {message.length} bytes, allowed are 8")
         if message.is_multiplexed():

@@ -2,13 +2,16 @@
 
 import typer
 
+from canshaper.can.binding import Deployment
+from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 
 
 def check(file: str = FILE) -> None:
     """Load a deployment against its DBC files and report every problem at once.
 
-    Exit code 0 when it is good, 2 when it is not.
+    Exit code 0 when it is good, 2 when it is not. A bus that is loaded above 50 % at its bit rate
+    is a warning.
 
     Examples:
 
@@ -27,7 +30,7 @@ def check(file: str = FILE) -> None:
     config = deployment.config
     typer.echo(f"{deployment.path}: good")
     for name, bus in config.buses.items():
-        typer.echo(f"  bus {name}: {bus.interface} {bus.channel}")
+        typer.echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
     for name, axis in deployment.axes.items():
         valve, stick = axis.config.valve, axis.config.stick
         period_ms = axis.period_ticks * config.tick_ms
@@ -35,3 +38,13 @@ def check(file: str = FILE) -> None:
             f"  axis {name}: {config.levers[stick.lever].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
+
+
+def _load(deployment: Deployment, bus: str) -> str:
+    """What its messages make of a bus, in words."""
+    load = deployment.load(bus)
+    if load is None:
+        return ", no bitrate given, so its load is not known"
+    rate = (deployment.config.buses[bus].bitrate or 0) / 1000
+    warning = " - WARNING: above 50 %, frames will wait for others" if load.share > BUSY else ""
+    return f", {load.messages} cyclic messages load {load.share:.0%} of {rate:g} kbit/s{warning}"

@@ -17,7 +17,7 @@ class Bus(Section):
     interface: str = Field(description="python-can interface, such as socketcan")
     channel: str = Field(description="channel of the interface, such as can0")
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
-    """Only for interfaces that set it; SocketCAN takes it from the system."""
+    """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
 
 
 class Checksum(Section):
@@ -92,6 +92,9 @@ class Valve(Section):
     bus: str = Field(description="name of the bus the message is sent on")
     message: str = Field(description="message in the DBC files")
     signal: str = Field(description="signal with the signed command; its DBC range is full command")
+    timeout_ms: Annotated[
+        int, number(10, 5000, "ms", "silence after which the valve closes by itself")
+    ]
     alive_counter: str | None = Field(None, description="signal counted up with every message")
 
 

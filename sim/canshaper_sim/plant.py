@@ -25,8 +25,6 @@ JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointPosition": ("SlewAngle", "LiftAngle", "KnuckleAngle", "Extension"),
     "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
 }
-# A valve that hears nothing for this long closes; makers give 100 to 300 ms.
-VALVE_TIMEOUT_S = 0.2
 
 
 class _ValveInput:
@@ -38,6 +36,7 @@ class _ValveInput:
         self._message = bound.valve_message
         self._codec: ValveCodec = bound.valve
         self._signal = bound.config.valve.signal
+        self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0
 
@@ -114,7 +113,7 @@ class PlantNode:
         """Let time pass with the last commands held, as long as the valves hold them."""
         commands = {}
         for valve in self._valves.values():
-            if valve.age_s >= VALVE_TIMEOUT_S:
+            if valve.age_s >= valve.timeout_s:
                 valve.command = 0.0
             valve.age_s += dt_s
             commands[valve.axis] = valve.command

@@ -160,8 +160,8 @@ def test_a_lever_and_a_valve_of_one_id(machine: Machine) -> None:
 
 def test_the_same_id_on_two_buses_or_extended_is_another_message(machine: Machine) -> None:
     machine.in_yaml(
-        "crane: { interface: socketcan, channel: vcan0 }",
-        "crane: { interface: socketcan, channel: vcan0 }\n"
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
         "  boom: { interface: socketcan, channel: vcan1 }",
     )
     machine.in_yaml("bus: crane, message: SlewCommand", "bus: boom, message: SlewCommand")
@@ -173,9 +173,9 @@ def test_the_same_id_on_two_buses_or_extended_is_another_message(machine: Machin
 
 def test_two_buses_on_one_channel(machine: Machine) -> None:
     line = machine.in_yaml(
-        "crane: { interface: socketcan, channel: vcan0 }",
-        "crane: { interface: socketcan, channel: vcan0 }\n"
-        "  boom: { interface: socketcan, channel: vcan0 }",
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
+        "  boom: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
     )
     assert machine.problems() == [
         f"machine.yaml:{line + 1}: buses.boom: has the channel vcan0 of bus crane"

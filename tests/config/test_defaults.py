@@ -24,7 +24,7 @@ levers: {l: {bus: b, message: L, timeout_ms: 100, enable: E}}
 axes:
   x:
     stick: {lever: l, signal: S}
-    valve: {bus: b, message: V, signal: S}
+    valve: {bus: b, message: V, signal: S, timeout_ms: 200}
     filter: {kind: off}
 """
 

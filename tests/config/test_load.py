@@ -83,7 +83,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         ("[../dbc/forwarder.dbc]", "[]", "dbc: found [], allowed are 1 or more entries"),
         ("[../dbc/forwarder.dbc]", "[3]", "dbc.0: found 3, allowed is text"),
         (
-            "{ interface: socketcan, channel: vcan0 }",
+            "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
             "vcan0",
             "buses.crane: found 'vcan0', allowed is a section with the keys interface, channel,",
         ),

@@ -15,8 +15,8 @@ TICK_NS = 20_000_000
 # A second bus with a lever of another cycle, a quicker tick, and an emergency stop.
 YAML = {
     "tick_ms: 20": "tick_ms: 10",
-    "  crane: { interface: socketcan, channel: vcan0 }\n": (
-        "  crane: { interface: socketcan, channel: vcan0 }\n"
+    "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n": (
+        "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
         "  boom: { interface: udp_multicast, channel: 239.1.2.3 }\n"
     ),
     "  right:\n    bus: crane": "  right:\n    bus: boom",

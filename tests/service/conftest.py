@@ -105,6 +105,10 @@ def changed_rig(tmp_path: Path) -> Callable[..., Rig]:
     def make(yaml: dict[str, str] | None = None, dbc: dict[str, str] | None = None) -> Rig:
         text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
         text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
+        # Valves that wait for longer, so that a test may slow them down.
+        text = text.replace(
+            "signal: Velocity, timeout_ms: 200", "signal: Velocity, timeout_ms: 600"
+        )
         network = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
         for old, new in (yaml or {}).items():
             assert old in text, old

@@ -40,7 +40,7 @@ def broken(tmp_path: Path) -> Path:
 def two_buses(tmp_path: Path) -> Path:
     path = tmp_path / "two.yaml"
     text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
-    bus = "  crane: { interface: socketcan, channel: vcan0 }\n"
+    bus = "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
     path.write_text(text.replace(bus, bus + bus.replace("crane", "boom").replace("vcan0", "vcan1")))
     return path
 
@@ -67,7 +67,7 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
     assert result.stderr == ""
     assert result.stdout.splitlines() == [
         f"{SHIPPED}: good",
-        "  bus crane: socketcan vcan0",
+        "  bus crane: socketcan vcan0, 14 cyclic messages load 24% of 250 kbit/s",
         "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
         "  axis near_far: LeverLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
         "  axis lift: LeverRight.Lift -> off -> LiftCommand.Velocity every 20 ms",

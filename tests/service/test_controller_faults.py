@@ -31,7 +31,7 @@ class Rig(Protocol):
 Make = Callable[..., Rig]
 
 TWO_BUSES = {
-    "crane: { interface: socketcan, channel: vcan0 }": (
+    "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }": (
         "crane: { interface: socketcan, channel: vcan0 }\n"
         "  boom: { interface: socketcan, channel: vcan1 }"
     ),
