@@ -5,21 +5,14 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
-from canshaper.can.codecs import (
-    AxisStatusCodec,
-    Sender,
-    ServiceStatusCodec,
-    ValveCodec,
-)
+from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
 from canshaper.can.database import Messages
-from canshaper.can.inputs import BoundLever, BoundStop, InputBinder
+from canshaper.can.inputs import BoundLever, BoundStop
 from canshaper.can.load import BusLoad, bus_load
-from canshaper.can.signals import (
-    command_fault,
-    radius_range,
-    status_faults,
-)
+from canshaper.can.signals import radius_range, status_faults
 from canshaper.can.socketcan import Ids
+from canshaper.can.valve import ValveCodec
+from canshaper.can.valves import ValveBinder
 from canshaper.config.filters import RobustFilter
 from canshaper.config.load import load_config
 from canshaper.config.schema import (
@@ -27,16 +20,10 @@ from canshaper.config.schema import (
     DeploymentConfig,
     RadialConfig,
     Status,
-    Valve,
 )
 from canshaper.config.source import DeploymentError, Place
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sway import SwayModel
-
-# A valve hears of a stop no sooner than with its next frame.
-SLOWEST_VALVE_MS = 200
-# Frames that a valve may miss but one before it closes by itself.
-FRAMES_PER_TIMEOUT = 3
 
 
 @dataclass(frozen=True)
@@ -99,7 +86,7 @@ class Deployment:
         inputs = [*self.levers.values(), *([self.emergency_stop] if self.emergency_stop else [])]
         radials = [a.radial.key for a in self.axes.values() if a.radial and a.radial.key]
         taken = [i.key for i in inputs] + radials
-        valves = [a.valve.sender.key for a in self.axes.values()]
+        valves = [a.valve.message.sender.key for a in self.axes.values()]
         sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
         return Ids(
             frozenset(key[1:] for key in taken if key[0] == bus),
@@ -122,7 +109,7 @@ def load_deployment(path: Path) -> Deployment:
     return _Binder(config, source).deployment(path)
 
 
-class _Binder(InputBinder):
+class _Binder(ValveBinder):
     """Binds part by part; with any problem there is no deployment."""
 
     def deployment(self, path: Path) -> Deployment:
@@ -163,7 +150,7 @@ class _Binder(InputBinder):
         if axis.stick.lever not in self.config.levers:
             names = ", ".join(self.config.levers)
             self.add((*place, "stick", "lever"), f"found {axis.stick.lever!r}, levers are {names}")
-        bound = self._valve((*place, "valve"), axis.valve)
+        bound = self.valve((*place, "valve"), axis.valve)
         status = self._status((*place, "status"), axis.status, AxisStatusCodec)
         if bound is None or len(self.problems) > before:
             return None
@@ -227,37 +214,6 @@ class _Binder(InputBinder):
         """Cycle of the axis' valve message; None where there is no such message."""
         found = self.messages.find(axis.valve.message)
         return None if isinstance(found, str) else found[1].cycle_time
-
-    def _valve(self, place: Place, valve: Valve) -> tuple[Message, ValveCodec, int] | None:
-        found = self.message(place, valve.bus, valve.message, takes=False)
-        if not found:
-            return None
-        file, message = found
-        ticks = self.period(file, message)
-        if (cycle := ticks * self.config.tick_ms) > SLOWEST_VALVE_MS:
-            text = f"has GenMsgCycleTime {cycle} ms, allowed for a valve is up to"
-            self.problems.append(file.problem(message, f"{text} {SLOWEST_VALVE_MS} ms"))
-        elif cycle * FRAMES_PER_TIMEOUT > valve.timeout_ms:
-            text = f"found {valve.timeout_ms}, allowed is {cycle * FRAMES_PER_TIMEOUT} ms or more:"
-            text += f" three cycles of {message.name}, so that two lost frames do not close it"
-            self.add((*place, "timeout_ms"), text)
-        signal = self.signal((*place, "signal"), message, valve.signal)
-        counter = self.signal((*place, "alive_counter"), message, valve.alive_counter)
-        if counter:
-            self.integer((*place, "alive_counter"), counter, signed=False)
-        if not signal or not ticks or not self.full_scale(file, message, signal):
-            return None
-        self.integer((*place, "signal"), signal)
-        if counter:
-            self.alone((*place, "alive_counter"), counter, {signal.name: "signal"})
-        if why := command_fault(signal):
-            self.problems.append(file.problem(message, why))
-            return None
-        return (
-            message,
-            ValveCodec(Sender(valve.bus, message), signal.name, valve.alive_counter),
-            ticks,
-        )
 
     def _status(
         self,

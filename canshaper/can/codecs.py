@@ -1,4 +1,4 @@
-"""Codecs of one lever, one valve and the status messages."""
+"""Codecs of a lever and of the status messages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -7,9 +7,9 @@ from typing import Any, ClassVar
 from cantools.database.can import Message
 
 from canshaper.can.flags import FlaggedVelocity
-from canshaper.can.frame import Frame, FrameFault, new_frame
+from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.layout import Layout
-from canshaper.can.signals import FieldSet, VelocitySignal, valve_steps
+from canshaper.can.signals import FieldSet, VelocitySignal
 from canshaper.shaping.states import Reason, State
 
 
@@ -62,41 +62,6 @@ class Sender:
     def frame(self, raw: dict[str, int]) -> Frame:
         """Frame with these raw values."""
         return Frame(self._bus, self._id, self._extended, self.fields.encode(raw))
-
-
-class ValveCodec:
-    """Grid steps of an axis to the valve's frame."""
-
-    def __init__(self, sender: Sender, signal: str, alive_counter: str | None) -> None:
-        self.sender = sender
-        self._bus, self._id, self._extended = sender.key
-        self._signal = signal
-        self._alive = alive_counter
-        message = sender.fields.message
-        self._layout = Layout(message)
-        self._raw = dict(sender.fields.start)
-        definition = next(s for s in message.signals if s.name == signal)
-        counter = next((s for s in message.signals if s.name == alive_counter), None)
-        self._counter_range = 1 << counter.length if counter else 1
-        self._count = 0
-        self._zero = round(-definition.offset / definition.scale)
-        self._sign = 1 if definition.scale > 0 else -1
-        self.steps = valve_steps(definition.maximum or 0.0, abs(definition.scale))
-
-    def frame(self, steps: int) -> Frame:
-        """Next frame, with the alive counter counted up."""
-        if not -self.steps <= steps <= self.steps:
-            raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
-        raw = self._raw
-        raw[self._signal] = self._zero + self._sign * steps
-        if self._alive is not None:
-            raw[self._alive] = self._count = (self._count + 1) % self._counter_range
-        data = self._layout.encode(raw)
-        return new_frame(Frame, (self._bus, self._id, self._extended, data))
-
-    def velocity_steps(self, raw: int) -> int:
-        """Grid steps for a raw value of the signal."""
-        return self._sign * (raw - self._zero)
 
 
 @dataclass(frozen=True, slots=True)

@@ -26,22 +26,30 @@ class Layout:
     """Where the signals of a message lie.
 
     For messages that were loaded strictly, so that no signals overlap, that are not multiplexed and
-    have no ``layout_fault``.
+    have no ``layout_fault``. In encoded messages of J1939 the bits that no signal has are 1, in all
+    others 0.
     """
 
     def __init__(self, message: Message) -> None:
         bits = 8 * message.length
+        used = 0  # the lowest bit of the first byte is the lowest
         intel: dict[int, Signal] = {}
         motorola: dict[int, Signal] = {}
         for signal in message.signals:
             if signal.byte_order == "little_endian":
                 # ``start`` is the lowest bit; the bytes will be reversed.
                 intel[bits - signal.start - signal.length] = signal
+                used |= _ones(signal.length) << signal.start
             else:
                 # ``start`` is the highest bit, counted from the right within its byte.
-                motorola[signal.start // 8 * 8 + 7 - signal.start % 8] = signal
+                first = signal.start // 8 * 8 + 7 - signal.start % 8
+                motorola[first] = signal
+                place = _ones(signal.length) << (bits - first - signal.length)
+                used |= int.from_bytes(place.to_bytes(message.length, "big"), "little")
         self._intel = _compiled(intel, bits)
         self._motorola = _compiled(motorola, bits) if motorola else None
+        self._unused = _ones(bits) & ~used if is_j1939(message) else 0
+        self._length = message.length
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """Raw value of every signal, by name.
@@ -55,7 +63,7 @@ class Layout:
         return values
 
     def encode(self, raw: dict[str, Any]) -> bytes:
-        """Bytes of the message; bits that no signal has are 0.
+        """Bytes of the message.
 
         Args:
             raw: raw value of every signal, by name; a whole number where the signal is no float.
@@ -67,7 +75,18 @@ class Layout:
         data: bytes = self._intel.pack(raw)[::-1]
         if self._motorola is not None:
             data = bytes(a | b for a, b in zip(data, self._motorola.pack(raw), strict=True))
+        if self._unused:
+            data = (int.from_bytes(data, "little") | self._unused).to_bytes(self._length, "little")
         return data
+
+
+def is_j1939(message: Message) -> bool:
+    """Whether the DBC says that it is a message of J1939 (VFrameFormat J1939PG)."""
+    return message.protocol == "j1939"
+
+
+def _ones(count: int) -> int:
+    return (1 << count) - 1
 
 
 def _compiled(places: dict[int, Signal], bits: int) -> Any:

@@ -12,7 +12,7 @@ from typing import Any
 
 from cantools.database.can import Message, Signal
 
-from canshaper.can.layout import Layout
+from canshaper.can.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
 
 # Names that the tables of a DBC give to raw values that are no measurement.
@@ -175,6 +175,8 @@ class VelocitySignal:
 class FieldSet:
     """Physical values to the raw fields of one message; what is not set keeps its start value.
 
+    That is GenSigStartValue; without one 0, in messages of J1939 all bits 1: not available.
+
     Attributes:
         message: the message.
         start: raw start value of every signal.
@@ -183,17 +185,21 @@ class FieldSet:
     def __init__(self, message: Message) -> None:
         self.message = message
         self._layout = Layout(message)
-        self.start: dict[str, Any] = {s.name: self._start(s) for s in message.signals}
+        self.start: dict[str, Any] = {
+            s.name: self._start(s, is_j1939(message)) for s in message.signals
+        }
         self._fields = {
             s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
         }
 
     @staticmethod
-    def _start(signal: Signal) -> int | float:
+    def _start(signal: Signal, all_ones: bool) -> int | float:
         """GenSigStartValue (a raw value), within the bits of the signal."""
         if signal.is_float:
             return float(signal.raw_initial or 0.0)
         low, high = raw_limits(signal)
+        if all_ones and signal.raw_initial is None:
+            return -1 if signal.is_signed else high
         return min(max(int(signal.raw_initial or 0), low), high)
 
     def raw(self, name: str, value: float) -> int:

@@ -86,12 +86,32 @@ class Stick(Section):
     ] = 2.0
 
 
+class DirectionCodes(Section):
+    """Direction of a valve command told by codes, as the valve state of ISO 11783-7 does."""
+
+    signal: str = Field(description="signal that tells the direction")
+    neutral: Annotated[int, number(0, 255, "", "code of no command")]
+    positive: Annotated[int, number(0, 255, "", "code of positive commands")]
+    negative: Annotated[int, number(0, 255, "", "code of negative commands")]
+
+    @model_validator(mode="after")
+    def _different(self) -> Self:
+        codes = (self.neutral, self.positive, self.negative)
+        if len({*codes}) < len(codes):
+            found = ", ".join(str(code) for code in codes)
+            raise ValueError(f"found the codes {found}; allowed are three different ones")
+        return self
+
+
 class Valve(Section):
     """Valve command message of an axis; its GenMsgCycleTime is the period it is sent at."""
 
     bus: str = Field(description="name of the bus the message is sent on")
     message: str = Field(description="message in the DBC files")
-    signal: str = Field(description="signal with the signed command; its DBC range is full command")
+    signal: str = Field(description="signal with the command; its DBC range is full command")
+    direction: DirectionCodes | None = None
+    """Only where the command has no sign of its own."""
+    also: list[str] = Field([], description="signals that tell the same in another resolution")
     timeout_ms: Annotated[
         int, number(10, 5000, "ms", "silence after which the valve closes by itself")
     ]

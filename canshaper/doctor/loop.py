@@ -39,7 +39,9 @@ class Loop:
             )
             for name, one in sockets.items()
         }
-        self._valves = {a.valve.sender.key: i for i, a in enumerate(deployment.axes.values())}
+        self._valves: dict[tuple[str, int, bool], list[int]] = {}
+        for i, axis in enumerate(deployment.axes.values()):
+            self._valves.setdefault(axis.valve.message.sender.key, []).append(i)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         shortest_ms = min(lever.config.timeout_ms for lever in deployment.levers.values())
         self._stall_ns = shortest_ms * 1_000_000
@@ -78,8 +80,9 @@ class Loop:
         for frame in controller.tick(now_ns, missed):
             if not ports[frame.bus].send(frame):
                 controller.send_failed(frame)
-            elif (axis := self._valves.get(frame[:3])) is not None:
-                self._sent.extend((tick, axis, time.monotonic_ns()))
+            else:
+                for axis in self._valves.get(frame[:3], ()):
+                    self._sent.extend((tick, axis, time.monotonic_ns()))
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)

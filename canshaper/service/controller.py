@@ -89,7 +89,6 @@ class Controller:
             name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
             for name, bound in deployment.axes.items()
         }
-        self._by_message = {a.bound.valve.sender.key: a for a in self.axes.values()}
         self._sent = {
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
         }
@@ -105,6 +104,12 @@ class Controller:
         self._others = deployment.messages.ids() - used
         # An axis that asks something of another one goes first.
         self._order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
+        self._by_message: dict[tuple[str, int, bool], list[AxisRunner]] = {}
+        for _, runner in self._order:
+            key = runner.bound.valve.message.sender.key
+            self._by_message.setdefault(key, []).append(runner)
+        for runners in self._by_message.values():
+            runners[-1].sends = True  # when all axes of the message have moved
         self._last = -1  # number of the last deadline
         self._late = 0
         self._overrun = False
@@ -122,7 +127,7 @@ class Controller:
             fault = entry.receive(frame.data, now_ns)
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
-            if runner := self._by_message.get(key):
+            for runner in self._by_message.get(key, ()):
                 runner.contested_ns = now_ns
         elif key[1:] in self._others:
             return
@@ -156,7 +161,8 @@ class Controller:
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
-                yield runner.valve_frame()
+                if runner.sends:
+                    yield runner.bound.valve.message.frame()
                 if transition is not None:
                     self.events.append(Event(name, transition))
                     changed.append(runner)
@@ -189,15 +195,17 @@ class Controller:
                 runner.trip = Reason.LOOP_STALLED
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus; the axis of a valve frame trips."""
+        """A frame did not reach its bus; the axes of a valve frame trip."""
         self.counters.add(FrameFault.SEND_FAILED)
-        runner = self._by_message.get((frame.bus, frame.can_id, frame.extended))
-        if runner is not None and not runner.axis.neutral:
-            runner.trip = Reason.SEND_FAILED
+        for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
+            if not runner.axis.neutral:
+                runner.trip = Reason.SEND_FAILED
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve: the last thing sent."""
-        return [runner.bound.valve.frame(0) for runner in self.axes.values()]
+        for runner in self.axes.values():
+            runner.bound.valve.put(0)
+        return [runners[-1].bound.valve.message.frame() for runners in self._by_message.values()]
 
 
 def _passed(last: int, now: int, period: int) -> int:

@@ -26,6 +26,7 @@ class AxisRunner:
         lost: the input was lost since the last tick, though it may be back: neutral comes first.
         contested_ns: when a frame of another sender with the id of this valve was last seen.
         added: velocity that another axis asks of this one, fraction of full speed.
+        sends: the message of its valve goes out when this axis has moved.
         compensator: what this axis asks of another one, where it slews.
     """
 
@@ -58,6 +59,7 @@ class AxisRunner:
         self.lost = False
         self.contested_ns: int | None = None
         self.added = 0.0
+        self.sends = False
         self.compensator: Compensator | None = None
 
     def tick(
@@ -75,10 +77,12 @@ class AxisRunner:
         if overrun and stick.enabled and stick.fault is None:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
         if self.compensator is None:
-            return self.axis.tick(stick, self.added)
-        self.compensator.before_slew()
-        transition = self.axis.tick(stick, self.added)
-        self.compensator.after_slew(now_ns)
+            transition = self.axis.tick(stick, self.added)
+        else:
+            self.compensator.before_slew()
+            transition = self.axis.tick(stick, self.added)
+            self.compensator.after_slew(now_ns)
+        self.bound.valve.put(self.axis.raw)
         return transition
 
     def _stick(self, now_ns: int, emergency: EmergencyStopInput | None) -> StickInput:
@@ -98,10 +102,6 @@ class AxisRunner:
         if lost:
             return StickInput(fault=Reason.STICK_TIMEOUT, trip=trip)
         return self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
-
-    def valve_frame(self) -> Frame:
-        """The frame for what the axis sends now."""
-        return self.bound.valve.frame(self.axis.raw)
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""

@@ -4,9 +4,10 @@ import math
 from collections.abc import Mapping
 
 from canshaper.can.binding import Deployment
-from canshaper.can.codecs import Sender, ValveCodec
+from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 from canshaper.can.signals import find_signal
+from canshaper.can.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
 from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.grapple import Sway
@@ -35,7 +36,6 @@ class _ValveInput:
         self.axis = axis
         self._message = bound.valve_message
         self._codec: ValveCodec = bound.valve
-        self._signal = bound.config.valve.signal
         self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0
@@ -46,8 +46,8 @@ class _ValveInput:
         self.command = 0.0
         if len(data) == self._message.length:
             raw = self._message.decode(data, decode_choices=False, scaling=False)
-            steps = self._codec.velocity_steps(int(raw[self._signal]))  # type: ignore
-            if abs(steps) <= self._codec.steps:
+            steps = self._codec.read(raw)  # type: ignore[arg-type]
+            if steps is not None:
                 self.command = steps / self._codec.steps
 
 
@@ -90,13 +90,10 @@ class PlantNode:
             raise DeploymentError(problems)
         self._machine = build_machine(name, parameters, sway)
         inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
-        self._valves = {
-            (
-                deployment.axes[v.axis].config.valve.bus,
-                deployment.axes[v.axis].valve_message.frame_id,
-            ): v
-            for v in inputs
-        }
+        self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
+        for valve in inputs:
+            key = deployment.axes[valve.axis].valve.message.sender.key
+            self._valves.setdefault(key, []).append(valve)
 
     @property
     def crane(self) -> Crane:
@@ -105,14 +102,13 @@ class PlantNode:
 
     def receive(self, frame: Frame) -> None:
         """Take a frame from a bus; those that are no valve commands are passed over."""
-        valve = self._valves.get((frame.bus, frame.can_id))
-        if valve is not None:
+        for valve in self._valves.get(frame[:3], ()):
             valve.receive(frame.data)
 
     def advance(self, dt_s: float) -> None:
         """Let time pass with the last commands held, as long as the valves hold them."""
         commands = {}
-        for valve in self._valves.values():
+        for valve in (one for shared in self._valves.values() for one in shared):
             if valve.age_s >= valve.timeout_s:
                 valve.command = 0.0
             valve.age_s += dt_s

@@ -53,14 +53,11 @@ class Recorder:
         for lever in deployment.levers.values():
             self._handlers[lever.key] = (self._stick, lever.message)
             self._levers[lever.message.name] = lever
-        self._valves: dict[str, str] = {}
+        self._valves: dict[str, list[str]] = {}
         for name, axis in deployment.axes.items():
-            bus, message = axis.config.valve.bus, axis.valve_message
-            self._handlers[bus, message.frame_id, message.is_extended_frame] = (
-                self._valve,
-                message,
-            )
-            self._valves[message.name] = name
+            message = axis.valve_message
+            self._handlers[axis.valve.message.sender.key] = (self._valve, message)
+            self._valves.setdefault(message.name, []).append(name)
         for message_name, handler in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
@@ -113,11 +110,11 @@ class Recorder:
                 self._now[name][0] = 0.0 if isinstance(command, Reason) else command
 
     def _valve(self, message: Any, data: bytes, _time_s: float) -> None:
-        name = self._valves[message.name]
-        axis = self._axes[name]
-        raw = self._raw(message, data)[axis.config.valve.signal]
-        command = axis.valve.velocity_steps(raw) / axis.valve.steps
-        self._now[name][1] = without_deadband(command, axis.config.limits.deadband_pct / 100.0)
+        raw = self._raw(message, data)
+        for name in self._valves[message.name]:
+            axis = self._axes[name]
+            command = (axis.valve.read(raw) or 0) / axis.valve.steps
+            self._now[name][1] = without_deadband(command, axis.config.limits.deadband_pct / 100.0)
 
     def _speed(self, message: Any, data: bytes, _time_s: float) -> None:
         values = message.decode(data)

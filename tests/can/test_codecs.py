@@ -15,11 +15,11 @@ from canshaper.can.codecs import (
     LeverCodec,
     Sender,
     ServiceStatusCodec,
-    ValveCodec,
     WrongLengthError,
 )
-from canshaper.can.frame import FrameFault
+from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.signals import FieldSet, VelocitySignal
+from canshaper.can.valve import ValveCodec, ValveMessage
 from canshaper.shaping.states import Reason, State
 
 SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
@@ -77,7 +77,15 @@ def lever(message: str) -> LeverCodec:
 
 
 def valve(message: str, counter: str | None = None) -> ValveCodec:
-    return ValveCodec(Sender("b", custom.get_message_by_name(message)), "Velocity", counter)
+    definition = custom.get_message_by_name(message)
+    count = signal(definition, counter) if counter else None
+    shared = ValveMessage(Sender("b", definition), count)
+    return ValveCodec(shared, signal(definition, "Velocity"))
+
+
+def sent(codec: ValveCodec, steps: int) -> Frame:
+    codec.put(steps)
+    return codec.message.frame()
 
 
 def raw_lever(stick: int) -> bytes:
@@ -216,19 +224,19 @@ def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
     ],
 )
 def test_steps_become_bytes(message: str, steps: int, data: str) -> None:
-    assert valve(message).frame(steps).data == bytes.fromhex(data)
+    assert sent(valve(message), steps).data == bytes.fromhex(data)
 
 
 @pytest.mark.parametrize("message", ["Offset", "Motorola", "Falling"])
 def test_steps_are_judged_by_cantools(message: str) -> None:
     codec = valve(message)
     for steps in {-codec.steps, -codec.steps // 3, -1, 0, 1, codec.steps // 2, codec.steps}:
-        judge = custom.get_message_by_name(message).decode(codec.frame(steps).data)
+        judge = custom.get_message_by_name(message).decode(sent(codec, steps).data)
         assert isinstance(judge, dict)
         assert judge["Velocity"] == pytest.approx(100.0 * steps / codec.steps)
-        raw = custom.get_message_by_name(message).decode(codec.frame(steps).data, scaling=False)
+        raw = custom.get_message_by_name(message).decode(sent(codec, steps).data, scaling=False)
         assert isinstance(raw, dict)
-        assert codec.velocity_steps(int(raw["Velocity"])) == steps
+        assert codec.read(raw) == steps
 
 
 @pytest.mark.parametrize("message", ["Offset", "Motorola", "Falling"])
@@ -236,20 +244,20 @@ def test_steps_beyond_full_command_are_refused(message: str) -> None:
     codec = valve(message)
     for steps in (codec.steps + 1, -codec.steps - 1, 10**9):
         with pytest.raises(ValueError, match=f"allowed is \\+-{codec.steps}"):
-            codec.frame(steps)
+            sent(codec, steps)
 
 
 def test_the_alive_counter_counts_every_frame_and_wraps() -> None:
     codec = valve("Offset", "Counter")
-    counts = [codec.frame(0).data[0] & 0xF for _ in range(34)]
+    counts = [sent(codec, 0).data[0] & 0xF for _ in range(34)]
     assert counts == [*range(1, 16), *range(16), 0, 1, 2]
 
 
 def test_a_frame_that_is_refused_is_not_counted() -> None:
     codec = valve("Offset", "Counter")
     with pytest.raises(ValueError, match="126 steps"):
-        codec.frame(126)
-    assert codec.frame(0).data[0] & 0xF == 1
+        sent(codec, 126)
+    assert sent(codec, 0).data[0] & 0xF == 1
 
 
 def test_start_values_beyond_the_bits_are_held_within() -> None:

@@ -46,7 +46,7 @@ def test_joystick_and_valves_on_different_buses(
     (joystick, joystick_far), (valve, valve_far) = can_pairs
     text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
     text = text.replace(
-        "  crane: { interface: socketcan, channel: vcan0 }",
+        "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
         "  joy: { interface: socketcan, channel: can0 }\n"
         "  crane: { interface: socketcan, channel: can2 }",
     )
