@@ -17,7 +17,7 @@ import time
 
 from canshaper.can.bus import Port, open_port
 from canshaper.cli.common import data_directory
-from canshaper.config.schema import Bus
+from canshaper.config.bus import Bus
 
 PEER = """
 import sys, can, cantools

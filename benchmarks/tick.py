@@ -21,7 +21,7 @@ from canshaper.can.binding import Deployment, load_deployment
 from canshaper.can.bus import Port, open_port
 from canshaper.can.frame import Frame
 from canshaper.cli.common import data_directory
-from canshaper.config.schema import Bus
+from canshaper.config.bus import Bus
 from canshaper.service.controller import Controller
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script

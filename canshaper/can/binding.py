@@ -7,9 +7,11 @@ from cantools.database.can import Message
 
 from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
 from canshaper.can.database import Messages
-from canshaper.can.inputs import BoundLever, BoundStop
+from canshaper.can.inputs import BoundFeedback, BoundInput, BoundLever, BoundRadius, BoundStop
+from canshaper.can.j1939 import CLAIMED, REQUEST, group_of
+from canshaper.can.layout import is_j1939
 from canshaper.can.load import BusLoad, bus_load
-from canshaper.can.signals import radius_range, status_faults
+from canshaper.can.signals import status_faults
 from canshaper.can.socketcan import Ids
 from canshaper.can.valve import ValveCodec
 from canshaper.can.valves import ValveBinder
@@ -31,14 +33,12 @@ class BoundRadial:
     """Radial compensation with the message of its radius, where that is measured."""
 
     config: RadialConfig
-    message: Message | None
+    radius: BoundRadius | None
 
     @property
     def key(self) -> tuple[str, int, bool] | None:
         """Where the frames of the radius are found."""
-        if self.message is None or self.config.radius is None:
-            return None
-        return self.config.radius.bus, self.message.frame_id, self.message.is_extended_frame
+        return self.radius.key if self.radius else None
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ class BoundAxis:
     status: AxisStatusCodec | None
     status_ticks: int
     radial: BoundRadial | None = None
+    feedback: BoundFeedback | None = None
 
 
 @dataclass(frozen=True)
@@ -70,30 +71,41 @@ class Deployment:
     on_bus: dict[str, list[Message]]
 
     def load(self, bus: str) -> BusLoad | None:
-        """Load of a bus at its bit rate; None where that is not given.
-
-        By the messages of the deployment, and where there is one bus only, by all others of the DBC
-        files too.
-        """
+        """Load of a bus by the messages of the deployment; None where its bit rate is not given."""
         bitrate = self.config.buses[bus].bitrate
-        if bitrate is None:
-            return None
-        alone = len(self.config.buses) == 1
-        return bus_load(self.messages.all() if alone else self.on_bus.get(bus, []), bitrate)
+        return bus_load(self.on_bus.get(bus, []), bitrate) if bitrate else None
 
     def ids(self, bus: str) -> Ids:
         """Messages that matter on a bus."""
-        inputs = [*self.levers.values(), *([self.emergency_stop] if self.emergency_stop else [])]
+        inputs = [i for i in self.inputs() if i.key[0] == bus]
         radials = [a.radial.key for a in self.axes.values() if a.radial and a.radial.key]
-        taken = [i.key for i in inputs] + radials
+        taken = [i.key for i in inputs if not i.any_source] + radials
         valves = [a.valve.message.sender.key for a in self.axes.values()]
         sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
+        j1939 = self.config.buses[bus].j1939 is not None
+        groups = {group_of(i.key[1]) for i in inputs if i.any_source}
         return Ids(
             frozenset(key[1:] for key in taken if key[0] == bus),
             frozenset(key[1:] for key in sent if key[0] == bus),
             frozenset(key[1:] for key in valves if key[0] == bus),
             frozenset(self.messages.ids()),
+            frozenset(groups | ({CLAIMED << 8, REQUEST << 8} if j1939 else set())),
+            frozenset(self.sent_groups(bus)),
+            j1939,
         )
+
+    def inputs(self) -> list[BoundInput]:
+        """Levers, emergency stop and feedback of the valves."""
+        feedback = [axis.feedback for axis in self.axes.values()]
+        return [*self.levers.values(), *(i for i in (self.emergency_stop, *feedback) if i)]
+
+    def sent_groups(self, bus: str) -> set[int]:
+        """Groups of J1939 that command a valve of ours, from whatever address they come."""
+        return {
+            group_of(axis.valve.message.sender.key[1])
+            for axis in self.axes.values()
+            if axis.config.valve.bus == bus and is_j1939(axis.valve_message)
+        }
 
     def _axis_status(self) -> list[AxisStatusCodec | None]:
         return [axis.status for axis in self.axes.values()]
@@ -167,6 +179,7 @@ class _Binder(ValveBinder):
             AxisStatusCodec(status[0]) if status else None,
             status[1] if status else 0,
             self._radial((*place, "radial_compensation"), axis),
+            self.feedback((*place, "feedback"), axis.feedback) if axis.feedback else None,
         )
 
     def _radial(self, place: Place, axis: AxisConfig) -> BoundRadial | None:
@@ -189,14 +202,8 @@ class _Binder(ValveBinder):
         if radius is None:
             return BoundRadial(config, None)
         at: Place = (*place, "radius")
-        found = self.message(at, radius.bus, radius.message, takes=True)
-        signal = self.signal((*at, "signal"), found[1], radius.signal) if found else None
-        if found is None or signal is None:
-            return None
-        if why := radius_range(signal):
-            self.problems.append(found[0].problem(found[1], why))
-        self.timeout(at, radius.timeout_ms, found[1])
-        return BoundRadial(config, found[1])
+        bound = self.radius(at, radius)
+        return BoundRadial(config, bound) if bound else None
 
     def _asked_once(self, place: Place, name: str, axis: AxisConfig) -> None:
         """An axis is asked by one other at most, and by none when it asks itself."""
@@ -230,7 +237,9 @@ class _Binder(ValveBinder):
         faults = status_faults(message, codec.SIGNALS, codec.CODES)
         self.problems += [file.problem(message, fault) for fault in faults]
         ticks = self.period(file, message)
-        return (Sender(status.bus, message), ticks) if ticks else None
+        use = dict.fromkeys(codec.SIGNALS, "a signal of the status")
+        protection = self.protection(place, status, message, use)
+        return (self.sender(status.bus, message, protection), ticks) if ticks else None
 
 
 def _filter_fault(axis: AxisConfig, period_s: float) -> str | None:

@@ -15,7 +15,7 @@ import can
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.can.raw import MOST_FRAMES, RawPort
 from canshaper.can.socketcan import Ids, open_sockets
-from canshaper.config.schema import Bus
+from canshaper.config.bus import Bus
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256

@@ -8,7 +8,9 @@ from cantools.database.can import Message
 
 from canshaper.can.flags import FlaggedVelocity
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.layout import Layout
+from canshaper.can.j1939 import with_source
+from canshaper.can.layout import Layout, is_j1939
+from canshaper.can.protection import UNPROTECTED, Protection, Protector
 from canshaper.can.signals import FieldSet, VelocitySignal
 from canshaper.shaping.states import Reason, State
 
@@ -46,13 +48,30 @@ class LeverCodec:
 
 
 class Sender:
-    """A message we send: its place on the bus and its fields."""
+    """A message we send: its place on the bus and its fields.
 
-    def __init__(self, bus: str, message: Message) -> None:
+    Args:
+        bus: name of the bus.
+        message: its definition.
+        source: source address, for messages of J1939 instead of that of the DBC.
+        protection: that of its frames.
+    """
+
+    def __init__(
+        self,
+        bus: str,
+        message: Message,
+        source: int | None = None,
+        protection: Protection = UNPROTECTED,
+    ) -> None:
         self._bus = bus
         self._id = message.frame_id
+        if source is not None and is_j1939(message):
+            self._id = with_source(message.frame_id, source)
         self._extended = message.is_extended_frame
         self.fields = FieldSet(message)
+        self.protection = protection
+        self.protector = Protector(protection, Layout(message))
 
     @property
     def key(self) -> tuple[str, int, bool]:
@@ -60,8 +79,9 @@ class Sender:
         return self._bus, self._id, self._extended
 
     def frame(self, raw: dict[str, int]) -> Frame:
-        """Frame with these raw values."""
-        return Frame(self._bus, self._id, self._extended, self.fields.encode(raw))
+        """The next frame, protected, with these raw values."""
+        data = self.protector.protect({**self.fields.start, **raw})
+        return Frame(self._bus, self._id, self._extended, data)
 
 
 @dataclass(frozen=True, slots=True)

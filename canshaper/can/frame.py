@@ -38,6 +38,9 @@ class FrameFault(IntEnum):
     NOT_CONFIRMED = 15
     BUS_GONE = 16
     BUS_DOWN = 17
+    ADDRESS_LOST = 18
+    NOT_FOLLOWING = 19
+    FEEDBACK_LOST = 20
 
 
 class BusState(Enum):

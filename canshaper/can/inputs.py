@@ -2,15 +2,22 @@
 
 from dataclasses import dataclass
 
-from cantools.database.can import Message, Signal
+from cantools.database.can import Message
 
 from canshaper.can.codecs import LeverCodec
 from canshaper.can.database import DbcFile
 from canshaper.can.flags import FlaggedVelocity
-from canshaper.can.lookup import Lookup
-from canshaper.can.protection import Guard
-from canshaper.can.signals import VelocitySignal, magnitude_range, symmetrical_range
-from canshaper.config.schema import EmergencyStop, Input, Lever
+from canshaper.can.j1939 import NULL, with_source
+from canshaper.can.layout import is_j1939
+from canshaper.can.protection import Guard, Protection
+from canshaper.can.protections import ProtectionBinder
+from canshaper.can.signals import (
+    VelocitySignal,
+    magnitude_range,
+    radius_range,
+    symmetrical_range,
+)
+from canshaper.config.schema import EmergencyStop, Feedback, Input, Lever, Radius
 from canshaper.config.source import Place
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.
@@ -24,19 +31,26 @@ class BoundInput:
     config: Input
     message: Message
     codec: LeverCodec
-    counter_range: int
-    checksum: tuple[str, int] | None
+    protection: Protection
 
     @property
     def key(self) -> tuple[str, int, bool]:
-        """Where its frames are found."""
-        return self.config.bus, self.message.frame_id, self.message.is_extended_frame
+        """Where its frames are found; of J1939 with the source address, 254 for any."""
+        can_id, source = self.message.frame_id, self.config.source
+        if source is not None:
+            can_id = with_source(can_id, source)
+        return self.config.bus, can_id, self.message.is_extended_frame
+
+    @property
+    def any_source(self) -> bool:
+        """Whether it may come from any source address."""
+        return is_j1939(self.message) and self.key[1] & 0xFF == NULL
 
     def guard(self) -> Guard:
         """A new guard of its protection."""
         config = self.config
-        step = config.alive_max_step or min(USUAL_MAX_STEP, self.counter_range // 2)
-        return Guard(self.counter_range, step, self.checksum, config.qualify)
+        step = config.alive_max_step or min(USUAL_MAX_STEP, self.protection.counts // 2)
+        return Guard(self.protection, step, config.qualify)
 
 
 @dataclass(frozen=True)
@@ -54,7 +68,21 @@ class BoundStop(BoundInput):
     config: EmergencyStop
 
 
-class InputBinder(Lookup):
+@dataclass(frozen=True)
+class BoundRadius(BoundInput):
+    """A measured radius with its message."""
+
+    config: Radius
+
+
+@dataclass(frozen=True)
+class BoundFeedback(BoundInput):
+    """Feedback of a valve with its message."""
+
+    config: Feedback
+
+
+class InputBinder(ProtectionBinder):
     """Binds them, or notes every problem."""
 
     def lever(self, name: str, lever: Lever) -> BoundLever | None:
@@ -65,13 +93,11 @@ class InputBinder(Lookup):
         found = self._input(place, lever, ("enable", "reset", "anti_sway_off"), use)
         if not found:
             return None
-        file, message, counter_range, checksum = found
+        file, message, protection = found
         velocities = self._velocities(name, file, message, use)
         if len(self.problems) > before:
             return None
-        return BoundLever(
-            lever, message, LeverCodec(message, velocities), counter_range, checksum, name
-        )
+        return BoundLever(lever, message, LeverCodec(message, velocities), protection, name)
 
     def _velocities(
         self, lever: str, file: DbcFile, message: Message, use: dict[str, str]
@@ -110,14 +136,49 @@ class InputBinder(Lookup):
         found = self._input(place, stop, ("signal",), {})
         if not found or len(self.problems) > before:
             return None
-        _, message, counter_range, checksum = found
-        return BoundStop(stop, message, LeverCodec(message, []), counter_range, checksum)
+        _, message, protection = found
+        return BoundStop(stop, message, LeverCodec(message, []), protection)
+
+    def radius(self, place: Place, radius: Radius) -> BoundRadius | None:
+        """The measured radius of a radial compensation."""
+        before = len(self.problems)
+        source = radius.source
+        found = self.message(place, radius.bus, radius.message, takes=True, source=source)
+        if not found:
+            return None
+        file, message = found
+        signal = self.signal((*place, "signal"), message, radius.signal)
+        if signal and (why := radius_range(signal)):
+            self.problems.append(file.problem(message, why))
+        self.timeout(place, radius.timeout_ms, message)
+        use = {radius.signal: "signal"}
+        protection = self.input_protection(place, radius, message, use)
+        bound = BoundRadius(radius, message, LeverCodec(message, []), protection)
+        if bound.any_source:
+            text = f"missing: in the DBC {message.name} may come from any source address"
+            self.add((*place, "source"), f"{text}; the radius needs a known one")
+        return bound if len(self.problems) == before else None
+
+    def feedback(self, place: Place, feedback: Feedback) -> BoundFeedback | None:
+        """What a valve says of itself."""
+        before = len(self.problems)
+        found = self._input(place, feedback, (), {feedback.signal: "signal"})
+        if not found:
+            return None
+        file, message, protection = found
+        signal = self.signal((*place, "signal"), message, feedback.signal)
+        if signal and feedback.full is None and not signal.maximum:
+            text = f"{signal.name} has no range in the DBC; allowed is that, or full"
+            self.problems.append(file.problem(message, text))
+        if len(self.problems) > before:
+            return None
+        return BoundFeedback(feedback, message, LeverCodec(message, []), protection)
 
     def _input(
         self, place: Place, config: Input, switches: tuple[str, ...], use: dict[str, str]
-    ) -> tuple[DbcFile, Message, int, tuple[str, int] | None] | None:
-        """Message, its switches (noted in ``use``), range of its counter, place of its checksum."""
-        found = self.message(place, config.bus, config.message, takes=True)
+    ) -> tuple[DbcFile, Message, Protection] | None:
+        """Message, its switches (noted in ``use``), its protection."""
+        found = self.message(place, config.bus, config.message, takes=True, source=config.source)
         if not found:
             return None
         file, message = found
@@ -130,42 +191,16 @@ class InputBinder(Lookup):
                 self.integer((*place, key), signal)
                 self.alone((*place, key), signal, use)
                 use[signal.name] = key
-        return file, message, *self._protection(place, config, message, use)
+        return file, message, self.input_protection(place, config, message, use)
 
-    def _protection(
+    def input_protection(
         self, place: Place, config: Input, message: Message, use: dict[str, str]
-    ) -> tuple[int, tuple[str, int] | None]:
-        counter_range = 0
-        if counter := self.signal((*place, "alive_counter"), message, config.alive_counter):
-            self.integer((*place, "alive_counter"), counter, signed=False)
-            self.alone((*place, "alive_counter"), counter, use)
-            use[counter.name] = "alive_counter"
-            counter_range = 1 << counter.length
-            # Beyond half of its range a step back could not be told from a step forward.
-            if (config.alive_max_step or 0) > counter_range // 2:
-                self.add(
-                    (*place, "alive_max_step"),
-                    f"is {config.alive_max_step}, allowed is up to {counter_range // 2}:"
-                    f" {counter.name} has {counter.length} bits",
-                )
-        if config.checksum is None:
-            return counter_range, None
-        at: Place = (*place, "checksum", "signal")
-        signal = self.signal(at, message, config.checksum.signal)
-        if signal is None:
-            return counter_range, None
-        self.alone(at, signal, use)
-        use[signal.name] = "checksum"
-        byte = _whole_byte(signal)
-        if byte is None:
-            self.add(at, f"{signal.name} is no unsigned byte of its own; allowed is one that is")
-            return counter_range, None
-        return counter_range, (config.checksum.kind, byte)
-
-
-def _whole_byte(signal: Signal) -> int | None:
-    """Number of the byte that an unsigned integer signal fills, or None."""
-    first = 0 if signal.byte_order == "little_endian" else 7
-    if signal.is_float or signal.is_signed or signal.length != 8 or signal.start % 8 != first:
-        return None
-    return signal.start // 8
+    ) -> Protection:
+        """Protection of a message that is taken, and the largest step of its counter."""
+        protection = self.protection(place, config, message, use)
+        most = protection.counts // 2
+        # Beyond half of its range a step back could not be told from a step forward.
+        if protection.counts and (config.alive_max_step or 0) > most:
+            text = f"is {config.alive_max_step}, allowed is up to {most}: its counter has"
+            self.add((*place, "alive_max_step"), f"{text} {protection.counts} values")
+        return protection

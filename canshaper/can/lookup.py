@@ -5,7 +5,11 @@ from pathlib import Path
 
 from cantools.database.can import Message, Signal
 
+from canshaper.can.codecs import Sender
 from canshaper.can.database import DbcFile, Messages, load_dbc
+from canshaper.can.j1939 import NULL, with_source
+from canshaper.can.layout import is_j1939
+from canshaper.can.protection import Protection
 from canshaper.can.signals import find_signal, symmetrical_range
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place, Problem, Source
@@ -43,8 +47,32 @@ class Lookup:
         self.messages = Messages(files)
         return self.messages
 
+    def address(
+        self, bus: str, message: Message, *, takes: bool, source: int | None = None
+    ) -> tuple[int, bool]:
+        """Identifier of a message on a bus, and whether any source address may stand in it.
+
+        A message of J1939 that we send gets our address; one that is taken the address that is
+        asked for, else that of the DBC, where 254 means any.
+        """
+        can_id = message.frame_id
+        if not is_j1939(message):
+            return can_id, False
+        if takes:
+            source = can_id & 0xFF if source is None else source
+        else:
+            config = self.config.buses.get(bus)
+            source = config.j1939.address if config and config.j1939 else NULL
+        return with_source(can_id, source), takes and source == NULL
+
+    def sender(self, bus: str, message: Message, protection: Protection) -> Sender:
+        """A message that we send, under our address where it has one."""
+        config = self.config.buses.get(bus)
+        address = config.j1939.address if config and config.j1939 else None
+        return Sender(bus, message, address, protection)
+
     def message(
-        self, place: Place, bus: str, name: str, *, takes: bool
+        self, place: Place, bus: str, name: str, *, takes: bool, source: int | None = None
     ) -> tuple[DbcFile, Message] | None:
         """The message; noted as used on that bus, where no other part may use it."""
         if bus not in self.config.buses:
@@ -54,15 +82,16 @@ class Lookup:
             self.add((*place, "message"), found)
             return None
         message = found[1]
-        where = ".".join(str(p) for p in place)
-        key = (bus, message.frame_id, message.is_extended_frame)
+        self._check_j1939(place, bus, message, takes=takes, source=source)
+        can_id, _ = self.address(bus, message, takes=takes, source=source)
+        key = (bus, can_id, message.is_extended_frame)
         if key in self._used:
             self.add(
                 (*place, "message"),
-                f"{name} has the id {message.frame_id:#x} on bus {bus}, which is used already"
+                f"{name} has the id {can_id:#x} on bus {bus}, which is used already"
                 f" by {self._used[key]}",
             )
-        self._used[key] = where
+        self._used[key] = ".".join(str(p) for p in place)
         self.on_bus.setdefault(bus, []).append(message)
         if message.length > 8:
             self.add((*place, "message"), f"{name} has {message.length} bytes, allowed are 8")
@@ -70,6 +99,25 @@ class Lookup:
             verb = "taken from" if takes else "sent in"
             self.add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
         return found
+
+    def _check_j1939(
+        self, place: Place, bus: str, message: Message, *, takes: bool, source: int | None
+    ) -> None:
+        """Source addresses that cannot be."""
+        config = self.config.buses.get(bus)
+        own = config.j1939.address if config and config.j1939 else None
+        if not is_j1939(message):
+            if source is not None:
+                text = f"{message.name} is no message of J1939 (VFrameFormat in the DBC)"
+                self.add((*place, "source"), text)
+        elif not takes and own is None:
+            text = f"{message.name} is a message of J1939, and bus {bus} has no address for us"
+            self.add((*place, "bus"), f"{text}: allowed is one with a section j1939")
+        elif takes and own is not None:
+            can_id, _ = self.address(bus, message, takes=takes, source=source)
+            if can_id & 0xFF == own:
+                text = f"{message.name} comes from address {own}, which is ours on bus {bus}"
+                self.add((*place, "source" if source is not None else "message"), text)
 
     def signal(self, place: Place, message: Message, name: str | None) -> Signal | None:
         """The signal; None when there is none of that name, or none was asked for."""

@@ -1,68 +1,112 @@
-"""Protection of a message: checksum and alive counter, as AUTOSAR E2E and simpler schemes use them.
+"""Protection of a message: alive counter and checksum, or a profile of AUTOSAR E2E.
 
 The rule of the counter is that of E2E: a step of 1 up to a largest one is good (some were lost), 0
 is a repetition and no news, a larger one is a wrong sequence.
 """
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import reduce
 from operator import xor
+from typing import Any
 
-from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850
-
+from canshaper.can.crc8 import AUTOSAR, SAE_J1850
+from canshaper.can.e2e import COUNTER, E2e
 from canshaper.can.frame import FrameFault
-
-
-def _crc8(crc: type[Crc8Base]) -> Callable[[bytes], int]:
-    """The same CRC from a table of 256 entries: the library works bit by bit."""
-    end: int = crc.calc(b"", initvalue=0)
-    start: int = crc.calc(b"") ^ end
-    table = bytes(crc.calc(bytes([i]), initvalue=0) ^ end for i in range(256))
-
-    def check(data: bytes) -> int:
-        value = start
-        for byte in data:
-            value = table[value ^ byte]
-        return value ^ end
-
-    return check
-
+from canshaper.can.layout import Layout
 
 CHECKSUMS: dict[str, Callable[[bytes], int]] = {
     "xor": lambda data: reduce(xor, data, 0),
     "sum": lambda data: sum(data) & 0xFF,
-    "crc8_sae_j1850": _crc8(Crc8SaeJ1850),
-    "crc8_autosar": _crc8(Crc8Autosar),
+    "crc8_sae_j1850": SAE_J1850.of,
+    "crc8_autosar": AUTOSAR.of,
 }
 """Eight-bit checksums by name, over all bytes of a frame but the one that holds the checksum."""
 
 GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
 
 
-class Guard:
-    """Judges the frames of one message.
+@dataclass(frozen=True, slots=True)
+class Checksum:
+    """One of ``CHECKSUMS`` and the byte that holds it."""
+
+    kind: str
+    byte: int
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame has the checksum that it should."""
+        at = self.byte
+        return CHECKSUMS[self.kind](data[:at] + data[at + 1 :]) == data[at]
+
+    def seal(self, data: bytes, count: int) -> bytes:
+        """The same frame with its checksum; the counter is one of its signals."""
+        before, after = data[: self.byte], data[self.byte + 1 :]
+        return before + bytes((CHECKSUMS[self.kind](before + after),)) + after
+
+
+@dataclass(frozen=True, slots=True)
+class Protection:
+    """Protection of one message, as it is bound.
+
+    Attributes:
+        counter: signal of the alive counter, where it is one.
+        counts: values of the counter, be it that signal or that of E2E; 0 where there is none.
+        check: what protects the content.
+    """
+
+    counter: str | None = None
+    counts: int = 0
+    check: Checksum | E2e | None = None
+
+
+UNPROTECTED = Protection()
+
+
+class Protector:
+    """Protects the frames of one message that is sent: the next counter, and the check anew.
 
     Args:
-        counter_range: values of the alive counter; 0 where the message has none.
+        protection: that of the message.
+        layout: that of the message.
+    """
+
+    def __init__(self, protection: Protection, layout: Layout) -> None:
+        self._counter, self._counts = protection.counter, protection.counts
+        self._check = protection.check
+        self._encode = layout.encode
+        self._count = 0
+
+    def protect(self, raw: dict[str, Any]) -> bytes:
+        """The next frame.
+
+        Args:
+            raw: raw value of every signal, by name; that of the counter is changed.
+        """
+        if self._counts:
+            self._count = (self._count + 1) % self._counts
+            if self._counter is not None:
+                raw[self._counter] = self._count
+        data = self._encode(raw)
+        return data if self._check is None else self._check.seal(data, self._count)
+
+
+class Guard:
+    """Judges the frames of one message that is taken.
+
+    Args:
+        protection: that of the message.
         max_step: largest step of the counter that is still the next one.
-        checksum: name of the checksum and the byte that holds it, or None.
         qualify: good frames in a row that are needed at the start and after a wrong one.
 
     Attributes:
         qualified: whether the last frame, found good, may be used: enough have come in a row.
     """
 
-    def __init__(
-        self,
-        counter_range: int,
-        max_step: int,
-        checksum: tuple[str, int] | None,
-        qualify: int,
-    ) -> None:
-        self._range = counter_range
+    def __init__(self, protection: Protection, max_step: int, qualify: int) -> None:
+        self._range = protection.counts
         self._max_step = max_step
-        self._checksum = CHECKSUMS[checksum[0]] if checksum else None
-        self._byte = checksum[1] if checksum else 0
+        self._check = protection.check
+        self._in_header = isinstance(protection.check, E2e)
         self._qualify = qualify
         self._last: int | None = None
         self._anew = True
@@ -75,13 +119,18 @@ class Guard:
         self._qualify_anew()
 
     def judge(self, data: bytes, count: int) -> FrameFault:
-        """What is wrong with a frame of the right length whose alive counter is ``count``."""
-        if self._checksum is not None:
-            at = self._byte
-            if self._checksum(data[:at] + data[at + 1 :]) != data[at]:
-                self._qualify_anew()
-                return FrameFault.CHECKSUM
+        """What is wrong with a frame of the right length.
+
+        Args:
+            data: its bytes.
+            count: value of its alive counter; E2E has one of its own, which counts instead.
+        """
+        if self._check is not None and not self._check.right(data):
+            self._qualify_anew()
+            return FrameFault.CHECKSUM
         if self._range:
+            if self._in_header:
+                count = data[1] & COUNTER
             last, self._last = self._last, count
             anew, self._anew = self._anew, False
             if last is not None:

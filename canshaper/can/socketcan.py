@@ -8,6 +8,8 @@ import socket
 import struct
 from dataclasses import dataclass
 
+from canshaper.can.j1939 import group_mask
+
 # linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.
 CAN_RAW_ERR_FILTER = 2
 CAN_INV_FILTER = 0x20000000
@@ -18,6 +20,7 @@ ERROR_CLASSES = 0x1FFFFFFD
 # Room for the backlog of a long stall; the default holds about 300 frames.
 RECEIVE_BUFFER_BYTES = 1 << 20
 
+EFF = socket.CAN_EFF_FLAG
 _FILTER = struct.Struct("=II")
 _MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
 
@@ -31,12 +34,18 @@ class Ids:
         sent: those that we send, and nobody else may.
         valves: those of them that move something.
         known: all that the DBC files know; one that they do not know is a fault.
+        taken_groups: groups of J1939 that are taken, from whatever address.
+        sent_groups: groups that we send, and nobody else may.
+        j1939: the bus is one of J1939, where ids of 29 bits that nobody knows are daily life.
     """
 
     taken: frozenset[tuple[int, bool]]
     sent: frozenset[tuple[int, bool]]
     valves: frozenset[tuple[int, bool]]
     known: frozenset[tuple[int, bool]]
+    taken_groups: frozenset[int] = frozenset()
+    sent_groups: frozenset[int] = frozenset()
+    j1939: bool = False
 
 
 def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
@@ -79,10 +88,14 @@ def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
     others = ids.taken | ids.sent | ids.known
     if len(others) > MOST_FILTERS:
         others = ids.taken | ids.sent  # what the DBC files know besides is left to the reader
-    for one, messages, flag in zip(
-        sockets, (ids.taken, ids.sent, others), (0, 0, CAN_INV_FILTER), strict=True
+    groups = ids.taken_groups, ids.sent_groups, ids.taken_groups | ids.sent_groups
+    for one, messages, some, flag in zip(
+        sockets, (ids.taken, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
     ):
-        words = (_word_and_mask(message) for message in messages)
+        words = [_word_and_mask(message) for message in messages]
+        words += [(group | EFF, group_mask(group) | EFF) for group in some]
+        if flag and ids.j1939:
+            words.append((EFF, EFF))
         filters = b"".join(_FILTER.pack(word | flag, mask) for word, mask in words)
         one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
 

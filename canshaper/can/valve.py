@@ -8,7 +8,6 @@ from cantools.database.can import Signal
 
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame, new_frame
-from canshaper.can.layout import Layout
 from canshaper.can.signals import valve_steps
 
 
@@ -20,21 +19,15 @@ class ValveMessage:
         raw: raw value of every signal, which the axes change.
     """
 
-    def __init__(self, sender: Sender, alive_counter: Signal | None) -> None:
+    def __init__(self, sender: Sender) -> None:
         self.sender = sender
         self.raw: dict[str, Any] = dict(sender.fields.start)
         self._bus, self._id, self._extended = sender.key
-        self._layout = Layout(sender.fields.message)
-        self._alive = alive_counter.name if alive_counter else None
-        self._counter_range = 1 << alive_counter.length if alive_counter else 1
-        self._count = 0
+        self._protect = sender.protector.protect
 
     def frame(self) -> Frame:
-        """The next frame with what its axes have put in, and the alive counter counted up."""
-        raw = self.raw
-        if self._alive is not None:
-            raw[self._alive] = self._count = (self._count + 1) % self._counter_range
-        data = self._layout.encode(raw)
+        """The next frame, protected, with what its axes have put in."""
+        data = self._protect(self.raw)
         return new_frame(Frame, (self._bus, self._id, self._extended, data))
 
 

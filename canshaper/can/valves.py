@@ -5,7 +5,6 @@ from dataclasses import dataclass, field
 
 from cantools.database.can import Message, Signal
 
-from canshaper.can.codecs import Sender
 from canshaper.can.database import DbcFile
 from canshaper.can.inputs import InputBinder
 from canshaper.can.signals import (
@@ -32,9 +31,9 @@ class _Shared:
     file: DbcFile
     message: Message
     ticks: int
-    alive_counter: str | None
+    config: Valve
     codec: ValveMessage
-    use: dict[str, str] = field(default_factory=dict)
+    use: dict[str, str]
 
 
 @dataclass
@@ -77,25 +76,20 @@ class ValveBinder(InputBinder):
         if not isinstance(known, str):
             shared = self._shared.get(_key(valve, known[1]))
             if shared and shared.message is known[1]:
-                if valve.alive_counter != shared.alive_counter:
-                    self.add(
-                        (*place, "alive_counter"),
-                        f"found {valve.alive_counter!r}, allowed is that of the other axes of"
-                        f" {shared.message.name}, {shared.alive_counter!r}",
-                    )
+                for key in ("alive_counter", "checksum", "e2e"):
+                    if getattr(valve, key) != getattr(shared.config, key):
+                        text = f"differs from that of the other axes of {shared.message.name}"
+                        self.add((*place, key), f"{text}, allowed is the same")
                 return shared
         found = self.message(place, valve.bus, valve.message, takes=False)
         if not found:
             return None
         file, message = found
         ticks = self.period(file, message)
-        counter = self.signal((*place, "alive_counter"), message, valve.alive_counter)
         use: dict[str, str] = {}
-        if counter:
-            self.integer((*place, "alive_counter"), counter, signed=False)
-            use[counter.name] = "the alive counter"
-        codec = ValveMessage(Sender(valve.bus, message), counter)
-        shared = _Shared(file, message, ticks, valve.alive_counter, codec, use)
+        protection = self.protection(place, valve, message, use)
+        codec = ValveMessage(self.sender(valve.bus, message, protection))
+        shared = _Shared(file, message, ticks, valve, codec, use)
         self._shared[_key(valve, message)] = shared
         return shared
 

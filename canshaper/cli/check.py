@@ -47,4 +47,4 @@ def _load(deployment: Deployment, bus: str) -> str:
         return ", no bitrate given, so its load is not known"
     rate = (deployment.config.buses[bus].bitrate or 0) / 1000
     warning = " - WARNING: above 50 %, frames will wait for others" if load.share > BUSY else ""
-    return f", {load.messages} cyclic messages load {load.share:.0%} of {rate:g} kbit/s{warning}"
+    return f", its {load.messages} messages load {load.share:.0%} of {rate:g} kbit/s{warning}"

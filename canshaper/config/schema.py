@@ -1,41 +1,26 @@
 """Schema of the deployment file. Unknown keys are errors; every number has a range and a unit."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from canshaper.config.bus import Bus
 from canshaper.config.filters import Filter
+from canshaper.config.protection import Protected
 from canshaper.config.section import Section, number
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS_OF_SWAY
 from canshaper.shaping.sway import SwayMode
 
 
-class Bus(Section):
-    """A CAN bus, in the words of python-can."""
-
-    interface: str = Field(description="python-can interface, such as socketcan")
-    channel: str = Field(description="channel of the interface, such as can0")
-    bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
-    """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
-
-
-class Checksum(Section):
-    """Checksum of a message, over all its bytes but the one that holds it."""
-
-    signal: str = Field(description="signal that holds it: 8 bits that fill a byte")
-    kind: Literal["xor", "sum", "crc8_sae_j1850", "crc8_autosar"] = Field(
-        description="how it is computed"
-    )
-
-
-class Input(Section):
+class Input(Protected):
     """A message that is taken, with its age limit and its protection."""
 
-    bus: str = Field(description="name of the bus the message arrives on")
-    message: str = Field(description="message in the DBC files")
+    source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
+        None
+    )
+    """By default that of the DBC, where 254 means any: then the first that is heard."""
     timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
-    alive_counter: str | None = Field(None, description="signal counted up with every message")
     alive_max_step: (
         Annotated[
             int, number(1, 255, "", "largest step of the alive counter that is still the next one")
@@ -43,7 +28,6 @@ class Input(Section):
         | None
     ) = None
     """3, or half of the counter's range where that is less."""
-    checksum: Checksum | None = None
     qualify: Annotated[
         int, number(1, 20, "messages", "good ones in a row that are needed after a wrong one")
     ] = 1
@@ -103,11 +87,9 @@ class DirectionCodes(Section):
         return self
 
 
-class Valve(Section):
+class Valve(Protected):
     """Valve command message of an axis; its GenMsgCycleTime is the period it is sent at."""
 
-    bus: str = Field(description="name of the bus the message is sent on")
-    message: str = Field(description="message in the DBC files")
     signal: str = Field(description="signal with the command; its DBC range is full command")
     direction: DirectionCodes | None = None
     """Only where the command has no sign of its own."""
@@ -115,14 +97,27 @@ class Valve(Section):
     timeout_ms: Annotated[
         int, number(10, 5000, "ms", "silence after which the valve closes by itself")
     ]
-    alive_counter: str | None = Field(None, description="signal counted up with every message")
 
 
-class Status(Section):
+class Feedback(Input):
+    """What a valve says of itself: estimated flow, or position of the spool."""
+
+    signal: str = Field(
+        description="signal with the flow or position, its sign that of the command"
+    )
+    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
+    full: Annotated[float, number(1e-3, 1e6, "", "its value at full command")] | None = None
+    """By default the end of its DBC range."""
+    tolerance_pct: Annotated[
+        float, number(1, 100, "% of full", "how far it may be from what was commanded")
+    ] = 20.0
+    settle_ms: Annotated[
+        int, number(20, 2000, "ms", "how long the valve, and its message, may take to follow")
+    ] = 500
+
+
+class Status(Protected):
     """A status message for displays and tools."""
-
-    bus: str = Field(description="name of the bus the message is sent on")
-    message: str = Field(description="message in the DBC files")
 
 
 class Sway(Section):
@@ -171,11 +166,9 @@ class Sway(Section):
         )
 
 
-class Radius(Section):
+class Radius(Input):
     """Radius of the tip, measured."""
 
-    bus: str = Field(description="name of the bus the message arrives on")
-    message: str = Field(description="message in the DBC files")
     signal: str = Field(description="signal with the radius in m")
     timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
 
@@ -256,6 +249,7 @@ class AxisConfig(Section):
 
     stick: Stick = Field(description="the stick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")
+    feedback: Feedback | None = None
     status: Status | None = None
     sway: Sway | None = None
     filter: Filter = Field(discriminator="kind", description="filter of the axis")

@@ -15,6 +15,7 @@ MOST_NODES = 50_000
 _TAG = "tag:yaml.org,2002:"
 _SCALARS = frozenset(_TAG + t for t in ("str", "int", "float", "bool", "null", "timestamp"))
 _WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})")
+_HEX = re.compile(r"0x[0-9a-fA-F]{1,8}")
 _DECIMAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 
@@ -142,6 +143,8 @@ def _scalar(node: yaml.ScalarNode) -> str | int | float | bool | None:
         return text.lower() == "true"
     if plain and _WHOLE.fullmatch(text):
         return int(text)
+    if plain and _HEX.fullmatch(text):
+        return int(text, 16)
     if plain and (_DECIMAL.fullmatch(text) or _NOT_FINITE.fullmatch(text)):
         return float(text.lower().replace(".inf", "inf").replace(".nan", "nan"))
     return text

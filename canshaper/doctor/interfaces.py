@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from canshaper.config.schema import Bus
+from canshaper.config.bus import Bus
 from canshaper.doctor.finding import Finding, Level
 
 # Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands

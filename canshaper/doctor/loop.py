@@ -11,7 +11,7 @@ from typing import Any
 from canshaper.can.binding import Deployment, load_deployment
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
-from canshaper.service.controller import Controller
+from canshaper.service.controller import Controller, Event
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory
 
@@ -93,8 +93,9 @@ class Loop:
 
     def _housekeeping(self, now_ns: int) -> None:
         for event in self._controller.events:
-            t = event.transition
-            self._events.append((event.axis, t.new.name, t.reason.name))
+            if isinstance(event, Event):
+                t = event.transition
+                self._events.append((event.axis, t.new.name, t.reason.name))
         self._controller.events.clear()
         self._moved |= {n for n, runner in self._controller.axes.items() if runner.axis.raw}
         self._collector.pause(now_ns)

@@ -8,8 +8,11 @@ from dataclasses import dataclass
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.inputs import BoundInput
+from canshaper.service.feedback import Feedback, Following
 from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
+from canshaper.service.network import AddressEvent, Network
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
 from canshaper.shaping.states import Reason, Transition
@@ -18,6 +21,11 @@ from canshaper.shaping.states import Reason, Transition
 # than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
 LATE_WEIGHT = 5
 LATE_LIMIT = 50
+FAULT_OF = {
+    Following.NO: FrameFault.NOT_FOLLOWING,
+    Following.LOST: FrameFault.FEEDBACK_LOST,
+}
+NOWHERE: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,6 +34,28 @@ class Event:
 
     axis: str
     transition: Transition
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        t = self.transition
+        return f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackEvent:
+    """The feedback of a valve says something else than before."""
+
+    axis: str
+    following: Following
+    value: float
+    sent: float
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        found = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
+        return f"axis={self.axis} valve={self.following.value} {found}"
 
 
 class Counters:
@@ -75,19 +105,27 @@ class Controller:
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.counters = Counters()
-        self.events: list[Event] = []
+        self.events: list[Event | AddressEvent | FeedbackEvent] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
-        self._inputs: dict[tuple[str, int, bool], Input | RadiusInput] = {
-            lever.key: levers[name] for name, lever in deployment.levers.items()
-        }
+        taken: list[tuple[BoundInput, Input]] = [
+            (lever, levers[name]) for name, lever in deployment.levers.items()
+        ]
         self._stop: EmergencyStopInput | None = None
         if stop := deployment.emergency_stop:
             self._stop = EmergencyStopInput(stop, stop.config.signal)
-            self._inputs[stop.key] = self._stop
+            taken.append((stop, self._stop))
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
             name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
             for name, bound in deployment.axes.items()
+        }
+        taken += [
+            (runner.bound.feedback, runner.feedback)
+            for runner in self.axes.values()
+            if runner.bound.feedback and runner.feedback
+        ]
+        self._inputs: dict[tuple[str, int, bool], Input | RadiusInput] = {
+            bound.key: one for bound, one in taken
         }
         self._sent = {
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
@@ -110,6 +148,7 @@ class Controller:
             self._by_message.setdefault(key, []).append(runner)
         for runners in self._by_message.values():
             runners[-1].sends = True  # when all axes of the message have moved
+        self._network = Network(deployment, self.axes, taken)
         self._last = -1  # number of the last deadline
         self._late = 0
         self._overrun = False
@@ -129,7 +168,9 @@ class Controller:
             fault = FrameFault.SECOND_SENDER
             for runner in self._by_message.get(key, ()):
                 runner.contested_ns = now_ns
-        elif key[1:] in self._others:
+        elif frame.extended and (group := self._network.entry(key[0], key[1])):
+            fault = group.receive(frame, now_ns)
+        elif key[1:] in self._others or (frame.extended and key[0] in self._network.nodes):
             return
         else:
             fault = FrameFault.UNKNOWN_ID
@@ -156,24 +197,46 @@ class Controller:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
         overrun = self._overruns(missed)
         changed = []
+        silent = self._network.silent if self._network.nodes else NOWHERE
         for name, runner in self._order:
             if passed := _passed(last, now, runner.bound.period_ticks):
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
-                if runner.sends:
+                if runner.sends and runner.bound.config.valve.bus not in silent:
                     yield runner.bound.valve.message.frame()
+                if runner.feedback is not None:
+                    self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:
                     self.events.append(Event(name, transition))
                     changed.append(runner)
+        yield from self._statuses(changed, last, now, silent)
+        if self._network.nodes:
+            yield from self._network.frames(now_ns)
+            self.events += self._network.changes()
+
+    def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
+        """Tell when the valve no longer does what it is told, and when it does again."""
+        sent = runner.axis.sent
+        if feedback.check(sent, now_ns):
+            self.events.append(FeedbackEvent(name, feedback.following, feedback.value, sent))
+            if fault := FAULT_OF.get(feedback.following):
+                self.counters.add(fault)
+
+    def _statuses(
+        self, changed: list[AxisRunner], last: int, now: int, silent: frozenset[str]
+    ) -> Iterator[Frame]:
+        """Status of the axes that changed and of all that are due, and of the service."""
         for runner in self.axes.values():
             if runner in changed or _passed(last, now, runner.bound.status_ticks):
                 frame = runner.status_frame()
-                if frame:
+                if frame and frame.bus not in silent:
                     yield frame
         service = self.deployment.status
         if service and _passed(last, now, self.deployment.status_ticks):
-            yield service.frame(self.counters.status())
+            frame = service.frame(self.counters.status())
+            if frame.bus not in silent:
+                yield frame
 
     def _overruns(self, missed: int) -> bool:
         """Whether so many ticks came late that the filter no longer does what it was tuned for."""
@@ -205,7 +268,8 @@ class Controller:
         """A neutral frame for every valve: the last thing sent."""
         for runner in self.axes.values():
             runner.bound.valve.put(0)
-        return [runners[-1].bound.valve.message.frame() for runners in self._by_message.values()]
+        frames = (runners[-1].bound.valve.message.frame() for runners in self._by_message.values())
+        return [frame for frame in frames if frame.bus not in self._network.silent]
 
 
 def _passed(last: int, now: int, period: int) -> int:

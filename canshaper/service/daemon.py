@@ -9,7 +9,8 @@ from types import FrameType
 from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port, open_port
 from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.config.schema import Bus, Input
+from canshaper.config.bus import Bus
+from canshaper.config.schema import Input
 from canshaper.config.source import DeploymentError
 from canshaper.service.controller import Controller
 from canshaper.service.loop import run_at_deadlines
@@ -101,14 +102,7 @@ class Daemon:
         controller = self._controller
         self._manager.ping(now_ns)
         for event in controller.events:
-            t = event.transition
-            log.info(
-                "axis=%s state=%s from=%s reason=%s",
-                event.axis,
-                t.new.name,
-                t.old.name,
-                t.reason.name,
-            )
+            log.info("%s", event.text)
         controller.events.clear()
         for name, port in self._ports.items():
             if port.state is not self._bus_states[name]:

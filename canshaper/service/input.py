@@ -22,7 +22,7 @@ class Input:
     def __init__(self, bound: BoundInput) -> None:
         self._codec = bound.codec
         self._guard = bound.guard()
-        self._counter = bound.config.alive_counter
+        self._counter = bound.protection.counter
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
         self._heard_ns: int | None = None
         self._refused_ns: int | None = None

@@ -4,8 +4,11 @@ import math
 
 from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
+from canshaper.service.claim import ClaimState
+from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
 from canshaper.service.lever import LeverInput
+from canshaper.service.node import Node
 from canshaper.service.radius import RadiusInput
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.radial import RadialCompensation
@@ -27,6 +30,8 @@ class AxisRunner:
         contested_ns: when a frame of another sender with the id of this valve was last seen.
         added: velocity that another axis asks of this one, fraction of full speed.
         sends: the message of its valve goes out when this axis has moved.
+        feedback: what the valve says of itself, where it does.
+        node: our node on the bus of its valve, where that is one of J1939.
         compensator: what this axis asks of another one, where it slews.
     """
 
@@ -60,6 +65,8 @@ class AxisRunner:
         self.contested_ns: int | None = None
         self.added = 0.0
         self.sends = False
+        self.node: Node | None = None
+        self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
         self.compensator: Compensator | None = None
 
     def tick(
@@ -94,6 +101,11 @@ class AxisRunner:
                 trip = trip or Reason.SECOND_SENDER
             else:
                 self.contested_ns = None
+        if self.node is not None:
+            if self.node.state is ClaimState.LOST:
+                trip = trip or Reason.ADDRESS_LOST
+            elif self.node.state is ClaimState.WAITING:
+                return StickInput(fault=Reason.ADDRESS_NOT_CLAIMED, trip=trip)
         if emergency is not None and (stop := emergency.stop(now_ns, since_ns)):
             if stop is Reason.EMERGENCY_STOP or not self.axis.neutral:
                 trip = trip or stop

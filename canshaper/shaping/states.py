@@ -55,6 +55,7 @@ class Reason(IntEnum):
     STICK_FROZEN = 39
     STICK_UNTRUSTED = 40
     LOOP_OVERRUN = 41
+    ADDRESS_NOT_CLAIMED = 42
     # Neutral at once, latched.
     ENABLE_LOST = 64
     OUTPUT_INVALID = 65
@@ -63,6 +64,7 @@ class Reason(IntEnum):
     EMERGENCY_STOP = 68
     EMERGENCY_STOP_LOST = 69
     SECOND_SENDER = 70
+    ADDRESS_LOST = 71
 
 
 class StickInput(NamedTuple):

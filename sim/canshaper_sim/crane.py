@@ -220,6 +220,11 @@ class Crane:
         """The axes that are held by an end stop just now."""
         return tuple(name for name, axis in self._axes.items() if axis.at_stop)
 
+    def opening(self, axis: str) -> float:
+        """How far the valve of an axis is open, -1 .. 1; 0 for an axis that has none."""
+        moved = self._axes.get(axis)
+        return moved.valve.speed if moved else 0.0
+
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.
 

@@ -6,37 +6,27 @@ from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput, BoundLever, BoundStop
-from canshaper.can.protection import CHECKSUMS
 from canshaper_sim.axes import JOINT_AXES, SLEW
 from canshaper_sim.strokes import Script
 
+# Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
+JOYSTICK_ADDRESS = 0x33
+
 
 class _Message:
-    """A message with its alive counter and its checksum."""
+    """A message with its protection."""
 
     def __init__(self, bound: BoundInput) -> None:
         config = bound.config
         self.cycle_ms = bound.message.cycle_time or 20
-        self._sender = Sender(config.bus, bound.message)
-        self._alive = config.alive_counter
-        self._range = bound.counter_range
-        self._checksum = bound.checksum
-        self._count = 0
+        # Of J1939 from the address that is asked for.
+        source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
+        self._sender = Sender(config.bus, bound.message, source, bound.protection)
         self._base: dict[str, int] = {}
 
     def frame(self, script: Script, time_s: float) -> Frame:
         """The next frame, at a time of the script."""
-        raw = {**self._base, **self.sticks(script, time_s)}
-        if self._alive:
-            self._count = (self._count + 1) % self._range
-            raw[self._alive] = self._count
-        frame = self._sender.frame(raw)
-        if self._checksum is None:
-            return frame
-        kind, at = self._checksum
-        data = bytearray(frame.data)
-        data[at] = CHECKSUMS[kind](frame.data[:at] + frame.data[at + 1 :])
-        return frame._replace(data=bytes(data))
+        return self._sender.frame({**self._base, **self.sticks(script, time_s)})
 
     def sticks(self, script: Script, time_s: float) -> dict[str, int]:
         """Raw values that the script moves."""

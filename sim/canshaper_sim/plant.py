@@ -1,11 +1,14 @@
 """The crane as a node on CAN: valve frames in, feedback frames out. No clock, no sockets."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from typing import Any
 
 from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
+from canshaper.can.inputs import USUAL_MAX_STEP, BoundFeedback
+from canshaper.can.protection import Guard
 from canshaper.can.signals import find_signal
 from canshaper.can.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
@@ -27,28 +30,63 @@ JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
 }
 
+# Source address of the valves on J1939; 0x80 to 0x8F are what a maker uses.
+VALVE_ADDRESS = 0x80
+
 
 class _ValveInput:
-    """Commands for one valve, and how old the last one is."""
+    """Commands for one valve, and how old the last one is.
+
+    A frame whose protection is wrong is passed over: the valve closes when no right one comes.
+    """
 
     def __init__(self, axis: str, deployment: Deployment) -> None:
         bound = deployment.axes[axis]
         self.axis = axis
         self._message = bound.valve_message
         self._codec: ValveCodec = bound.valve
+        protection = bound.valve.message.sender.protection
+        self._counter = protection.counter
+        self._guard = Guard(protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1)
         self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0
 
     def receive(self, data: bytes) -> None:
         """Take a command; what is none (wrong length, no velocity) closes the valve."""
-        self.age_s = 0.0
-        self.command = 0.0
+        steps = None
         if len(data) == self._message.length:
-            raw = self._message.decode(data, decode_choices=False, scaling=False)
-            steps = self._codec.read(raw)  # type: ignore[arg-type]
-            if steps is not None:
-                self.command = steps / self._codec.steps
+            raw: Any = self._message.decode(data, decode_choices=False, scaling=False)
+            if self.age_s >= self.timeout_s:
+                self._guard.begin_anew()
+            if self._guard.judge(data, raw[self._counter] if self._counter else 0):
+                return
+            steps = self._codec.read(raw)
+        self.age_s = 0.0
+        self.command = 0.0 if steps is None else steps / self._codec.steps
+
+
+class _ValveFeedback:
+    """What a valve says of itself: how far it is open, each cycle of its message."""
+
+    def __init__(self, axis: str, bound: BoundFeedback) -> None:
+        config = bound.config
+        source = VALVE_ADDRESS if bound.any_source else bound.key[1] & 0xFF
+        self._axis = axis
+        self._signal = config.signal
+        signal = find_signal(bound.message, config.signal)
+        self._full = config.full or float((signal.maximum if signal else None) or 0.0)
+        self._sender = Sender(config.bus, bound.message, source, bound.protection)
+        self._cycle_s = (bound.message.cycle_time or 100) / 1000.0
+        self._left_s = self._cycle_s
+
+    def frames(self, crane: Crane, passed_s: float) -> Iterator[Frame]:
+        """The frame, when it is due after so much more time."""
+        self._left_s -= passed_s
+        if self._left_s <= 1e-9:
+            self._left_s += self._cycle_s
+            value = self._full * crane.opening(self._axis)
+            yield self._sender.frame({self._signal: self._sender.fields.raw(self._signal, value)})
 
 
 class PlantNode:
@@ -89,6 +127,12 @@ class PlantNode:
         if problems:
             raise DeploymentError(problems)
         self._machine = build_machine(name, parameters, sway)
+        self._valve_feedback = [
+            _ValveFeedback(axis, bound.feedback)
+            for axis, bound in deployment.axes.items()
+            if bound.feedback
+        ]
+        self._passed_s = 0.0
         inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
         self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
         for valve in inputs:
@@ -107,6 +151,7 @@ class PlantNode:
 
     def advance(self, dt_s: float) -> None:
         """Let time pass with the last commands held, as long as the valves hold them."""
+        self._passed_s += dt_s
         commands = {}
         for valve in (one for shared in self._valves.values() for one in shared):
             if valve.age_s >= valve.timeout_s:
@@ -116,7 +161,7 @@ class PlantNode:
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
-        """Pose, speeds and sway as frames."""
+        """What the valves say of themselves, pose, speeds and sway as frames."""
         state = self.crane.state
         values: dict[str, tuple[float, ...]] = {
             "TipPosition": (_heading_deg(state.theta1_rad), state.radius_m, state.height_m),
@@ -134,6 +179,9 @@ class PlantNode:
             sender = self._senders[name]
             raw = {s: sender.fields.raw(s, v) for s, v in zip(signals, values[name], strict=True)}
             frames.append(sender.frame(raw))
+        for valve in self._valve_feedback:
+            frames += valve.frames(self.crane, self._passed_s)
+        self._passed_s = 0.0
         return frames
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundLever
+from canshaper.can.j1939 import NULL, with_source
 from canshaper.report.recording import AxisTrace, Recording
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
@@ -79,7 +80,9 @@ class Recorder:
 
     def receive(self, frame: Frame, time_s: float) -> None:
         """Take a frame seen at this time (any origin, increasing)."""
-        entry = self._handlers.get((frame.bus, frame.can_id, frame.extended))
+        entry = self._handlers.get(frame[:3])
+        if entry is None and frame.extended:  # of J1939, from any address
+            entry = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         if entry is None:
             return
         handler, message = entry

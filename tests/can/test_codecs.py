@@ -18,6 +18,7 @@ from canshaper.can.codecs import (
     WrongLengthError,
 )
 from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.protection import UNPROTECTED, Protection
 from canshaper.can.signals import FieldSet, VelocitySignal
 from canshaper.can.valve import ValveCodec, ValveMessage
 from canshaper.shaping.states import Reason, State
@@ -79,7 +80,8 @@ def lever(message: str) -> LeverCodec:
 def valve(message: str, counter: str | None = None) -> ValveCodec:
     definition = custom.get_message_by_name(message)
     count = signal(definition, counter) if counter else None
-    shared = ValveMessage(Sender("b", definition), count)
+    protection = Protection(count.name, 1 << count.length) if count else UNPROTECTED
+    shared = ValveMessage(Sender("b", definition, protection=protection))
     return ValveCodec(shared, signal(definition, "Velocity"))
 
 

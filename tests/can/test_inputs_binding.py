@@ -7,6 +7,7 @@ import pytest
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import FrameFault
+from canshaper.can.protection import UNPROTECTED, Checksum, Protection
 from canshaper.service.controller import Controller
 
 COUNTER = "alive_counter: AliveCounter"
@@ -72,7 +73,7 @@ def stop(machine: Machine, text: str) -> int:
 def test_a_lever_without_protection(machine: Machine) -> None:
     machine.in_yaml(COUNTER, "")
     bound = machine.load().levers["left"]
-    assert (bound.counter_range, bound.checksum) == (0, None)
+    assert bound.protection == UNPROTECTED
     config = bound.config
     assert (config.alive_max_step, config.qualify, config.frozen_s) == (None, 1, 20.0)
 
@@ -88,8 +89,8 @@ def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
     )
     deployment = protected.load()
     left, right = deployment.levers.values()
-    assert (left.counter_range, left.checksum) == (256, (kind, 6))
-    assert (right.counter_range, right.checksum) == (256, None)
+    assert left.protection == Protection("AliveCounter", 256, Checksum(kind, 6))
+    assert right.protection == Protection("AliveCounter", 256)
     Controller(deployment)
 
 
@@ -100,7 +101,7 @@ def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
 def test_a_checksum_in_either_byte_order(protected: Machine, signal: str, byte: int) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|255] "" SHAPER\n')
     lever(protected, "checksum: { signal: Check, kind: xor }")
-    assert protected.load().levers["left"].checksum == ("xor", byte)
+    assert protected.load().levers["left"].protection.check == Checksum("xor", byte)
 
 
 @pytest.mark.parametrize(
@@ -138,7 +139,7 @@ def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
         ),
         (
             "alive_max_step: 129",
-            "levers.left.alive_max_step: is 129, allowed is up to 128: AliveCounter has 8 bits",
+            "levers.left.alive_max_step: is 129, allowed is up to 128: its counter has 256 values",
         ),
         ("alive_max_step: 0", "levers.left.alive_max_step: found 0, allowed is a whole number,"),
         ("alive_max_step: 256", "levers.left.alive_max_step: found 256, allowed is a whole"),
@@ -162,7 +163,7 @@ def test_what_a_lever_may_not_say(protected: Machine, text: str, says: str) -> N
 def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, usual: int) -> None:
     protected.in_yaml(COUNTER, f"alive_counter: {counter}")
     bound = protected.load().levers["left"]
-    for step in range(1, bound.counter_range):
+    for step in range(1, bound.protection.counts):
         guard = bound.guard()
         assert guard.judge(b"", 0) is FrameFault.NONE
         wanted = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
@@ -180,7 +181,9 @@ def test_a_step_is_at_most_half_of_the_counters_range(
     assert protected.load().levers["left"].config.alive_max_step == most
     protected.in_yaml(f"alive_max_step: {most}", f"alive_max_step: {most + 1}")
     (problem,) = protected.problems()
-    assert f"is {most + 1}, allowed is up to {most}: {counter} has" in problem
+    values = {1: 2, 2: 4, 8: 16, 128: 256}[most]
+    wanted = f"is {most + 1}, allowed is up to {most}: its counter has {values} values"
+    assert wanted in problem
 
 
 @pytest.mark.parametrize("key", ["checksum", "alive_counter"])
@@ -249,7 +252,7 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
     bound = deployment.emergency_stop
     assert bound is not None
     assert bound.key == ("crane", 0x40, False)
-    assert (bound.counter_range, bound.checksum) == (16, ("crc8_autosar", 2))
+    assert bound.protection == Protection("Count", 16, Checksum("crc8_autosar", 2))
     assert (0x40, False) in deployment.ids("crane").taken
     Controller(deployment)
 
@@ -276,7 +279,7 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
         (f"{STOP}, alive_counter: Force", "emergency_stop.alive_counter: Force is a float"),
         (
             f"{STOP}, alive_counter: Count, alive_max_step: 9",
-            "emergency_stop.alive_max_step: is 9, allowed is up to 8: Count has 4 bits",
+            "emergency_stop.alive_max_step: is 9, allowed is up to 8: its counter has 16 values",
         ),
         (
             f"{STOP}, checksum: {{ signal: Count, kind: xor }}",

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.can.frame import FrameFault
-from canshaper.can.protection import CHECKSUMS, Guard
+from canshaper.can.protection import CHECKSUMS, Checksum, Guard, Protection
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
@@ -19,7 +19,9 @@ BODY = bytes(range(1, 8))
 def guard(
     bits: int = 8, max_step: int = 3, qualify: int = 1, checksum: tuple[str, int] | None = None
 ) -> Guard:
-    return Guard(1 << bits if bits else 0, max_step, checksum, qualify)
+    check = Checksum(*checksum) if checksum else None
+    counts = 1 << bits if bits else 0
+    return Guard(Protection("C" if bits else None, counts, check), max_step, qualify)
 
 
 def faults(judge: Guard, *counts: int) -> list[FrameFault]:

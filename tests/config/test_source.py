@@ -141,7 +141,10 @@ def test_every_double_key_is_told_with_its_first_line(problems: Problems) -> Non
         ("20", 20),
         ("-3", -3),
         ("010", 10.0),  # a float: no whole number is taken for the octal 8
-        ("0x10", "0x10"),
+        ("0x10", 16),
+        ("0xFf", 255),
+        ("0x", "0x"),
+        ("-0x10", "-0x10"),
         ("1_000", "1_000"),
         ("1:30", "1:30"),
         ("1.5", 1.5),

@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.schema import Bus
+from canshaper.config.bus import Bus
 from canshaper.doctor import interfaces
 from canshaper.doctor.finding import Finding, Level
 from canshaper.doctor.interfaces import (

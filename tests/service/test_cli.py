@@ -67,7 +67,7 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
     assert result.stderr == ""
     assert result.stdout.splitlines() == [
         f"{SHIPPED}: good",
-        "  bus crane: socketcan vcan0, 14 cyclic messages load 24% of 250 kbit/s",
+        "  bus crane: socketcan vcan0, its 9 messages load 12% of 250 kbit/s",
         "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
         "  axis near_far: LeverLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
         "  axis lift: LeverRight.Lift -> off -> LiftCommand.Velocity every 20 ms",

@@ -1,0 +1,78 @@
+"""Identifiers of J1939: parameter groups, source addresses, and the NAME of a node.
+
+An identifier is priority (3 bits), data page and extended data page (2), PDU format PF (8), PDU
+specific PS (8), source address SA (8). Below PF 240 PS is the destination, from 240 on a part of
+the group (SAE J1939-21). Here a *group* is an identifier without priority and source, and without
+destination where there is one.
+"""
+
+from canshaper.config.bus import J1939Name
+
+GLOBAL = 0xFF  # as destination: everybody
+NULL = 0xFE  # as source: a node without an address; in DBC files: any
+DEFAULT_PRIORITY, LOWEST_PRIORITY = 6, 7
+
+REQUEST = 0xEA00  # PGN 59904
+CLAIMED = 0xEE00  # PGN 60928, address claimed or cannot claim
+ACKNOWLEDGE = 0xE800  # PGN 59392
+TRANSPORT = 0xEC00  # PGN 60416, connection management
+TRANSPORT_DATA = 0xEB00  # PGN 60160
+DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
+
+_PAGES_AND_FORMAT = 0x03FF0000
+_GROUP_OF_PDU2 = 0x03FFFF00
+
+
+def group_mask(can_id: int) -> int:
+    """Bits of an identifier that tell its group."""
+    return _GROUP_OF_PDU2 if (can_id >> 16) & 0xFF >= 240 else _PAGES_AND_FORMAT
+
+
+def group_of(can_id: int) -> int:
+    """Group of an identifier of 29 bits."""
+    return can_id & group_mask(can_id)
+
+
+def identifier(
+    pgn: int, source: int, destination: int = GLOBAL, priority: int = DEFAULT_PRIORITY
+) -> int:
+    """Identifier of a message.
+
+    Args:
+        pgn: parameter group number.
+        source: source address.
+        destination: only for groups that have one.
+        priority: 0 to 7, the lower the sooner.
+    """
+    specific = 0 if (pgn >> 8) & 0xFF >= 240 else destination << 8
+    return priority << 26 | pgn << 8 | specific | source
+
+
+def with_source(can_id: int, source: int) -> int:
+    """The same message from another address."""
+    return can_id & ~0xFF | source
+
+
+def name_bytes(name: J1939Name) -> bytes:
+    """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
+
+    The bit for a node that may choose another address stays 0: our address is the one that
+    valves are told to listen to.
+    """
+    fields = (
+        (name.identity_number, 21),
+        (name.manufacturer_code, 11),
+        (name.ecu_instance, 3),
+        (name.function_instance, 5),
+        (name.function, 8),
+        (0, 1),
+        (name.vehicle_system, 7),
+        (name.vehicle_system_instance, 4),
+        (name.industry_group, 3),
+        (0, 1),
+    )
+    value = at = 0
+    for number, bits in fields:
+        value |= number << at
+        at += bits
+    return value.to_bytes(8, "little")

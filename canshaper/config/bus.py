@@ -1,0 +1,46 @@
+"""Schema of the buses of a deployment, and of our node on them."""
+
+from typing import Annotated
+
+from pydantic import Field
+
+from canshaper.config.section import Section, number
+
+# The manufacturer's own range of suspect parameter numbers ends at 524287; an axis takes two: one
+# for its commands, one for its valve.
+LAST_FIRST_SPN = 524287 - 63
+
+
+class J1939Name(Section):
+    """NAME of our node (SAE J1939-81): what tells two nodes apart, and which of them wins."""
+
+    identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of this PC")]
+    manufacturer_code: Annotated[int, number(0, 2047, "", "code that SAE gave to the maker")]
+    function: Annotated[int, number(0, 255, "", "function code")] = 129
+    """129 in industry group 2: auxiliary valve control."""
+    ecu_instance: Annotated[int, number(0, 7, "", "instance of the ECU")] = 0
+    function_instance: Annotated[int, number(0, 31, "", "instance of the function")] = 0
+    vehicle_system: Annotated[int, number(0, 127, "", "vehicle system, or device class")] = 0
+    vehicle_system_instance: Annotated[int, number(0, 15, "", "instance of that")] = 0
+    industry_group: Annotated[int, number(0, 7, "", "2 is agriculture and forestry")] = 2
+
+
+class J1939(Section):
+    """Our node on a bus of J1939 or ISO 11783."""
+
+    address: Annotated[int, number(0, 253, "", "source address of what we send")]
+    name: J1939Name = Field(description="NAME of our node")
+    first_spn: Annotated[
+        int, number(1, LAST_FIRST_SPN, "", "suspect parameter number of the first axis in DM1")
+    ] = 520192
+    """By default the first of the range that is free to every maker."""
+
+
+class Bus(Section):
+    """A CAN bus, in the words of python-can."""
+
+    interface: str = Field(description="python-can interface, such as socketcan")
+    channel: str = Field(description="channel of the interface, such as can0")
+    bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
+    """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
+    j1939: J1939 | None = None

@@ -1,0 +1,56 @@
+"""How a message is protected, taken or sent: counter and checksum, or a profile of AUTOSAR E2E."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from canshaper.config.section import Section, number
+
+
+class Checksum(Section):
+    """Checksum of a message, over all its bytes but the one that holds it."""
+
+    signal: str = Field(description="signal that holds it: 8 bits that fill a byte")
+    kind: Literal["xor", "sum", "crc8_sae_j1850", "crc8_autosar"] = Field(
+        description="how it is computed"
+    )
+
+
+class E2e(Section):
+    """Profile 1 or 2 of AUTOSAR E2E: CRC in byte 0, counter in the lower half of byte 1."""
+
+    profile: Literal["p01", "p02"] = Field(description="profile of AUTOSAR E2E")
+    data_id: Annotated[int, number(0, 0xFFFF, "", "data ID of the message, profile 1")] | None = (
+        None
+    )
+    data_id_mode: Literal["both", "low", "alternating", "nibble"] | None = None
+    """Which bytes of the data ID enter the CRC, profile 1."""
+    data_ids: (
+        Annotated[
+            list[Annotated[int, number(0, 0xFF, "", "data ID")]],
+            Field(min_length=16, max_length=16, description="data IDs by the counter, profile 2"),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        needs = {"p01": ["data_id", "data_id_mode"], "p02": ["data_ids"]}[self.profile]
+        given = [k for k in ("data_id", "data_id_mode", "data_ids") if getattr(self, k) is not None]
+        if given != needs:
+            found = " and ".join(given) or "no data ID"
+            raise ValueError(f"found {found}; profile {self.profile} needs {' and '.join(needs)}")
+        if self.data_id_mode == "nibble" and (self.data_id or 0) > 0xFFF:
+            raise ValueError(f"data_id is {self.data_id:#x}, allowed is up to 0xfff in mode nibble")
+        return self
+
+
+class Protected(Section):
+    """A message that is taken or sent, and its protection."""
+
+    bus: str = Field(description="name of the bus of the message")
+    message: str = Field(description="message in the DBC files")
+    alive_counter: str | None = Field(None, description="signal counted up with every message")
+    checksum: Checksum | None = None
+    e2e: E2e | None = None
+    """Instead of both."""

@@ -1,0 +1,108 @@
+"""J1939 on the buses of a deployment: our nodes, and messages known by their group."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from canshaper.can.binding import Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundInput
+from canshaper.can.j1939 import group_of
+from canshaper.config.bus import J1939
+from canshaper.service.claim import ClaimState
+from canshaper.service.dm1 import FMI_OF, FMI_OF_FOLLOWING
+from canshaper.service.feedback import Following
+from canshaper.service.groups import AnySource, CommandedByOthers
+from canshaper.service.input import Input
+from canshaper.service.node import GROUPS, Node
+from canshaper.service.runner import AxisRunner
+
+
+@dataclass(frozen=True, slots=True)
+class AddressEvent:
+    """Our address on a bus is claimed, or lost."""
+
+    bus: str
+    address: int
+    state: ClaimState
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"bus={self.bus} address={self.address:#04x} state={self.state.value}"
+
+
+class Network:
+    """Nodes and groups of all buses.
+
+    Args:
+        deployment: the machine.
+        axes: its axes, which are told the node on the bus of their valve.
+        taken: its inputs with their messages.
+
+    Attributes:
+        nodes: our node on each bus of J1939.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        axes: Mapping[str, AxisRunner],
+        taken: Sequence[tuple[BoundInput, Input]],
+    ) -> None:
+        buses = deployment.config.buses
+        self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
+        self._axes = axes
+        self.nodes = {name: Node(name, config) for name, config in self._configs.items()}
+        self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
+        self._groups: dict[tuple[str, int], Node | AnySource | CommandedByOthers] = {}
+        for bus, node in self.nodes.items():
+            self._groups |= {(bus, group): node for group in GROUPS}
+            there = [r for r in axes.values() if r.bound.config.valve.bus == bus]
+            for runner in there:
+                runner.node = node
+            for group in deployment.sent_groups(bus):
+                runners = [
+                    r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group
+                ]
+                self._groups[bus, group] = CommandedByOthers(runners)
+        for bound, one in taken:
+            if bound.any_source:
+                bus, config = bound.config.bus, self._configs.get(bound.config.bus)
+                own = config.address if config else None
+                timeout_ns = bound.config.timeout_ms * 1_000_000
+                self._groups[bus, group_of(bound.key[1])] = AnySource(one, timeout_ns, own)
+
+    def entry(self, bus: str, can_id: int) -> Node | AnySource | CommandedByOthers | None:
+        """Who takes a message, by its group."""
+        return self._groups.get((bus, group_of(can_id)))
+
+    @property
+    def silent(self) -> frozenset[str]:
+        """Buses on which our address is not ours: only the node itself may send there."""
+        claimed = ClaimState.CLAIMED
+        return frozenset(n for n, node in self.nodes.items() if node.state is not claimed)
+
+    def frames(self, now_ns: int) -> Iterator[Frame]:
+        """What the nodes have to send now."""
+        for bus, node in self.nodes.items():
+            yield from node.frames(self._active_faults(bus), now_ns)
+
+    def changes(self) -> Iterator[AddressEvent]:
+        """What became of our addresses since the last call."""
+        for bus, node in self.nodes.items():
+            if node.state is not self._told[bus]:
+                self._told[bus] = node.state
+                yield AddressEvent(bus, self._configs[bus].address, node.state)
+
+    def _active_faults(self, bus: str) -> list[tuple[int, int]]:
+        """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""
+        first, found = self._configs[bus].first_spn, []
+        for i, runner in enumerate(self._axes.values()):
+            if runner.bound.config.valve.bus != bus:
+                continue
+            if (fmi := FMI_OF.get(runner.axis.reason)) is not None:
+                found.append((first + 2 * i, fmi))
+            following = runner.feedback.following if runner.feedback else Following.UNKNOWN
+            if (fmi := FMI_OF_FOLLOWING.get(following)) is not None:
+                found.append((first + 2 * i + 1, fmi))
+        return found

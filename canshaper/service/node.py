@@ -1,0 +1,44 @@
+"""Our node on a bus of J1939: what it takes, and what it sends besides commands and status."""
+
+from collections.abc import Iterator, Sequence
+
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.j1939 import CLAIMED, DM1, REQUEST
+from canshaper.config.bus import J1939
+from canshaper.service.claim import AddressClaim, ClaimState
+from canshaper.service.dm1 import ActiveFaults
+
+GROUPS = (CLAIMED << 8, REQUEST << 8)
+"""Groups that a node listens to."""
+
+
+class Node:
+    """Address and active faults on one bus.
+
+    Attributes:
+        state: of our address.
+    """
+
+    def __init__(self, bus: str, config: J1939) -> None:
+        self._claim = AddressClaim(bus, config, frozenset((DM1,)))
+        self._faults = ActiveFaults(bus, config.address)
+
+    @property
+    def state(self) -> ClaimState:
+        """State of our address; in any other than CLAIMED all but the node itself is silent."""
+        return self._claim.state
+
+    def receive(self, frame: Frame, now_ns: int) -> FrameFault:
+        """Take a claim or a request; a claim that wins over ours is a fault."""
+        before = self._claim.state
+        self._claim.receive(frame, now_ns)
+        lost = self._claim.state is ClaimState.LOST and before is not ClaimState.LOST
+        return FrameFault.ADDRESS_LOST if lost else FrameFault.NONE
+
+    def frames(self, active: Sequence[tuple[int, int]], now_ns: int) -> Iterator[Frame]:
+        """What is due now; ``active`` are (SPN, FMI) of the faults that are there."""
+        yield from self._claim.frames(now_ns)
+        if self._claim.sends:
+            requested = DM1 in self._claim.requested
+            self._claim.requested.clear()
+            yield from self._faults.frames(active, now_ns, requested=requested)
