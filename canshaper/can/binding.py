@@ -5,9 +5,17 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
+from canshaper.can.canopen import EMERGENCY, HEARTBEAT
 from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
 from canshaper.can.database import Messages
-from canshaper.can.inputs import BoundFeedback, BoundInput, BoundLever, BoundRadius, BoundStop
+from canshaper.can.inputs import (
+    BoundFeedback,
+    BoundInput,
+    BoundLever,
+    BoundRadius,
+    BoundStatusWord,
+    BoundStop,
+)
 from canshaper.can.j1939 import CLAIMED, REQUEST, group_of
 from canshaper.can.layout import is_j1939
 from canshaper.can.load import BusLoad, bus_load
@@ -54,6 +62,7 @@ class BoundAxis:
     status_ticks: int
     radial: BoundRadial | None = None
     feedback: BoundFeedback | None = None
+    status_word: BoundStatusWord | None = None
 
 
 @dataclass(frozen=True)
@@ -82,6 +91,11 @@ class Deployment:
         taken = [i.key for i in inputs if not i.any_source] + radials
         valves = [a.valve.message.sender.key for a in self.axes.values()]
         sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
+        canopen = self.config.buses[bus].canopen
+        if canopen:
+            nodes = [n.id for n in canopen.nodes.values()]
+            taken += [(bus, base + n, False) for n in nodes for base in (HEARTBEAT, EMERGENCY)]
+            sent.append((bus, HEARTBEAT + canopen.node, False))
         j1939 = self.config.buses[bus].j1939 is not None
         groups = {group_of(i.key[1]) for i in inputs if i.any_source}
         return Ids(
@@ -95,9 +109,10 @@ class Deployment:
         )
 
     def inputs(self) -> list[BoundInput]:
-        """Levers, emergency stop and feedback of the valves."""
-        feedback = [axis.feedback for axis in self.axes.values()]
-        return [*self.levers.values(), *(i for i in (self.emergency_stop, *feedback) if i)]
+        """Levers, emergency stop, feedback and status words of the valves."""
+        axes = self.axes.values()
+        told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
+        return [*self.levers.values(), *(i for i in (self.emergency_stop, *told) if i)]
 
     def sent_groups(self, bus: str) -> set[int]:
         """Groups of J1939 that command a valve of ours, from whatever address they come."""
@@ -127,6 +142,7 @@ class _Binder(ValveBinder):
     def deployment(self, path: Path) -> Deployment:
         config = self.config
         self._check_buses()
+        self._check_canopen()
         messages = self.load(path.parent)
         if messages is None:
             raise DeploymentError(self.problems)
@@ -147,6 +163,22 @@ class _Binder(ValveBinder):
             service[1] if service else 0,
             self.on_bus,
         )
+
+    def _check_canopen(self) -> None:
+        """Ids of nodes are used once, by no other message."""
+        for bus, config in self.config.buses.items():
+            canopen = config.canopen
+            if canopen is None:
+                continue
+            ids = {"node": canopen.node} | {f"nodes.{n}": c.id for n, c in canopen.nodes.items()}
+            seen: dict[int, str] = {}
+            for name, number in ids.items():
+                place = ("buses", bus, "canopen", *name.split("."))
+                if number in seen:
+                    self.add(place, f"has the node id {number} of {seen[number]}")
+                seen[number] = name
+                for base in (HEARTBEAT, EMERGENCY):
+                    self.reserve(bus, base + number, f"buses.{bus}.canopen.{name}")
 
     def _check_buses(self) -> None:
         seen: dict[tuple[str, str], str] = {}
@@ -180,6 +212,9 @@ class _Binder(ValveBinder):
             status[1] if status else 0,
             self._radial((*place, "radial_compensation"), axis),
             self.feedback((*place, "feedback"), axis.feedback) if axis.feedback else None,
+            self.status_word((*place, "valve", "cia408", "status"), axis.valve.cia408.status)
+            if axis.valve.cia408
+            else None,
         )
 
     def _radial(self, place: Place, axis: AxisConfig) -> BoundRadial | None:

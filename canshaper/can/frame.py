@@ -41,6 +41,8 @@ class FrameFault(IntEnum):
     ADDRESS_LOST = 18
     NOT_FOLLOWING = 19
     FEEDBACK_LOST = 20
+    HEARTBEAT_LOST = 21
+    NODE_EMERGENCY = 22
 
 
 class BusState(Enum):

@@ -17,7 +17,7 @@ from canshaper.can.signals import (
     radius_range,
     symmetrical_range,
 )
-from canshaper.config.schema import EmergencyStop, Feedback, Input, Lever, Radius
+from canshaper.config.schema import EmergencyStop, Feedback, Input, Lever, Radius, StatusWord
 from canshaper.config.source import Place
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.
@@ -82,6 +82,13 @@ class BoundFeedback(BoundInput):
     config: Feedback
 
 
+@dataclass(frozen=True)
+class BoundStatusWord(BoundInput):
+    """Status word of a valve with its message."""
+
+    config: StatusWord
+
+
 class InputBinder(ProtectionBinder):
     """Binds them, or notes every problem."""
 
@@ -93,6 +100,7 @@ class InputBinder(ProtectionBinder):
         found = self._input(place, lever, ("enable", "reset", "anti_sway_off"), use)
         if not found:
             return None
+        self.node(place, lever.bus, lever.node)
         file, message, protection = found
         velocities = self._velocities(name, file, message, use)
         if len(self.problems) > before:
@@ -158,6 +166,25 @@ class InputBinder(ProtectionBinder):
             text = f"missing: in the DBC {message.name} may come from any source address"
             self.add((*place, "source"), f"{text}; the radius needs a known one")
         return bound if len(self.problems) == before else None
+
+    def status_word(self, place: Place, config: StatusWord) -> BoundStatusWord | None:
+        """The status word of a valve."""
+        before = len(self.problems)
+        found = self._input(place, config, ("signal",), {})
+        if not found or len(self.problems) > before:
+            return None
+        _, message, protection = found
+        return BoundStatusWord(config, message, LeverCodec(message, []), protection)
+
+    def node(self, place: Place, bus: str, name: str | None) -> None:
+        """A node of CANopen that is named has to be one of its bus."""
+        if name is None:
+            return
+        config = self.config.buses.get(bus)
+        nodes = config.canopen.nodes if config and config.canopen else {}
+        if name not in nodes:
+            text = f"found {name!r}, nodes of bus {bus} are {', '.join(nodes) or 'none'}"
+            self.add((*place, "node"), text)
 
     def feedback(self, place: Place, feedback: Feedback) -> BoundFeedback | None:
         """What a valve says of itself."""

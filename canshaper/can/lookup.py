@@ -100,6 +100,10 @@ class Lookup:
             self.add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
         return found
 
+    def reserve(self, bus: str, can_id: int, where: str) -> None:
+        """Note that an id of 11 bits is used, by something that stands in no DBC file."""
+        self._used[bus, can_id, False] = where
+
     def _check_j1939(
         self, place: Place, bus: str, message: Message, *, takes: bool, source: int | None
     ) -> None:

@@ -14,7 +14,7 @@ from canshaper.can.signals import (
     symmetrical_range,
 )
 from canshaper.can.valve import DirectionCodec, ValveCodec, ValveMessage
-from canshaper.config.schema import DirectionCodes, Valve
+from canshaper.config.schema import Cia408, DirectionCodes, Valve
 from canshaper.config.source import Place
 
 # A valve hears of a stop no sooner than with its next frame.
@@ -63,6 +63,8 @@ class ValveBinder(InputBinder):
             self._command((*place, "also", i), shared, valve, name)
             for i, name in enumerate(valve.also)
         ]
+        if valve.cia408:
+            self._control((*place, "cia408"), shared, valve, valve.cia408)
         direction = valve.direction
         codec = self._direction((*place, "direction"), shared, direction) if direction else None
         if signal is None or not ticks or len(self.problems) > before:
@@ -106,6 +108,13 @@ class ValveBinder(InputBinder):
         self.integer(place, signal)
         self._alone(place, shared, signal)
         return signal
+
+    def _control(self, place: Place, shared: _Shared, valve: Valve, config: Cia408) -> None:
+        self.node(place, valve.bus, config.node)
+        signal = self.signal((*place, "control"), shared.message, config.control)
+        if signal:
+            self.integer((*place, "control"), signal, signed=False)
+            self._alone((*place, "control"), shared, signal)
 
     def _direction(
         self, place: Place, shared: _Shared, direction: DirectionCodes

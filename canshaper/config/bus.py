@@ -36,6 +36,22 @@ class J1939(Section):
     """By default the first of the range that is free to every maker."""
 
 
+class CanopenNode(Section):
+    """Another node of CANopen that is watched."""
+
+    id: Annotated[int, number(1, 127, "", "its node id")]
+    heartbeat_ms: Annotated[int, number(20, 10_000, "ms", "longest time between its heartbeats")]
+
+
+class Canopen(Section):
+    """Our node on a bus of CANopen."""
+
+    node: Annotated[int, number(1, 127, "", "our node id")]
+    heartbeat_ms: Annotated[int, number(20, 10_000, "ms", "time between our heartbeats")] = 200
+    master: bool = Field(False, description="we start the other nodes; else another master does")
+    nodes: dict[str, CanopenNode] = Field({}, description="other nodes by name")
+
+
 class Bus(Section):
     """A CAN bus, in the words of python-can."""
 
@@ -44,3 +60,4 @@ class Bus(Section):
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
     """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
     j1939: J1939 | None = None
+    canopen: Canopen | None = None

@@ -39,9 +39,24 @@ class Lever(Input):
     enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(None, description="signal that asks for the unshaped stick")
+    node: str | None = Field(None, description="name of its node on a bus of CANopen")
     frozen_s: Annotated[
         float, number(1, 3600, "s", "a stick deflected for so long without change is broken")
     ] = 20.0
+
+
+class StatusWord(Input):
+    """Status word of a valve of CiA 408."""
+
+    signal: str = Field(description="signal with object 6041h, its low four bits the state")
+
+
+class Cia408(Section):
+    """State machine of a CANopen valve (CiA 408): it is brought to work, and watched."""
+
+    control: str = Field(description="signal of the valve message with object 6040h")
+    status: StatusWord = Field(description="message of the valve with its status word")
+    node: str | None = Field(None, description="name of the valve's node on its bus")
 
 
 class EmergencyStop(Input):
@@ -97,6 +112,7 @@ class Valve(Protected):
     timeout_ms: Annotated[
         int, number(10, 5000, "ms", "silence after which the valve closes by itself")
     ]
+    cia408: Cia408 | None = None
 
 
 class Feedback(Input):

@@ -5,10 +5,12 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from typing import Protocol
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
+from canshaper.service.canopen import NodeEvent, canopen_buses
 from canshaper.service.feedback import Feedback, Following
 from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
@@ -94,6 +96,16 @@ class Counters:
         return {**self.values, "LastFault": int(self.last_fault)}
 
 
+class Taken(Protocol):
+    """Takes the frames of one message."""
+
+    def receive(self, data: bytes, now_ns: int, /) -> FrameFault:
+        """Take one."""
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+
+
 class Controller:
     """All axes of a deployment.
 
@@ -105,7 +117,7 @@ class Controller:
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.counters = Counters()
-        self.events: list[Event | AddressEvent | FeedbackEvent] = []
+        self.events: list[Event | AddressEvent | FeedbackEvent | NodeEvent] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
         taken: list[tuple[BoundInput, Input]] = [
             (lever, levers[name]) for name, lever in deployment.levers.items()
@@ -124,9 +136,12 @@ class Controller:
             for runner in self.axes.values()
             if runner.bound.feedback and runner.feedback
         ]
-        self._inputs: dict[tuple[str, int, bool], Input | RadiusInput] = {
-            bound.key: one for bound, one in taken
-        }
+        taken += [
+            (runner.bound.status_word, runner.control)
+            for runner in self.axes.values()
+            if runner.bound.status_word and runner.control
+        ]
+        self._inputs: dict[tuple[str, int, bool], Taken] = {bound.key: one for bound, one in taken}
         self._sent = {
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
         }
@@ -148,6 +163,9 @@ class Controller:
             self._by_message.setdefault(key, []).append(runner)
         for runners in self._by_message.values():
             runners[-1].sends = True  # when all axes of the message have moved
+        self._canopen = canopen_buses(deployment, self.axes)
+        for bus, nodes in self._canopen.items():
+            self._inputs |= {(bus, n, False): one for n, one in nodes.inputs.items()}
         self._network = Network(deployment, self.axes, taken)
         self._last = -1  # number of the last deadline
         self._late = 0
@@ -214,6 +232,11 @@ class Controller:
         if self._network.nodes:
             yield from self._network.frames(now_ns)
             self.events += self._network.changes()
+        for nodes in self._canopen.values():
+            if lost := nodes.lost(now_ns):
+                self.counters.add(FrameFault.HEARTBEAT_LOST, lost)
+            yield from nodes.frames(now_ns)
+            self.events += nodes.changes()
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
         """Tell when the valve no longer does what it is told, and when it does again."""
@@ -268,6 +291,8 @@ class Controller:
         """A neutral frame for every valve: the last thing sent."""
         for runner in self.axes.values():
             runner.bound.valve.put(0)
+            if runner.control is not None:
+                runner.control.hold()
         frames = (runners[-1].bound.valve.message.frame() for runners in self._by_message.values())
         return [frame for frame in frames if frame.bus not in self._network.silent]
 

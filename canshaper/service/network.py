@@ -59,7 +59,7 @@ class Network:
             self._groups |= {(bus, group): node for group in GROUPS}
             there = [r for r in axes.values() if r.bound.config.valve.bus == bus]
             for runner in there:
-                runner.node = node
+                runner.gates.append(node.gate)
             for group in deployment.sent_groups(bus):
                 runners = [
                     r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group

@@ -7,6 +7,7 @@ from canshaper.can.j1939 import CLAIMED, DM1, REQUEST
 from canshaper.config.bus import J1939
 from canshaper.service.claim import AddressClaim, ClaimState
 from canshaper.service.dm1 import ActiveFaults
+from canshaper.shaping.states import Reason
 
 GROUPS = (CLAIMED << 8, REQUEST << 8)
 """Groups that a node listens to."""
@@ -27,6 +28,12 @@ class Node:
     def state(self) -> ClaimState:
         """State of our address; in any other than CLAIMED all but the node itself is silent."""
         return self._claim.state
+
+    def gate(self, _neutral: bool, _now_ns: int) -> Reason | None:
+        """Why nothing may move."""
+        if self._claim.state is ClaimState.LOST:
+            return Reason.ADDRESS_LOST
+        return Reason.ADDRESS_NOT_CLAIMED if self._claim.state is ClaimState.WAITING else None
 
     def receive(self, frame: Frame, now_ns: int) -> FrameFault:
         """Take a claim or a request; a claim that wins over ours is a fault."""

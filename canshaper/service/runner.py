@@ -1,14 +1,14 @@
 """One axis of a deployment at work, and the compensation that one axis asks of another."""
 
 import math
+from collections.abc import Callable
 
 from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
-from canshaper.service.claim import ClaimState
+from canshaper.service.cia408 import ValveControl
 from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
 from canshaper.service.lever import LeverInput
-from canshaper.service.node import Node
 from canshaper.service.radius import RadiusInput
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.radial import RadialCompensation
@@ -19,6 +19,10 @@ from canshaper.shaping.sway import SwayModel
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
 CONTESTED_NS = 1_000_000_000
+# Called with whether the axis is neutral, and the time; why it may not move, or None.
+Gate = Callable[[bool, int], Reason | None]
+# Reasons from here on are for neutral at once.
+TRIPS = Reason.ENABLE_LOST
 
 
 class AxisRunner:
@@ -30,8 +34,9 @@ class AxisRunner:
         contested_ns: when a frame of another sender with the id of this valve was last seen.
         added: velocity that another axis asks of this one, fraction of full speed.
         sends: the message of its valve goes out when this axis has moved.
+        control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
-        node: our node on the bus of its valve, where that is one of J1939.
+        gates: what else has to agree before the axis may move.
         compensator: what this axis asks of another one, where it slews.
     """
 
@@ -65,8 +70,13 @@ class AxisRunner:
         self.contested_ns: int | None = None
         self.added = 0.0
         self.sends = False
-        self.node: Node | None = None
+        self.gates: list[Gate] = []
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
+        self.control: ValveControl | None = None
+        if bound.status_word and config.valve.cia408:
+            control = config.valve.cia408.control
+            self.control = ValveControl(bound.status_word, control, bound.valve.message)
+            self.gates.append(self.control.gate)
         self.compensator: Compensator | None = None
 
     def tick(
@@ -101,11 +111,12 @@ class AxisRunner:
                 trip = trip or Reason.SECOND_SENDER
             else:
                 self.contested_ns = None
-        if self.node is not None:
-            if self.node.state is ClaimState.LOST:
-                trip = trip or Reason.ADDRESS_LOST
-            elif self.node.state is ClaimState.WAITING:
-                return StickInput(fault=Reason.ADDRESS_NOT_CLAIMED, trip=trip)
+        for gate in self.gates:
+            found = gate(self.axis.neutral, now_ns)
+            if found is not None and found >= TRIPS:
+                trip = trip or found
+            elif found is not None:
+                return StickInput(fault=found, trip=trip)
         if emergency is not None and (stop := emergency.stop(now_ns, since_ns)):
             if stop is Reason.EMERGENCY_STOP or not self.axis.neutral:
                 trip = trip or stop

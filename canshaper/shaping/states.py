@@ -56,6 +56,8 @@ class Reason(IntEnum):
     STICK_UNTRUSTED = 40
     LOOP_OVERRUN = 41
     ADDRESS_NOT_CLAIMED = 42
+    NODE_FAULT = 43
+    VALVE_NOT_READY = 44
     # Neutral at once, latched.
     ENABLE_LOST = 64
     OUTPUT_INVALID = 65
@@ -65,6 +67,7 @@ class Reason(IntEnum):
     EMERGENCY_STOP_LOST = 69
     SECOND_SENDER = 70
     ADDRESS_LOST = 71
+    VALVE_FAULT = 72
 
 
 class StickInput(NamedTuple):

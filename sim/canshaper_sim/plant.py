@@ -12,6 +12,7 @@ from canshaper.can.protection import Guard
 from canshaper.can.signals import find_signal
 from canshaper.can.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
+from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
@@ -132,6 +133,7 @@ class PlantNode:
             for axis, bound in deployment.axes.items()
             if bound.feedback
         ]
+        self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
         inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
         self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
@@ -148,6 +150,7 @@ class PlantNode:
         """Take a frame from a bus; those that are no valve commands are passed over."""
         for valve in self._valves.get(frame[:3], ()):
             valve.receive(frame.data)
+        self._canopen.receive(frame)
 
     def advance(self, dt_s: float) -> None:
         """Let time pass with the last commands held, as long as the valves hold them."""
@@ -181,6 +184,7 @@ class PlantNode:
             frames.append(sender.frame(raw))
         for valve in self._valve_feedback:
             frames += valve.frames(self.crane, self._passed_s)
+        frames += self._canopen.frames(self._passed_s)
         self._passed_s = 0.0
         return frames
 

@@ -94,7 +94,7 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
         (
             "alive_counter: AliveCounter }",
             "alive_counter: Velocity }",
-            "axes.slew.valve.signal: found 'Velocity', which is the alive counter already",
+            "axes.slew.valve.signal: found 'Velocity', which is alive_counter already",
         ),
         (
             "anti_sway_off: AntiSwayOff",

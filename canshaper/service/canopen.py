@@ -1,0 +1,173 @@
+"""Our node on a bus of CANopen: heartbeats, emergencies, and starting the others (CiA 301)."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+
+from canshaper.can.binding import Deployment
+from canshaper.can.canopen import (
+    EMERGENCY,
+    HEARTBEAT,
+    NMT,
+    NO_EMERGENCY,
+    START,
+    NodeState,
+)
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.config.bus import Canopen, CanopenNode
+from canshaper.service.runner import AxisRunner
+from canshaper.shaping.states import Reason
+
+# Between two commands to start one node: what it needs to answer with a heartbeat.
+START_AGAIN_NS = 500_000_000
+OPERATIONAL = bytes((NodeState.OPERATIONAL,))
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEvent:
+    """Another node says something else than before."""
+
+    bus: str
+    node: str
+    told: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"bus={self.bus} node={self.node} {self.told}"
+
+
+class RemoteNode:
+    """Another node, as its heartbeats and emergency messages show it.
+
+    Attributes:
+        state: what it said last; None when nothing was heard of it, or for too long.
+        emergency: its error code, 0 for none.
+    """
+
+    def __init__(self, config: CanopenNode) -> None:
+        self.id = config.id
+        self.state: int | None = None
+        self.emergency = NO_EMERGENCY
+        self._timeout_ns = config.heartbeat_ms * 1_000_000
+        self._heard_ns = 0
+        self._start_ns = 0
+
+    def heartbeat(self, data: bytes, now_ns: int) -> FrameFault:
+        """Take a heartbeat; one that boots has no emergency any more."""
+        if len(data) != 1:
+            return FrameFault.WRONG_LENGTH
+        self.state = data[0] & 0x7F
+        self._heard_ns = now_ns
+        if self.state == NodeState.BOOT_UP:
+            self.emergency = NO_EMERGENCY
+            self._start_ns = now_ns
+        return FrameFault.NONE
+
+    def alarm(self, data: bytes, _now_ns: int) -> FrameFault:
+        """Take an emergency message; its error code 0 tells that all is well again."""
+        if len(data) != 8:
+            return FrameFault.WRONG_LENGTH
+        self.emergency = int.from_bytes(data[:2], "little")
+        return FrameFault.NODE_EMERGENCY if self.emergency else FrameFault.NONE
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether it has just fallen silent; its state is not known any more then."""
+        if self.state is None or now_ns - self._heard_ns <= self._timeout_ns:
+            return False
+        self.state = None
+        return True
+
+    def to_start(self, now_ns: int) -> bool:
+        """Whether it is to be started now."""
+        if self.state in (NodeState.OPERATIONAL, None) or now_ns < self._start_ns:
+            return False
+        self._start_ns = now_ns + START_AGAIN_NS
+        return True
+
+    @property
+    def works(self) -> bool:
+        """Whether what it sends and takes means something."""
+        return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
+
+    def lever_gate(self, _neutral: bool, _now_ns: int) -> Reason | None:
+        """Why an axis may not move whose lever is this node: a shaped stop."""
+        return None if self.works else Reason.NODE_FAULT
+
+    def valve_gate(self, neutral: bool, _now_ns: int) -> Reason | None:
+        """Why an axis may not move whose valve is this node."""
+        if self.works:
+            return None
+        return Reason.NODE_FAULT if neutral else Reason.VALVE_FAULT
+
+
+class _Heard:
+    """One kind of message of another node."""
+
+    def __init__(self, take: Callable[[bytes, int], FrameFault]) -> None:
+        self.receive = take
+
+    def forget(self) -> None:
+        """A heartbeat that is old is lost by its own time."""
+
+
+class CanopenBus:
+    """All that CANopen asks of us on one bus.
+
+    Attributes:
+        nodes: the other nodes, by name.
+        inputs: what takes their messages, by id.
+    """
+
+    def __init__(self, bus: str, config: Canopen) -> None:
+        self._bus = bus
+        self._own = config.node
+        self._cycle_ns = config.heartbeat_ms * 1_000_000
+        self._due_ns = 0
+        self._master = config.master
+        self.nodes = {name: RemoteNode(node) for name, node in config.nodes.items()}
+        self._told: dict[str, str] = {}
+        self.inputs: dict[int, _Heard] = {}
+        for node in self.nodes.values():
+            self.inputs[HEARTBEAT + node.id] = _Heard(node.heartbeat)
+            self.inputs[EMERGENCY + node.id] = _Heard(node.alarm)
+
+    def frames(self, now_ns: int) -> Iterator[Frame]:
+        """What is due now: our heartbeat, and commands to start."""
+        if now_ns >= self._due_ns:
+            self._due_ns = now_ns + self._cycle_ns
+            yield Frame(self._bus, HEARTBEAT + self._own, False, OPERATIONAL)
+        if self._master:
+            for node in self.nodes.values():
+                if node.to_start(now_ns):
+                    yield Frame(self._bus, NMT, False, bytes((START, node.id)))
+
+    def lost(self, now_ns: int) -> int:
+        """How many nodes have just fallen silent."""
+        return sum(node.lost(now_ns) for node in self.nodes.values())
+
+    def changes(self) -> Iterator[NodeEvent]:
+        """What the nodes say else than at the last call."""
+        for name, node in self.nodes.items():
+            state = "lost" if node.state is None else _name(node.state)
+            told = f"state={state} emergency={node.emergency:#06x}"
+            if self._told.get(name) != told:
+                self._told[name] = told
+                yield NodeEvent(self._bus, name, told)
+
+
+def _name(state: int) -> str:
+    known = {s.value: s.name for s in NodeState}
+    return known.get(state, f"unknown ({state})")
+
+
+def canopen_buses(deployment: Deployment, axes: Mapping[str, AxisRunner]) -> dict[str, CanopenBus]:
+    """Our node on each bus of CANopen; axes are told the nodes of their lever and valve."""
+    buses = {n: CanopenBus(n, b.canopen) for n, b in deployment.config.buses.items() if b.canopen}
+    for runner in axes.values():
+        config = runner.bound.config
+        lever, valve = deployment.config.levers[config.stick.lever], config.valve
+        if lever.node:
+            runner.gates.append(buses[lever.bus].nodes[lever.node].lever_gate)
+        if valve.cia408 and valve.cia408.node:
+            runner.gates.append(buses[valve.bus].nodes[valve.cia408.node].valve_gate)
+    return buses

@@ -1,0 +1,88 @@
+"""The other nodes of a CANopen bus: heartbeats, and the status words of valves of CiA 408."""
+
+from collections.abc import Iterator
+from typing import Any
+
+from canshaper.can.binding import BoundAxis, Deployment
+from canshaper.can.canopen import HEARTBEAT, NMT, START, NodeState
+from canshaper.can.codecs import Sender
+from canshaper.can.frame import Frame
+
+# Heartbeats are sent three times as often as they are asked for.
+HEARTBEATS_IN_TIME = 3
+
+
+class _Node:
+    """A node that boots, and works when it is told to, or at once where there is no master."""
+
+    def __init__(self, bus: str, number: int, timeout_ms: int, *, waits: bool) -> None:
+        self._key = bus, HEARTBEAT + number
+        self._cycle_s = timeout_ms / 1000.0 / HEARTBEATS_IN_TIME
+        self._left_s = 0.0
+        self.number = number
+        self.state = NodeState.PRE_OPERATIONAL if waits else NodeState.OPERATIONAL
+
+    def frames(self, passed_s: float) -> Iterator[Frame]:
+        self._left_s -= passed_s
+        if self._left_s <= 1e-9:
+            self._left_s += self._cycle_s
+            yield Frame(*self._key, False, bytes((self.state,)))
+
+
+class _ValveStatus:
+    """A valve that is in the state that it is told, and says so."""
+
+    def __init__(self, axis: BoundAxis) -> None:
+        assert axis.status_word
+        assert axis.config.valve.cia408
+        self.key = axis.valve.message.sender.key
+        self._message: Any = axis.valve_message
+        self._control = axis.config.valve.cia408.control
+        config = axis.status_word.config
+        self._signal = config.signal
+        self._sender = Sender(
+            config.bus, axis.status_word.message, None, axis.status_word.protection
+        )
+        self._cycle_s = (axis.status_word.message.cycle_time or 100) / 1000.0
+        self._left_s = 0.0
+        self._state = 0
+
+    def receive(self, data: bytes) -> None:
+        if len(data) == self._message.length:
+            raw = self._message.decode(data, decode_choices=False, scaling=False)
+            self._state = int(raw[self._control]) & 0xF
+
+    def frames(self, passed_s: float) -> Iterator[Frame]:
+        self._left_s -= passed_s
+        if self._left_s <= 1e-9:
+            self._left_s += self._cycle_s
+            yield self._sender.frame({self._signal: self._state})
+
+
+class CanopenSide:
+    """Every node that the deployment watches, and every valve of CiA 408."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._nodes = {
+            (bus, node.id): _Node(bus, node.id, node.heartbeat_ms, waits=config.canopen.master)
+            for bus, config in deployment.config.buses.items()
+            if config.canopen
+            for node in config.canopen.nodes.values()
+        }
+        self._valves = [_ValveStatus(a) for a in deployment.axes.values() if a.status_word]
+
+    def receive(self, frame: Frame) -> None:
+        """Take a control word, or a command to start."""
+        for valve in self._valves:
+            if valve.key == frame[:3]:
+                valve.receive(frame.data)
+        if frame.can_id == NMT and not frame.extended and frame.data[:1] == bytes((START,)):
+            for (bus, number), node in self._nodes.items():
+                if bus == frame.bus and frame.data[1] in (0, number):
+                    node.state = NodeState.OPERATIONAL
+
+    def frames(self, passed_s: float) -> Iterator[Frame]:
+        """What is due after so much more time."""
+        parts: list[_Node | _ValveStatus] = [*self._nodes.values(), *self._valves]
+        for part in parts:
+            yield from part.frames(passed_s)
