@@ -5,9 +5,10 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
-from canshaper.can.canopen import EMERGENCY, HEARTBEAT
+from canshaper.can.canopen import EMERGENCY, HEARTBEAT, NMT
 from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
 from canshaper.can.database import Messages
+from canshaper.can.filters import FilterBinder
 from canshaper.can.inputs import (
     BoundFeedback,
     BoundInput,
@@ -15,15 +16,15 @@ from canshaper.can.inputs import (
     BoundRadius,
     BoundStatusWord,
     BoundStop,
+    BoundSwitch,
 )
-from canshaper.can.j1939 import CLAIMED, REQUEST, group_of
+from canshaper.can.j1939 import CLAIMED, REQUEST, claims_of, group_of, sent_by
 from canshaper.can.layout import is_j1939
 from canshaper.can.load import BusLoad, bus_load
 from canshaper.can.signals import status_faults
 from canshaper.can.socketcan import Ids
 from canshaper.can.valve import ValveCodec
-from canshaper.can.valves import ValveBinder
-from canshaper.config.filters import RobustFilter
+from canshaper.config.bus import LAST_SPN, J1939Name
 from canshaper.config.load import load_config
 from canshaper.config.schema import (
     AxisConfig,
@@ -32,8 +33,6 @@ from canshaper.config.schema import (
     Status,
 )
 from canshaper.config.source import DeploymentError, Place
-from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.sway import SwayModel
 
 
 @dataclass(frozen=True)
@@ -77,6 +76,8 @@ class Deployment:
     emergency_stop: BoundStop | None
     status: ServiceStatusCodec | None
     status_ticks: int
+    grapple: BoundSwitch | None
+    feel: BoundSwitch | None
     on_bus: dict[str, list[Message]]
 
     def load(self, bus: str) -> BusLoad | None:
@@ -86,9 +87,9 @@ class Deployment:
 
     def ids(self, bus: str) -> Ids:
         """Messages that matter on a bus."""
-        inputs = [i for i in self.inputs() if i.key[0] == bus]
-        radials = [a.radial.key for a in self.axes.values() if a.radial and a.radial.key]
-        taken = [i.key for i in inputs if not i.any_source] + radials
+        radii = [a.radial.radius for a in self.axes.values() if a.radial and a.radial.radius]
+        inputs = [i for i in (*self.inputs(), *radii) if i.key[0] == bus]
+        taken = [i.key for i in inputs if not i.by_group]
         valves = [a.valve.message.sender.key for a in self.axes.values()]
         sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
         canopen = self.config.buses[bus].canopen
@@ -96,23 +97,34 @@ class Deployment:
             nodes = [n.id for n in canopen.nodes.values()]
             taken += [(bus, base + n, False) for n in nodes for base in (HEARTBEAT, EMERGENCY)]
             sent.append((bus, HEARTBEAT + canopen.node, False))
-        j1939 = self.config.buses[bus].j1939 is not None
-        groups = {group_of(i.key[1]) for i in inputs if i.any_source}
+            sent += [(bus, NMT, False)] if canopen.master else []
+        own = self.config.buses[bus].j1939
+        if own:
+            sent += [(bus, can_id, True) for can_id in sent_by(own.address)]
+        groups = {group_of(i.key[1]) for i in inputs if i.by_group}
         return Ids(
             frozenset(key[1:] for key in taken if key[0] == bus),
             frozenset(key[1:] for key in sent if key[0] == bus),
             frozenset(key[1:] for key in valves if key[0] == bus),
             frozenset(self.messages.ids()),
-            frozenset(groups | ({CLAIMED << 8, REQUEST << 8} if j1939 else set())),
+            frozenset(groups | ({CLAIMED << 8, REQUEST << 8} if own else set())),
             frozenset(self.sent_groups(bus)),
-            j1939,
+            frozenset((can_id, True) for can_id in (claims_of(own.address) if own else ())),
+            self.is_j1939(bus),
+            canopen is not None,
         )
 
+    def is_j1939(self, bus: str) -> bool:
+        """Whether a bus is one of J1939: we have an address there, or know a message of it."""
+        has_node = self.config.buses[bus].j1939 is not None
+        return has_node or any(is_j1939(message) for message in self.on_bus.get(bus, ()))
+
     def inputs(self) -> list[BoundInput]:
-        """Levers, emergency stop, feedback and status words of the valves."""
+        """Levers, switches, feedback and status words of the valves."""
         axes = self.axes.values()
         told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
-        return [*self.levers.values(), *(i for i in (self.emergency_stop, *told) if i)]
+        others = (self.emergency_stop, self.grapple, self.feel, *told)
+        return [*self.levers.values(), *(i for i in others if i)]
 
     def sent_groups(self, bus: str) -> set[int]:
         """Groups of J1939 that command a valve of ours, from whatever address they come."""
@@ -136,19 +148,21 @@ def load_deployment(path: Path) -> Deployment:
     return _Binder(config, source).deployment(path)
 
 
-class _Binder(ValveBinder):
+class _Binder(FilterBinder):
     """Binds part by part; with any problem there is no deployment."""
 
     def deployment(self, path: Path) -> Deployment:
         config = self.config
         self._check_buses()
-        self._check_canopen()
+        self._check_node_ids()
         messages = self.load(path.parent)
         if messages is None:
             raise DeploymentError(self.problems)
         levers = {n: self.lever(n, lever) for n, lever in config.levers.items()}
         axes = {n: self._axis(n, axis) for n, axis in config.axes.items()}
         stop = self.stop(config.emergency_stop) if config.emergency_stop else None
+        grapple = self.switch(("grapple",), config.grapple) if config.grapple else None
+        feel = self.switch(("feel",), config.feel) if config.feel else None
         service = self._status(("status",), config.status, ServiceStatusCodec)
         if self.problems:
             raise DeploymentError(self.problems)
@@ -161,32 +175,45 @@ class _Binder(ValveBinder):
             stop,
             ServiceStatusCodec(service[0]) if service else None,
             service[1] if service else 0,
+            grapple,
+            feel,
             self.on_bus,
         )
 
-    def _check_canopen(self) -> None:
-        """Ids of nodes are used once, by no other message."""
+    def _check_node_ids(self) -> None:
+        """Ids of nodes are used once."""
         for bus, config in self.config.buses.items():
             canopen = config.canopen
             if canopen is None:
                 continue
-            ids = {"node": canopen.node} | {f"nodes.{n}": c.id for n, c in canopen.nodes.items()}
+            others = {f"nodes.{n}": node.id for n, node in canopen.nodes.items()}
+            ids = {"node": canopen.node} | others
             seen: dict[int, str] = {}
             for name, number in ids.items():
-                place = ("buses", bus, "canopen", *name.split("."))
                 if number in seen:
-                    self.add(place, f"has the node id {number} of {seen[number]}")
-                seen[number] = name
-                for base in (HEARTBEAT, EMERGENCY):
-                    self.reserve(bus, base + number, f"buses.{bus}.canopen.{name}")
+                    where = (*name.split("."), "id") if name in others else (name,)
+                    text = f"found {number}, which is the node id of {seen[number]}"
+                    self.add(("buses", bus, "canopen", *where), f"{text}; allowed is another one")
+                seen.setdefault(number, name)
 
     def _check_buses(self) -> None:
         seen: dict[tuple[str, str], str] = {}
+        names: dict[J1939Name, str] = {}
         for name, bus in self.config.buses.items():
             key = (bus.interface, bus.channel)
             if key in seen:
                 self.add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
             seen[key] = name
+            if bus.j1939 is None:
+                continue
+            # Behind a gateway both may meet, and nobody would know which is meant.
+            if (other := names.setdefault(bus.j1939.name, name)) != name:
+                text = f"is the NAME of bus {other}; each node needs one of its own:"
+                self.add(("buses", name, "j1939", "name"), f"{text} another ecu_instance will do")
+            last = bus.j1939.first_spn + 2 * len(self.config.axes) - 1
+            if last > LAST_SPN:
+                text = f"found {bus.j1939.first_spn}, which makes the last one {last};"
+                self.add(("buses", name, "j1939", "first_spn"), f"{text} allowed is {LAST_SPN}")
 
     def _axis(self, name: str, axis: AxisConfig) -> BoundAxis | None:
         place: Place = ("axes", name)
@@ -199,8 +226,8 @@ class _Binder(ValveBinder):
         if bound is None or len(self.problems) > before:
             return None
         message, codec, ticks = bound
-        if fault := _filter_fault(axis, ticks * self.config.tick_ms / 1000.0):
-            self.add((*place, "filter"), fault)
+        self.check_filters(place, axis, ticks * self.config.tick_ms / 1000.0)
+        if len(self.problems) > before:
             return None
         return BoundAxis(
             name,
@@ -275,25 +302,3 @@ class _Binder(ValveBinder):
         use = dict.fromkeys(codec.SIGNALS, "a signal of the status")
         protection = self.protection(place, status, message, use)
         return (self.sender(status.bus, message, protection), ticks) if ticks else None
-
-
-def _filter_fault(axis: AxisConfig, period_s: float) -> str | None:
-    """Why the filter cannot run at the period of the valve, or None."""
-    chosen = axis.filter
-    if isinstance(chosen, RobustFilter) and chosen.tick_ms != round(1000.0 * period_s):
-        return (
-            f"tick_ms of the taps is {chosen.tick_ms} ms, allowed is the period of the valve,"
-            f" {1000.0 * period_s:g} ms"
-        )
-    try:
-        sway = SwayModel(axis.sway.mode(), period_s) if axis.sway else None
-        build_shaper(
-            chosen.kind,
-            period_s,
-            sway,
-            valve_rate_per_s=axis.limits.slowest_per_s,
-            **chosen.parameters(),
-        )
-    except ValueError as error:
-        return str(error)
-    return None

@@ -71,7 +71,7 @@ class Sender:
         self._extended = message.is_extended_frame
         self.fields = FieldSet(message)
         self.protection = protection
-        self.protector = Protector(protection, Layout(message))
+        self.protector = Protector(protection, self.fields.layout)
 
     @property
     def key(self) -> tuple[str, int, bool]:
@@ -84,6 +84,9 @@ class Sender:
         return Frame(self._bus, self._id, self._extended, data)
 
 
+ACTIVE_SET = "ActiveSet"
+
+
 @dataclass(frozen=True, slots=True)
 class AxisStatusCodec:
     """Status message of an axis."""
@@ -93,19 +96,30 @@ class AxisStatusCodec:
     CODES: ClassVar[dict[str, int]] = {"State": max(State), "Reason": max(Reason)}
 
     def frame(
-        self, state: State, reason: Reason, command: float, sent: float, sway_deg: float
+        self,
+        state: State,
+        reason: Reason,
+        command: float,
+        sent: float,
+        sway_deg: float,
+        *,
+        active_set: int = 0,
     ) -> Frame:
-        """Status frame; command and sent in [-1, 1]."""
+        """Status frame; command and sent in [-1, 1].
+
+        The signal ActiveSet need not be there.
+        """
         fields = self.sender.fields
-        return self.sender.frame(
-            {
-                "State": int(state),
-                "Reason": int(reason),
-                "RawCommand": fields.raw("RawCommand", 100.0 * command),
-                "ShapedCommand": fields.raw("ShapedCommand", 100.0 * sent),
-                "PredictedSway": fields.raw("PredictedSway", sway_deg),
-            }
-        )
+        raw = {
+            "State": int(state),
+            "Reason": int(reason),
+            "RawCommand": fields.raw("RawCommand", 100.0 * command),
+            "ShapedCommand": fields.raw("ShapedCommand", 100.0 * sent),
+            "PredictedSway": fields.raw("PredictedSway", sway_deg),
+        }
+        if ACTIVE_SET in fields.start:
+            raw[ACTIVE_SET] = fields.raw(ACTIVE_SET, active_set)
+        return self.sender.frame(raw)
 
 
 @dataclass(frozen=True, slots=True)

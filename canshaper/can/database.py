@@ -8,7 +8,7 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database, Message
 
-from canshaper.can.layout import layout_fault
+from canshaper.can.layout import is_j1939, layout_fault
 from canshaper.config.source import Problem
 
 # Bytes of a message, first bit and bits of a signal: cantools makes a list of as many, and the
@@ -16,6 +16,7 @@ from canshaper.config.source import Problem
 _TOO_LARGE = re.compile(
     r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{6,})|\bSG_\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{6,})"
 )
+WIDE_ID = "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 more"
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,8 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
     except Exception as error:  # whatever a broken file makes the parser raise
         cause = getattr(error, "e_dbc", None) or error  # without the names of other formats
         text = " ".join(str(cause).split()) or type(cause).__name__
+        if "more than 11 bits" in text:
+            text += f" ({WIDE_ID})"
         if at := re.search(r"at line (\d+)", text):
             line = int(at.group(1))
         elif at := re.search(r"in message (\w+)|unused VAL_ entries in DBC: (VAL_ \d+ \w+)", text):
@@ -76,9 +79,16 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
             text = f"has the id {message.frame_id:#x} of {seen[key]}"
             problems.append(loaded.problem(message, text))
         seen[key] = message.name
-    faults = [(m, fault) for m in database.messages if (fault := layout_fault(m))]
+    faults = [(m, fault) for m in database.messages if (fault := layout_fault(m) or _id_fault(m))]
     problems += [loaded.problem(*fault) for fault in faults]
     return None if faults else loaded, problems
+
+
+def _id_fault(message: Message) -> str | None:
+    """Why the id of a message is not the one that was meant, or None."""
+    if is_j1939(message) and not message.is_extended_frame:
+        return f"is one of J1939 with an id of 11 bits; {WIDE_ID}"
+    return None
 
 
 class Messages:

@@ -7,7 +7,7 @@ from cantools.database.can import Message
 from canshaper.can.codecs import LeverCodec
 from canshaper.can.database import DbcFile
 from canshaper.can.flags import FlaggedVelocity
-from canshaper.can.j1939 import NULL, with_source
+from canshaper.can.j1939 import NULL, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Guard, Protection
 from canshaper.can.protections import ProtectionBinder
@@ -17,7 +17,9 @@ from canshaper.can.signals import (
     radius_range,
     symmetrical_range,
 )
-from canshaper.config.schema import EmergencyStop, Feedback, Input, Lever, Radius, StatusWord
+from canshaper.config.input import Input
+from canshaper.config.schema import EmergencyStop, Feedback, Lever, Radius, StatusWord
+from canshaper.config.sets import FeelSwitch, Grapple
 from canshaper.config.source import Place
 
 # Two frames may be lost in a row; more is no longer the noise of a bus.
@@ -45,6 +47,11 @@ class BoundInput:
     def any_source(self) -> bool:
         """Whether it may come from any source address."""
         return is_j1939(self.message) and self.key[1] & 0xFF == NULL
+
+    @property
+    def by_group(self) -> bool:
+        """Whether its frames are known by group and source, whatever their priority."""
+        return is_j1939(self.message) and not has_destination(self.message.frame_id)
 
     def guard(self) -> Guard:
         """A new guard of its protection."""
@@ -87,6 +94,13 @@ class BoundStatusWord(BoundInput):
     """Status word of a valve with its message."""
 
     config: StatusWord
+
+
+@dataclass(frozen=True)
+class BoundSwitch(BoundInput):
+    """The state of the grapple, or the operator's choice, with its message."""
+
+    config: Grapple | FeelSwitch
 
 
 class InputBinder(ProtectionBinder):
@@ -145,7 +159,15 @@ class InputBinder(ProtectionBinder):
         if not found or len(self.problems) > before:
             return None
         _, message, protection = found
-        return BoundStop(stop, message, LeverCodec(message, []), protection)
+        bound = BoundStop(stop, message, LeverCodec(message, []), protection)
+        self._known_source(place, bound, "the emergency stop")
+        return bound if len(self.problems) == before else None
+
+    def _known_source(self, place: Place, bound: BoundInput, what: str) -> None:
+        """From any source address the first that is heard would count, and no other."""
+        if bound.any_source:
+            text = f"missing: in the DBC {bound.message.name} may come from any source address"
+            self.add((*place, "source"), f"{text}; {what} needs a known one")
 
     def radius(self, place: Place, radius: Radius) -> BoundRadius | None:
         """The measured radius of a radial compensation."""
@@ -162,19 +184,35 @@ class InputBinder(ProtectionBinder):
         use = {radius.signal: "signal"}
         protection = self.input_protection(place, radius, message, use)
         bound = BoundRadius(radius, message, LeverCodec(message, []), protection)
-        if bound.any_source:
-            text = f"missing: in the DBC {message.name} may come from any source address"
-            self.add((*place, "source"), f"{text}; the radius needs a known one")
+        self._known_source(place, bound, "the radius")
         return bound if len(self.problems) == before else None
 
     def status_word(self, place: Place, config: StatusWord) -> BoundStatusWord | None:
         """The status word of a valve."""
         before = len(self.problems)
         found = self._input(place, config, ("signal",), {})
-        if not found or len(self.problems) > before:
+        if not found:
             return None
         _, message, protection = found
+        if signal := self.signal((*place, "signal"), message, config.signal):
+            self.state_bits((*place, "signal"), signal)
+        if len(self.problems) > before:
+            return None
         return BoundStatusWord(config, message, LeverCodec(message, []), protection)
+
+    def switch(self, place: Place, config: Grapple | FeelSwitch) -> BoundSwitch | None:
+        """The state of the grapple, or the operator's choice."""
+        before = len(self.problems)
+        found = self._input(place, config, (), {config.signal: "signal"})
+        if not found:
+            return None
+        _, message, protection = found
+        signal = self.signal((*place, "signal"), message, config.signal)
+        if signal and isinstance(config, FeelSwitch):
+            self.integer((*place, "signal"), signal)
+        if len(self.problems) > before:
+            return None
+        return BoundSwitch(config, message, LeverCodec(message, []), protection)
 
     def node(self, place: Place, bus: str, name: str | None) -> None:
         """A node of CANopen that is named has to be one of its bus."""

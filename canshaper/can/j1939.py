@@ -23,9 +23,14 @@ _PAGES_AND_FORMAT = 0x03FF0000
 _GROUP_OF_PDU2 = 0x03FFFF00
 
 
+def has_destination(can_id: int) -> bool:
+    """Whether messages of its group are sent to one node, or to all where that says so."""
+    return (can_id >> 16) & 0xFF < 240
+
+
 def group_mask(can_id: int) -> int:
     """Bits of an identifier that tell its group."""
-    return _GROUP_OF_PDU2 if (can_id >> 16) & 0xFF >= 240 else _PAGES_AND_FORMAT
+    return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
 
 
 def group_of(can_id: int) -> int:
@@ -48,9 +53,30 @@ def identifier(
     return priority << 26 | pgn << 8 | specific | source
 
 
+def pgn_of(can_id: int) -> int:
+    """Parameter group number of an identifier."""
+    return group_of(can_id) >> 8
+
+
 def with_source(can_id: int, source: int) -> int:
     """The same message from another address."""
     return can_id & ~0xFF | source
+
+
+def claims_of(address: int) -> list[int]:
+    """Identifiers of what a node says about its address: that it claims it, or cannot."""
+    return [identifier(CLAIMED, source) for source in (address, NULL)]
+
+
+def sent_by(address: int) -> list[int]:
+    """Identifiers of what a node sends besides its claims, commands and status."""
+    low = LOWEST_PRIORITY
+    return [
+        identifier(ACKNOWLEDGE, address),
+        identifier(DM1, address),
+        identifier(TRANSPORT, address, priority=low),
+        identifier(TRANSPORT_DATA, address, priority=low),
+    ]
 
 
 def name_bytes(name: J1939Name) -> bytes:

@@ -5,9 +5,10 @@ from pathlib import Path
 
 from cantools.database.can import Message, Signal
 
+from canshaper.can.canopen import STATE_BITS, service_of
 from canshaper.can.codecs import Sender
 from canshaper.can.database import DbcFile, Messages, load_dbc
-from canshaper.can.j1939 import NULL, with_source
+from canshaper.can.j1939 import NULL, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Protection
 from canshaper.can.signals import find_signal, symmetrical_range
@@ -83,6 +84,7 @@ class Lookup:
             return None
         message = found[1]
         self._check_j1939(place, bus, message, takes=takes, source=source)
+        self._check_canopen(place, bus, message)
         can_id, _ = self.address(bus, message, takes=takes, source=source)
         key = (bus, can_id, message.is_extended_frame)
         if key in self._used:
@@ -100,9 +102,13 @@ class Lookup:
             self.add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
         return found
 
-    def reserve(self, bus: str, can_id: int, where: str) -> None:
-        """Note that an id of 11 bits is used, by something that stands in no DBC file."""
-        self._used[bus, can_id, False] = where
+    def _check_canopen(self, place: Place, bus: str, message: Message) -> None:
+        """On a bus of CANopen a message is a PDO: a command in an SDO would change a parameter."""
+        config = self.config.buses.get(bus)
+        service = None if message.is_extended_frame else service_of(message.frame_id)
+        if config and config.canopen and service:
+            text = f"{message.name} has the id {message.frame_id:#x}, which is one of {service}"
+            self.add((*place, "message"), f"{text} in CANopen; allowed are those of PDOs")
 
     def _check_j1939(
         self, place: Place, bus: str, message: Message, *, takes: bool, source: int | None
@@ -117,11 +123,14 @@ class Lookup:
         elif not takes and own is None:
             text = f"{message.name} is a message of J1939, and bus {bus} has no address for us"
             self.add((*place, "bus"), f"{text}: allowed is one with a section j1939")
-        elif takes and own is not None:
-            can_id, _ = self.address(bus, message, takes=takes, source=source)
+        elif takes:
+            can_id, any_source = self.address(bus, message, takes=takes, source=source)
             if can_id & 0xFF == own:
                 text = f"{message.name} comes from address {own}, which is ours on bus {bus}"
                 self.add((*place, "source" if source is not None else "message"), text)
+            elif any_source and has_destination(can_id):
+                text = f"missing: {message.name} is sent from one node to another"
+                self.add((*place, "source"), f"{text}; allowed is the address of its sender")
 
     def signal(self, place: Place, message: Message, name: str | None) -> Signal | None:
         """The signal; None when there is none of that name, or none was asked for."""
@@ -139,6 +148,12 @@ class Lookup:
             found = "is a float" if signal.is_float else "has a sign"
             allowed = "an integer" if signed else "an unsigned integer"
             self.add(place, f"{signal.name} {found}, allowed is {allowed} signal")
+
+    def state_bits(self, place: Place, signal: Signal) -> None:
+        """Control and status word of CiA 408 tell the state in their low bits."""
+        if signal.length < STATE_BITS:
+            text = f"{signal.name} has {signal.length} bits, allowed is {STATE_BITS} or more"
+            self.add(place, text)
 
     def alone(self, place: Place, signal: Signal, use: dict[str, str]) -> None:
         """A switch that is a stick too, or a counter that is a command, would move the axis."""

@@ -81,6 +81,9 @@ class Protector:
 
         Args:
             raw: raw value of every signal, by name; that of the counter is changed.
+
+        Raises:
+            OverflowError: a value is not within the bits of its signal.
         """
         if self._counts:
             self._count = (self._count + 1) % self._counts

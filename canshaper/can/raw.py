@@ -9,7 +9,8 @@ import select
 import socket
 import struct
 import time
-from collections.abc import Callable, Iterator
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
 
 from canshaper.can.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.can.socketcan import Ids, dropped_frames, set_filters
@@ -31,6 +32,8 @@ UNCONFIRMED_NS = 20_000_000
 PROBE_NS = 500_000_000
 # How often an interface that has gone is looked for; it shall work again within a second.
 REOPEN_NS = 200_000_000
+# Claims of ours under way: on a bus that takes none, one every PROBE_NS until its queue is full.
+MOST_CLAIMS = 32
 # linux/can/error.h: classes in the id, controller state in data[1].
 CLASS_CONTROLLER, CLASS_BUS_OFF, CLASS_RESTARTED = 0x4, 0x40, 0x100
 OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
@@ -82,7 +85,9 @@ class RawPort:
         self._not_before_ns = 0
         self._dropped = 0
         self._ids = ids
-        self._valves = _words(ids)
+        self._valves = _words(ids.valves if ids else ())
+        self._claims = _words(ids.claims if ids else ())
+        self._claimed: deque[bytes] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
         self._use(open_sockets(ids))
 
     # -- receiving -----------------------------------------------------------------------------
@@ -100,6 +105,10 @@ class RawPort:
             except OSError as error:
                 self._failed(error)
                 return
+            if self._claimed and data in self._claimed:
+                self._claimed.remove(data)
+                self._confirmed(CAN_FRAME.unpack(data)[0])
+                continue
             frame = self._frame(data)
             if frame is not None:
                 if self.state is not UP and self.state in LOST:
@@ -179,12 +188,15 @@ class RawPort:
         under_way = self._unconfirmed.get(word, 0)
         if under_way and self._stuck(word, under_way):
             return False
+        packed = CAN_FRAME.pack(word, len(data), data)
         try:
-            self._send(CAN_FRAME.pack(word, len(data), data))
+            self._send(packed)
         except OSError as error:
             self._failed(error)
             return False
-        if self._confirms:
+        if word in self._claims:
+            self._claimed.append(packed)
+        elif self._confirms:
             self._unconfirmed[word] = under_way + 1
         return True
 
@@ -244,6 +256,7 @@ class RawPort:
                 self._on_fault(FrameFault.BUS_DOWN)
             self.state = BusState.DOWN
             self._forget()  # the queue is emptied with the interface
+            self._claimed.clear()
         elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
             self.state = BusState.FAILED
             self._on_fault(FrameFault.BUS_ERROR)
@@ -254,6 +267,7 @@ class RawPort:
         self._receive = sockets[0].recv
         self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
         self._forget()
+        self._claimed.clear()
         self._dropped = 0
         self._up()
 
@@ -271,7 +285,8 @@ class RawPort:
 
     def watch(self, name: str, ids: Ids) -> None:
         """Serve another deployment: its name of the bus, its messages."""
-        self.name, self._ids, self._valves = name, ids, _words(ids)
+        self.name, self._ids = name, ids
+        self._valves, self._claims = _words(ids.valves), _words(ids.claims)
         self._forget()
         if self._sockets:
             try:
@@ -297,7 +312,6 @@ def _poll(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
     return poll.poll
 
 
-def _words(ids: Ids | None) -> frozenset[int]:
-    """The kernel's ids of the valve messages."""
-    valves = ids.valves if ids else ()
-    return frozenset(i | socket.CAN_EFF_FLAG if extended else i for i, extended in valves)
+def _words(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
+    """The kernel's ids of messages."""
+    return frozenset(i | socket.CAN_EFF_FLAG if extended else i for i, extended in messages)

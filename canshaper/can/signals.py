@@ -12,6 +12,7 @@ from typing import Any
 
 from cantools.database.can import Message, Signal
 
+from canshaper.can.canopen import FULL_SET_POINT
 from canshaper.can.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
 
@@ -89,6 +90,16 @@ def command_fault(signal: Signal) -> str | None:
     zero = signal.offset / signal.scale
     if abs(zero - round(zero)) > 1e-6:
         return f"{signal.name} has no raw value for zero, which neutral needs"
+    return None
+
+
+def set_point_fault(signal: Signal) -> str | None:
+    """Why a command signal cannot be the set point of a valve of CiA 408, or None."""
+    if signal.offset:
+        return f"{signal.name} has the offset {signal.offset:g}; a set point of CiA 408 has none"
+    if (steps := valve_steps(signal.maximum or 0.0, abs(signal.scale))) > FULL_SET_POINT:
+        text = f"{signal.name} has {steps} steps to full command; a set point of CiA 408 has"
+        return f"{text} {FULL_SET_POINT}, and float at {raw_limits(signal)[1]}"
     return None
 
 
@@ -179,12 +190,13 @@ class FieldSet:
 
     Attributes:
         message: the message.
+        layout: where its signals lie.
         start: raw start value of every signal.
     """
 
     def __init__(self, message: Message) -> None:
         self.message = message
-        self._layout = Layout(message)
+        self.layout = Layout(message)
         self.start: dict[str, Any] = {
             s.name: self._start(s, is_j1939(message)) for s in message.signals
         }
@@ -209,11 +221,3 @@ class FieldSet:
         """
         scale, offset, low, high = self._fields[name]
         return min(max(round((value - offset) / scale), low), high)
-
-    def encode(self, raw: dict[str, int]) -> bytes:
-        """Data of the message with these raw values.
-
-        Raises:
-            OverflowError: a value is not within the bits of its signal.
-        """
-        return self._layout.encode({**self.start, **raw})

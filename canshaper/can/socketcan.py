@@ -6,8 +6,10 @@ back from the bus, how many the kernel has dropped, and a filter for the ids tha
 
 import socket
 import struct
+from collections.abc import Iterable
 from dataclasses import dataclass
 
+from canshaper.can.canopen import SERVICES
 from canshaper.can.j1939 import group_mask
 
 # linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.
@@ -36,7 +38,9 @@ class Ids:
         known: all that the DBC files know; one that they do not know is a fault.
         taken_groups: groups of J1939 that are taken, from whatever address.
         sent_groups: groups that we send, and nobody else may.
+        claims: what we send of the groups that are taken: it comes back among them.
         j1939: the bus is one of J1939, where ids of 29 bits that nobody knows are daily life.
+        canopen: the bus is one of CANopen, where that is so for SDO, SYNC and the like.
     """
 
     taken: frozenset[tuple[int, bool]]
@@ -45,7 +49,9 @@ class Ids:
     known: frozenset[tuple[int, bool]]
     taken_groups: frozenset[int] = frozenset()
     sent_groups: frozenset[int] = frozenset()
+    claims: frozenset[tuple[int, bool]] = frozenset()
     j1939: bool = False
+    canopen: bool = False
 
 
 def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
@@ -85,10 +91,11 @@ def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
 
 def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
     """Let the three sockets hear these messages."""
-    others = ids.taken | ids.sent | ids.known
-    if len(others) > MOST_FILTERS:
-        others = ids.taken | ids.sent  # what the DBC files know besides is left to the reader
-    groups = ids.taken_groups, ids.sent_groups, ids.taken_groups | ids.sent_groups
+    # What the DBC files know besides is left to the reader where it is too much.
+    ours = ids.taken | ids.sent
+    all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
+    others = all_known if len(all_known) + len(SERVICES) < MOST_FILTERS else ours
+    groups: tuple[Iterable[int], ...] = ids.taken_groups, ids.sent_groups, ()
     for one, messages, some, flag in zip(
         sockets, (ids.taken, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
     ):
@@ -96,6 +103,8 @@ def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
         words += [(group | EFF, group_mask(group) | EFF) for group in some]
         if flag and ids.j1939:
             words.append((EFF, EFF))
+        if flag and ids.canopen:
+            words += [(base, mask | EFF) for base, mask, _ in SERVICES]
         filters = b"".join(_FILTER.pack(word | flag, mask) for word, mask in words)
         one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
 

@@ -11,6 +11,7 @@ from canshaper.can.signals import (
     command_fault,
     magnitude_range,
     raw_limits,
+    set_point_fault,
     symmetrical_range,
 )
 from canshaper.can.valve import DirectionCodec, ValveCodec, ValveMessage
@@ -65,6 +66,8 @@ class ValveBinder(InputBinder):
         ]
         if valve.cia408:
             self._control((*place, "cia408"), shared, valve, valve.cia408)
+            if signal and (why := set_point_fault(signal)):
+                self.problems.append(file.problem(message, why))
         direction = valve.direction
         codec = self._direction((*place, "direction"), shared, direction) if direction else None
         if signal is None or not ticks or len(self.problems) > before:
@@ -115,6 +118,7 @@ class ValveBinder(InputBinder):
         if signal:
             self.integer((*place, "control"), signal, signed=False)
             self._alone((*place, "control"), shared, signal)
+            self.state_bits((*place, "control"), signal)
 
     def _direction(
         self, place: Place, shared: _Shared, direction: DirectionCodes

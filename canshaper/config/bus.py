@@ -6,9 +6,9 @@ from pydantic import Field
 
 from canshaper.config.section import Section, number
 
-# The manufacturer's own range of suspect parameter numbers ends at 524287; an axis takes two: one
-# for its commands, one for its valve.
-LAST_FIRST_SPN = 524287 - 63
+# The maker's own range of suspect parameter numbers ends here; an axis takes two: one for its
+# commands, one for its valve.
+LAST_SPN = 524287
 
 
 class J1939Name(Section):
@@ -31,7 +31,7 @@ class J1939(Section):
     address: Annotated[int, number(0, 253, "", "source address of what we send")]
     name: J1939Name = Field(description="NAME of our node")
     first_spn: Annotated[
-        int, number(1, LAST_FIRST_SPN, "", "suspect parameter number of the first axis in DM1")
+        int, number(1, LAST_SPN - 1, "", "suspect parameter number of the first axis in DM1")
     ] = 520192
     """By default the first of the range that is free to every maker."""
 
@@ -50,6 +50,10 @@ class Canopen(Section):
     heartbeat_ms: Annotated[int, number(20, 10_000, "ms", "time between our heartbeats")] = 200
     master: bool = Field(False, description="we start the other nodes; else another master does")
     nodes: dict[str, CanopenNode] = Field({}, description="other nodes by name")
+
+    def __hash__(self) -> int:
+        """Of all but the names: a bus is a key where it is asked for what is open."""
+        return hash((self.node, self.heartbeat_ms, self.master, *self.nodes.values()))
 
 
 class Bus(Section):

@@ -6,31 +6,13 @@ from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus
 from canshaper.config.filters import Filter
+from canshaper.config.input import Input
 from canshaper.config.protection import Protected
 from canshaper.config.section import Section, number
+from canshaper.config.sets import Feel, FeelSwitch, Grapple, SetConfig, sets_fault
+from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS_OF_SWAY
-from canshaper.shaping.sway import SwayMode
-
-
-class Input(Protected):
-    """A message that is taken, with its age limit and its protection."""
-
-    source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
-        None
-    )
-    """By default that of the DBC, where 254 means any: then the first that is heard."""
-    timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
-    alive_max_step: (
-        Annotated[
-            int, number(1, 255, "", "largest step of the alive counter that is still the next one")
-        ]
-        | None
-    ) = None
-    """3, or half of the counter's range where that is less."""
-    qualify: Annotated[
-        int, number(1, 20, "messages", "good ones in a row that are needed after a wrong one")
-    ] = 1
 
 
 class Lever(Input):
@@ -136,52 +118,6 @@ class Status(Protected):
     """A status message for displays and tools."""
 
 
-class Sway(Section):
-    """Swing of the tool on one axis.
-
-    Either grapple data (``length_m``, ``damping_nms``, ``mass_kg``), or what a stopwatch shows
-    (``period_s`` with ``damping_ratio`` or ``decay_per_swing``).
-    """
-
-    full_speed_m_s: Annotated[
-        float, number(0.05, 20, "m/s", "speed of the tip at full command, scales the sway shown")
-    ]
-    length_m: Annotated[float, number(0.05, 30, "m", "pendulum length")] | None = None
-    damping_nms: Annotated[float, number(0, 1e6, "N m s/rad", "damping of the joint")] | None = None
-    mass_kg: Annotated[float, number(1, 1e5, "kg", "mass of tool and load")] | None = None
-    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")] | None = None
-    damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")] | None = None
-    decay_per_swing: (
-        Annotated[float, number(0, 0.99, "", "part of the amplitude lost over a full swing")] | None
-    ) = None
-
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
-        self.mode()
-        return self
-
-    def mode(self) -> SwayMode:
-        """Sway mode of this data.
-
-        Raises:
-            ValueError: the data is incomplete, given twice, or makes no sense.
-        """
-        given = self.model_dump(exclude={"full_speed_m_s"}, exclude_none=True).keys()
-        if given == {"length_m", "damping_nms", "mass_kg"}:
-            assert self.length_m and self.mass_kg and self.damping_nms is not None
-            return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)
-        if given == {"period_s", "damping_ratio"}:
-            assert self.period_s and self.damping_ratio is not None
-            return SwayMode.from_period(self.period_s, self.damping_ratio)
-        if given == {"period_s", "decay_per_swing"}:
-            assert self.period_s and self.decay_per_swing is not None
-            return SwayMode.from_decay(self.period_s, self.decay_per_swing)
-        raise ValueError(
-            f"found {', '.join(sorted(given)) or 'no sway data'}; allowed are length_m, damping_nms"
-            " and mass_kg, or period_s and damping_ratio, or period_s and decay_per_swing"
-        )
-
-
 class Radius(Input):
     """Radius of the tip, measured."""
 
@@ -269,6 +205,8 @@ class AxisConfig(Section):
     status: Status | None = None
     sway: Sway | None = None
     filter: Filter = Field(discriminator="kind", description="filter of the axis")
+    sets: list[SetConfig] = Field([], description="sway and filter by the state of the grapple")
+    feels: dict[str, Feel] = Field({}, description="other filters that the operator may choose")
     limits: Limits = Limits()
     radial_compensation: RadialConfig | None = None
 
@@ -278,6 +216,8 @@ class AxisConfig(Section):
             raise ValueError(
                 f"filter {self.filter.kind} needs the sway data of the axis; found no sway"
             )
+        if fault := sets_fault(self.filter.kind, self.sets):
+            raise ValueError(fault)
         return self
 
 
@@ -290,4 +230,6 @@ class DeploymentConfig(Section):
     levers: dict[str, Lever] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
     emergency_stop: EmergencyStop | None = None
+    grapple: Grapple | None = None
+    feel: FeelSwitch | None = None
     status: Status | None = None

@@ -11,7 +11,8 @@ from typing import Any
 from canshaper.can.binding import Deployment, load_deployment
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
-from canshaper.service.controller import Controller, Event
+from canshaper.service.controller import Controller
+from canshaper.service.events import Event
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory
 

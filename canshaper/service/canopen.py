@@ -6,20 +6,23 @@ from dataclasses import dataclass
 from canshaper.can.binding import Deployment
 from canshaper.can.canopen import (
     EMERGENCY,
+    GENERIC_ERROR,
     HEARTBEAT,
     NMT,
     NO_EMERGENCY,
     START,
+    STATE_MASK,
     NodeState,
 )
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.config.bus import Canopen, CanopenNode
+from canshaper.service.cia408 import ValveControl
 from canshaper.service.runner import AxisRunner
 from canshaper.shaping.states import Reason
 
 # Between two commands to start one node: what it needs to answer with a heartbeat.
 START_AGAIN_NS = 500_000_000
-OPERATIONAL = bytes((NodeState.OPERATIONAL,))
+BOOT_UP, OPERATIONAL = bytes((NodeState.BOOT_UP,)), bytes((NodeState.OPERATIONAL,))
 
 
 @dataclass(frozen=True, slots=True)
@@ -42,33 +45,48 @@ class RemoteNode:
     Attributes:
         state: what it said last; None when nothing was heard of it, or for too long.
         emergency: its error code, 0 for none.
+        stops: how often it said another state than OPERATIONAL.
+        alarms: how often it told an error.
     """
 
     def __init__(self, config: CanopenNode) -> None:
         self.id = config.id
         self.state: int | None = None
         self.emergency = NO_EMERGENCY
+        self.stops = self.alarms = 0
         self._timeout_ns = config.heartbeat_ms * 1_000_000
         self._heard_ns = 0
         self._start_ns = 0
 
     def heartbeat(self, data: bytes, now_ns: int) -> FrameFault:
-        """Take a heartbeat; one that boots has no emergency any more."""
+        """Take a heartbeat; a node that boots has no emergency any more."""
         if len(data) != 1:
             return FrameFault.WRONG_LENGTH
-        self.state = data[0] & 0x7F
+        self.state = data[0] & STATE_MASK
         self._heard_ns = now_ns
+        if self.state != NodeState.OPERATIONAL:
+            self.stops += 1
         if self.state == NodeState.BOOT_UP:
             self.emergency = NO_EMERGENCY
             self._start_ns = now_ns
         return FrameFault.NONE
 
     def alarm(self, data: bytes, _now_ns: int) -> FrameFault:
-        """Take an emergency message; its error code 0 tells that all is well again."""
+        """Take an emergency message.
+
+        Error code 0 tells that one error is over; only with an error register of 0 are all.
+        """
         if len(data) != 8:
             return FrameFault.WRONG_LENGTH
-        self.emergency = int.from_bytes(data[:2], "little")
-        return FrameFault.NODE_EMERGENCY if self.emergency else FrameFault.NONE
+        code, register = int.from_bytes(data[:2], "little"), data[2]
+        if code == NO_EMERGENCY and register:
+            self.emergency = self.emergency or GENERIC_ERROR
+            return FrameFault.NONE
+        self.emergency = code
+        if code == NO_EMERGENCY:
+            return FrameFault.NONE
+        self.alarms += 1
+        return FrameFault.NODE_EMERGENCY
 
     def lost(self, now_ns: int) -> bool:
         """Whether it has just fallen silent; its state is not known any more then."""
@@ -89,15 +107,34 @@ class RemoteNode:
         """Whether what it sends and takes means something."""
         return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
 
-    def lever_gate(self, _neutral: bool, _now_ns: int) -> Reason | None:
-        """Why an axis may not move whose lever is this node: a shaped stop."""
-        return None if self.works else Reason.NODE_FAULT
 
-    def valve_gate(self, neutral: bool, _now_ns: int) -> Reason | None:
-        """Why an axis may not move whose valve is this node."""
-        if self.works:
+class NodeGate:
+    """Why an axis may not move, by the node of its lever or of its valve.
+
+    Args:
+        node: that node.
+        in_motion: what an axis in motion is told when it no longer works.
+        control: state machine of the valve, which begins anew with a node that does.
+    """
+
+    def __init__(
+        self, node: RemoteNode, in_motion: Reason, control: ValveControl | None = None
+    ) -> None:
+        self._node = node
+        self._in_motion = in_motion
+        self._control = control
+        self._stops, self._alarms = node.stops, node.alarms
+
+    def __call__(self, neutral: bool, _now_ns: int) -> Reason | None:
+        """The reason, or None; a failure since it was asked last counts, however short it was."""
+        node = self._node
+        stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
+        self._stops, self._alarms = node.stops, node.alarms
+        if self._control is not None and (stopped or node.state != NodeState.OPERATIONAL):
+            self._control.begin_anew()
+        if node.works and not (stopped or alarmed):
             return None
-        return Reason.NODE_FAULT if neutral else Reason.VALVE_FAULT
+        return Reason.NODE_FAULT if neutral else self._in_motion
 
 
 class _Heard:
@@ -123,6 +160,7 @@ class CanopenBus:
         self._own = config.node
         self._cycle_ns = config.heartbeat_ms * 1_000_000
         self._due_ns = 0
+        self._booted = False
         self._master = config.master
         self.nodes = {name: RemoteNode(node) for name, node in config.nodes.items()}
         self._told: dict[str, str] = {}
@@ -132,9 +170,13 @@ class CanopenBus:
             self.inputs[EMERGENCY + node.id] = _Heard(node.alarm)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
-        """What is due now: our heartbeat, and commands to start."""
-        if now_ns >= self._due_ns:
-            self._due_ns = now_ns + self._cycle_ns
+        """What is due now: our boot-up message or heartbeat, and commands to start."""
+        if not self._booted:
+            self._booted, self._due_ns = True, now_ns
+            yield Frame(self._bus, HEARTBEAT + self._own, False, BOOT_UP)
+        elif now_ns >= self._due_ns:
+            # From the time it was due, so that lateness does not add up; but never in a burst.
+            self._due_ns = max(self._due_ns + self._cycle_ns, now_ns)
             yield Frame(self._bus, HEARTBEAT + self._own, False, OPERATIONAL)
         if self._master:
             for node in self.nodes.values():
@@ -167,7 +209,9 @@ def canopen_buses(deployment: Deployment, axes: Mapping[str, AxisRunner]) -> dic
         config = runner.bound.config
         lever, valve = deployment.config.levers[config.stick.lever], config.valve
         if lever.node:
-            runner.gates.append(buses[lever.bus].nodes[lever.node].lever_gate)
+            node = buses[lever.bus].nodes[lever.node]
+            runner.gates.insert(0, NodeGate(node, Reason.NODE_FAULT))
         if valve.cia408 and valve.cia408.node:
-            runner.gates.append(buses[valve.bus].nodes[valve.cia408.node].valve_gate)
+            node = buses[valve.bus].nodes[valve.cia408.node]
+            runner.gates.insert(0, NodeGate(node, Reason.VALVE_FAULT, runner.control))
     return buses

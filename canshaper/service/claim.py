@@ -26,6 +26,8 @@ WAIT_NS = 250_000_000
 STEP_NS = 600_000
 # Claims in answer to claims: two nodes that are set up wrong must not fill the bus.
 LEAST_BETWEEN_NS = 5_000_000
+# Refusals in one tick; who asks for more at once gets no answer, as on a bus that is full.
+MOST_REFUSED = 8
 
 
 class ClaimState(Enum):
@@ -43,13 +45,20 @@ class AddressClaim:
         bus: name of the bus.
         config: address and NAME.
         answered: groups (PGN) that are sent on request by others of us.
+        cyclic: groups that are sent anyhow; a request for one is answered by the next of them.
 
     Attributes:
         state: of our address; nothing but claims may be sent in any other than CLAIMED.
         requested: groups among ``answered`` that were asked for since the owner emptied it.
     """
 
-    def __init__(self, bus: str, config: J1939, answered: frozenset[int] = frozenset()) -> None:
+    def __init__(
+        self,
+        bus: str,
+        config: J1939,
+        answered: frozenset[int] = frozenset(),
+        cyclic: frozenset[int] = frozenset(),
+    ) -> None:
         self.state = ClaimState.WAITING
         self.requested: set[int] = set()
         self._bus = bus
@@ -57,6 +66,7 @@ class AddressClaim:
         self._name = name_bytes(config.name)
         self._number = int.from_bytes(self._name, "little")
         self._answered = answered
+        self._cyclic = cyclic
         self._delay_ns = config.name.identity_number % 256 * STEP_NS
         self._due_ns: int | None = 0  # when to send a claim, or that there is none
         self._until_ns: int | None = None
@@ -69,11 +79,11 @@ class AddressClaim:
         return self.state is ClaimState.CLAIMED
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a claim or a request of another node."""
+        """Take a claim or a request of another node; never one of ours, seen back."""
         destination, source = frame.can_id >> 8 & 0xFF, frame.can_id & 0xFF
         group = group_of(frame.can_id)
         if group == CLAIMED << 8 and len(frame.data) == 8:
-            if source == self._address:
+            if source == self._address and self.state is not ClaimState.LOST:
                 self._contended(int.from_bytes(frame.data, "little"), now_ns)
         elif (
             group == REQUEST << 8
@@ -84,23 +94,33 @@ class AddressClaim:
             self._asked(pgn, source, now_ns, by_name=destination != GLOBAL)
 
     def _contended(self, other: int, now_ns: int) -> None:
-        if other == self._number:  # our own claim, seen back
-            return
         if other > self._number:
-            if self.state is not ClaimState.LOST:
-                self._due_ns = max(now_ns, self._again_ns)
-        elif self.state is not ClaimState.LOST:
-            self.state = ClaimState.LOST
-            self._due_ns = now_ns + self._delay_ns
+            self._claim_at(now_ns)
+            return
+        # The same NAME too: two nodes that were set up alike cannot agree which of them it is.
+        self.state = ClaimState.LOST
+        self._refused.clear()
+        self._due_ns = now_ns + self._delay_ns
 
     def _asked(self, pgn: int, source: int, now_ns: int, *, by_name: bool) -> None:
         if pgn == CLAIMED:
             lost = self.state is ClaimState.LOST
-            self._due_ns = now_ns + (self._delay_ns if lost else 0)
+            self._claim_at(now_ns + (self._delay_ns if lost else 0))
         elif pgn in self._answered:
             self.requested.add(pgn)
-        elif by_name and self.sends and source != NULL and len(self._refused) < 8:
+        elif (
+            by_name
+            and self.sends
+            and pgn not in self._cyclic
+            and source < NULL
+            and len(self._refused) < MOST_REFUSED
+        ):
             self._refused.append((pgn, source))
+
+    def _claim_at(self, time_ns: int) -> None:
+        """A claim is due; one that is due already is not put off by who asks again."""
+        time_ns = max(time_ns, self._again_ns)
+        self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
         """What is due now: claims, and answers to requests for what we do not have."""
@@ -123,3 +143,21 @@ class AddressClaim:
             can_id = identifier(ACKNOWLEDGE, self._address)
             yield Frame(self._bus, can_id, True, data)
         self._refused.clear()
+
+    def repeat(self) -> None:
+        """Something did not go out; what we are is said once more."""
+        if self.state is not ClaimState.LOST:
+            self._claim_at(self._again_ns)
+
+    def not_sent(self) -> None:
+        """The last claim did not go out: it is tried again, and the wait begins with it."""
+        self.anew()
+        self._claim_at(self._again_ns)
+
+    def anew(self) -> None:
+        """Claim and wait as at the start; a lost address stays lost."""
+        if self.state is not ClaimState.LOST:
+            self.state = ClaimState.WAITING
+            self._until_ns = None
+            self._refused.clear()
+            self._claim_at(self._again_ns)

@@ -4,20 +4,23 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
-from typing import Protocol
 
 from canshaper.can.binding import Deployment
+from canshaper.can.canopen import service_of
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
-from canshaper.service.canopen import NodeEvent, canopen_buses
+from canshaper.service.canopen import canopen_buses
+from canshaper.service.counters import Counters
+from canshaper.service.events import Event, FeedbackEvent, Told
 from canshaper.service.feedback import Feedback, Following
+from canshaper.service.groups import Taken
 from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
-from canshaper.service.network import AddressEvent, Network
+from canshaper.service.network import Network
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
-from canshaper.shaping.states import Reason, Transition
+from canshaper.service.sets import SetChooser, SwitchInput
+from canshaper.shaping.states import Reason
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
 # than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
@@ -28,82 +31,6 @@ FAULT_OF = {
     Following.LOST: FrameFault.FEEDBACK_LOST,
 }
 NOWHERE: frozenset[str] = frozenset()
-
-
-@dataclass(frozen=True, slots=True)
-class Event:
-    """Something an administrator wants to read: a change of state of an axis."""
-
-    axis: str
-    transition: Transition
-
-    @property
-    def text(self) -> str:
-        """For the log."""
-        t = self.transition
-        return f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
-
-
-@dataclass(frozen=True, slots=True)
-class FeedbackEvent:
-    """The feedback of a valve says something else than before."""
-
-    axis: str
-    following: Following
-    value: float
-    sent: float
-
-    @property
-    def text(self) -> str:
-        """For the log."""
-        found = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
-        return f"axis={self.axis} valve={self.following.value} {found}"
-
-
-class Counters:
-    """What went wrong so far, by the signal names of the status message."""
-
-    __slots__ = ("last_fault", "values")
-
-    SIGNAL_OF = {  # noqa: RUF012  (a constant table)
-        FrameFault.WRONG_LENGTH: "WrongLength",
-        FrameFault.UNKNOWN_ID: "UnknownId",
-        FrameFault.ERROR_FRAME: "ErrorFrames",
-        FrameFault.INVALID_SIGNAL: "InvalidSignals",
-        FrameFault.SEND_FAILED: "SendFailures",
-        FrameFault.MISSED_DEADLINE: "MissedDeadlines",
-        FrameFault.CHECKSUM: "InvalidSignals",
-        FrameFault.COUNTER_REPEATED: "InvalidSignals",
-        FrameFault.COUNTER_JUMP: "InvalidSignals",
-        FrameFault.BUS_OFF: "ErrorFrames",
-        FrameFault.BUS_PASSIVE: "ErrorFrames",
-        FrameFault.NOT_CONFIRMED: "SendFailures",
-    }
-
-    def __init__(self) -> None:
-        self.values = dict.fromkeys(self.SIGNAL_OF.values(), 0)
-        self.last_fault = FrameFault.NONE
-
-    def add(self, fault: FrameFault, count: int = 1) -> None:
-        """Count a fault and remember it as the last one."""
-        self.last_fault = fault
-        signal = self.SIGNAL_OF.get(fault)
-        if signal is not None:
-            self.values[signal] += count
-
-    def status(self) -> dict[str, int]:
-        """Values of the status message."""
-        return {**self.values, "LastFault": int(self.last_fault)}
-
-
-class Taken(Protocol):
-    """Takes the frames of one message."""
-
-    def receive(self, data: bytes, now_ns: int, /) -> FrameFault:
-        """Take one."""
-
-    def forget(self) -> None:
-        """Nothing received so far counts any more."""
 
 
 class Controller:
@@ -117,9 +44,9 @@ class Controller:
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.counters = Counters()
-        self.events: list[Event | AddressEvent | FeedbackEvent | NodeEvent] = []
+        self.events: list[Told] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
-        taken: list[tuple[BoundInput, Input]] = [
+        taken: list[tuple[BoundInput, Taken]] = [
             (lever, levers[name]) for name, lever in deployment.levers.items()
         ]
         self._stop: EmergencyStopInput | None = None
@@ -131,6 +58,7 @@ class Controller:
             name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
             for name, bound in deployment.axes.items()
         }
+        taken += self._choose()
         taken += [
             (runner.bound.feedback, runner.feedback)
             for runner in self.axes.values()
@@ -141,15 +69,18 @@ class Controller:
             for runner in self.axes.values()
             if runner.bound.status_word and runner.control
         ]
-        self._inputs: dict[tuple[str, int, bool], Taken] = {bound.key: one for bound, one in taken}
+        self._inputs: dict[tuple[str, int, bool], Taken] = {
+            bound.key: one for bound, one in taken if not bound.any_source
+        }
         self._sent = {
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
         }
         for runner in self.axes.values():
             if runner.bound.radial is not None:
                 radius = RadiusInput(runner.bound.radial)
-                if runner.bound.radial.key is not None:
-                    self._inputs[runner.bound.radial.key] = radius
+                if (measured := runner.bound.radial.radius) is not None:
+                    taken.append((measured, radius))
+                    self._inputs[measured.key] = radius
                 target = self.axes[runner.bound.radial.config.axis]
                 runner.compensator = Compensator(runner, target, radius)
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
@@ -167,6 +98,7 @@ class Controller:
         for bus, nodes in self._canopen.items():
             self._inputs |= {(bus, n, False): one for n, one in nodes.inputs.items()}
         self._network = Network(deployment, self.axes, taken)
+        self._j1939 = {bus for bus in deployment.config.buses if deployment.is_j1939(bus)}
         self._last = -1  # number of the last deadline
         self._late = 0
         self._overrun = False
@@ -188,12 +120,18 @@ class Controller:
                 runner.contested_ns = now_ns
         elif frame.extended and (group := self._network.entry(key[0], key[1])):
             fault = group.receive(frame, now_ns)
-        elif key[1:] in self._others or (frame.extended and key[0] in self._network.nodes):
+        elif key[1:] in self._others or self._usual(frame):
             return
         else:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
+
+    def _usual(self, frame: Frame) -> bool:
+        """Whether such a frame is daily life of its bus, known to the DBC files or not."""
+        if frame.extended:
+            return frame.bus in self._j1939
+        return frame.bus in self._canopen and service_of(frame.can_id) is not None
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run every axis that is due.
@@ -231,12 +169,22 @@ class Controller:
         yield from self._statuses(changed, last, now, silent)
         if self._network.nodes:
             yield from self._network.frames(now_ns)
-            self.events += self._network.changes()
+        self.events += self._network.changes()
         for nodes in self._canopen.values():
             if lost := nodes.lost(now_ns):
                 self.counters.add(FrameFault.HEARTBEAT_LOST, lost)
             yield from nodes.frames(now_ns)
             self.events += nodes.changes()
+
+    def _choose(self) -> list[tuple[BoundInput, Input]]:
+        """Let grapple and operator choose sway data and filter of the axes that have a choice."""
+        bound = self.deployment.grapple, self.deployment.feel
+        grapple, feel = (SwitchInput(one) if one else None for one in bound)
+        codes = self.deployment.config.feel.codes if self.deployment.config.feel else {}
+        for runner in self.axes.values():
+            if runner.bound.config.sets or runner.bound.config.feels:
+                runner.chooser = SetChooser(runner.bound, runner.axis, grapple, feel, codes)
+        return [(b, one) for b, one in zip(bound, (grapple, feel), strict=True) if b and one]
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
         """Tell when the valve no longer does what it is told, and when it does again."""
@@ -275,14 +223,20 @@ class Controller:
         """The loop stood still for longer than any input may be old: nothing known still holds."""
         for entry in self._inputs.values():
             entry.forget()
+        self._network.stalled()
         for runner in self.axes.values():
             runner.lost = True
             if not runner.axis.neutral:
                 runner.trip = Reason.LOOP_STALLED
 
+    def unheard(self, bus: str) -> None:
+        """We are not on a bus now: what was said there about addresses we have not heard."""
+        self._network.unheard(bus)
+
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus; the axes of a valve frame trip."""
         self.counters.add(FrameFault.SEND_FAILED)
+        self._network.send_failed(frame)
         for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
             if not runner.axis.neutral:
                 runner.trip = Reason.SEND_FAILED

@@ -10,7 +10,7 @@ from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port, open_port
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.config.schema import Input
+from canshaper.config.input import Input
 from canshaper.config.source import DeploymentError
 from canshaper.service.controller import Controller
 from canshaper.service.loop import run_at_deadlines
@@ -22,6 +22,8 @@ log = logging.getLogger("canshaper")
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
 SECOND_NS = 1_000_000_000
+# Nobody hears us there, or we nobody.
+OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE))
 
 
 class Daemon:
@@ -105,6 +107,8 @@ class Daemon:
             log.info("%s", event.text)
         controller.events.clear()
         for name, port in self._ports.items():
+            if port.state in OFF_BUS:
+                controller.unheard(name)
             if port.state is not self._bus_states[name]:
                 self._bus_states[name] = port.state
                 level = logging.INFO if port.state is BusState.UP else logging.WARNING

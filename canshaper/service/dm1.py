@@ -46,6 +46,8 @@ FMI_OF = {
     Reason.LOOP_STALLED: BAD_DEVICE,
     Reason.EMERGENCY_STOP_LOST: ABNORMAL_RATE,
     Reason.SECOND_SENDER: SPECIAL,
+    Reason.NODE_FAULT: ABNORMAL_RATE,
+    Reason.VALVE_FAULT: BAD_DEVICE,
 }
 """Failure mode of an axis by its reason; what the operator does is no fault."""
 
@@ -124,6 +126,11 @@ class ActiveFaults:
         elif self._packets and now_ns >= self._packet_ns:
             self._packet_ns = now_ns + PACKET_NS
             yield self._frame(TRANSPORT_DATA, self._packets.pop(0), LOWEST_PRIORITY)
+
+    def interrupt(self) -> None:
+        """Nothing may be sent now: a broadcast under way is not gone on with later."""
+        self._packets.clear()
+        self._next_ns = 0
 
     def _frame(self, pgn: int, data: bytes, priority: int = DEFAULT_PRIORITY) -> Frame:
         return Frame(self._bus, identifier(pgn, self._address, priority=priority), True, data)

@@ -5,14 +5,19 @@ from dataclasses import dataclass
 
 from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput
-from canshaper.can.j1939 import group_of
+from canshaper.can.inputs import BoundInput, BoundLever
+from canshaper.can.j1939 import CLAIMED, group_of, pgn_of
 from canshaper.config.bus import J1939
 from canshaper.service.claim import ClaimState
 from canshaper.service.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.service.feedback import Following
-from canshaper.service.groups import AnySource, CommandedByOthers
-from canshaper.service.input import Input
+from canshaper.service.groups import (
+    AnySource,
+    CommandedByOthers,
+    SourceEvent,
+    Taken,
+    TakenGroup,
+)
 from canshaper.service.node import GROUPS, Node
 from canshaper.service.runner import AxisRunner
 
@@ -47,14 +52,18 @@ class Network:
         self,
         deployment: Deployment,
         axes: Mapping[str, AxisRunner],
-        taken: Sequence[tuple[BoundInput, Input]],
+        taken: Sequence[tuple[BoundInput, Taken]],
     ) -> None:
         buses = deployment.config.buses
         self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
         self._axes = axes
-        self.nodes = {name: Node(name, config) for name, config in self._configs.items()}
+        self.nodes = {
+            name: Node(name, config, frozenset(_cyclic(deployment, name)))
+            for name, config in self._configs.items()
+        }
         self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
-        self._groups: dict[tuple[str, int], Node | AnySource | CommandedByOthers] = {}
+        self._groups: dict[tuple[str, int], Node | TakenGroup | CommandedByOthers] = {}
+        self._any: list[AnySource] = []
         for bus, node in self.nodes.items():
             self._groups |= {(bus, group): node for group in GROUPS}
             there = [r for r in axes.values() if r.bound.config.valve.bus == bus]
@@ -66,13 +75,26 @@ class Network:
                 ]
                 self._groups[bus, group] = CommandedByOthers(runners)
         for bound, one in taken:
-            if bound.any_source:
-                bus, config = bound.config.bus, self._configs.get(bound.config.bus)
-                own = config.address if config else None
-                timeout_ns = bound.config.timeout_ms * 1_000_000
-                self._groups[bus, group_of(bound.key[1])] = AnySource(one, timeout_ns, own)
+            if bound.by_group:
+                self._take(bound, one)
 
-    def entry(self, bus: str, can_id: int) -> Node | AnySource | CommandedByOthers | None:
+    def _take(self, bound: BoundInput, one: Taken) -> None:
+        bus, can_id = bound.config.bus, bound.key[1]
+        entry = self._groups.get((bus, group_of(can_id)))
+        if not isinstance(entry, TakenGroup):
+            config = self._configs.get(bus)
+            entry = TakenGroup(config.address if config else None)
+            self._groups[bus, group_of(can_id)] = entry
+        if not bound.any_source:
+            entry.of[can_id & 0xFF] = one
+            return
+        name = bound.name if isinstance(bound, BoundLever) else None
+        moved = [r for r in self._axes.values() if r.bound.config.stick.lever == name]
+        timeout_ns = bound.config.timeout_ms * 1_000_000
+        entry.rest = AnySource(bus, bound.message.name, one, timeout_ns, moved)
+        self._any.append(entry.rest)
+
+    def entry(self, bus: str, can_id: int) -> Node | TakenGroup | CommandedByOthers | None:
         """Who takes a message, by its group."""
         return self._groups.get((bus, group_of(can_id)))
 
@@ -87,12 +109,32 @@ class Network:
         for bus, node in self.nodes.items():
             yield from node.frames(self._active_faults(bus), now_ns)
 
-    def changes(self) -> Iterator[AddressEvent]:
-        """What became of our addresses since the last call."""
+    def changes(self) -> Iterator[AddressEvent | SourceEvent]:
+        """What became of our addresses since the last call, and which others are new."""
         for bus, node in self.nodes.items():
             if node.state is not self._told[bus]:
                 self._told[bus] = node.state
                 yield AddressEvent(bus, self._configs[bus].address, node.state)
+        for one in self._any:
+            yield from one.events
+            one.events.clear()
+
+    def send_failed(self, frame: Frame) -> None:
+        """A frame did not reach its bus: who has lost what we say may have taken our address."""
+        if node := self.nodes.get(frame.bus):
+            node.send_failed(claim=frame.extended and pgn_of(frame.can_id) == CLAIMED)
+
+    def unheard(self, bus: str) -> None:
+        """Claims of others were missed on this bus: claim anew before anything else."""
+        if node := self.nodes.get(bus):
+            node.unheard()
+
+    def stalled(self) -> None:
+        """Nothing that was received so far counts any more, and claims were missed on all buses."""
+        for node in self.nodes.values():
+            node.unheard()
+        for one in self._any:
+            one.forget()
 
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
         """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""
@@ -106,3 +148,8 @@ class Network:
             if (fmi := FMI_OF_FOLLOWING.get(following)) is not None:
                 found.append((first + 2 * i + 1, fmi))
         return found
+
+
+def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
+    """Groups that we send again and again under our address, by their number."""
+    return (pgn_of(can_id) for can_id, extended in deployment.ids(bus).sent if extended)

@@ -16,12 +16,17 @@ GROUPS = (CLAIMED << 8, REQUEST << 8)
 class Node:
     """Address and active faults on one bus.
 
+    Args:
+        bus: name of the bus.
+        config: address and NAME.
+        cyclic: groups (PGN) that are sent anyhow, so that nobody has to ask for them.
+
     Attributes:
         state: of our address.
     """
 
-    def __init__(self, bus: str, config: J1939) -> None:
-        self._claim = AddressClaim(bus, config, frozenset((DM1,)))
+    def __init__(self, bus: str, config: J1939, cyclic: frozenset[int] = frozenset()) -> None:
+        self._claim = AddressClaim(bus, config, frozenset((DM1,)), cyclic)
         self._faults = ActiveFaults(bus, config.address)
 
     @property
@@ -29,11 +34,13 @@ class Node:
         """State of our address; in any other than CLAIMED all but the node itself is silent."""
         return self._claim.state
 
-    def gate(self, _neutral: bool, _now_ns: int) -> Reason | None:
-        """Why nothing may move."""
+    def gate(self, neutral: bool, _now_ns: int) -> Reason | None:
+        """Why nothing may move: silence is no shaped stop, and no axis goes on after it."""
         if self._claim.state is ClaimState.LOST:
             return Reason.ADDRESS_LOST
-        return Reason.ADDRESS_NOT_CLAIMED if self._claim.state is ClaimState.WAITING else None
+        if self._claim.state is ClaimState.WAITING:
+            return Reason.ADDRESS_NOT_CLAIMED if neutral else Reason.SEND_FAILED
+        return None
 
     def receive(self, frame: Frame, now_ns: int) -> FrameFault:
         """Take a claim or a request; a claim that wins over ours is a fault."""
@@ -49,3 +56,16 @@ class Node:
             requested = DM1 in self._claim.requested
             self._claim.requested.clear()
             yield from self._faults.frames(active, now_ns, requested=requested)
+        else:
+            self._faults.interrupt()
+
+    def send_failed(self, *, claim: bool) -> None:
+        """A frame did not reach the bus; one that was a claim is no claim."""
+        if claim:
+            self._claim.not_sent()
+        else:
+            self._claim.repeat()
+
+    def unheard(self) -> None:
+        """Claims of others were missed."""
+        self._claim.anew()

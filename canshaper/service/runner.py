@@ -10,6 +10,7 @@ from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
 from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
+from canshaper.service.sets import SetChooser
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.radial import RadialCompensation
 from canshaper.shaping.registry import build_shaper
@@ -36,6 +37,7 @@ class AxisRunner:
         sends: the message of its valve goes out when this axis has moved.
         control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
+        chooser: which sway data and filter are in force, where there is a choice.
         gates: what else has to agree before the axis may move.
         compensator: what this axis asks of another one, where it slews.
     """
@@ -71,6 +73,7 @@ class AxisRunner:
         self.added = 0.0
         self.sends = False
         self.gates: list[Gate] = []
+        self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
         self.control: ValveControl | None = None
         if bound.status_word and config.valve.cia408:
@@ -93,6 +96,8 @@ class AxisRunner:
         self._ticked_ns = now_ns
         if overrun and stick.enabled and stick.fault is None:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
+        if self.chooser is not None:
+            self.chooser.update(now_ns)
         if self.compensator is None:
             transition = self.axis.tick(stick, self.added)
         else:
@@ -111,20 +116,27 @@ class AxisRunner:
                 trip = trip or Reason.SECOND_SENDER
             else:
                 self.contested_ns = None
+        neutral, fault = self.axis.neutral, None
         for gate in self.gates:
-            found = gate(self.axis.neutral, now_ns)
+            found = gate(neutral, now_ns)
             if found is not None and found >= TRIPS:
                 trip = trip or found
-            elif found is not None:
-                return StickInput(fault=found, trip=trip)
+            else:
+                fault = fault or found
         if emergency is not None and (stop := emergency.stop(now_ns, since_ns)):
-            if stop is Reason.EMERGENCY_STOP or not self.axis.neutral:
+            if stop is Reason.EMERGENCY_STOP or not neutral:
                 trip = trip or stop
             else:  # not heard of yet: nothing to trip, but nothing may begin
-                return StickInput(fault=stop, trip=trip)
+                fault = fault or stop
         if lost:
-            return StickInput(fault=Reason.STICK_TIMEOUT, trip=trip)
-        return self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
+            fault = fault or Reason.STICK_TIMEOUT
+        if fault is not None and self.axis.state is State.TRIPPED:
+            # What tripped it is still there, so that a reset which is held is no new press.
+            trip, fault = trip or fault, None
+        stick = self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
+        if fault is None or not (neutral or stick.enabled):  # a release is more than a fault
+            return stick
+        return StickInput(fault=fault, trip=trip)
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""
@@ -133,7 +145,10 @@ class AxisRunner:
         axis = self.axis
         sway_rad = axis.sway.sway_rad(self._full_speed_m_s) if axis.sway else 0.0
         sway_deg = math.degrees(sway_rad)
-        return self.bound.status.frame(axis.state, axis.reason, axis.command, axis.sent, sway_deg)
+        number = self.chooser.number if self.chooser else 0
+        return self.bound.status.frame(
+            axis.state, axis.reason, axis.command, axis.sent, sway_deg, active_set=number
+        )
 
 
 class Compensator:

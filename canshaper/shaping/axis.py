@@ -8,6 +8,7 @@ from READY, which takes a fresh, valid, enabled stick seen in neutral.
 import math
 from collections.abc import Callable
 
+from canshaper.shaping.limit_aware import carry_over
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
@@ -157,7 +158,9 @@ class Axis:
             sway = SwayModel(mode, self._tick_s)
         else:
             sway = self.sway.retuned(mode, self.told)
-        self._shaper = shaper_for(sway)
+        shaper = shaper_for(sway)
+        carry_over(self._shaper, shaper, self.command)
+        self._shaper = shaper
         self.sway = sway
         self._rebump = True
 

@@ -39,6 +39,17 @@ class Fir:
         self._history.appendleft(command)
         return math.fsum(map(mul, self.taps, self._history))
 
+    def begin_at(self, command: float) -> None:
+        """Begin with a command that has long been there."""
+        self._history.extend([command] * len(self.taps))
+
+    def inherit(self, old: "Fir", _command: float) -> None:
+        """Go on with the commands that another one has seen; of older ones its oldest is taken."""
+        seen = list(old._history)
+        seen += [seen[-1]] * (len(self.taps) - len(seen))
+        self._history.clear()
+        self._history.extend(seen[: len(self.taps)])
+
 
 def zv_taps(mode: SwayMode, tick_s: float) -> list[float]:
     """Zero vibration: two impulses half a swing apart, the second on two neighbouring ticks.

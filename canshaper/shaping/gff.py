@@ -81,6 +81,14 @@ class Gff:
         command = self._command
         return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
 
+    def inherit(self, old: "Gff", _command: float) -> None:
+        """Go on from where another one stands; the swing is in the model."""
+        self._command = old._command
+
+    def begin_at(self, command: float) -> None:
+        """Begin with a command that has long been there."""
+        self._command = command
+
 
 def poles_from_denominator(a1: float, a2: float) -> tuple[float, float]:
     """Poles of 1 / (a2 s^2 + a1 s + 1), rad/s, the faster one first.

@@ -31,6 +31,20 @@ class _Shaper(Protocol):
     def wanted(self, command: float) -> float: ...
 
 
+def carry_over(old: _Shaper, new: _Shaper, command: float) -> None:
+    """Give a new shaper a memory: that of the one before it, where both are of one kind.
+
+    Args:
+        old: the one before.
+        new: the new one.
+        command: the command now; without a better memory it counts as the one for long.
+    """
+    if type(old) is type(new) and hasattr(new, "inherit"):
+        new.inherit(old, command)
+    elif hasattr(new, "begin_at"):
+        new.begin_at(command)
+
+
 class LimitAware:
     """A shaper with feedback of the swing that limits made.
 
@@ -58,6 +72,19 @@ class LimitAware:
         self._twin = SwayModel(sway.mode, sway.tick_s)
         self._shaper = shaper
         self._asked = 0.0
+
+    def inherit(self, old: "LimitAware", command: float) -> None:
+        """Go on from where another one stands."""
+        self._twin = old._twin.retuned(self._sway.mode, old._asked)
+        self._asked = old._asked
+        carry_over(old._shaper, self._shaper, command)
+
+    def begin_at(self, command: float) -> None:
+        """Begin with a command that has long been there, and no swing that limits have made."""
+        self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
+        self._asked = command
+        if hasattr(self._shaper, "begin_at"):
+            self._shaper.begin_at(command)
 
     def wanted(self, command: float) -> float:
         """Output for this tick's command, before limits."""

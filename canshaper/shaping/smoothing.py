@@ -22,6 +22,14 @@ class FirstOrder:
         self._value += self._share * (command - self._value)
         return self._value
 
+    def begin_at(self, command: float) -> None:
+        """Begin with a command that has long been there."""
+        self._value = command
+
+    def inherit(self, old: "FirstOrder", _command: float) -> None:
+        """Go on from where another one stands."""
+        self._value = old._value
+
 
 class SCurve:
     """Follows the command with limited rate and limited change of rate.
@@ -56,3 +64,11 @@ class SCurve:
             step, self._slope = left, 0.0  # arrived
         self._value += step
         return self._value
+
+    def begin_at(self, command: float) -> None:
+        """Begin with a command that has long been there."""
+        self._value, self._slope = command, 0.0
+
+    def inherit(self, old: "SCurve", _command: float) -> None:
+        """Go on from where another one stands."""
+        self._value, self._slope = old._value, old._slope

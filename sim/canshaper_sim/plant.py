@@ -8,7 +8,7 @@ from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import USUAL_MAX_STEP, BoundFeedback
-from canshaper.can.protection import Guard
+from canshaper.can.protection import UNPROTECTED, Guard
 from canshaper.can.signals import find_signal
 from canshaper.can.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
@@ -117,6 +117,9 @@ class PlantNode:
         bus = next(iter(deployment.axes.values())).config.valve.bus
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
+        # A feedback message that is the measured radius of the deployment is protected as it asks.
+        measured = [a.radial.radius for a in deployment.axes.values() if a.radial]
+        radii = {radius.message.name: radius.protection for radius in measured if radius}
         for message, signals in self._feedback.items():
             found = deployment.messages.find(message)
             if isinstance(found, str):
@@ -124,7 +127,8 @@ class PlantNode:
             elif missing := [s for s in signals if not find_signal(found[1], s)]:
                 problems.append(found[0].problem(found[1], f"lacks {', '.join(missing)}"))
             else:
-                self._senders[message] = Sender(bus, found[1])
+                protection = radii.get(message, UNPROTECTED)
+                self._senders[message] = Sender(bus, found[1], protection=protection)
         if problems:
             raise DeploymentError(problems)
         self._machine = build_machine(name, parameters, sway)

@@ -19,7 +19,7 @@ from canshaper.can.codecs import (
 )
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.protection import UNPROTECTED, Protection
-from canshaper.can.signals import FieldSet, VelocitySignal
+from canshaper.can.signals import VelocitySignal
 from canshaper.can.valve import ValveCodec, ValveMessage
 from canshaper.shaping.states import Reason, State
 
@@ -265,7 +265,7 @@ def test_a_frame_that_is_refused_is_not_counted() -> None:
 def test_start_values_beyond_the_bits_are_held_within() -> None:
     text = DBC.replace("SG_ 3 Unused 255", "SG_ 3 Unused 99999")
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Offset")
-    assert FieldSet(message).encode({})[2] == 255
+    assert Sender("b", message).frame({}).data[2] == 255
 
 
 # -- status ----------------------------------------------------------------------------------------

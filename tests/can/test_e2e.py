@@ -1,8 +1,8 @@
 """Profiles 1 and 2 of AUTOSAR E2E: published frames, the library's CRCs, every flipped bit.
 
 The frames of profile 1 are the protocol examples of AUTOSAR PRS_E2EProtocol (data ID 0x123, eight
-bytes, counter 0 and 1), as torsko/autosar-e2e and the Python package autosar-e2e test them; those of
-profile 2 are from the tests of that package.
+bytes, counter 0 and 1), as torsko/autosar-e2e and the Python package autosar-e2e test them; those
+of profile 2 are from the tests of that package.
 """
 
 import pytest

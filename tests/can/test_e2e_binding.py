@@ -122,7 +122,7 @@ HEADER = "its header takes the first 12 bits of"
         (
             [("enable: Enable", "enable: Seq")],
             "e2e:",
-            f"levers.hand.e2e: {HEADER} Lever, where Seq lies, which is enable already",
+            f"levers.hand.e2e: {HEADER} Lever, where Seq lies, which is enable",
         ),
         (
             [("enable: Enable", "enable: Top"), ("both", "nibble")],

@@ -3,7 +3,7 @@
 import pytest
 
 from canshaper.can.frame import FrameFault
-from canshaper.service.controller import Counters
+from canshaper.service.counters import Counters
 
 COUNTED = {
     "WrongLength": {"WRONG_LENGTH"},

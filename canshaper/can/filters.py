@@ -1,0 +1,67 @@
+"""Filters of a deployment against the period of the valve that they drive."""
+
+from canshaper.can.valves import ValveBinder
+from canshaper.config.filters import Filter, RobustFilter
+from canshaper.config.schema import AxisConfig
+from canshaper.config.sets import Feel
+from canshaper.config.source import Place
+from canshaper.config.sway import Sway
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.sway import SwayModel
+
+
+class FilterBinder(ValveBinder):
+    """Checks them, or notes every problem."""
+
+    def check_filters(self, place: Place, axis: AxisConfig, period_s: float) -> None:
+        """Every filter that the axis may get has to run at the period of its valve."""
+        rate = axis.limits.slowest_per_s
+        found: list[tuple[Place, Filter, Sway | None]] = []
+        parts: list[tuple[Place, AxisConfig | Feel]] = [(place, axis)]
+        parts += [((*place, "feels", name), feel) for name, feel in axis.feels.items()]
+        for at, part in parts:
+            found.append(((*at, "filter"), part.filter, axis.sway))
+            for i, one in enumerate(part.sets):
+                found.append(((*at, "sets", i, "filter"), one.filter, one.sway))
+            if part.sets and not self.config.grapple:
+                self.add((*at, "sets"), "need the signal that chooses them; found no grapple")
+        for at, chosen, sway in found:
+            if fault := filter_fault(chosen, sway, period_s, rate):
+                self.add(at, fault)
+        if len(found) > 1 and axis.sway is None:
+            self.add(place, "has sets or feels, and no sway data of its own; found no sway")
+        codes = self.config.feel.codes if self.config.feel else {}
+        for name in axis.feels:
+            if name not in codes:
+                allowed = ", ".join(codes) or "none: there is no feel at the top level"
+                self.add((*place, "feels", name), f"found {name!r}, feels are {allowed}")
+
+
+def filter_fault(
+    chosen: Filter, sway: Sway | None, period_s: float, valve_rate_per_s: float
+) -> str | None:
+    """Why a filter cannot run, or None.
+
+    Args:
+        chosen: the filter.
+        sway: sway data that it runs with.
+        period_s: time between two commands to the valve.
+        valve_rate_per_s: rate of the valve, full speeds per second.
+    """
+    if isinstance(chosen, RobustFilter) and chosen.tick_ms != round(1000.0 * period_s):
+        return (
+            f"tick_ms of the taps is {chosen.tick_ms} ms, allowed is the period of the valve,"
+            f" {1000.0 * period_s:g} ms"
+        )
+    try:
+        model = SwayModel(sway.mode(), period_s) if sway else None
+        build_shaper(
+            chosen.kind,
+            period_s,
+            model,
+            valve_rate_per_s=valve_rate_per_s,
+            **chosen.parameters(),
+        )
+    except ValueError as error:
+        return str(error)
+    return None

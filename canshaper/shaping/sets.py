@@ -1,0 +1,84 @@
+"""Sets of sway data and filter: one for an empty grapple, one for a full one, and all between."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from canshaper.shaping.gff import poles_from_denominator
+from canshaper.shaping.sway import SwayMode
+
+# Positions between two sets that are told apart: 1 to 2 % of their difference.
+STEPS_BETWEEN = 64
+
+
+@dataclass(frozen=True, slots=True)
+class ParameterSet:
+    """Sway of an axis and its filter.
+
+    Attributes:
+        at: value of the signal at which it holds.
+        mode: the sway.
+        kind: name of the filter in the registry.
+        parameters: its parameters by the names of the registry.
+    """
+
+    at: float
+    mode: SwayMode
+    kind: str
+    parameters: dict[str, Any]
+
+
+def position(sets: Sequence[ParameterSet], value: float) -> int:
+    """Where a value lies among sets in rising order, in steps; beyond the ends at the ends."""
+    values = [one.at for one in sets]
+    if value <= values[0]:
+        return 0
+    if value >= values[-1]:
+        return (len(sets) - 1) * STEPS_BETWEEN
+    low = bisect_right(values, value) - 1
+    share = (value - values[low]) / (values[low + 1] - values[low])
+    return low * STEPS_BETWEEN + round(share * STEPS_BETWEEN)
+
+
+def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
+    """The set at a position, between two of them interpolated.
+
+    Period, damping ratio, poles, taps and every other number run in straight lines; so poles stay
+    real and negative, and taps stay taps with the sum 1.
+    """
+    low, part = divmod(steps, STEPS_BETWEEN)
+    if not part:
+        return sets[low]
+    first, second = sets[low], sets[low + 1]
+    share = part / STEPS_BETWEEN
+    mode = SwayMode.from_period(
+        _between(first.mode.period_s, second.mode.period_s, share),
+        _between(first.mode.damping_ratio, second.mode.damping_ratio, share),
+    )
+    one, two = _by_poles(first.parameters), _by_poles(second.parameters)
+    parameters = {name: _between(one[name], two[name], share) for name in one.keys() & two.keys()}
+    at = _between(first.at, second.at, share)
+    return ParameterSet(at, mode, first.kind, parameters)
+
+
+def _by_poles(parameters: dict[str, Any]) -> dict[str, Any]:
+    """G_FF by its poles, the faster one first: between two denominators they may become complex."""
+    rest = dict(parameters)
+    if "a1" in rest:
+        rest["poles_rad_s"] = poles_from_denominator(rest.pop("a1"), rest.pop("a2"))
+    if "poles_rad_s" in rest:
+        rest["poles_rad_s"] = sorted(rest["poles_rad_s"])
+    return rest
+
+
+def _between(first: Any, second: Any, share: float) -> Any:
+    if isinstance(first, Sequence):
+        length = max(len(first), len(second))
+        pairs = zip(_filled(first, length), _filled(second, length), strict=True)
+        return [a + share * (b - a) for a, b in pairs]
+    return first + share * (second - first)
+
+
+def _filled(numbers: Sequence[float], length: int) -> list[float]:
+    return [*numbers, *[0.0] * (length - len(numbers))]

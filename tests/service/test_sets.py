@@ -1,0 +1,179 @@
+"""Grapple and operator choose sway data and filter, by frames; what does not fit is told."""
+
+from collections.abc import Callable
+from typing import Any, Protocol
+
+import pytest
+
+from canshaper.can.frame import Frame
+from canshaper.config.source import DeploymentError
+from canshaper.service.controller import Controller
+from canshaper.shaping.gff import Gff
+
+DBC = {
+    "BO_ 512 SlewCommand": """BO_ 1296 Load: 4 PLANT
+ SG_ Weight : 0|16@1+ (1,0) [0|5000] "kg" SHAPER
+
+BO_ 1297 Choice: 1 PLANT
+ SG_ Feel : 0|8@1+ (1,0) [0|255] "" SHAPER
+
+BO_ 512 SlewCommand""",
+    'BA_ "GenMsgCycleTime" BO_ 512 20;': (
+        'BA_ "GenMsgCycleTime" BO_ 512 20;\nBA_ "GenMsgCycleTime" BO_ 1296 200;\n'
+        'BA_ "GenMsgCycleTime" BO_ 1297 500;\nVAL_ 1296 Weight 65535 "NotAvailable" ;'
+    ),
+    ' SG_ State : 0|4@1+ (1,0) [0|15] "" PLANT\n': (
+        ' SG_ State : 0|4@1+ (1,0) [0|15] "" PLANT\n SG_ ActiveSet : 4|4@1+ (1,0) [0|15] "" PLANT\n'
+    ),
+}
+SETS = """
+    sets:
+      - at: 0
+        sway: { period_s: 2.3, damping_ratio: 0.04, full_speed_m_s: 1.5 }
+        filter: { kind: gff, a1: 0.7, a2: 0.12 }
+      - at: 1000
+        sway: { period_s: 2.9, damping_ratio: 0.05, full_speed_m_s: 1.5 }
+        filter: { kind: gff, a1: 0.9, a2: 0.2 }
+    feels:
+      fast: { filter: { kind: gff, a1: 0.5, a2: 0.06 } }
+      calm: { filter: { kind: gff, a1: 1.2, a2: 0.3 } }"""
+SLEW = "full_speed_m_s: 1.5 }\n    filter: { kind: gff, a1: 0.708, a2: 0.12 }"
+YAML = {
+    SLEW: SLEW + SETS,
+    "status: { bus: crane, message: ShaperStatus }": (
+        "status: { bus: crane, message: ShaperStatus }\n"
+        "grapple: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n"
+        "feel: { bus: crane, message: Choice, signal: Feel, timeout_ms: 1500,"
+        " codes: { balanced: 0, fast: 1, calm: 2 } }"
+    ),
+}
+
+
+class Rig(Protocol):
+    controller: Controller
+
+    def receive(self, *frames: Frame) -> None: ...
+    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
+
+
+Make = Callable[..., Rig]
+
+
+def load(kg: int) -> Frame:
+    return Frame("crane", 1296, False, kg.to_bytes(2, "little") + bytes(2))
+
+
+def feel(code: int) -> Frame:
+    return Frame("crane", 1297, False, bytes((code,)))
+
+
+def period_s(rig: Rig) -> float:
+    sway = rig.controller.axes["slew"].axis.sway
+    assert sway is not None
+    return sway.mode.period_s
+
+
+def poles(rig: Rig) -> tuple[float, float]:
+    shaper = rig.controller.axes["slew"].axis._shaper
+    assert isinstance(shaper, Gff)
+    return shaper.poles_rad_s
+
+
+@pytest.fixture
+def chosen(changed_rig: Make) -> Rig:
+    rig = changed_rig(yaml=YAML, dbc=DBC)
+    rig.run(3)
+    return rig
+
+
+def test_without_a_signal_the_axis_has_its_own_set(chosen: Rig) -> None:
+    chosen.run(100)
+    assert period_s(chosen) == pytest.approx(2.356)
+    assert chosen.controller.axes["slew"].chooser.number == 0  # type: ignore[union-attr]
+
+
+@pytest.mark.parametrize(
+    ("kg", "period", "number"),
+    [(0, 2.3, 1), (1000, 2.9, 2), (500, 2.6, 1), (750, 2.75, 2), (4000, 2.9, 2)],
+)
+def test_the_weight_chooses(chosen: Rig, kg: int, period: float, number: int) -> None:
+    chosen.receive(load(kg))
+    chosen.run(10)
+    assert period_s(chosen) == pytest.approx(period, abs=0.005)
+    assert chosen.controller.axes["slew"].chooser.number == number  # type: ignore[union-attr]
+
+
+def test_a_weight_that_is_lost_or_not_available_is_none(chosen: Rig) -> None:
+    chosen.receive(load(1000))
+    chosen.run(10)
+    for _ in range(12):
+        chosen.receive(load(65535))
+        chosen.run(5)
+    assert period_s(chosen) == pytest.approx(2.356)
+
+
+def test_the_operator_chooses(chosen: Rig) -> None:
+    base = poles(chosen)
+    chosen.receive(feel(1))
+    chosen.run(10)
+    fast = poles(chosen)
+    chosen.receive(feel(2))
+    chosen.run(10)
+    calm = poles(chosen)
+    assert max(fast) < max(base) < max(calm)
+    assert chosen.controller.axes["slew"].chooser.number == 4  # type: ignore[union-attr]
+    chosen.receive(feel(7))  # no choice of ours
+    chosen.run(10)
+    assert poles(chosen) == base
+
+
+def test_the_status_tells_it_where_there_is_a_signal(chosen: Rig) -> None:
+    chosen.receive(load(1000))
+    for _ in range(20):
+        sent = chosen.run(1)
+        if "SlewStatus" in sent and sent["SlewStatus"].get("ActiveSet"):
+            break
+    assert sent["SlewStatus"]["ActiveSet"] == 2
+
+
+def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
+    chosen.receive(load(0))
+    chosen.run(200, Slew=900)
+    last = chosen.controller.axes["slew"].axis.sent
+    for n in range(200):
+        chosen.receive(load(1000 if n // 20 % 2 else 0), feel(n // 33 % 3))
+        chosen.run(1, Slew=900)
+        sent = chosen.controller.axes["slew"].axis.sent
+        assert abs(sent - last) <= 0.02
+        last = sent
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("at: 1000", "at: 0", "axes.slew: found sets at 0, 0; allowed are rising values"),
+        (
+            "filter: { kind: gff, a1: 0.9, a2: 0.2 }",
+            "filter: { kind: zv }",
+            "axes.slew: found a set with filter zv, allowed is that of the axis, gff",
+        ),
+        ("      fast: {", "      quick: {", "feels.quick: found 'quick', feels are balanced, fast"),
+        ("signal: Weight", "signal: Mass", "grapple.signal: found 'Mass', signals of Load are"),
+        (
+            "grapple: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n",
+            "",
+            "axes.slew.sets: need the signal that chooses them; found no grapple",
+        ),
+        (
+            "filter: { kind: gff, a1: 0.5, a2: 0.06 }",
+            "filter: { kind: gff, poles_rad_s: [-60, -3] }",
+            "axes.slew.feels.fast.filter: pole is -60 rad/s",
+        ),
+    ],
+)
+def test_what_does_not_fit_is_told(changed_rig: Make, old: str, new: str, says: str) -> None:
+    changed = {key: value.replace(old, new) for key, value in YAML.items()}
+    assert changed != YAML
+    with pytest.raises(DeploymentError) as caught:
+        changed_rig(yaml=changed, dbc=DBC)
+    assert any(says in str(problem) for problem in caught.value.problems), caught.value.problems

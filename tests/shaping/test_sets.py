@@ -1,0 +1,171 @@
+"""Sets of sway data and filter: between two of them, and bumpless in motion."""
+
+import math
+from itertools import pairwise
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.fir import Fir, zv_taps
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limit_aware import LimitAware
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
+from canshaper.shaping.smoothing import FirstOrder, SCurve
+from canshaper.shaping.states import StickInput
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+TICK_S = 0.02
+EMPTY = SwayMode.from_period(2.0, 0.03)
+FULL = SwayMode.from_period(2.8, 0.05)
+SETS = (
+    ParameterSet(0.0, EMPTY, "gff", {"a1": 0.7, "a2": 0.12}),
+    ParameterSet(800.0, FULL, "gff", {"a1": 1.0, "a2": 0.2}),
+)
+
+
+@pytest.mark.parametrize(
+    ("value", "steps"),
+    [(-50, 0), (0, 0), (400, STEPS_BETWEEN // 2), (800, STEPS_BETWEEN), (5000, STEPS_BETWEEN)],
+)
+def test_values_beyond_the_ends_are_the_ends(value: float, steps: int) -> None:
+    assert position(SETS, value) == steps
+
+
+@given(st.floats(-100, 1000))
+def test_a_value_is_met_within_a_step(value: float) -> None:
+    found = at_position(SETS, position(SETS, value))
+    assert abs(found.at - min(max(value, 0.0), 800.0)) <= 800.0 / STEPS_BETWEEN / 2 + 1e-9
+
+
+@given(st.integers(0, STEPS_BETWEEN))
+def test_between_two_sets_everything_lies_between(steps: int) -> None:
+    found = at_position(SETS, steps)
+    share = steps / STEPS_BETWEEN
+    assert found.mode.period_s == pytest.approx(2.0 + 0.8 * share)
+    assert found.mode.damping_ratio == pytest.approx(0.03 + 0.02 * share)
+    shaper = build_shaper("gff", TICK_S, SwayModel(found.mode, TICK_S), **found.parameters)
+    assert isinstance(shaper, Gff)
+    assert all(pole < 0.0 for pole in shaper.poles_rad_s)
+
+
+def test_the_ends_are_the_sets_themselves() -> None:
+    assert at_position(SETS, 0) is SETS[0]
+    assert at_position(SETS, STEPS_BETWEEN) is SETS[1]
+
+
+def test_a_measured_period_is_met_exactly() -> None:
+    """Two sets whose value is their period: between them every period is itself."""
+    sets = [ParameterSet(p, SwayMode.from_period(p, 0.04), "zv", {}) for p in (1.5, 3.0)]
+    found = at_position(sets, position(sets, 2.25))
+    assert found.mode.period_s == pytest.approx(2.25)
+
+
+def test_taps_stay_taps() -> None:
+    sets = [
+        ParameterSet(0.0, EMPTY, "robust", {"taps": [0.5, 0.5]}),
+        ParameterSet(1.0, FULL, "robust", {"taps": [0.25, 0.25, 0.5]}),
+    ]
+    taps = at_position(sets, STEPS_BETWEEN // 4).parameters["taps"]
+    assert taps == pytest.approx([0.4375, 0.4375, 0.125])
+    assert math.fsum(taps) == pytest.approx(1.0)
+
+
+# -- in motion -------------------------------------------------------------------------------------
+
+
+def axis_with(shaper_of: str) -> Axis:
+    sway = SwayModel(EMPTY, TICK_S)
+    return Axis(
+        TICK_S,
+        OutputLimits(rise_per_s=5.0, fall_per_s=5.0, tail_s=2.0),
+        sway=sway,
+        shaper=make(shaper_of, sway),
+        grid_steps=10_000,
+    )
+
+
+def make(kind: str, sway: SwayModel) -> Shaper:
+    parameters: dict[str, dict[str, object]] = {
+        "gff": {"a1": 0.7, "a2": 0.12},
+        "robust": {"taps": [0.02] * 50},
+        "first_order": {"time_constant_s": 0.4},
+        "s_curve": {"rate_per_s": 1.5, "jerk_per_s2": 6.0},
+    }
+    return build_shaper(kind, TICK_S, sway, valve_rate_per_s=5.0, **parameters.get(kind, {}))
+
+
+@pytest.mark.parametrize("new", ["gff", "robust", "zv", "zvd", "first_order", "s_curve", "off"])
+@pytest.mark.parametrize("old", ["gff", "robust", "zv", "zvd", "first_order", "s_curve", "off"])
+def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
+    """At a constant command that has come through, no filter asks for anything much else."""
+    axis = axis_with(old)
+    axis.tick(StickInput())
+    for _ in range(800):
+        axis.tick(StickInput(0.8))
+    before = axis.sent
+    assert before == pytest.approx(0.8, abs=2e-3)
+    axis.retune(FULL, lambda sway: make(new, sway))
+    last = before
+    for _ in range(150):
+        axis.tick(StickInput(0.8))
+        # What the old filter left of the swing, the new one may damp, and that softly.
+        assert abs(axis.sent - last) <= 0.005
+        assert axis.sent == pytest.approx(before, abs=0.03)
+        last = axis.sent
+
+
+@pytest.mark.parametrize("kind", ["robust", "zv", "gff"])
+def test_a_change_on_the_way_makes_no_jump(kind: str) -> None:
+    """Half-way through its rise the output goes on from where it is."""
+    axis = axis_with(kind)
+    axis.tick(StickInput())
+    sent = []
+    for n in range(150):
+        if n == 25:
+            axis.retune(FULL, lambda sway: make(kind, sway))
+        axis.tick(StickInput(0.6))
+        sent.append(axis.sent)
+    steps = [abs(b - a) for a, b in pairwise(sent)]
+    # 5 full speeds a second over a tick is the valve's own rate.
+    assert max(steps[24:27]) <= 5.0 * TICK_S + 1e-3
+    assert min(sent[25:]) >= sent[24] - 0.05
+
+
+def test_inherited_history_gives_the_same_output() -> None:
+    old = Fir(zv_taps(EMPTY, TICK_S))
+    for n in range(200):
+        old.wanted(math.sin(n / 10))
+    new = Fir(old.taps)
+    new.inherit(old, 0.0)
+    assert [new.wanted(0.3) for _ in range(60)] == [old.wanted(0.3) for _ in range(60)]
+
+
+def test_a_longer_shaper_takes_the_oldest_command_for_older_ones() -> None:
+    old = Fir([0.5, 0.5])
+    old.wanted(0.2)
+    old.wanted(0.8)
+    new = Fir([0.25] * 4)
+    new.inherit(old, 0.0)
+    assert new.wanted(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
+    shorter = Fir([1.0])
+    shorter.inherit(old, 0.0)
+    assert shorter.wanted(0.4) == 0.4
+
+
+def test_every_shaper_begins_at_a_command() -> None:
+    sway = SwayModel(EMPTY, TICK_S)
+    sway.rate = -0.7  # the equilibrium under a constant 0.7
+    shapers = [
+        Fir([0.5, 0.5]),
+        FirstOrder(TICK_S, 0.4),
+        SCurve(TICK_S, 1.0, 5.0),
+        Gff(sway, (-3.0, -2.0), -5.0),
+        LimitAware(sway, Fir([0.5, 0.5])),
+    ]
+    for shaper in shapers:
+        shaper.begin_at(0.7)
+        assert shaper.wanted(0.7) == pytest.approx(0.7, abs=1e-9)
