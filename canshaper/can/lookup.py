@@ -84,7 +84,7 @@ class Lookup:
             return None
         message = found[1]
         self._check_j1939(place, bus, message, takes=takes, source=source)
-        self._check_canopen(place, bus, message)
+        self._check_pdo(place, bus, message)
         can_id, _ = self.address(bus, message, takes=takes, source=source)
         key = (bus, can_id, message.is_extended_frame)
         if key in self._used:
@@ -102,7 +102,7 @@ class Lookup:
             self.add((*place, "message"), f"{name} is multiplexed; nothing can be {verb} it")
         return found
 
-    def _check_canopen(self, place: Place, bus: str, message: Message) -> None:
+    def _check_pdo(self, place: Place, bus: str, message: Message) -> None:
         """On a bus of CANopen a message is a PDO: a command in an SDO would change a parameter."""
         config = self.config.buses.get(bus)
         service = None if message.is_extended_frame else service_of(message.frame_id)

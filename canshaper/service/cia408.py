@@ -107,7 +107,7 @@ class ValveControl(Input):
 
     def hold(self) -> None:
         """Let a valve that is active hold: the last thing it is told."""
-        if self._step > HOLD:
+        if self._word == ValveState.ACTIVE:
             self._message.raw[self._control] = int(ValveState.HOLD)
 
     def forget(self) -> None:

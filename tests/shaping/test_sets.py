@@ -112,9 +112,9 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
     last = before
     for _ in range(150):
         axis.tick(StickInput(0.8))
-        # What the old filter left of the swing, the new one may damp, and that softly.
-        assert abs(axis.sent - last) <= 0.005
-        assert axis.sent == pytest.approx(before, abs=0.03)
+        # What the old filter left of the swing the new one may damp, at a fifth of the valve's rate.
+        assert abs(axis.sent - last) <= 0.02
+        assert axis.sent == pytest.approx(before, abs=0.1)
         last = axis.sent
 
 
