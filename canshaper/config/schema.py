@@ -13,6 +13,7 @@ from canshaper.config.sets import Feel, FeelSwitch, Grapple, SetConfig, sets_fau
 from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS_OF_SWAY
+from canshaper.shaping.valve_curve import ValveCurve
 
 
 class Lever(Input):
@@ -148,6 +149,27 @@ class RadialConfig(Section):
         return self
 
 
+class Curve(Section):
+    """What the valve makes of its command, measured; `canshaper calibrate` writes it."""
+
+    command_pct: list[Annotated[float, number(-100, 100, "% of full command", "command")]]
+    speed_pct: list[Annotated[float, number(-100, 100, "% of full speed", "speed at each command")]]
+
+    @model_validator(mode="after")
+    def _is_one(self) -> Self:
+        self.curve()
+        return self
+
+    def curve(self) -> ValveCurve:
+        """The same in parts of full.
+
+        Raises:
+            ValueError: the points are no curve of a valve.
+        """
+        command, speed = ([v / 100.0 for v in part] for part in (self.command_pct, self.speed_pct))
+        return ValveCurve(command, speed)
+
+
 class Limits(Section):
     """Output limits of an axis; see ``OutputLimits``."""
 
@@ -162,6 +184,8 @@ class Limits(Section):
     deadband_pct: Annotated[
         float, number(0, 50, "% of full command", "deadband of the valve, jumped over")
     ] = 0.0
+    curve: Curve | None = None
+    """Instead of ``deadband_pct``."""
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
@@ -175,6 +199,8 @@ class Limits(Section):
     def _ordered(self) -> Self:
         if self.min_pct >= self.max_pct:
             raise ValueError(f"min_pct is {self.min_pct:g}, allowed is below max_pct")
+        if self.curve and self.deadband_pct:
+            raise ValueError("found deadband_pct and curve; allowed is one of them")
         return self
 
     @property
@@ -190,6 +216,7 @@ class Limits(Section):
             rise_per_s=self.rise_per_s,
             fall_per_s=self.fall_per_s,
             deadband=self.deadband_pct / 100.0,
+            curve=self.curve.curve() if self.curve else None,
             tail_s=self.tail_s,
             allow_faster=self.allow_faster,
             allow_reverse=self.allow_reverse,

@@ -285,7 +285,9 @@ class Axis:
             low = limited
         elif limited > high:
             high = limited
-        self.raw, self.sent = on_grid(limited, low, high, limits.deadband, self._grid_steps)
+        self.raw, self.sent = on_grid(
+            limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
+        )
 
     def _drive_both(self, target: float, added: float) -> None:
         """Send the operator's part and the added one.
@@ -302,7 +304,12 @@ class Axis:
         aim = within(wish + paid, -limits.maximum, limits.maximum, least)
         self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
         self.raw, self.sent = on_grid(
-            self._limited, -limits.maximum, limits.maximum, limits.deadband, self._grid_steps
+            self._limited,
+            -limits.maximum,
+            limits.maximum,
+            limits.deadband,
+            self._grid_steps,
+            curve=limits.curve,
         )
         self._owed = within(self._owed + target + added - self.sent, -MOST_OWED, MOST_OWED, 0.0)
 

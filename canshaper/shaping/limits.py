@@ -10,6 +10,8 @@ import math
 from collections import deque
 from dataclasses import dataclass
 
+from canshaper.shaping.valve_curve import ValveCurve
+
 
 @dataclass(frozen=True, slots=True)
 class OutputLimits:
@@ -23,6 +25,7 @@ class OutputLimits:
         fall_per_s: fastest fall of |velocity| towards zero, full scales per second.
         deadband: fraction of the command in which the valve does not open; added to every
             command that is not zero.
+        curve: instead of the deadband: the measured valve.
         tail_s: how long after the operator asked for a speed the output may still be as fast.
         allow_faster: the output may exceed what the operator asks or asked within the tail.
         allow_reverse: the output may go against the lever.
@@ -33,6 +36,7 @@ class OutputLimits:
     rise_per_s: float = 5.0
     fall_per_s: float = 5.0
     deadband: float = 0.0
+    curve: ValveCurve | None = None
     tail_s: float = 2.0
     allow_faster: bool = False
     allow_reverse: bool = False
@@ -158,7 +162,13 @@ def without_deadband(command: float, deadband: float) -> float:
 
 
 def on_grid(
-    velocity: float, low: float, high: float, deadband: float, steps: int
+    velocity: float,
+    low: float,
+    high: float,
+    deadband: float,
+    steps: int,
+    *,
+    curve: ValveCurve | None = None,
 ) -> tuple[int, float]:
     """Round to what the frame can carry.
 
@@ -168,13 +178,27 @@ def on_grid(
         high: upper bound that rounding must not pass.
         deadband: deadband to add, fraction of full command.
         steps: raw steps of the frame from zero to full command.
+        curve: instead of the deadband, where the valve is measured.
 
     Returns:
         (raw step of the frame, velocity which that step gives: what the filter must be told).
     """
+    if curve is not None:
+        return _on_curve(velocity, low, high, curve, steps)
     raw = round(with_deadband(velocity, deadband) * steps)
     sent = without_deadband(raw / steps, deadband)
     while raw and not low <= sent <= high:
         raw += -1 if raw > 0 else 1
         sent = without_deadband(raw / steps, deadband)
+    return (raw, sent) if sent else (0, 0.0)
+
+
+def _on_curve(
+    velocity: float, low: float, high: float, curve: ValveCurve, steps: int
+) -> tuple[int, float]:
+    raw = round(curve.command(velocity) * steps)
+    sent = curve.velocity(raw / steps)
+    while raw and not low <= sent <= high:
+        raw += -1 if raw > 0 else 1
+        sent = curve.velocity(raw / steps)
     return (raw, sent) if sent else (0, 0.0)

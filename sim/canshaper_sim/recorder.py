@@ -117,7 +117,12 @@ class Recorder:
         for name in self._valves[message.name]:
             axis = self._axes[name]
             command = (axis.valve.read(raw) or 0) / axis.valve.steps
-            self._now[name][1] = without_deadband(command, axis.config.limits.deadband_pct / 100.0)
+            limits = axis.config.limits.output_limits()
+            self._now[name][1] = (
+                limits.curve.velocity(command)
+                if limits.curve
+                else without_deadband(command, limits.deadband)
+            )
 
     def _speed(self, message: Any, data: bytes, _time_s: float) -> None:
         values = message.decode(data)

@@ -19,6 +19,8 @@ _SAME_TIME_S = 1e-9
 _ALLOWED = {
     "dead_time_s": (0.0, 0.2),
     "deadband": (0.0, 0.5),
+    "negative_more_deadband": (-0.3, 0.3),
+    "negative_gain": (0.2, 1.0),
     "flow_limit": (0.05, 1.0),
     "rate_limit_1_s": (0.1, math.inf),  # inf: no rate limit
     "lag_s": (0.01, 1.0),  # a speed that jumps would need an infinite tip acceleration
@@ -31,6 +33,8 @@ class ValveParameters:
 
     dead_time_s: float = 0.0  # delay of the whole command
     deadband: float = 0.05  # fraction of full stroke in which no oil flows
+    negative_more_deadband: float = 0.0  # what negative commands need besides to open it
+    negative_gain: float = 1.0  # speed at full negative command, fraction of full speed
     flow_limit: float = 1.0  # largest |speed|, fraction of full speed
     rate_limit_1_s: float = 5.0  # full speeds per second of spool travel
     lag_s: float = 0.1  # time constant; 0.05 .. 0.15 s is usual
@@ -43,9 +47,14 @@ class ValveParameters:
 
         Just outside the deadband the flow starts at zero; a full command gives a full flow.
         """
-        opening = (abs(command) - self.deadband) / (1.0 - self.deadband)
+        deadband = self.deadband
+        if command < 0.0:
+            deadband = max(0.0, deadband + self.negative_more_deadband)
+        opening = (abs(command) - deadband) / (1.0 - deadband)
         if opening <= 0.0:
             return 0.0
+        if command < 0.0:
+            opening *= self.negative_gain
         return math.copysign(min(opening, self.flow_limit), command)
 
 

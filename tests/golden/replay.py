@@ -133,10 +133,10 @@ def margin() -> Iterator[Margin]:
     on_grid, raw = axis.on_grid, FieldSet.raw
 
     def watched_grid(
-        velocity: float, low: float, high: float, deadband: float, steps: int
+        velocity: float, low: float, high: float, deadband: float, steps: int, **curve: Any
     ) -> tuple[int, float]:
         found.see(with_deadband(velocity, deadband) * steps, "valve")
-        return on_grid(velocity, low, high, deadband, steps)
+        return on_grid(velocity, low, high, deadband, steps, **curve)
 
     def watched_raw(self: FieldSet, name: str, value: float) -> int:
         signal = next(s for s in self.message.signals if s.name == name)

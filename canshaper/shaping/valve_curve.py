@@ -1,0 +1,86 @@
+"""What a valve makes of its command: dead band, gain and asymmetry of both directions, a table."""
+
+from bisect import bisect_right
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+
+class ValveCurve:
+    """Speed over command of one valve, in straight lines between measured points.
+
+    Args:
+        commands: rising from -1 to 1.
+        speeds: speed at each command as a part of full, rising; zero at two neighbouring points,
+            the ends of the dead band, of which the first is at a command up to 0 and the second
+            from 0 on.
+
+    Raises:
+        ValueError: the points are no such curve.
+    """
+
+    __slots__ = ("_commands", "_zero", "speeds")
+
+    def __init__(self, commands: Sequence[float], speeds: Sequence[float]) -> None:
+        if fault := curve_fault(commands, speeds):
+            raise ValueError(fault)
+        self._commands = tuple(commands)
+        self.speeds = tuple(speeds)
+        self._zero = self.speeds.index(0.0)  # of the negative end of the dead band
+
+    def command(self, velocity: float) -> float:
+        """Command for a velocity; beyond what the valve gives, full command."""
+        if velocity == 0.0:
+            return 0.0
+        speeds, commands = self.speeds, self._commands
+        if velocity >= speeds[-1]:
+            return commands[-1]
+        if velocity <= speeds[0]:
+            return commands[0]
+        # Of the two points with speed zero the right one is found for each direction.
+        high = bisect_right(speeds, velocity) if velocity > 0.0 else self._above(velocity)
+        return _between(velocity, speeds, commands, high)
+
+    def velocity(self, command: float) -> float:
+        """Velocity that a command gives; zero within the dead band."""
+        speeds, commands, zero = self.speeds, self._commands, self._zero
+        if commands[zero] <= command <= commands[zero + 1]:
+            return 0.0
+        if command >= commands[-1]:
+            return speeds[-1]
+        if command <= commands[0]:
+            return speeds[0]
+        return _between(command, commands, speeds, bisect_right(commands, command))
+
+    def _above(self, velocity: float) -> int:
+        """First point that is above a negative velocity."""
+        return min(bisect_right(self.speeds, velocity), self._zero)
+
+
+def curve_fault(commands: Sequence[float], speeds: Sequence[float]) -> str | None:
+    """Why points are no curve of a valve, or None."""
+    return next(_faults(commands, speeds), None)
+
+
+def _faults(commands: Sequence[float], speeds: Sequence[float]) -> Iterator[str]:
+    """Faults of the points; each takes it that those before were none."""
+    if len(commands) != len(speeds):
+        yield f"found {len(commands)} commands and {len(speeds)} speeds, allowed is one for each"
+    if len(commands) < 4 or commands[0] != -1.0 or commands[-1] != 1.0:
+        yield "allowed are commands from -100 to 100 %, with the ends of the dead band between"
+    if any(b <= a for a, b in pairwise(commands)):
+        yield "commands do not rise"
+    zeros = [i for i, speed in enumerate(speeds) if speed == 0.0]
+    if len(zeros) != 2 or zeros[1] != zeros[0] + 1 or not 0 < zeros[0] < len(speeds) - 2:
+        yield "allowed are two neighbouring commands with speed 0, the ends of the dead band"
+    if not commands[zeros[0]] <= 0.0 <= commands[zeros[1]]:
+        yield "the dead band does not lie around command 0"
+    if any(b <= a for a, b in pairwise([*speeds[: zeros[1]], *speeds[zeros[1] + 1 :]])):
+        yield "speeds do not rise with the command"
+    if not 0.999 <= max(-speeds[0], speeds[-1]) <= 1.0:
+        yield "the faster direction has speed 100 % at full command, and none has more"
+
+
+def _between(value: float, xs: Sequence[float], ys: Sequence[float], high: int) -> float:
+    """On the line through the points ``high - 1`` and ``high``."""
+    x0, x1, y0, y1 = xs[high - 1], xs[high], ys[high - 1], ys[high]
+    return y0 + (value - x0) * (y1 - y0) / (x1 - x0)

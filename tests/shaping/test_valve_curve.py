@@ -1,0 +1,105 @@
+"""Measured valve: command and speed over each other, and what does not make a curve."""
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.shaping.limits import on_grid, with_deadband, without_deadband
+from canshaper.shaping.valve_curve import ValveCurve
+
+# Opens at 7 % one way and at 4 % the other, where it is slower.
+COMMANDS = (-1.0, -0.5, -0.04, 0.07, 0.4, 1.0)
+SPEEDS = (-0.8, -0.3, 0.0, 0.0, 0.35, 1.0)
+CURVE = ValveCurve(COMMANDS, SPEEDS)
+
+
+@pytest.mark.parametrize(("command", "speed"), list(zip(COMMANDS, SPEEDS, strict=True)))
+def test_it_goes_through_its_points(command: float, speed: float) -> None:
+    assert CURVE.velocity(command) == pytest.approx(speed)
+    if speed:
+        assert CURVE.command(speed) == pytest.approx(command)
+
+
+@given(st.floats(-0.8, 1.0))
+def test_a_command_gives_the_velocity_it_was_made_for(velocity: float) -> None:
+    assert CURVE.velocity(CURVE.command(velocity)) == pytest.approx(velocity, abs=1e-12)
+
+
+@given(st.floats(-1.0, 1.0), st.floats(-1.0, 1.0))
+def test_it_rises(first: float, second: float) -> None:
+    low, high = sorted((first, second))
+    assert CURVE.velocity(low) <= CURVE.velocity(high)
+    assert CURVE.command(low) <= CURVE.command(high)
+
+
+@given(st.floats(-1.0, 1.0).filter(lambda v: abs(v) > 1e-9))
+def test_a_command_has_the_sign_of_its_velocity(velocity: float) -> None:
+    assert math.copysign(1.0, CURVE.command(velocity)) == math.copysign(1.0, velocity)
+
+
+@pytest.mark.parametrize(("velocity", "command"), [(0.0, 0.0), (-1.0, -1.0), (-0.9, -1.0)])
+def test_zero_is_zero_and_what_it_cannot_give_is_full_command(
+    velocity: float, command: float
+) -> None:
+    assert CURVE.command(velocity) == command
+
+
+def test_the_smallest_velocity_opens_the_valve() -> None:
+    assert CURVE.command(1e-12) == pytest.approx(0.07)
+    assert CURVE.command(-1e-12) == pytest.approx(-0.04)
+
+
+@given(st.floats(-1.0, 1.0), st.sampled_from((0.0, 0.05, 0.2)))
+def test_a_symmetrical_one_is_the_deadband(velocity: float, deadband: float) -> None:
+    edge = deadband or 1e-9
+    curve = ValveCurve((-1.0, -edge, edge, 1.0), (-1.0, 0.0, 0.0, 1.0))
+    assert curve.command(velocity) == pytest.approx(with_deadband(velocity, deadband), abs=1e-6)
+    assert curve.velocity(velocity) == pytest.approx(without_deadband(velocity, deadband), abs=1e-6)
+
+
+@given(
+    st.floats(-1.0, 1.0),
+    st.floats(-1.0, 0.0),
+    st.floats(0.0, 1.0),
+    st.sampled_from((20, 125, 250, 64_000)),
+)
+def test_the_grid_stays_within_its_bounds(
+    velocity: float, low: float, high: float, steps: int
+) -> None:
+    velocity = min(max(velocity, low), high)
+    raw, sent = on_grid(velocity, low, high, 0.0, steps, curve=CURVE)
+    assert low <= sent <= high
+    assert (raw == 0) == (sent == 0.0)
+    assert sent == 0.0 or sent == CURVE.velocity(raw / steps)
+    # A step of the frame is at most two steps of speed on the steepest part of this curve.
+    reached = min(max(velocity, -0.8), 1.0)
+    assert abs(sent - reached) <= 2.2 / steps or sent == 0.0 or abs(sent) < abs(reached)
+
+
+@pytest.mark.parametrize(
+    ("commands", "speeds", "says"),
+    [
+        ((-1, 0, 1), (-1, 0, 0, 1), "found 3 commands and 4 speeds"),
+        ((-1, 0, 1), (-1, 0, 1), "from -100 to 100 %"),
+        ((-0.9, -0.1, 0.1, 1), (-1, 0, 0, 1), "from -100 to 100 %"),
+        ((-1, -0.1, 0.1, 0.9), (-1, 0, 0, 1), "from -100 to 100 %"),
+        ((-1, 0.1, 0.1, 1), (-1, 0, 0, 1), "commands do not rise"),
+        ((-1, -0.1, 0.1, 1), (-1, -0.1, 0, 1), "two neighbouring commands with speed 0"),
+        ((-1, -0.1, 0, 0.1, 1), (-1, 0, 0, 0, 1), "two neighbouring commands with speed 0"),
+        ((-1, -0.1, 0.1, 1), (0, 0, 0.5, 1), "two neighbouring commands with speed 0"),
+        ((-1, -0.5, 0.1, 1), (-1, -0.5, 0, 0), "two neighbouring commands with speed 0"),
+        ((-1, 0.1, 0.2, 1), (-1, 0, 0, 1), "does not lie around command 0"),
+        ((-1, -0.2, -0.1, 1), (-1, 0, 0, 1), "does not lie around command 0"),
+        ((-1, -0.5, -0.1, 0.1, 1), (-0.5, -0.6, 0, 0, 1), "speeds do not rise"),
+        ((-1, -0.1, 0.1, 0.5, 1), (-1, 0, 0, 0.7, 0.7), "speeds do not rise"),
+        ((-1, -0.1, 0.1, 1), (-0.9, 0, 0, 0.9), "the faster direction has speed 100 %"),
+        ((-1, -0.1, 0.1, 1), (-1.1, 0, 0, 1), "the faster direction has speed 100 %"),
+    ],
+)
+def test_what_is_no_curve_is_refused(
+    commands: tuple[float, ...], speeds: tuple[float, ...], says: str
+) -> None:
+    with pytest.raises(ValueError, match=says):
+        ValveCurve(commands, speeds)
