@@ -4,9 +4,10 @@
 # make coverage   every line and branch of what decides whether a valve moves
 # make mutation   does a test notice every small change of it? (mutation-core: within make test)
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
+# make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak bench deb clean
+.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -26,7 +27,7 @@ demo: .venv/demo-ready
 test: lint
 	.venv/bin/python -m pytest
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
-		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
+		tests/hil/test_closed_loop.py tests/hil/test_doctor.py tests/hil/test_j1939.py
 
 # Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
 test-faults: .venv/test-ready
@@ -64,6 +65,10 @@ fuzz: .venv/fuzz-ready
 MINUTES ?= 30
 soak: .venv/test-ready
 	.venv/bin/python -m tests.lane --timeout 0 -- .venv/bin/python -m tests.soak --minutes $(MINUTES)
+
+j1939: .venv/test-ready
+	.venv/bin/python -m tests.lane --timeout 0 -- \
+		.venv/bin/python -m tests.hil.j1939_drive --minutes $(MINUTES)
 
 bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py

@@ -11,6 +11,7 @@ import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
+from typing import Any
 
 from canshaper.can.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.can.socketcan import Ids, dropped_frames, set_filters
@@ -87,7 +88,7 @@ class RawPort:
         self._ids = ids
         self._valves = _words(ids.valves if ids else ())
         self._claims = _words(ids.claims if ids else ())
-        self._claimed: deque[bytes] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
+        self._claimed: deque[Any] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
         self._use(open_sockets(ids))
 
     # -- receiving -----------------------------------------------------------------------------
@@ -105,9 +106,7 @@ class RawPort:
             except OSError as error:
                 self._failed(error)
                 return
-            if self._claimed and data in self._claimed:
-                self._claimed.remove(data)
-                self._confirmed(CAN_FRAME.unpack(data)[0])
+            if self._claimed and len(data) == SIZE and self._seen_back(CAN_FRAME.unpack(data)):
                 continue
             frame = self._frame(data)
             if frame is not None:
@@ -195,7 +194,7 @@ class RawPort:
             self._failed(error)
             return False
         if word in self._claims:
-            self._claimed.append(packed)
+            self._claimed.append(CAN_FRAME.unpack(packed))
         elif self._confirms:
             self._unconfirmed[word] = under_way + 1
         return True
@@ -205,6 +204,14 @@ class RawPort:
         self._since_ns.pop(word, None)
         if self.state in SILENT:
             self._up()
+
+    def _seen_back(self, content: Any) -> bool:
+        """Whether this is a claim of ours; no other kind of ours comes to the first socket."""
+        if content not in self._claimed:
+            return False
+        self._claimed.remove(content)
+        self._confirmed(content[0])
+        return True
 
     def _stuck(self, word: int, under_way: int) -> bool:
         """Whether frames of this id have been under way for too long to queue another one."""

@@ -94,7 +94,8 @@ def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
     # What the DBC files know besides is left to the reader where it is too much.
     ours = ids.taken | ids.sent
     all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
-    others = all_known if len(all_known) + len(SERVICES) < MOST_FILTERS else ours
+    whole_kinds = ids.j1939 + len(SERVICES) * ids.canopen
+    others = all_known if len(all_known) + whole_kinds <= MOST_FILTERS else ours
     groups: tuple[Iterable[int], ...] = ids.taken_groups, ids.sent_groups, ()
     for one, messages, some, flag in zip(
         sockets, (ids.taken, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True

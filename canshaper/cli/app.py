@@ -4,6 +4,7 @@ import typer
 
 from canshaper import __version__
 from canshaper.cli import (
+    calibrate,
     check,
     compare,
     config_schema,
@@ -43,6 +44,7 @@ def _main(
 
 app.command("run")(run.run)
 app.command("check")(check.check)
+app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
 app.command("demo")(demo.demo)
 app.command("sim")(sim.sim)

@@ -149,27 +149,6 @@ class RadialConfig(Section):
         return self
 
 
-class Curve(Section):
-    """What the valve makes of its command, measured; `canshaper calibrate` writes it."""
-
-    command_pct: list[Annotated[float, number(-100, 100, "% of full command", "command")]]
-    speed_pct: list[Annotated[float, number(-100, 100, "% of full speed", "speed at each command")]]
-
-    @model_validator(mode="after")
-    def _is_one(self) -> Self:
-        self.curve()
-        return self
-
-    def curve(self) -> ValveCurve:
-        """The same in parts of full.
-
-        Raises:
-            ValueError: the points are no curve of a valve.
-        """
-        command, speed = ([v / 100.0 for v in part] for part in (self.command_pct, self.speed_pct))
-        return ValveCurve(command, speed)
-
-
 class Limits(Section):
     """Output limits of an axis; see ``OutputLimits``."""
 
@@ -184,8 +163,13 @@ class Limits(Section):
     deadband_pct: Annotated[
         float, number(0, 50, "% of full command", "deadband of the valve, jumped over")
     ] = 0.0
-    curve: Curve | None = None
-    """Instead of ``deadband_pct``."""
+    curve_command_pct: (
+        list[Annotated[float, number(-100, 100, "% of full command", "command")]] | None
+    ) = None
+    """Instead of ``deadband_pct`` the measured valve: commands, and the speed at each."""
+    curve_speed_pct: (
+        list[Annotated[float, number(-100, 100, "% of full speed", "speed at a command")]] | None
+    ) = None
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
@@ -199,14 +183,25 @@ class Limits(Section):
     def _ordered(self) -> Self:
         if self.min_pct >= self.max_pct:
             raise ValueError(f"min_pct is {self.min_pct:g}, allowed is below max_pct")
-        if self.curve and self.deadband_pct:
-            raise ValueError("found deadband_pct and curve; allowed is one of them")
+        if self.curve() and self.deadband_pct:
+            raise ValueError("found deadband_pct and a curve; allowed is one of them")
         return self
 
     @property
     def slowest_per_s(self) -> float:
         """The slower of both rates: what the valve follows in either direction."""
         return min(self.rise_per_s, self.fall_per_s)
+
+    def curve(self) -> ValveCurve | None:
+        """The measured valve, where it is.
+
+        Raises:
+            ValueError: the points are no curve of a valve.
+        """
+        command, speed = self.curve_command_pct, self.curve_speed_pct
+        if command is None and speed is None:
+            return None
+        return ValveCurve([v / 100.0 for v in command or []], [v / 100.0 for v in speed or []])
 
     def output_limits(self) -> OutputLimits:
         """The same in fractions of full scale."""
@@ -216,7 +211,7 @@ class Limits(Section):
             rise_per_s=self.rise_per_s,
             fall_per_s=self.fall_per_s,
             deadband=self.deadband_pct / 100.0,
-            curve=self.curve.curve() if self.curve else None,
+            curve=self.curve(),
             tail_s=self.tail_s,
             allow_faster=self.allow_faster,
             allow_reverse=self.allow_reverse,

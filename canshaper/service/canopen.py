@@ -172,7 +172,7 @@ class CanopenBus:
     def frames(self, now_ns: int) -> Iterator[Frame]:
         """What is due now: our boot-up message or heartbeat, and commands to start."""
         if not self._booted:
-            self._booted, self._due_ns = True, now_ns
+            self._booted, self._due_ns = True, now_ns + self._cycle_ns
             yield Frame(self._bus, HEARTBEAT + self._own, False, BOOT_UP)
         elif now_ns >= self._due_ns:
             # From the time it was due, so that lateness does not add up; but never in a burst.

@@ -38,6 +38,7 @@ class Controller:
 
     Attributes:
         counters: what went wrong so far.
+        levers: the levers by name.
         events: changes of state since the owner last emptied the list.
     """
 
@@ -46,6 +47,7 @@ class Controller:
         self.counters = Counters()
         self.events: list[Told] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
+        self.levers = levers
         taken: list[tuple[BoundInput, Taken]] = [
             (lever, levers[name]) for name, lever in deployment.levers.items()
         ]

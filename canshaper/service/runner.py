@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Callable
+from typing import Protocol
 
 from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
 from canshaper.service.cia408 import ValveControl
 from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
-from canshaper.service.lever import LeverInput
 from canshaper.service.radius import RadiusInput
 from canshaper.service.sets import SetChooser
 from canshaper.shaping.axis import Axis
@@ -24,6 +24,15 @@ CONTESTED_NS = 1_000_000_000
 Gate = Callable[[bool, int], Reason | None]
 # Reasons from here on are for neutral at once.
 TRIPS = Reason.ENABLE_LOST
+
+
+class StickSource(Protocol):
+    """Where an axis gets its stick from."""
+
+    def stick(
+        self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
+    ) -> StickInput:
+        """What the axis may use now, see ``LeverInput``."""
 
 
 class AxisRunner:
@@ -42,7 +51,7 @@ class AxisRunner:
         compensator: what this axis asks of another one, where it slews.
     """
 
-    def __init__(self, bound: BoundAxis, tick_s: float, lever: LeverInput) -> None:
+    def __init__(self, bound: BoundAxis, tick_s: float, lever: StickSource) -> None:
         config = bound.config
         self.bound = bound
         self._lever = lever
@@ -81,6 +90,10 @@ class AxisRunner:
             self.control = ValveControl(bound.status_word, control, bound.valve.message)
             self.gates.append(self.control.gate)
         self.compensator: Compensator | None = None
+
+    def replace_lever(self, lever: StickSource) -> None:
+        """Take the stick from somewhere else."""
+        self._lever = lever
 
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool

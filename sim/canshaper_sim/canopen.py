@@ -1,15 +1,16 @@
-"""The other nodes of a CANopen bus: heartbeats, and the status words of valves of CiA 408."""
+"""The other nodes of a CANopen bus: heartbeats, and the state machines of valves of CiA 408."""
 
 from collections.abc import Iterator
 from typing import Any
 
 from canshaper.can.binding import BoundAxis, Deployment
-from canshaper.can.canopen import HEARTBEAT, NMT, START, NodeState
+from canshaper.can.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 
 # Heartbeats are sent three times as often as they are asked for.
 HEARTBEATS_IN_TIME = 3
+STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIVE)
 
 
 class _Node:
@@ -29,13 +30,14 @@ class _Node:
             yield Frame(*self._key, False, bytes((self.state,)))
 
 
-class _ValveStatus:
-    """A valve that is in the state that it is told, and says so."""
+class _ValveStates:
+    """A valve that goes one step up, or any number down, to the state that it is told."""
 
-    def __init__(self, axis: BoundAxis) -> None:
+    def __init__(self, axis: BoundAxis, node: _Node | None) -> None:
         assert axis.status_word
         assert axis.config.valve.cia408
         self.key = axis.valve.message.sender.key
+        self._node = node
         self._message: Any = axis.valve_message
         self._control = axis.config.valve.cia408.control
         config = axis.status_word.config
@@ -45,18 +47,30 @@ class _ValveStatus:
         )
         self._cycle_s = (axis.status_word.message.cycle_time or 100) / 1000.0
         self._left_s = 0.0
-        self._state = 0
+        self._step = 0
+
+    @property
+    def _operational(self) -> bool:
+        return self._node is None or self._node.state is NodeState.OPERATIONAL
+
+    @property
+    def active(self) -> bool:
+        """Whether it follows its set point."""
+        return self._operational and STEPS[self._step] is ValveState.ACTIVE
 
     def receive(self, data: bytes) -> None:
-        if len(data) == self._message.length:
+        if self._operational and len(data) == self._message.length:
             raw = self._message.decode(data, decode_choices=False, scaling=False)
-            self._state = int(raw[self._control]) & 0xF
+            word = int(raw[self._control])
+            told = STEPS.index(ValveState(word)) if word in STEPS else self._step
+            self._step = min(told, self._step + 1)
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
         self._left_s -= passed_s
         if self._left_s <= 1e-9:
             self._left_s += self._cycle_s
-            yield self._sender.frame({self._signal: self._state})
+            if self._operational:
+                yield self._sender.frame({self._signal: STEPS[self._step]})
 
 
 class CanopenSide:
@@ -69,11 +83,27 @@ class CanopenSide:
             if config.canopen
             for node in config.canopen.nodes.values()
         }
-        self._valves = [_ValveStatus(a) for a in deployment.axes.values() if a.status_word]
+        self._valves = {
+            name: _ValveStates(axis, self._node_of(deployment, axis))
+            for name, axis in deployment.axes.items()
+            if axis.status_word
+        }
+
+    def _node_of(self, deployment: Deployment, axis: BoundAxis) -> _Node | None:
+        valve = axis.config.valve
+        canopen = deployment.config.buses[valve.bus].canopen
+        if canopen is None or valve.cia408 is None or valve.cia408.node is None:
+            return None
+        return self._nodes[valve.bus, canopen.nodes[valve.cia408.node].id]
+
+    def closed(self, axis: str) -> bool:
+        """Whether the valve of an axis does not follow its set point."""
+        valve = self._valves.get(axis)
+        return valve is not None and not valve.active
 
     def receive(self, frame: Frame) -> None:
         """Take a control word, or a command to start."""
-        for valve in self._valves:
+        for valve in self._valves.values():
             if valve.key == frame[:3]:
                 valve.receive(frame.data)
         if frame.can_id == NMT and not frame.extended and frame.data[:1] == bytes((START,)):
@@ -83,6 +113,6 @@ class CanopenSide:
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
         """What is due after so much more time."""
-        parts: list[_Node | _ValveStatus] = [*self._nodes.values(), *self._valves]
+        parts: list[_Node | _ValveStates] = [*self._nodes.values(), *self._valves.values()]
         for part in parts:
             yield from part.frames(passed_s)

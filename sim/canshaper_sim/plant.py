@@ -164,7 +164,8 @@ class PlantNode:
             if valve.age_s >= valve.timeout_s:
                 valve.command = 0.0
             valve.age_s += dt_s
-            commands[valve.axis] = valve.command
+            closed = self._canopen.closed(valve.axis)
+            commands[valve.axis] = 0.0 if closed else valve.command
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:

@@ -54,6 +54,15 @@ BO_ 1025 TipPosition: 4 LEVERS
 BO_ 1026 Short: 1 LEVERS
  SG_ Radius : 0|8@1+ (0.2,0) [0|50] "m" SHAPER
 
+BO_ 1027 Half: 4 LEVERS
+ SG_ Radius : 11|13@1+ (0.01,0) [0|60] "m" SHAPER
+
+BO_ 1028 Big: 4 LEVERS
+ SG_ Radius : 11|12@0+ (0.02,0) [0|60] "m" SHAPER
+
+BO_ 1029 Beside: 4 LEVERS
+ SG_ Radius : 23|16@0+ (0.001,0) [0|60] "m" SHAPER
+
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
 BA_DEF_DEF_ "GenMsgCycleTime" 0;
 BA_ "GenMsgCycleTime" BO_ 64 20;

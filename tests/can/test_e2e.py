@@ -156,6 +156,14 @@ def test_a_frame_for_another_data_id_is_refused(
     assert Profile1(mine, mode).right(Profile1(mine, mode).seal(data, 0))
 
 
+@pytest.mark.parametrize("mine", range(16))
+def test_the_part_of_the_data_id_that_is_sent_is_compared(mine: int) -> None:
+    """The CRC covers it, so only that tells it from another sender's."""
+    for other in range(16):
+        frame = Profile1(other << 8 | 0x42, "nibble").seal(bytes(8), 3)
+        assert Profile1(mine << 8 | 0x42, "nibble").right(frame) is (mine == other)
+
+
 def test_of_all_data_ids_one_in_256_has_the_same_crc() -> None:
     frame = Profile1(0x123, "both").seal(bytes(range(8)), 7)
     assert sum(Profile1(i, "both").right(frame) for i in range(0x10000)) == 256

@@ -215,6 +215,19 @@ def test_one_fault_is_told_with_its_line(
 
 
 @pytest.mark.parametrize(
+    ("message", "overlaps"), [("Half", True), ("Big", True), ("Beside", False)]
+)
+def test_one_bit_of_a_signal_in_the_header_is_too_many(
+    tmp_path: Path, message: str, overlaps: bool
+) -> None:
+    """In either byte order."""
+    found = problems(tmp_path, ("message: TipPosition", f"message: {message}"))
+    where = f"machine.yaml:{line_of(f'e2e: {RADIUS}')}: axes.slew.radial_compensation.radius.e2e: "
+    says = f"{HEADER} {message}, where Radius lies, which is signal"
+    assert found == ([where + says] if overlaps else [])
+
+
+@pytest.mark.parametrize(
     ("protection", "says"),
     [
         (

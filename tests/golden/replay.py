@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from itertools import groupby
 from math import floor
 from pathlib import Path
+from typing import Any
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.frame import Frame

@@ -20,7 +20,7 @@ MACHINE_TOOLS = {
     "setpriv": "util-linux",
 }
 # Counterparts that tests like to have; a lane is complete without them.
-TEST_TOOLS = {"cangw": "can-utils", "tc": "iproute2"}
+TEST_TOOLS = {"cangw": "can-utils", "tc": "iproute2", "tshark": "tshark"}
 EVERYWHERE = ":/usr/local/sbin:/usr/sbin:/sbin:/usr/local/bin:/usr/bin:/bin"
 
 

@@ -1,5 +1,6 @@
 """The J1939 machine of the repository in lock-step; joysticks are encoded by plain cantools."""
 
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -50,11 +51,14 @@ def request(pgn: int, source: int = OTHER, to: int = GLOBAL) -> Frame:
     return Frame("crane", 0x18EA0000 | to << 8 | source, True, pgn.to_bytes(3, "little"))
 
 
+load = cache(load_deployment)
+
+
 class Rig:
     """A controller with its clock; what it sends is seen as frames."""
 
     def __init__(self, path: Path = ROOT / "config" / "j1939-forwarder.yaml") -> None:
-        self.deployment = load_deployment(path)
+        self.deployment = load(path)
         self.controller = Controller(self.deployment)
         config = self.deployment.config.buses["crane"].j1939
         assert config is not None
@@ -94,7 +98,7 @@ class Rig:
     def moving(self) -> "Rig":
         """Slew in full motion."""
         self.claimed().run(5)
-        sent = self.run(40, X=100.0)[-1]
+        sent = self.run(60, X=100.0)[-1]
         assert flow(sent) > 50.0
         assert self.state() is State.ACTIVE
         return self

@@ -1,0 +1,1 @@
+"""Measuring a valve: at which command it opens, and what it gives in each direction."""

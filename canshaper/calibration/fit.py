@@ -1,0 +1,153 @@
+"""From a slow ramp to the curve of a valve.
+
+A valve follows with a delay, so on the way up it opens at a larger command than it should, and on
+the way down it closes at a smaller one. With a ramp as fast up as down the mean of both is right.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+
+class Sample(NamedTuple):
+    """One moment of a measurement.
+
+    Attributes:
+        command: what the valve was told, part of full command.
+        speed: what the feedback showed, in its own unit.
+    """
+
+    command: float
+    speed: float
+
+
+class CalibrationError(Exception):
+    """The measurement makes no curve; the message says why and what to do."""
+
+
+@dataclass(frozen=True, slots=True)
+class Direction:
+    """One direction of a valve.
+
+    Attributes:
+        opens: command at which it begins to move, part of full.
+        points: (command, speed) from there to the top of the ramp, speed in the unit of feedback.
+        delay: by how much of a command up and down differ at the opening: the delay of the valve.
+        full: speed at full command, in a straight line through the first and the last point.
+    """
+
+    opens: float
+    points: tuple[tuple[float, float], ...]
+    delay: float
+    full: float
+
+
+@dataclass(frozen=True, slots=True)
+class Calibration:
+    """Both directions; magnitudes, the negative one too."""
+
+    positive: Direction
+    negative: Direction
+    noise: float
+
+    def curve(self) -> tuple[list[float], list[float]]:
+        """Commands and speeds in % for the deployment file, full speed that of the faster one."""
+        full = max(self.positive.full, self.negative.full)
+        commands, speeds = [], []
+        for sign, one in ((-1.0, self.negative), (1.0, self.positive)):
+            points = [(one.opens, 0.0), *one.points, (1.0, one.full)]
+            part = [(sign * 100.0 * c, sign * 100.0 * s / full) for c, s in points]
+            for command, speed in reversed(part) if sign < 0 else part:
+                commands.append(round(command, 2) + 0.0)
+                speeds.append(round(speed, 2) + 0.0)
+        return commands, speeds
+
+
+# A ramp that goes this far has measured full speed.
+FULL = 0.97
+# Points of the curve between the opening and the top of the ramp.
+POINTS = (0.25, 0.5, 0.75)
+# Above the noise of the feedback by so many standard deviations counts as moving, for so long.
+SIGMAS = 5.0
+LASTING = 5
+# Less than this part of the largest speed seen is resolution, not motion.
+LEAST = 0.01
+
+
+def fit(
+    up: Sequence[Sample], held: Sequence[Sample], down: Sequence[Sample], noise: float
+) -> Direction:
+    """One direction from its ramp, as magnitudes.
+
+    Args:
+        up: samples while the command rose, in order.
+        held: samples at the largest command, when all had settled.
+        down: samples while it fell, in order.
+        noise: standard deviation of the feedback at rest.
+
+    Raises:
+        CalibrationError: it did not move, or not enough to measure.
+    """
+    if not (up and held and down):
+        raise CalibrationError("no feedback came while the axis was driven")
+    rising, falling = list(up), list(reversed(down))
+    top = held[-1].command
+    largest = max(s.speed for s in (*rising, *falling))
+    moving = max(SIGMAS * noise, LEAST * largest)
+    if largest < 2.0 * moving:
+        raise CalibrationError(
+            f"the axis did not move up to {top:.0%} of the command, or its feedback trembles as"
+            f" much: largest speed {largest:g}, noise {noise:g}; try a higher top"
+        )
+    opens_up, opens_down = _opening(rising, moving), _opening(falling, moving)
+    opens = max(0.0, 0.5 * (opens_up + opens_down))
+    points = []
+    for share in POINTS:
+        at = opens + share * (top - opens)
+        speed = 0.5 * (_speed_at(rising, at, top) + _speed_at(falling, at, top))
+        points.append((at, speed))
+    points.append((top, sum(s.speed for s in held) / len(held)))
+    rising_points = [p for p in pairwise([(opens, 0.0), *points]) if p[1][1] > p[0][1]]
+    if len(rising_points) < len(points):
+        raise CalibrationError("the speed does not rise with the command; is the axis at its end?")
+    (c0, s0), (c1, s1) = points[0], points[-1]
+    full = s1 + (1.0 - c1) * (s1 - s0) / (c1 - c0) if c1 < 1.0 else s1
+    kept = tuple(points if top < FULL else points[:-1])
+    return Direction(opens, kept, opens_up - opens_down, full)
+
+
+def _opening(samples: Sequence[Sample], moving: float) -> float:
+    """Command at which the speed would be zero, by the line of what moves first."""
+    run = 0
+    for i, sample in enumerate(samples):
+        run = run + 1 if sample.speed > moving else 0
+        if run == LASTING:
+            first = i - LASTING + 1
+            break
+    else:
+        raise CalibrationError("the axis did not move steadily; is the feedback that of this axis?")
+    above = [s for s in samples[first:] if s.speed < 6.0 * moving] or list(samples[first:])
+    command, slope = _line(above[: max(len(above), LASTING)])
+    return command if slope > 0.0 else samples[first].command
+
+
+def _line(samples: Sequence[Sample]) -> tuple[float, float]:
+    """Command at speed zero and slope of the straight line through samples (least squares)."""
+    n = len(samples)
+    c, s = sum(x.command for x in samples) / n, sum(x.speed for x in samples) / n
+    spread = math.fsum((x.command - c) ** 2 for x in samples)
+    if spread == 0.0:
+        return c, 0.0
+    slope = math.fsum((x.command - c) * (x.speed - s) for x in samples) / spread
+    return (c - s / slope, slope) if slope > 0.0 else (c, 0.0)
+
+
+def _speed_at(samples: Sequence[Sample], command: float, top: float) -> float:
+    """Speed at a command: mean of the samples nearest to it."""
+    width = 0.03 * top
+    near = [s.speed for s in samples if abs(s.command - command) <= width]
+    if not near:
+        raise CalibrationError("too few samples of the feedback; is its message cyclic?")
+    return sum(near) / len(near)

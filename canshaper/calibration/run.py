@@ -1,0 +1,75 @@
+"""Where a measurement runs: on the buses of the machine, or on the simulated crane in lock-step."""
+
+import signal
+import time
+from collections.abc import Callable
+from types import FrameType
+
+from canshaper.calibration.drive import CalibrationDrive
+from canshaper.can.binding import Deployment
+from canshaper.can.bus import Port, open_port
+from canshaper.can.frame import FrameFault
+from canshaper.service.loop import run_at_deadlines
+
+# How often the end is told to every valve: a frame may be lost.
+LAST_FRAMES = 3
+
+
+def run_live(
+    drive: CalibrationDrive, deployment: Deployment, tell: Callable[[CalibrationDrive], None]
+) -> None:
+    """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
+
+    However it ends, neutral is the last that every valve is told.
+
+    Args:
+        drive: the measurement.
+        deployment: its machine.
+        tell: called now and then.
+
+    Raises:
+        BusError: a bus cannot be opened.
+    """
+    ports: dict[str, Port] = {}
+    stopped = False
+
+    def ignore(_fault: FrameFault) -> None:
+        pass
+
+    def stop(_number: int, _frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = True
+
+    for number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(number, stop)
+    told_ns = 0
+
+    def body(now_ns: int, missed: int, _late_ns: int) -> bool:
+        nonlocal told_ns
+        for port in ports.values():
+            for frame in port.frames():
+                drive.receive(frame, now_ns)
+        for frame in drive.tick(now_ns, missed):
+            ports[frame.bus].send(frame)
+        for port in ports.values():
+            for frame in port.others():
+                drive.receive(frame, now_ns)
+        if now_ns >= told_ns:
+            told_ns = now_ns + 200_000_000
+            tell(drive)
+        if stopped and not drive.ended:
+            drive.ended = "stopped: Ctrl-C"
+        return not drive.ended
+
+    try:
+        for name, bus in deployment.config.buses.items():
+            ports[name] = open_port(name, bus, ignore)
+        run_at_deadlines(deployment.config.tick_ms * 1_000_000, body)
+    finally:
+        for _ in range(LAST_FRAMES if ports else 0):
+            for frame in drive.neutral_frames():
+                ports[frame.bus].send(frame)
+            time.sleep(deployment.config.tick_ms / 1000.0)
+        for port in ports.values():
+            port.close()
+    tell(drive)

@@ -1,0 +1,168 @@
+"""``canshaper calibrate``: dead band, gain and asymmetry of a valve, measured and written."""
+
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.sim import SET
+
+if TYPE_CHECKING:
+    from canshaper.calibration.drive import CalibrationDrive
+    from canshaper.calibration.fit import Calibration
+    from canshaper.can.binding import Deployment
+
+# Speed of each axis as `canshaper sim` tells it.
+SIMULATED = {
+    "slew": "TipVelocity.SlewRate",
+    "near_far": "TipVelocity.RadialSpeed",
+    "lift": "TipVelocity.VerticalSpeed",
+    "lift_cylinder": "JointVelocity.LiftRate",
+    "knuckle": "JointVelocity.KnuckleRate",
+    "extension": "JointVelocity.ExtensionSpeed",
+}
+EXIT_NOT_MEASURED = 1
+
+
+def calibrate(
+    file: str = FILE,
+    axis: str = typer.Option(..., "--axis", help="Axis whose valve is measured."),
+    speed: str | None = typer.Option(
+        None, "--speed", metavar="MESSAGE.SIGNAL", help="Feedback of its speed in the DBC files."
+    ),
+    rate_pct_s: float = typer.Option(3.0, "--rate", min=0.5, max=10.0, help="Ramp, % per s."),
+    top_pct: float = typer.Option(40.0, "--top", min=10.0, max=100.0, help="Largest command, %."),
+    live: bool = typer.Option(False, "--live", help="On the machine, not on the simulated crane."),
+    yes: bool = typer.Option(False, "--yes", help="With --live: do not ask."),
+    write: bool = typer.Option(False, "--write", help="Write the curve into the file."),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    changes: list[str] | None = SET,
+) -> None:
+    """Measure at which command a valve opens, and what it gives, in each direction.
+
+    Drives one axis slowly up and down, first with positive, then with negative commands, and
+    compares with the feedback of its speed. By default on the simulated crane; with --live on the
+    machine: stop the service first, keep everybody away, hold the enable switch all the time and
+    leave the stick in neutral. Releasing the enable, moving the stick, Ctrl-C and every fault that
+    stops the daemon end it with neutral valves.
+
+    Beyond the top of the ramp the curve is a straight line, and says so.
+
+    Examples:
+
+      canshaper calibrate config/forwarder.yaml --axis slew
+
+      canshaper calibrate config/forwarder.yaml --axis slew --set slew.deadband=0.08
+
+      canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
+    """
+    from canshaper.calibration.drive import CalibrationDrive
+    from canshaper.calibration.fit import CalibrationError
+    from canshaper.calibration.ramp import Ramp
+    from canshaper.calibration.run import run_live
+    from canshaper.can.bus import BusError
+    from canshaper.config.source import DeploymentError
+
+    try:
+        deployment = loader(file, interface, channel)()
+        ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
+        drive = CalibrationDrive(deployment, axis, _speed(deployment, axis, speed), ramp)
+        if live and not yes:
+            typer.confirm(
+                f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
+                f" {top_pct:.0f} % of its command in both directions. Is everybody away, and the"
+                " enable switch held?",
+                abort=True,
+            )
+        with _progress(axis) as progress:
+            task = progress.add_task("", total=1.0, text="")
+
+            def tell(now: "CalibrationDrive") -> None:
+                waits = f"waits for {now.waiting_for}" if now.waiting_for else ""
+                progress.update(task, completed=now.progress, text=waits)
+
+            if live:
+                run_live(drive, deployment, tell)
+            else:
+                from canshaper_sim.calibrating import run_simulated
+                from canshaper_sim.parameters import changed_parameters
+
+                run_simulated(drive, deployment, changed_parameters(changes or []), tell)
+        result = drive.result()
+    except BusError as error:
+        raise fail(error, EXIT_NO_BUS) from None
+    except (DeploymentError, ValueError) as error:
+        raise fail(error) from None
+    except CalibrationError as error:
+        raise fail(error, EXIT_NOT_MEASURED) from None
+    _told(deployment, axis, result, top_pct)
+    if write:
+        _write(deployment, axis, result)
+
+
+def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str, str]:
+    """Message and signal with the speed of the axis.
+
+    Raises:
+        ValueError: no such axis; or none was named, and none is known.
+    """
+    bound = deployment.axes.get(axis)
+    if bound is None:
+        raise ValueError(f"--axis: found {axis!r}, axes are {', '.join(deployment.axes)}")
+    if speed is None and bound.config.feedback:
+        return bound.config.feedback.message, bound.config.feedback.signal
+    message, dot, signal = (speed or SIMULATED.get(axis, "")).partition(".")
+    if not (message and dot and signal):
+        raise ValueError(f"--speed: found {speed or 'none'}, allowed is MESSAGE.SIGNAL")
+    return message, signal
+
+
+def _progress(axis: str) -> Progress:
+    columns = (TextColumn(f"{axis}"), BarColumn(), TextColumn("{task.fields[text]}"))
+    return Progress(*columns, console=Console(stderr=True), transient=True)
+
+
+def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: float) -> None:
+    """The result for people, beside what the file has."""
+    limits = deployment.axes[axis].config.limits
+    now = f"deadband_pct {limits.deadband_pct:g}"
+    if limits.curve_command_pct:
+        now = f"a curve with the dead band at {_dead_band(limits.curve_command_pct, limits)}"
+    typer.echo(f"axis {axis}: the file has {now}")
+    full = max(result.positive.full, result.negative.full)
+    for name, one in (("positive", result.positive), ("negative", result.negative)):
+        typer.echo(
+            f"  {name}: opens at {100 * one.opens:.1f} % of the command, full speed"
+            f" {one.full:.4g} ({100 * one.full / full:.0f} %), delay of the valve worth"
+            f" {100 * one.delay:.1f} %"
+        )
+    commands, speeds = result.curve()
+    typer.echo(f"  curve_command_pct: {commands}\n  curve_speed_pct: {speeds}")
+    if top_pct < 100:
+        typer.echo(f"  above {top_pct:g} % of the command this is a straight line, not measured")
+
+
+def _dead_band(commands: list[float], limits: object) -> str:
+    speeds = getattr(limits, "curve_speed_pct", None) or []
+    ends = [f"{c:g}" for c, s in zip(commands, speeds, strict=False) if s == 0.0]
+    return " to ".join(ends) + " %"
+
+
+def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
+    from canshaper.config.edit import set_values
+    from canshaper.config.source import DeploymentError
+
+    commands, speeds = result.curve()
+    values = {
+        "deadband_pct": None,
+        "curve_command_pct": commands,
+        "curve_speed_pct": speeds,
+    }
+    try:
+        set_values(deployment.path, ("axes", axis, "limits"), values)
+    except DeploymentError as error:
+        raise fail(error) from None
+    typer.echo(f"written: {deployment.path}")

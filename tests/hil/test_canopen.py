@@ -1,0 +1,214 @@
+"""The daemon on CANopen: joysticks, valves and their faults are those of the library canopen."""
+
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from itertools import groupby
+from pathlib import Path
+
+import cantools
+import pytest
+
+from tests.hil.canopen_nodes import (
+    ACTIVE,
+    DISABLED,
+    FAULT_HOLD,
+    FLOW_COMMAND_LATE,
+    HOLD,
+    INIT,
+    Machine,
+    machine_on,
+)
+from tests.hil.machine import ANSWER_S, ROOT, Service, candump, logged, open_bus, service
+
+FILE = ROOT / "config" / "canopen-forwarder.yaml"
+DBC = cantools.database.load_file(ROOT / "dbc" / "canopen-cia401-cia408.dbc")
+SLEW_STATUS, SLEW_COMMAND, PROBE = 0x6A0, 0x220, 0x7FE
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Iterator[Machine]:
+    with machine_on(tmp_path, interface="socketcan", channel="vcan0") as running:
+        yield running
+
+
+@pytest.fixture
+def daemon(machine: Machine, tmp_path: Path) -> Iterator[Service]:
+    with service(tmp_path / "daemon.log", "run", str(FILE)) as running:
+        running.wait_log("started file=")
+        yield running
+
+
+def until(accept: Callable[[], bool], what: str) -> None:
+    """Wait for something of the nodes; the clock only ends a test that hangs."""
+    end = time.monotonic() + ANSWER_S
+    while not accept():
+        assert time.monotonic() < end, what
+        time.sleep(0.01)
+
+
+def wait_state(state: str, reason: str | None = None) -> None:
+    """Until the status of slew says so."""
+    with open_bus("vcan0") as bus:
+        last = None
+        end = time.monotonic() + ANSWER_S
+        while time.monotonic() < end:
+            message = bus.recv(1.0)
+            if message is None or message.arbitration_id != SLEW_STATUS:
+                continue
+            last = DBC.decode_message(SLEW_STATUS, message.data)
+            if str(last["State"]) == state and reason in (None, str(last["Reason"])):
+                return
+    raise AssertionError(f"no {state} {reason}, the last was {last}")
+
+
+def drive(machine: Machine) -> None:
+    """Bring slew into motion."""
+    wait_state("READY")
+    machine.levers["left"].x = 32767
+    until(lambda: machine.valves["slew"].spool > 8000, "the spool follows")
+
+
+def reset(machine: Machine) -> None:
+    """The operator lets go and presses reset."""
+    machine.levers["left"].x = 0
+    wait_state("TRIPPED")
+    until(lambda: machine.valves["slew"].state == ACTIVE, "the valve works again")
+    machine.levers["left"].switches = 0b11
+    wait_state("READY")
+    machine.levers["left"].switches = 0b01
+
+
+def commands(log: Path, can_id: int = SLEW_COMMAND) -> list[tuple[float, int, int]]:
+    """Time, control word and set point of each frame."""
+    found = []
+    for message in logged(log):
+        if message.arbitration_id == can_id:
+            raw = DBC.decode_message(can_id, message.data, decode_choices=False, scaling=False)
+            found.append((message.timestamp, raw["ControlWord"], raw["SetPoint"]))
+    return found
+
+
+def changes(found: list[tuple[float, int, int]]) -> list[int]:
+    """The control words in their order."""
+    return [word for word, _ in groupby(word for _, word, _ in found)]
+
+
+def test_nodes_are_started_and_the_set_point_follows_the_stick(
+    machine: Machine, tmp_path: Path
+) -> None:
+    log = tmp_path / "drive.log"
+    with candump(log, "vcan0"), service(tmp_path / "daemon.log", "run", str(FILE)) as daemon:
+        drive(machine)
+        assert machine.valves["lift"].spool == 0
+        machine.levers["left"].x = 0
+        until(lambda: machine.valves["slew"].spool == 0, "the spool returns")
+        wait_state("READY")
+        machine.levers["left"].x = -32767
+        until(lambda: machine.valves["slew"].spool < -8000, "the spool follows")
+        assert daemon.end() == 0
+        assert "fault=" not in daemon.text()
+    assert machine.valves["slew"].words == [INIT, DISABLED, HOLD, ACTIVE, HOLD]
+    found = commands(log)
+    assert changes(found) == [INIT, DISABLED, HOLD, ACTIVE, HOLD]
+    assert all(-0x4000 <= point <= 0x4000 for _, _, point in found)
+    assert all(point == 0 for _, word, point in found if word != ACTIVE)
+    assert found[-1][1:] == (HOLD, 0)
+    messages = logged(log)
+    started = {m.data[1] for m in messages if m.arbitration_id == 0}
+    assert started == {0x10, 0x11, 0x20, 0x21, 0x22}
+    assert {bytes(m.data)[:1] for m in messages if m.arbitration_id == 0} == {b"\x01"}
+    ours = [bytes(m.data) for m in messages if m.arbitration_id == 0x77E]
+    assert ours[0] == b"\x00"
+    assert set(ours[1:]) == {b"\x05"}
+    judge_by_tshark(log)
+
+
+def judge_by_tshark(log: Path) -> None:
+    """Every frame of the log is CANopen to it, without an error."""
+    if shutil.which("tshark") is None:
+        print("no tshark here: candump and cantools alone have judged")
+        return
+    fields = ("_ws.col.Protocol", "_ws.malformed", "_ws.expert.severity", "can.id")
+    command = ["tshark", "-r", str(log), "-d", "can.subdissector,canopen", "-T", "fields"]
+    command += [word for field in fields for word in ("-e", field)]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    rows = [line.split("\t") for line in done.stdout.splitlines()]
+    rows = [row for row in rows if int(row[3], 0) != PROBE]
+    assert len(rows) == len(logged(log))
+    assert {(*row[:3],) for row in rows} == {("CANopen", "", "")}
+
+
+def test_an_emergency_in_motion_is_neutral_named_reset_and_on_again(
+    machine: Machine, daemon: Service, tmp_path: Path
+) -> None:
+    log = tmp_path / "emergency.log"
+    with candump(log, "vcan0"):
+        drive(machine)
+        machine.valves["slew"].fault(FLOW_COMMAND_LATE)
+        wait_state("TRIPPED", "VALVE_FAULT")
+        daemon.wait_log(r"node=slew state=OPERATIONAL emergency=0x8003")
+        daemon.wait_log(r"axis=slew state=TRIPPED from=ACTIVE reason=VALVE_FAULT")
+        reset(machine)
+        machine.levers["left"].x = 32767
+        until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
+    messages = logged(log)
+    told = next(m.timestamp for m in messages if m.arbitration_id == 0xA0 and any(m.data[:2]))
+    after = [c for c in commands(log) if c[0] > told]
+    again = next(i for i, c in enumerate(after) if c[1] == ACTIVE and i > 3)
+    # One frame may be under way already.
+    assert all(point == 0 for _, _, point in after[1:again])
+    assert FAULT_HOLD in [word for _, word, _ in after[:again]]
+    assert machine.valves["slew"].words[-3:] == [FAULT_HOLD, HOLD, ACTIVE]
+
+
+def test_a_lost_heartbeat_in_motion(machine: Machine, daemon: Service, tmp_path: Path) -> None:
+    log = tmp_path / "heartbeat.log"
+    with candump(log, "vcan0"):
+        drive(machine)
+        machine.valves["slew"].dead = True
+        wait_state("TRIPPED", "VALVE_FAULT")
+        daemon.wait_log(r"node=slew state=lost")
+        machine.valves["slew"].dead = False
+        reset(machine)
+    found = commands(log)
+    last = max(i for i, (_, _, point) in enumerate(found) if point)
+    assert found[last][1] == ACTIVE
+    assert found[last + 1][1:] == (INIT, 0)  # and then from the beginning
+    assert changes(found[last + 1 :]) == [INIT, DISABLED, HOLD, ACTIVE]
+
+
+def test_a_node_that_restarts_in_motion(machine: Machine, daemon: Service, tmp_path: Path) -> None:
+    log = tmp_path / "restart.log"
+    with candump(log, "vcan0"):
+        drive(machine)
+        machine.valves["slew"].boot()
+        wait_state("TRIPPED", "VALVE_FAULT")
+        reset(machine)
+        machine.levers["left"].x = 32767
+        until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
+    # What it was told since it booted, the frame that was under way left out.
+    words = machine.valves["slew"].words
+    assert words[-4:] == [INIT, DISABLED, HOLD, ACTIVE]
+    boots = [m.timestamp for m in logged(log) if m.arbitration_id == 0x720 and m.data[0] == 0]
+    starts = [m.timestamp for m in logged(log) if m.arbitration_id == 0 and m.data[1] == 0x20]
+    assert any(start > boots[-1] for start in starts)
+    after = [c for c in commands(log) if c[0] > boots[-1]]
+    until_active = next(i for i, c in enumerate(after) if i > 3 and c[1] == ACTIVE)
+    assert all(point == 0 for _, _, point in after[1:until_active])
+
+
+def test_a_joystick_that_boots_in_motion_stops_shaped(machine: Machine, daemon: Service) -> None:
+    drive(machine)
+    machine.levers["left"].node.nmt.state = "INITIALISING"
+    daemon.wait_log(r"axis=slew state=STOPPING from=ACTIVE reason=NODE_FAULT")
+    machine.levers["left"].node.nmt.state = "PRE-OPERATIONAL"  # our master starts it again
+    machine.levers["left"].x = 0
+    wait_state("READY")
+
+
+def test_a_second_one_with_our_heartbeat_is_named(machine: Machine, daemon: Service) -> None:
+    wait_state("READY")
+    machine.network.send_message(0x77E, [5])
+    daemon.wait_log(r"fault=SECOND_SENDER")
