@@ -41,7 +41,8 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
             "enable: Enable",
             "enable: Enable\n    on: X",
             "levers.left.on: unknown key; allowed are bus, message, alive_counter, checksum, e2e,"
-            " source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off, frozen_s",
+            " source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off, node,"
+            " frozen_s",
         ),
         (
             "{ lever: left,",

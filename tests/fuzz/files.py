@@ -68,8 +68,8 @@ def runs(deployment: Deployment) -> None:
     if stop := deployment.emergency_stop:
         messages[stop.key] = stop.message
     for axis in deployment.axes.values():
-        if axis.radial and axis.radial.key and axis.radial.message:
-            messages[axis.radial.key] = axis.radial.message
+        if axis.radial and axis.radial.radius:
+            messages[axis.radial.radius.key] = axis.radial.radius.message
     for data in (0x00, 0xFF, 0x55, 0x01):
         for key, message in messages.items():
             controller.receive(Frame(*key, bytes([data]) * message.length), now_ns)

@@ -100,6 +100,7 @@ def test_nodes_are_started_and_the_set_point_follows_the_stick(
 ) -> None:
     log = tmp_path / "drive.log"
     with candump(log, "vcan0"), service(tmp_path / "daemon.log", "run", str(FILE)) as daemon:
+        daemon.wait_log("started file=")
         drive(machine)
         assert machine.valves["lift"].spool == 0
         machine.levers["left"].x = 0

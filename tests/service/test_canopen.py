@@ -114,6 +114,13 @@ def test_a_node_that_restarts_between_two_ticks_is_seen(rig: CanopenRig) -> None
     assert rig.axis() == FAULT
 
 
+def test_a_joystick_that_restarts_between_two_ticks_is_a_shaped_stop(rig: CanopenRig) -> None:
+    rig.moving()
+    rig.heartbeat("left", 0)
+    assert rig.run(Slew=30000)["slew"]["SetPoint"] > 0
+    assert rig.axis() == ("STOPPING", "NODE_FAULT")
+
+
 def test_the_toggle_bit_of_node_guarding_is_no_state(rig: CanopenRig) -> None:
     rig.states = dict.fromkeys(NODES, OPERATIONAL | 0x80)
     rig.states["left"] = rig.states["right"] = OPERATIONAL

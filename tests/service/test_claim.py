@@ -1,5 +1,7 @@
 """The address of our node: claimed, defended, lost."""
 
+from itertools import pairwise
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -135,6 +137,16 @@ def test_who_asks_again_and_again_does_not_put_the_answer_off(rig: Rig) -> None:
     answers = [f for _ in range(50) for f in rig.tick(*[request(CLAIMED)] * 5)]
     assert answers
     assert set(ids(answers)) == {NO_CLAIM}
+
+
+def test_claims_are_5_ms_apart_in_a_quick_loop_too() -> None:
+    name = J1939Name(identity_number=7, manufacturer_code=1)
+    claim, at = AddressClaim("crane", J1939(address=OWN, name=name)), []
+    for ms in range(100):
+        claim.receive(request(CLAIMED), ms * 1_000_000)
+        claim.receive(Frame("crane", CLAIM, True, b"\xff" * 8), ms * 1_000_000)
+        at += [ms for _ in claim.frames(ms * 1_000_000)]
+    assert {b - a for a, b in pairwise(at)} == {5}
 
 
 def test_a_storm_of_claims_is_answered_once_a_tick_at_most(rig: Rig) -> None:

@@ -154,6 +154,16 @@ def test_the_machine_tells_which_axes_cannot_move_and_why() -> None:
     assert found == [(FIRST + 1, 9, 1), (FIRST + 3, 9, 1), (FIRST + 4, 9, 1), (FIRST + 5, 9, 1)]
 
 
+def test_a_broadcast_is_begun_anew_after_the_address_was_not_ours() -> None:
+    rig = Rig().claimed()
+    while BROADCAST not in ids(rig.run(1)[0]):
+        pass
+    rig.controller.unheard("crane")
+    sent = [f for frames in rig.run(20) for f in frames]
+    under_way = [i for i in ids(sent) if i in (BROADCAST, PACKET)]
+    assert under_way[0] == BROADCAST
+
+
 def test_a_request_for_dm1_is_answered_also_when_it_came_while_waiting() -> None:
     rig = Rig()
     rig.tick(request(0xFECA))

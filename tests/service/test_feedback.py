@@ -47,6 +47,8 @@ def test_a_valve_that_goes_the_other_way_or_not_at_all(rig: Rig) -> None:
 def test_a_valve_may_take_its_time_to_settle(rig: Rig) -> None:
     run(rig, 50, 0.0, 0.0)
     assert run(rig, 20, 60.0, 0.0) == []  # 400 ms of 500
+    run(rig, 100, 60.0, 60.0)
+    assert run(rig, 20, 0.0, 60.0) == []
 
 
 def test_silence_is_told_and_the_way_back(rig: Rig) -> None:

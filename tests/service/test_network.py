@@ -3,6 +3,8 @@
 from pathlib import Path
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from canshaper.can.frame import Frame
 from canshaper.shaping.states import State
@@ -76,12 +78,19 @@ def test_a_change_of_joysticks_always_stops_however_the_ticks_fall(rig: Rig, gap
         assert began is State.ACTIVE  # the first one still counted
 
 
-def test_nobody_else_may_use_our_address(rig: Rig) -> None:
-    rig.claimed()
-    for _ in range(30):
-        rig.tick(bjm("BJM1", OWN, X=100.0), bjm("BJM2"))
+@pytest.mark.parametrize("source", [OWN, 0xFE])
+def test_a_second_joystick_without_an_address_of_its_own(rig: Rig, source: int) -> None:
+    """Ours is nobody else's, and FE is that of a node without one: what a DBC has for any."""
+    rig.moving()
+    sent = rig.tick(bjm("BJM1", X=100.0), bjm("BJM2"), bjm("BJM1", source, X=-100.0))
     assert rig.fault == "SECOND_SENDER"
-    assert rig.state() is State.NEUTRAL_WAIT
+    assert flow(sent) > 50.0
+
+
+def test_nobody_else_may_use_our_address(rig: Rig) -> None:
+    for _ in range(30):
+        rig.tick(bjm("BJM1", OWN), bjm("BJM2"))
+    assert rig.reason() == "STICK_TIMEOUT"
 
 
 def test_a_joystick_of_one_address_and_no_other(tmp_path: Path) -> None:
@@ -179,3 +188,32 @@ def test_the_joystick_that_counts_is_taken_from_after_an_outage_too(rig: Rig) ->
     rig.run(40)
     assert rig.state() is State.READY
     assert rig.events.count(f"bus=crane message=BJM1 source={JOYSTICK:#04x}") == 1
+
+
+GROUPS = [0xEE00, 0xEA00, 0xFDD6, 0xFDD8, 0xFE30, 0xFE10, 0xFECA, 0xEC00, 0xEB00, 0xFEE5]
+any_frame = st.builds(
+    lambda priority, pgn, low, source, data: Frame(
+        "crane", priority << 26 | (pgn | low if pgn < 0xF000 else pgn) << 8 | source, True, data
+    ),
+    st.integers(0, 7),
+    st.sampled_from(GROUPS) | st.integers(0, 0x3FFFF),
+    st.sampled_from([0, OWN, 0xFF]),
+    st.sampled_from([OWN, OTHER, 0xFE, 0xFF]),
+    st.binary(max_size=8),
+)
+
+
+@given(st.lists(st.lists(any_frame, max_size=5), max_size=40))
+def test_whatever_comes_we_speak_under_our_address_only_and_not_when_it_is_lost(
+    ticks: list[list[Frame]],
+) -> None:
+    rig = Rig().claimed()
+    lost = False
+    for frames in ticks:
+        sent = rig.tick(bjm("BJM1"), bjm("BJM2"), *frames)
+        lost |= "bus=crane address=0x9c state=lost" in rig.events
+        for frame in sent:
+            assert len(frame.data) == 8
+            assert frame.can_id & 0xFF == (0xFE if lost else OWN)
+        if not lost:
+            assert [flow(sent, n) for n in range(3)] == [0.0, 0.0, 0.0]

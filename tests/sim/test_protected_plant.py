@@ -94,8 +94,11 @@ def test_a_valve_closes_when_the_same_frame_comes_again_and_again(machine: Deplo
 def test_a_controller_that_starts_again_is_followed_again(machine: Deployment) -> None:
     plant = PlantNode(machine)
     moving = drive(plant, [frame(n) for n in range(100)])[-1]
-    drive(plant, [None] * 20)
-    rates = drive(plant, [frame(n) for n in range(111, 200)])
+    still = drive(plant, [None] * 100)[-1]
+    assert abs(still) < 0.01 * moving
+    # The first frame counts, whatever its counter: 99 was the last.
+    assert drive(plant, [frame(109), *[None] * 8])[-1] > 0.1 * moving
+    rates = drive(plant, [frame(n) for n in range(110, 200)])
     assert rates[-1] > 0.9 * moving
 
 

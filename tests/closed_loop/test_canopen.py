@@ -1,0 +1,29 @@
+"""The machine of forwarder.yaml with nodes of CANopen damps as much, in lock-step."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.report.metrics import compare
+from canshaper_sim.lockstep import drive
+from canshaper_sim.operator import SCRIPTS
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+
+
+def residual_reduction_pct(file: str) -> dict[str, float]:
+    deployment = load_deployment(CONFIG / file)
+    script = SCRIPTS["demo"]
+    report = compare(drive(deployment, script, bypass=True), drive(deployment, script))
+    found = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
+    return {name: value for name, value in found.items() if value is not None}
+
+
+def test_sway_is_reduced_as_with_messages_of_our_own() -> None:
+    """By valves that follow in the state ACTIVE only, on nodes that are started by us."""
+    ours = residual_reduction_pct("forwarder.yaml")
+    canopen = residual_reduction_pct("canopen-forwarder.yaml")
+    print(ours, canopen)
+    assert canopen == pytest.approx(ours, abs=1.0)
+    assert min(canopen.values()) > 90.0
