@@ -6,7 +6,7 @@
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak bench deb clean
+.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak bench bench-realtime deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -70,6 +70,17 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/tune.py
+	.venv/bin/python benchmarks/frames.py
+	.venv/bin/python benchmarks/kilohertz.py
+	.venv/bin/python benchmarks/kilohertz.py --vcan --seconds 3
+	.venv/bin/python benchmarks/memory.py --minutes 1 --every 5
+
+# The slow ones of docs/realtime.md, on both kernels.
+bench-realtime: .venv/test-ready
+	.venv/bin/python benchmarks/lateness.py --ticks 1000
+	.venv/bin/python benchmarks/lateness.py --ticks 1000 --kernel rt
+	.venv/bin/python benchmarks/frames.py --bus can
+	.venv/bin/python benchmarks/memory.py --minutes 60 --every 30
 
 # dist/canshaper_VERSION_ARCH.deb: docs/service.md
 deb:
