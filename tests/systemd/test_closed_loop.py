@@ -9,10 +9,11 @@ from tests.systemd.unit import Unit
 DWELL_S = 2.5  # after the release, as in the reports of the demo
 # The same pulse without anti-sway leaves more than 10 degrees: tests/hil/test_closed_loop.py.
 MOST_DEG = 1.5
-# A hand whose frames this machine held up for longer than the timeout of the lever in the
-# deployment: the axis stops, as it must, and there is nothing to judge.
+# A machine that stands still for longer than the timeout of the lever in the deployment: the axis
+# stops, as it must, and there is nothing to judge. The daemon names it too.
 HELD_UP_S = 0.1
-DRIVES = 3
+HELD_UP = {"LOOP_OVERRUN", "LOOP_STALLED"}
+DRIVES = 5
 
 
 def drive(folder: Path) -> list[tuple[float, str, dict]]:
@@ -38,13 +39,15 @@ def test_after_a_pulse_the_grapple_hangs_still(forwarder: Unit, tmp_path: Path) 
         heard = drive(tmp_path)
         levers = [t for t, name, _ in heard if name == "LeverLeft"]
         longest_s = max(later - t for t, later in pairwise(levers))
-        if longest_s < HELD_UP_S:
+        told = [str(s["Reason"]) for _, name, s in heard if name == "NearFarStatus"]
+        if longest_s < HELD_UP_S and not HELD_UP & {*told}:
             break
-        print(f"once more: {longest_s:.2f} s between two frames of the hand")
+        print(f"once more: {longest_s:.2f} s between two frames of the hand; {sorted({*told})}")
     released = max(t for t, name, s in heard if name == "LeverLeft" and s["NearFar"] != 0.0)
     swings = [(t, max(map(abs, s.values()))) for t, name, s in heard if name == "GrappleSway"]
     after = [swing for t, swing in swings if t > released + DWELL_S]
-    assert max(s["RadialSpeed"] for _, name, s in heard if name == "TipVelocity") > 0.95  # of 1 m/s
+    fastest = max(s["RadialSpeed"] for _, name, s in heard if name == "TipVelocity")
+    assert fastest > 0.95, sorted({*told})  # of 1 m/s
     assert max(swing for _, swing in swings) > 2 * MOST_DEG
     assert len(after) > 10
     assert max(after) < MOST_DEG
