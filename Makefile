@@ -7,7 +7,7 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench deb clean
+.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -44,11 +44,11 @@ lint: .venv/test-ready
 
 # Tests that take seconds of pure reckoning add no line, nor do those of the daemon around the
 # controller, which start processes and threads; few examples will do.
-AROUND = cli journal loop notify realtime
+AROUND = cli journal loop notify reading realtime
 coverage: .venv/test-ready
 	@mkdir -p out
 	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \
-		tests/shaping tests/service $(AROUND:%=--ignore=tests/service/test_%.py)
+		tests/shaping tests/service $(AROUND:%=--ignore-glob='*/test_%*.py')
 	.venv/bin/python -m coverage report
 
 mutation: .venv/test-ready
@@ -75,6 +75,17 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/tune.py
+	.venv/bin/python benchmarks/frames.py
+	.venv/bin/python benchmarks/kilohertz.py
+	.venv/bin/python benchmarks/kilohertz.py --vcan --seconds 3
+	.venv/bin/python benchmarks/memory.py --minutes 1 --every 5
+
+# The slow ones of docs/realtime.md, on both kernels.
+bench-realtime: .venv/test-ready
+	.venv/bin/python benchmarks/lateness.py --ticks 1000
+	.venv/bin/python benchmarks/lateness.py --ticks 1000 --kernel rt
+	.venv/bin/python benchmarks/frames.py --bus can
+	.venv/bin/python benchmarks/memory.py --minutes 60 --every 30
 
 # dist/canshaper_VERSION_ARCH.deb: docs/service.md
 deb:

@@ -1,38 +1,51 @@
-"""Eight axes at 1 kHz on one core of this machine, by its own clock.
+"""Eight axes at 1 kHz on one core: of this machine by its own clock, or in virtual time.
 
-The daemon runs as ``canshaper run`` does, on a multicast group of python-can; joystick frames come
-every 20 ms and keep all axes moving. Beside it, on the same core at the same time, one priority
-above it, a loop in C that only sleeps until its next deadline: what that one misses, the machine
-has done. Where real-time priorities may not be had, both run without.
+The daemon runs as ``canshaper run`` does, on a multicast group of python-can, or with ``--vcan`` on
+SocketCAN in virtual time; joystick frames come every 20 ms and keep all axes moving. Beside it, on
+the same core at the same time, one priority above it, a loop in C that only sleeps until its next
+deadline: what that one misses, the machine has done. "own" are deadlines that the daemon missed
+while the C loop was never late by more than a tenth of a tick. Where real-time priorities may not
+be had, both run without.
 
     python benchmarks/kilohertz.py
+    python benchmarks/kilohertz.py --vcan
     python benchmarks/kilohertz.py --axes 4 --tick-ms 2 --seconds 30
 """
 
 import argparse
+import itertools
 import os
 import subprocess
 import sys
 import tempfile
 import time
+from contextlib import closing
+from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Self
 
-import can
 import yaml
 from rig import (
     GATEWAY_FIFO,
     PEERS,
     ROOT,
     Row,
+    as_client,
     compiled,
+    cpu_ns,
+    in_lane,
+    machine,
     print_table,
     quantile,
+    run_in_lane,
     running,
     wait_for_text,
 )
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.bus import Port, open_port
+from canshaper.can.frame import Frame
+from canshaper.config.schema import Bus
 
 JOYSTICK_MS = 20
 LEVER, VALVE = 0x110, 0x200
@@ -53,10 +66,11 @@ BA_DEF_DEF_ "GenMsgCycleTime" 0;
 """
 
 
-def deployment(directory: Path, axes: int, tick_ms: int, buses: dict[str, Any]) -> Path:
+def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
     """A machine with a lever, a valve and G_FF for each axis; every valve in every tick."""
     dbc = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: LEVERS SHAPER VALVES\n'
     cycles = CYCLES
+    buses = {"crane": {"interface": bus.interface, "channel": bus.channel}}
     config: dict[str, Any] = {"tick_ms": tick_ms, "buses": buses, "dbc": ["many.dbc"]}
     config |= {"levers": {}, "axes": {}}
     for n in range(axes):
@@ -83,8 +97,8 @@ def deployment(directory: Path, axes: int, tick_ms: int, buses: dict[str, Any]) 
 class Hands:
     """All levers, enabled, moved slowly to and fro after a second in neutral."""
 
-    def __init__(self, file: Path, bus: can.BusABC) -> None:
-        self._bus = bus
+    def __init__(self, file: Path, port: Port) -> None:
+        self._port = port
         self._levers = [lever.message for lever in load_deployment(file).levers.values()]
         self._count = 0
 
@@ -99,9 +113,9 @@ class Hands:
             values = {"Stick": stick, "Enable": 1, "AliveCounter": self._count % 256}
             for message in self._levers:
                 data = message.encode(values)
-                self._bus.send(
-                    can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data)
-                )
+                self._port.send(Frame("crane", message.frame_id, False, data))
+            for _ in self._port.frames():  # or its queue would fill
+                pass
             left = begin + (i + 1) * JOYSTICK_MS * 1_000_000 - time.monotonic_ns()
             time.sleep(max(0, left) / 1e9)
         return begin, time.monotonic_ns()
@@ -121,62 +135,103 @@ def main() -> None:
     parser.add_argument("--axes", type=int, default=8)
     parser.add_argument("--tick-ms", type=int, default=1)
     parser.add_argument("--seconds", type=int, default=10)
+    parser.add_argument("--vcan", action="store_true", help="SocketCAN, in virtual time")
     options = parser.parse_args()
+    if options.vcan and not in_lane():
+        raise SystemExit(run_in_lane("std"))
     core = max(os.sched_getaffinity(0))
     fifo = GATEWAY_FIFO if may_fifo(core) else None
     group = f"239.78.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
-    buses = {"crane": {"interface": "udp_multicast", "channel": group}}
+    bus = Bus(interface="udp_multicast", channel=group)
+    if options.vcan:
+        as_client()
+        bus = Bus(interface="socketcan", channel="vcan0")
     period_ns = options.tick_ms * 1_000_000
     with tempfile.TemporaryDirectory() as name:
-        directory = Path(name)
-        file = deployment(directory, options.axes, options.tick_ms, buses)
-        sleeper = compiled(PEERS / "sleeper.c", directory)
-        notes, log, late = directory / "ticks", directory / "log", directory / "late"
-        on_core = ["taskset", "-c", str(core)]
-        program = ROOT / "benchmarks" / "observed.py"
-        command = [*on_core, sys.executable, program, "ticks", notes, file]
-        bus = can.Bus(interface="udp_multicast", channel=group, ignore_config=True)
-        with bus, running(command, log, fifo) as process:
-            wait_for_text(process, log, "started")
-            hands = Hands(file, bus)
-            hands.drive(1.0, neutral=True)
-            hands.drive(1.0)
-            count = str(options.seconds * 1000 // options.tick_ms)
-            peer = [*on_core, sleeper, str(period_ns), count] if sleeper else ["true"]
-            before = cpu_s(process.pid)
-            with running(peer, late, fifo and fifo + 1) as sleeping:
-                begin, end = hands.drive(options.seconds)
-                share = (cpu_s(process.pid) - before) / ((end - begin) / 1e9)
-                sleeping.wait()
-        ticks = [list(map(int, line.split())) for line in notes.read_text().splitlines()]
-        ticks = [t for t in ticks if begin <= t[0] < end]
-        peer_late = [int(line) for line in late.read_text().splitlines()]
-        text = log.read_text()
-    rows = [
-        row("canshaper run", [t[1] for t in ticks], [t[2] for t in ticks], sum(t[3] for t in ticks))
-    ]
-    if peer_late:
-        rows.append(row("C, sleeps only", peer_late, [], sum(n >= period_ns for n in peer_late)))
+        file = deployment(Path(name), options.axes, options.tick_ms, bus)
+        count = options.seconds * 1000 // options.tick_ms
+        with closing(open_port("crane", bus, lambda _fault: None)) as port:
+            run = Run.of(file, port, core=core, fifo=fifo, period_ns=period_ns, count=count)
+    rows = [run.row(period_ns)]
+    if run.peers:
+        late = [p[1] for p in run.peers]
+        rows.append(row("C, sleeps only", late, [], sum(n >= period_ns for n in late), None))
     policy = f"FIFO {fifo}" if fifo else "no real-time priority"
     print(f"{options.axes} axes, tick {options.tick_ms} ms, core {core}, {policy}; us")
-    print_table(["ticks", "late p50", "p99", "p99.9", "max", "work p50", "p99", "missed"], rows)
-    print(f"CPU of the daemon: {100 * share:.0f} % of the core")
-    for line in text.splitlines():
+    if options.vcan:
+        print(machine())
+    heads = ["ticks", "late p50", "p99", "p99.9", "max", "work p50", "p99", "missed", "own"]
+    print_table(heads, rows)
+    print(f"CPU of the daemon: {100 * run.share:.0f} % of the core")
+    for line in run.log.splitlines():
         if "fault=" in line or "STOPPING" in line or "TRIPPED" in line:
             print(line)
 
 
-def row(title: str, late: list[int], work: list[int], missed: int) -> Row:
+@dataclass
+class Run:
+    """What both loops wrote while both ran: daemon's ticks, the C loop's deadlines, a log."""
+
+    ticks: list[list[int]]
+    peers: list[list[int]]
+    share: float
+    log: str
+
+    @classmethod
+    def of(
+        cls, file: Path, port: Port, *, core: int, fifo: int | None, period_ns: int, count: int
+    ) -> Self:
+        """Run both on one core."""
+        directory = file.parent
+        sleeper = compiled(PEERS / "sleeper.c", directory)
+        notes, log, late = directory / "ticks", directory / "log", directory / "late"
+        on_core = ["taskset", "-c", str(core)]
+        program = ROOT / "benchmarks" / "observed.py"
+        with running([*on_core, sys.executable, program, "ticks", notes, file], log, fifo) as ours:
+            wait_for_text(ours, log, "started")
+            hands = Hands(file, port)
+            hands.drive(1.0, neutral=True)
+            hands.drive(1.0)
+            peer = [*on_core, sleeper, str(period_ns), str(count)] if sleeper else ["true"]
+            before = cpu_ns(ours.pid)
+            with running(peer, late, fifo and fifo + 1) as sleeping:
+                begin, end = hands.drive(period_ns * count / 1e9)
+                share = (cpu_ns(ours.pid) - before) / (end - begin)
+                sleeping.wait()
+        peers = numbers(late)
+        if peers:  # the time in which both ran
+            begin, end = peers[0][0], peers[-1][0]
+        ticks = [tick for tick in numbers(notes) if begin <= tick[0] < end]
+        return cls(ticks, peers, share, log.read_text())
+
+    def row(self, period_ns: int) -> Row:
+        """The daemon's row of the table."""
+        late, work, missed = ([tick[i] for tick in self.ticks] for i in (1, 2, 3))
+        return row("canshaper run", late, work, sum(missed), self.own(period_ns))
+
+    def own(self, period_ns: int) -> int:
+        """Deadlines that the daemon missed while the machine let the C loop run in time.
+
+        A missed deadline lies between the begin of one tick and that of the next.
+        """
+        late = [(at, at + by) for at, by in self.peers if by > period_ns // 10]
+        count = 0
+        for before, tick in itertools.pairwise(self.ticks):
+            if tick[3] and not any(begin < tick[0] and end > before[0] for begin, end in late):
+                count += tick[3]
+        return count
+
+
+def numbers(file: Path) -> list[list[int]]:
+    """Lines of whole numbers."""
+    return [list(map(int, line.split())) for line in file.read_text().splitlines()]
+
+
+def row(title: str, late: list[int], work: list[int], missed: int, ours: int | None) -> Row:
     """A row of the table."""
     cells = [str(len(late)), *(f"{quantile(late, q) / 1e3:.0f}" for q in (0.5, 0.99, 0.999, 1.0))]
     cells += [f"{quantile(work, q) / 1e3:.0f}" if work else "" for q in (0.5, 0.99)]
-    return Row(title, [*cells, str(missed)])
-
-
-def cpu_s(pid: int) -> float:
-    """CPU time of a process so far."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    return Row(title, [*cells, str(missed), "" if ours is None else str(ours)])
 
 
 if __name__ == "__main__":

@@ -74,7 +74,7 @@ class Bench:
                     time.sleep(0.1)
                 with running([*command, str(MS), str(self.count)], log) as process:
                     process.wait()
-            late = [int(line) for line in log.read_text().splitlines()]
+            late = [int(line.split()[1]) for line in log.read_text().splitlines()]
             self.results[loaded].append(Ticks(title, late))
 
     def daemon(self, title: str, file: Path, tick_ms: int, fifo: int | None) -> None:

@@ -20,6 +20,7 @@ from typing import Any
 
 import yaml
 
+from canshaper.config.schema import Bus
 from canshaper.config.source import Source
 from canshaper.service.realtime import lock_memory
 
@@ -105,6 +106,13 @@ def cpu_ns(pid: int) -> int:
     return sum(int(task.read_text().split()[0]) for task in tasks)
 
 
+def _worked_ns(pid: int) -> int:
+    """CPU time of a process and of its children that have ended, ns."""
+    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+    ended = int(fields[13]) + int(fields[14])  # cutime, cstime: proc(5)
+    return cpu_ns(pid) + ended * 1_000_000_000 // os.sysconf("SC_CLK_TCK")
+
+
 @contextmanager
 def load(directory: Path, kinds: Sequence[str]) -> Iterator[Callable[[], bool]]:
     """What else may run on a machine PC, at ordinary priority.
@@ -139,7 +147,7 @@ def load(directory: Path, kinds: Sequence[str]) -> Iterator[Callable[[], bool]]:
         for command in commands[kind]
     ]
     try:
-        yield lambda: all(cpu_ns(process.pid) > AT_WORK_NS for process in processes)
+        yield lambda: all(_worked_ns(process.pid) > AT_WORK_NS for process in processes)
     finally:
         for process in processes:
             os.killpg(process.pid, signal.SIGKILL)
@@ -171,10 +179,15 @@ def _cycle(dbc: str, can_id: int, cycle_ms: int) -> str:
 
 
 def shipped(directory: Path, channel: str) -> Path:
-    """The shipped deployment on this channel."""
+    """The shipped deployment on this SocketCAN channel."""
+    return on_channel(directory, Bus(interface="socketcan", channel=channel))
+
+
+def on_channel(directory: Path, bus: Bus) -> Path:
+    """The shipped deployment on this bus."""
     data: dict[str, Any] = Source(CONFIG).data
     data["dbc"] = [str(DBC)]
-    data["buses"]["crane"]["channel"] = channel
+    data["buses"]["crane"] = {"interface": bus.interface, "channel": bus.channel}
     file = directory / "shipped.yaml"
     file.write_text(yaml.safe_dump(data, sort_keys=False))
     return file

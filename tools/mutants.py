@@ -6,22 +6,26 @@ mutants.py judge SURVIVORS [PATTERN ...]     settings as soon as it is imported
 
 import fnmatch
 import re
+import signal
 import sys
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
+from typing import Any
 
 import libcst as cst
 from mutmut import __main__ as mutmut
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import get_diff_for_mutant
 from mutmut.mutation.mutators import mutation_operators
-from mutmut.utils.file_utils import walk_mutatable_files
+from mutmut.runners.harness import PytestRunner
+from mutmut.state import state
+from mutmut.utils.file_utils import change_cwd, walk_mutatable_files
 from mutmut.workers import isolation
 
 PROCESSES = 2
 # Exit codes of mutmut's workers: a test failed, or its time was up (a loop that never ends).
-KILLED, TIMED_OUT, SURVIVED, TYPES = (1, 3), (-24, 24, 36, 152, 255), 0, 37
+KILLED, TIMED_OUT, SURVIVED, TYPES = (1, 3), (-27, -24, 24, 36, 152, 255), 0, 37
 
 Change = tuple[str, tuple[str, ...]]  # function, and the lines of the difference
 
@@ -67,6 +71,21 @@ def patient(pid: int, timeout_s: float) -> None:
 register_timeout = isolation.register_timeout
 
 
+class Limit:
+    """Ends a worker in one of whose tests a loop never ends, by processor time."""
+
+    def pytest_runtest_logstart(self, nodeid: str, location: Any) -> None:
+        """Four times what the test takes without a mutant, and two seconds more."""
+        signal.setitimer(signal.ITIMER_PROF, 2.0 + 4.0 * state().duration_by_test[nodeid])
+
+
+def run_tests(runner: PytestRunner, *, mutant_name: str | None, tests: Iterable[str]) -> int:
+    """Run tests as mutmut does, each of those of a mutant with a limit."""
+    plugins = [Limit()] if mutant_name else []
+    with change_cwd("mutants"):
+        return int(runner.execute_pytest(runner._pytest_args_regular_run(tests), plugins=plugins))
+
+
 def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None:
     """Run mutmut.
 
@@ -77,6 +96,7 @@ def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None
     """
     mutation_operators.extend(MORE)  # type: ignore[attr-defined]
     isolation.register_timeout = patient
+    PytestRunner.run_tests = run_tests  # type: ignore[method-assign]
     if survivors is not None:
         Path("mutants").mkdir()
         mutmut.copy_src_dir()

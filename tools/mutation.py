@@ -20,10 +20,10 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 SURVIVORS = ROOT / "tests/mutation/survivors.txt"
 # Not of service: tests of the daemon around the controller, which start processes and threads.
-AROUND = ("cli", "journal", "loop", "notify", "realtime")
+AROUND = ("cli", "journal", "loop", "notify", "reading", "realtime")
 TESTS = {
     "shaping": ["tests/shaping"],
-    "service": ["tests/service", *(f"--ignore=tests/service/test_{name}.py" for name in AROUND)],
+    "service": ["tests/service", *(f"--ignore-glob=*/test_{name}*.py" for name in AROUND)],
 }
 CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
 CORE_TESTS = ["test_axis*.py", "test_limits.py"]

@@ -1,4 +1,5 @@
-/* The same in C: sleeper PERIOD_NS COUNT */
+/* A loop that only sleeps until its next deadline; writes each deadline and how late it was, ns.
+   sleeper PERIOD_NS COUNT */
 #include <stdio.h>
 #include <stdlib.h>
 #include <sys/mman.h>
@@ -12,7 +13,7 @@ static long long ns(struct timespec t)
 int main(int argc, char **argv)
 {
     struct timespec now, next;
-    long long period, deadline, *late;
+    long long period, begin, deadline, *late;
     int count;
 
     if (argc != 3) {
@@ -25,7 +26,7 @@ int main(int argc, char **argv)
     if (!late || mlockall(MCL_CURRENT | MCL_FUTURE))
         perror("memory");
     clock_gettime(CLOCK_MONOTONIC, &now);
-    deadline = ns(now);
+    begin = deadline = ns(now);
     for (int i = 0; i < count; i++) {
         deadline += period;
         next.tv_sec = deadline / 1000000000;
@@ -35,6 +36,6 @@ int main(int argc, char **argv)
         late[i] = ns(now) - deadline;
     }
     for (int i = 0; i < count; i++)
-        printf("%lld\n", late[i]);
+        printf("%lld %lld\n", begin + (i + 1) * period, late[i]);
     return 0;
 }

@@ -1,4 +1,4 @@
-"""A loop that only sleeps until its next deadline, and writes how late it was each time, ns.
+"""The same as sleeper.c in Python.
 
 sleeper.py PERIOD_NS COUNT
 """
@@ -8,9 +8,10 @@ import time
 
 period, count = int(sys.argv[1]), int(sys.argv[2])
 late = [0] * count
-deadline = time.monotonic_ns()
+begin = deadline = time.monotonic_ns()
 for i in range(count):
     deadline += period
     time.sleep(max(0, deadline - time.monotonic_ns()) / 1e9)
     late[i] = time.monotonic_ns() - deadline
-print(*late, sep="\n", flush=True)
+for i in range(count):
+    print(begin + (i + 1) * period, late[i])

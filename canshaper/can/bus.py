@@ -5,6 +5,8 @@ the next tick, so an interface that comes back is used again.
 """
 
 import errno
+import os
+import socket
 from collections import deque
 from collections.abc import Callable, Iterator
 from functools import partial
@@ -19,6 +21,8 @@ from canshaper.config.bus import Bus
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
+# linux/in.h, linux/in6.h; Python has no names for these.
+IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 
 
 class BusError(Exception):
@@ -97,9 +101,10 @@ class PythonCanPort:
             **options,
         )
         # Multicast brings back what this process sent; the others do not.
-        self._echoes: deque[Frame] | None = (
-            deque(maxlen=MOST_ECHOES) if config.interface == "udp_multicast" else None
-        )
+        self._echoes: deque[Frame] | None = None
+        if config.interface == "udp_multicast":
+            self._echoes = deque(maxlen=MOST_ECHOES)
+            _hear_one_group(self._bus.fileno())
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -159,3 +164,16 @@ class PythonCanPort:
             self._bus.shutdown()
         except (can.CanError, OSError):
             return
+
+
+def _hear_one_group(fileno: int) -> None:
+    """Let a multicast socket hear its own group only.
+
+    Linux hands it the frames of every group that any program of this machine has joined at the
+    same port, so that two buses would be one.
+    """
+    with socket.socket(fileno=os.dup(fileno)) as one:
+        if one.family == socket.AF_INET6:
+            one.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+        else:
+            one.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)

@@ -138,7 +138,7 @@ class RawPort:
             except OSError as error:
                 self._failed(error)
                 return
-            if flags & socket.MSG_CONFIRM:
+            if flags & socket.MSG_CONFIRM and len(data) == SIZE:
                 self._confirmed(CAN_FRAME.unpack(data)[0])
             elif (frame := self._frame(data)) is not None:
                 yield frame

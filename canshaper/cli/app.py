@@ -1,5 +1,7 @@
 """The ``canshaper`` command. Each verb imports what it needs when it is called."""
 
+import sys
+
 import typer
 
 from canshaper import __version__
@@ -16,6 +18,7 @@ from canshaper.cli import (
     sim,
     tune,
 )
+from canshaper.cli.common import EXIT_WITHOUT_TOOLS, INSTALL_TOOLS, TOOLS
 
 app = typer.Typer(
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
@@ -58,4 +61,11 @@ app.command("config-schema")(config_schema.config_schema)
 
 def main() -> None:
     """Entry point of the command."""
-    app(prog_name="canshaper")
+    try:
+        app(prog_name="canshaper")
+    except ModuleNotFoundError as error:
+        name = (error.name or "").partition(".")[0]
+        if name not in TOOLS:
+            raise
+        typer.echo(f"this command needs {name}, which is missing: {INSTALL_TOOLS}", err=True)
+        sys.exit(EXIT_WITHOUT_TOOLS)

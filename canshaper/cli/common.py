@@ -10,7 +10,12 @@ from canshaper.can.binding import Deployment, load_deployment
 from canshaper.config.source import DeploymentError, Problem
 
 EXIT_BAD_DEPLOYMENT = 2
+EXIT_WITHOUT_TOOLS = 2
 EXIT_NO_BUS = 3  # the file is good; the service manager tries again until the interface is there
+
+# What only the extra ``tools`` installs.
+TOOLS = ("casadi", "matplotlib", "numpy", "scipy")
+INSTALL_TOOLS = "pip install 'canshaper[tools]'"
 
 FILE = typer.Argument(..., help="Deployment file (YAML), or the name of a shipped one.")
 INTERFACE = typer.Option(None, "--interface", help="python-can interface instead of the file's.")

@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
-from canshaper.cli.common import fail, loader
+from canshaper.cli.common import INSTALL_TOOLS, fail, loader
 
 if TYPE_CHECKING:
     from canshaper_sim.comparison.summary import Row
@@ -90,7 +90,7 @@ def compare(
         from canshaper.report.pareto import Point, draw
         from canshaper_sim.comparison.limits import limits_for
     except ImportError:
-        console.print("No picture: matplotlib is missing; pip install 'canshaper[tools]'")
+        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
         return
     off = next(row for row in table if row.name == "off")
     calm = advice["calm"][0]

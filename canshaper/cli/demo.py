@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import fail, loader
+from canshaper.cli.common import INSTALL_TOOLS, fail, loader
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
@@ -115,7 +115,7 @@ def _draw(
     try:
         from canshaper.report.plot import draw
     except ImportError:
-        console.print("No picture: matplotlib is missing; pip install 'canshaper[tools]'")
+        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
         return
     draw(raw, shaped, report, path)
     console.print(f"Picture: {path}", highlight=False)

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, data_directory, fail, loader
+from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -54,14 +54,9 @@ def reproduce(
 
 def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
     from canshaper.config.source import DeploymentError
+    from canshaper.report.paper_table import print_paper_table
+    from canshaper_sim.reproduction.study import FIGURES, Study, steps
 
-    try:
-        from canshaper.report.paper_table import print_paper_table
-        from canshaper_sim.reproduction.study import FIGURES, Study, steps
-    except ImportError as error:
-        text = f"reproduce needs {error.name}: pip install 'canshaper[tools]'"
-        typer.echo(text, err=True)
-        raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None
     for number in wanted:
         if number not in FIGURES:
             allowed = ", ".join(map(str, FIGURES))
@@ -103,7 +98,7 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
     for finding, path in drawn:
         console.print(f"{path}: {finding}", highlight=False, markup=False)
     if not drawn:
-        console.print("No pictures: matplotlib is missing; pip install 'canshaper[tools]'")
+        console.print(f"No pictures: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
 
 
 def _picture(study: "Study", number: int) -> "tuple[str, Figure | None]":

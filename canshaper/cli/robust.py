@@ -45,6 +45,7 @@ def robust(
     from canshaper.config.source import DeploymentError
     from canshaper.shaping.registry import build_shaper
     from canshaper.tuning.evaluate import Machine, evaluate
+    from canshaper.tuning.robust import least_residual, shortest
 
     console = Console()
     try:
@@ -53,11 +54,6 @@ def robust(
         if bound is None or bound.config.sway is None:
             having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway)
             raise ValueError(f"axis {axis!r}, allowed are axes with sway data: {having or 'none'}")
-        try:
-            from canshaper.tuning.robust import least_residual, shortest
-        except ImportError as error:
-            text = f"{error.name} is missing; pip install 'canshaper[tools]'"
-            raise ValueError(text) from None
         mode = bound.config.sway.mode()
         limits = bound.config.limits
         tick_ms = bound.period_ticks * deployment.config.tick_ms

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import FILE, fail, loader
+from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader
 
 if TYPE_CHECKING:
     from canshaper.can.binding import BoundAxis, Deployment
@@ -175,10 +175,8 @@ def _solve(
     if method != "optimal":
         raise ValueError(f"method is {method}, allowed are optimal, manual")
     tell("loading the solver", 0.0)
-    try:
-        from canshaper.tuning.optimal import tune as optimal
-    except ImportError as error:
-        raise ValueError(f"{error.name} is missing; pip install 'canshaper[tools]'") from None
+    from canshaper.tuning.optimal import tune as optimal
+
     return optimal(task, starts, tell)
 
 
@@ -252,7 +250,7 @@ def _report(
             highlight=False,
         )
     console.print(f"\n[b]{sentence}[/b]", highlight=False)
-    none = "none, matplotlib is missing; pip install 'canshaper[tools]'"
+    none = f"none, matplotlib is missing: {INSTALL_TOOLS}"
     console.print(f"Picture: {picture or none}", highlight=False, markup=False)
     if write:
         console.print(

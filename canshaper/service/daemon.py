@@ -11,10 +11,10 @@ from canshaper.can.bus import BusError, Port, open_port
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.config.input import Input
-from canshaper.config.source import DeploymentError
 from canshaper.service.controller import Controller
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
+from canshaper.service.reading import Reading
 from canshaper.service.realtime import Collector, lock_memory
 
 log = logging.getLogger("canshaper")
@@ -30,7 +30,7 @@ class Daemon:
     """Runs a deployment until it is told to stop.
 
     Args:
-        load: reads the deployment, at the start and at every SIGHUP.
+        load: reads the deployment, at the start and, in another process, at every SIGHUP.
 
     Raises:
         DeploymentError: the deployment is not valid.
@@ -40,8 +40,10 @@ class Daemon:
     def __init__(self, load: Callable[[], Deployment]) -> None:
         self._load = load
         self._stop = False
-        self._reload = False
-        self._reload_told = False
+        self._reload = False  # asked for and not yet begun
+        self._reading: Reading | None = None
+        self._next: Deployment | None = None  # read, and good
+        self._waiting_told = False
         self._manager = ServiceManager()
         self._collector = Collector()
         self._logged_fault = FrameFault.NONE
@@ -56,6 +58,7 @@ class Daemon:
         """Run until SIGTERM or SIGINT; then every valve is told neutral and the buses close."""
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, the end of a Reading would be lost
         names = ",".join(self._controller.axes)
         why = lock_memory()
         log.info("memory=%s", f"not-locked ({why})" if why else "locked")
@@ -66,12 +69,14 @@ class Daemon:
         try:
             while not self._stop:
                 run_at_deadlines(self._tick_ns, self._body)
-                if self._reload and not self._stop:
-                    self._apply_reload()
+                if self._next and not self._stop:
+                    self._apply(self._next)
         finally:
             self._manager.stopping()
             self._send_neutral()
             self._close(self._ports.values())
+            if self._reading:
+                self._reading.end()
         log.info("stopped valves=neutral")
 
     # -- one tick ------------------------------------------------------------------------------
@@ -97,7 +102,7 @@ class Daemon:
                 controller.receive(frame, now_ns)
         self._latest_ns = max(self._latest_ns, late_ns)
         self._housekeeping(now_ns)
-        return not (self._stop or (self._reload and controller.neutral))
+        return not (self._stop or (self._next and controller.neutral))
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""
@@ -118,12 +123,9 @@ class Daemon:
             self._logged_fault = fault
             self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
             log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
-        if self._reload and not self._reload_told:
-            self._reload_told = True
-            self._manager.reloading()
-            if not controller.neutral:
-                log.info("reload=waiting until every axis is neutral")
-        elif now_ns >= self._told_ns:
+        if self._reload or self._reading or self._next:
+            self._prepare_reload()
+        if now_ns >= self._told_ns:
             self._told_ns = now_ns + SECOND_NS
             self._manager.status(self._summary())
             self._latest_ns = 0
@@ -163,22 +165,45 @@ class Daemon:
             raise
         return ports
 
-    def _apply_reload(self) -> None:
-        """Replace the deployment by the file as it is now, if that is valid; else go on as before.
+    def _prepare_reload(self) -> None:
+        """A step towards the deployment as its files are now: the loop never waits for it.
 
-        Called with every axis neutral and no tick running, so it may take its time.
+        Nothing is begun while something moves: even a new process costs a tick a millisecond.
         """
-        self._reload = self._reload_told = False
+        neutral = self._controller.neutral
+        if self._reload and neutral:
+            if self._reading:  # of files that may have changed since
+                self._reading.end()
+            self._reload, self._reading, self._next = False, None, None
+            try:
+                self._reading = Reading(self._load)
+            except OSError as error:
+                self._refuse(f"cannot read: {error.strerror}")
+        elif self._reading and (found := self._reading.result()) is not None:
+            self._reading = None
+            if isinstance(found, Deployment):
+                self._next = found
+            else:
+                self._refuse(found)
+        waiting = not neutral and bool(self._reload or self._next)
+        if waiting and not self._waiting_told:
+            log.info("reload=waiting until every axis is neutral")
+        self._waiting_told = waiting
+
+    def _apply(self, deployment: Deployment) -> None:
+        """Replace the deployment, if its buses can be opened; else go on as before.
+
+        Called with every axis neutral and no tick running, so a bus may take its time.
+        """
+        self._manager.reloading()
+        self._next = None
         config = self._controller.deployment.config
         opened = {bus: self._ports[name] for name, bus in config.buses.items()}
         try:
-            deployment = self._load()
             ports = self._open(deployment, opened)
-        except (DeploymentError, BusError) as error:
-            lines = str(error).splitlines()
-            for line in lines:
-                log.error("reload=refused %s", line)
-            self._manager.ready(f"reload refused: {lines[0]}")
+        except BusError as error:
+            self._manager.ready("as before")
+            self._refuse(str(error))
         else:
             self._send_neutral()
             self._close(port for port in opened.values() if port not in ports.values())
@@ -188,8 +213,16 @@ class Daemon:
             self._use(deployment)
             log.info("reload=applied file=%s", deployment.path)
             self._manager.ready("reload applied")
-        self._told_ns = time.monotonic_ns() + SECOND_NS
+            self._told_ns = time.monotonic_ns() + SECOND_NS
         self._collector.freeze()
+
+    def _refuse(self, why: str) -> None:
+        """Tell why a reload changes nothing."""
+        lines = why.splitlines()
+        for line in lines:
+            log.error("reload=refused %s", line)
+        self._manager.status(f"reload refused: {lines[0]}")
+        self._told_ns = time.monotonic_ns() + SECOND_NS
 
     # -- ends ----------------------------------------------------------------------------------
 

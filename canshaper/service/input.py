@@ -1,5 +1,6 @@
 """A message that is taken: is it whole, right, in sequence, and still fresh?"""
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 from canshaper.can.codecs import WrongLengthError
@@ -11,7 +12,7 @@ from canshaper.shaping.states import Reason
 GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
 
 
-class Input:
+class Input(ABC):
     """What is known of one message now.
 
     Attributes:
@@ -52,6 +53,7 @@ class Input:
         self.raw, self.commands, self._received_ns = raw, commands, now_ns
         return content
 
+    @abstractmethod
     def heard(
         self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
     ) -> FrameFault:
@@ -66,7 +68,6 @@ class Input:
         Returns:
             What is wrong with its content.
         """
-        raise NotImplementedError
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""

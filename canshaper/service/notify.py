@@ -8,8 +8,7 @@ import socket
 import time
 from collections.abc import Mapping
 
-# Reading deployment and DBC files takes a part of a second, on a slow PC several; then the loop
-# does not run, with every axis in neutral.
+# Some adapters take seconds to open; then the loop does not run, with every axis in neutral.
 RELOAD_US = 30_000_000
 
 
@@ -41,7 +40,11 @@ class ServiceManager:
         self._send_surely(f"READY=1\nSTATUS={status}{limit}")
 
     def reloading(self) -> None:
-        """A reload has begun; ``ready`` ends it. Until then the watchdog has more patience."""
+        """What was read is being put to work, and the loop waits; ``ready`` ends it.
+
+        Until then the watchdog has more patience. systemd ends this state after TimeoutStartSec, so
+        waiting for neutral is no part of it.
+        """
         limit = f"\nWATCHDOG_USEC={RELOAD_US}" if self._limit_us else ""
         self._send_surely(f"RELOADING=1\nMONOTONIC_USEC={time.monotonic_ns() // 1000}{limit}")
 

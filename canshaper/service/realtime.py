@@ -26,8 +26,11 @@ class Collector:
         self._next_ns = 0
 
     def freeze(self) -> None:
-        """Collect everything once, and let it be from now on."""
-        gc.unfreeze()
+        """Collect what is not frozen yet, and let it be from now on.
+
+        To look through what was frozen before would take longer than a tick. So a reload must
+        leave no cycles of the old deployment behind; the end of its references ends it.
+        """
         gc.collect()
         gc.freeze()
         gc.disable()

@@ -190,24 +190,26 @@ class Compensator:
 
     def before_slew(self) -> None:
         """Tell the slew axis what to add in this tick."""
-        axis = self._slew.axis
-        self._slew.added = 0.0
-        if axis.sway is not None:
-            self._share = self._radial.tip_share(axis.sway, axis.told)
-            if self._moving():
-                self._slew.added = self._radial.slew(axis.sway, axis.told)
+        sway, told = self._sway(), self._slew.axis.told
+        self._share = self._radial.tip_share(sway, told)
+        self._slew.added = self._radial.slew(sway, told) if self._moving() else 0.0
 
     def after_slew(self, now_ns: int) -> None:
         """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
-        axis = self._slew.axis
-        sway = axis.sway
         self._near_far.added = 0.0
-        if self._moving() and sway is not None:
-            share = self._radial.tip_share(sway, axis.told)
+        if self._moving():
+            sway = self._sway()
+            share = self._radial.tip_share(sway, self._slew.axis.told)
             circle_m = self._radius.circle_m(now_ns, share)
             if circle_m is not None:
                 added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
                 self._near_far.added = added
+
+    def _sway(self) -> SwayModel:
+        """Sway model of the slew axis now; a change of its sway data makes another one."""
+        sway = self._slew.axis.sway
+        assert sway is not None  # checked with the deployment
+        return sway
 
     def _moving(self) -> bool:
         """Not for ever after a swing that nobody damps: nothing may move without an operator."""

@@ -12,7 +12,7 @@ import can
 from can.interfaces.socketcan.socketcan import build_can_frame
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.raw import RawPort
+from canshaper.can.raw import SIZE, RawPort
 from canshaper.can.socketcan import Ids
 
 TICK_NS = 20_000_000
@@ -93,14 +93,14 @@ class Line:
         message = can.Message(arbitration_id=kind, is_error_frame=True, dlc=8, data=data)
         self.put(message, len(self.far) // 2)
 
-    def confirm(self, frame: Frame) -> None:
-        """One of our own frames comes back."""
+    def confirm(self, frame: Frame, size: int = SIZE) -> None:
+        """One of our own frames comes back, or no more of it than ``size`` bytes."""
         message = can.Message(
             arbitration_id=frame.can_id, is_extended_id=frame.extended, data=frame.data
         )
         data = bytearray(build_can_frame(message))
         data[MARK_AT] = 1
-        self.far[SENT_BACK].send(data)
+        self.far[SENT_BACK].send(data[:size])
 
     def heard(self) -> list[Frame]:
         """What the port hands out in a tick."""

@@ -7,9 +7,10 @@ import pytest
 
 from canshaper.can import raw
 from canshaper.can.frame import BusState, FrameFault
-from canshaper.can.raw import PROBE_NS
+from canshaper.can.raw import PROBE_NS, SIZE
 from tests.can.raw_line import (
     IDS,
+    MARK_AT,
     OTHER,
     SENT_BACK,
     STATUS,
@@ -53,6 +54,19 @@ def test_own_frames_are_not_handed_on_but_those_of_another_sender_are(line: Line
     assert line.heard() == []
     line.put(message(VALVE.can_id, VALVE.data), SENT_BACK)
     assert line.heard() == [VALVE]
+
+
+@pytest.mark.parametrize("size", [MARK_AT + 1, SIZE - 1])
+def test_a_confirmation_that_is_not_whole_is_counted_and_confirms_nothing(
+    line: Line, size: int
+) -> None:
+    for _ in range(3):
+        line.now_ns += TICK_NS
+        line.port.send(VALVE)
+        line.confirm(VALVE, size)
+    assert line.heard() == []
+    assert line.faults == [FrameFault.WRONG_LENGTH] * 3
+    assert line.unconfirmed() == 0
 
 
 def test_frames_of_another_sender_confirm_nothing(line: Line) -> None:

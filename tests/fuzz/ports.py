@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 from canshaper.can import raw
 from canshaper.can.frame import BusState, Frame
-from tests.can.raw_line import IDS, MARK_AT, OTHER, STATUS, VALVE, Line
+from tests.can.raw_line import IDS, OTHER, STATUS, VALVE, Line
 from tests.fuzz.frames import Bytes
 
 ERRORS = ("ENODEV", "ENXIO", "EBADF", "ENETDOWN", "ENOBUFS", "EAGAIN", "EINVAL", "EIO", "EPERM")
@@ -32,10 +32,7 @@ def run(data: bytes) -> set[BusState]:
 def _step(line: Line, source: Bytes) -> None:
     kind, number = source.number(), source.number()
     if kind < 80:
-        data = bytearray(source.take(kind % 24))
-        if len(data) > MARK_AT and len(data) != raw.SIZE:
-            data[MARK_AT] = 0  # only what was sent comes back, and that is whole
-        _put(line, number, data)
+        _put(line, number, source.take(kind % 24))
     elif kind < 150:  # of the right size, with a length that is mostly right
         word = source.number(4)
         _put(line, number, raw.CAN_FRAME.pack(word, number >> 4 & 7 or 8, source.take(8)))
@@ -45,6 +42,8 @@ def _step(line: Line, source: Bytes) -> None:
         error = getattr(errno, ERRORS[number % len(ERRORS)])
         for near in line.near:
             near.fail = OSError(error, "as the bytes say") if kind & 1 else None
+        if kind & 1:
+            _put(line, number, b"")  # the kernel says of an error that there is something to read
         line.refuse = OSError(errno.ENODEV, "no such device") if kind % 3 == 0 else None
     elif kind < 220:
         assert line.port.send((VALVE, OTHER, STATUS)[number % 3]) in (True, False)
@@ -53,7 +52,7 @@ def _step(line: Line, source: Bytes) -> None:
         _hear(line)
 
 
-def _put(line: Line, number: int, data: bytes | bytearray) -> None:
+def _put(line: Line, number: int, data: bytes) -> None:
     try:
         line.far[number % len(line.far)].send(data)
     except OSError:  # the queue is full, or the port has closed its end

@@ -6,6 +6,7 @@ from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from canshaper.can.frame import BusState
+from tests.can.raw_line import MARK_AT, SENT_BACK
 from tests.fuzz import ports
 
 # Kinds of steps that the first byte of each tells apart (``ports.run``).
@@ -47,11 +48,14 @@ def error(word: int, controller: int) -> bytes:
 
 
 GONE = put(FAIL, 0) + put(HEAR, 0)
+# One of our own frames comes back, and not whole.
+CUT_SHORT = put(ANY + 15, SENT_BACK, bytes(MARK_AT) + b"\1" + bytes(9))
 
 
 @settings(max_examples=300)
 @given(name=machines, script=st.lists(steps, max_size=60))
 @example(name=b"\0", script=[])
+@example(name=b"\1", script=[CUT_SHORT, put(HEAR, 0)])
 def test_any_bytes_from_the_sockets_are_taken(name: bytes, script: list[bytes]) -> None:
     for state in ports.run(name + b"".join(script)):
         event(state.value)

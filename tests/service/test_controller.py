@@ -36,6 +36,13 @@ def still(sent: dict[str, dict[str, Any]]) -> bool:
     return all(sent[v]["Velocity"] == 0 for v in VALVES)
 
 
+def test_a_tick_is_punctual_unless_told(rig: Rig) -> None:
+    for _ in range(3):
+        assert [*rig.controller.tick(rig.now_ns)]
+        rig.now_ns += TICK_NS
+    assert rig.count("MissedDeadlines") == 0
+
+
 def test_every_valve_hears_every_tick_from_the_first(rig: Rig) -> None:
     for count in range(1, 600):
         sent = rig.tick()

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.can.frame import FrameFault
+from canshaper.can.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.service.emergency import DBC, FRESH_TICKS, READY, STOP, Machine, Make, still
 
@@ -22,6 +22,12 @@ def test_without_a_word_of_it_nothing_begins(machine: Machine) -> None:
     assert machine.rig.reason() == "STICK_NOT_NEUTRAL"
     machine.run(1)
     assert machine.states() == READY
+
+
+def test_a_second_sender_is_told_without_a_word_of_it(machine: Machine) -> None:
+    machine.rig.receive(Frame("crane", 0x200, False, bytes(2)))
+    machine.rig.run(1)
+    assert machine.states()[0] == (State.TRIPPED, "SECOND_SENDER")
 
 
 def test_lost_in_motion_is_neutral_at_once_after_its_timeout(machine: Machine) -> None:

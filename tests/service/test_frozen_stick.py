@@ -5,13 +5,16 @@ from typing import Any, Protocol
 
 import pytest
 
+from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame
-from canshaper.shaping.states import State
+from canshaper.service.lever import LeverInput
+from canshaper.shaping.states import Reason, State
 
 LEFT = "    alive_counter: AliveCounter\n  right:"
 
 
 class Rig(Protocol):
+    deployment: Deployment
     counts: dict[str, int]
 
     def lever(self, name: str = ..., **raw: int) -> Frame: ...
@@ -29,6 +32,15 @@ Make = Callable[..., Rig]
 
 def velocity(sent: dict[str, dict[str, Any]]) -> float:
     return float(sent["SlewCommand"]["Velocity"])
+
+
+def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make) -> None:
+    deployment = changed_rig(ONE_SECOND).deployment
+    lever = LeverInput(deployment.levers["left"])
+    rig = changed_rig(ONE_SECOND)
+    for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.STICK_FROZEN)):
+        lever.receive(rig.lever(Slew=500).data, now_ns)
+        assert lever.stick("Slew", now_ns, -1, None, 0.02).fault is fault
 
 
 ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    frozen_s: 1\n  right")}

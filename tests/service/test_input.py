@@ -102,6 +102,25 @@ def test_a_lever_that_was_switched_off_may_begin_with_any_counter(rig: Rig, coun
     assert rig.state() is State.READY
 
 
+def test_silence_until_the_timeout_is_none(rig: Rig) -> None:
+    rig.moving()
+    for _ in range(FRESH_TICKS - 1):
+        feed(rig)
+    skip(rig, 100)
+    feed(rig, rig.lever(Slew=200))
+    assert last_fault(rig) is FrameFault.COUNTER_JUMP
+    assert command(rig) == 1.0
+
+
+def test_without_a_counter_every_frame_counts(changed_rig: Make) -> None:
+    rig = changed_rig({LEFT: "  right:"})
+    rig.moving()
+    for raw in (400, 400, 200):
+        feed(rig, rig.lever(Slew=raw, AliveCounter=7))
+        assert command(rig) == pytest.approx(raw / 1000)
+    assert rig.count("InvalidSignals") == 0
+
+
 def test_a_jump_without_silence_is_refused_and_the_next_frame_counts(rig: Rig) -> None:
     rig.moving()
     skip(rig, 3)
@@ -162,9 +181,11 @@ def test_silence_is_not_distrust(rig: Rig, silent: bool) -> None:
             feed(rig)
         else:
             feed(rig, frozen)
-    assert rig.reason() == ("STICK_TIMEOUT" if silent else "STICK_UNTRUSTED")
-    for _ in range(FRESH_TICKS + 1):  # what was refused is forgotten as what was accepted is
+    for _ in range(FRESH_TICKS):
+        assert rig.reason() == ("STICK_TIMEOUT" if silent else "STICK_UNTRUSTED")
         feed(rig)
+    assert rig.reason() == ("STICK_TIMEOUT" if silent else "STICK_UNTRUSTED")
+    feed(rig)  # what was refused is forgotten as what was accepted is
     assert rig.reason() == "STICK_TIMEOUT"
 
 

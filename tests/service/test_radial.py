@@ -12,6 +12,7 @@ from canshaper.service.controller import Controller
 from canshaper.shaping.states import Reason, State
 
 TICK_S = 0.02
+FULL_SPEED_RAD_S = 0.5
 SLEW_SWAY = "sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
 FIXED = "axis: near_far, full_speed_rad_s: 0.5, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
@@ -76,6 +77,26 @@ def test_near_far_moves_in_while_slewing_and_comes_back(changed_rig: Make) -> No
     transitions = [(e.axis, e.transition.reason) for e in rig.controller.events]
     assert transitions.count(("near_far", Reason.COMPENSATING)) == 1
     assert transitions.count(("near_far", Reason.AT_REST)) == 1
+
+
+def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make) -> None:
+    """The tip stands ahead of the grapple by psi, tan psi = L / s5; the filter makes the lead L."""
+    rig = compensated(changed_rig)
+    rig.run(3)
+    slew = rig.controller.axes["slew"]
+    sway = slew.axis.sway
+    assert sway is not None
+    added, missing, most = 0.0, 0.0, 0.0
+    for tick in range(250):
+        rig.run(1, Slew=1000 if tick < 125 else 0)
+        added += slew.added * TICK_S * FULL_SPEED_RAD_S
+        assert added == pytest.approx(missing, abs=1.2e-4)  # the sum of a rate, tick by tick
+        assert slew.axis.sent - slew.axis.told == pytest.approx(slew.added, abs=1e-12)
+        lead = sway.angle * FULL_SPEED_RAD_S
+        speed = sway.rate * FULL_SPEED_RAD_S
+        missing = math.atan2(lead, 1.0 - (speed / sway.mode.omega_rad_s) ** 2) - lead
+        most = max(most, abs(missing))
+    assert most > 1.5e-3
 
 
 @pytest.mark.parametrize("command", [1000, -1000])

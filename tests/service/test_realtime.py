@@ -46,15 +46,19 @@ def test_garbage_of_the_start_is_collected_first(collector: Collector) -> None:
     assert gone() is None
 
 
-def test_a_second_start_takes_what_the_first_one_froze(collector: Collector) -> None:
-    """After a reload the old deployment must not stay in memory for ever."""
+def test_a_second_start_looks_at_what_came_since_and_at_nothing_else(collector: Collector) -> None:
+    """All that is there takes longer to look through than a tick lasts."""
     old = Cycle()
     gone = weakref.ref(old)
     collector.freeze()
     del old
-    assert gone() is not None
+    since = weakref.ref(Cycle())
+    kept = [[i] for i in range(1000)]
     collector.freeze()
-    assert gone() is None
+    assert gone() is not None
+    assert since() is None
+    assert gc.get_freeze_count() > len(kept)
+    assert sum(len(gc.get_objects(generation)) for generation in range(3)) < 1000
 
 
 def test_nothing_is_collected_in_the_loop(collector: Collector) -> None:

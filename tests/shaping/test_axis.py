@@ -156,6 +156,16 @@ def test_enable_is_not_looked_at_in_a_lost_frame(drive: Drive) -> None:
     assert drive.axis.raw == 0
 
 
+def test_enable_released_as_a_stop_ends_is_latched_all_the_same(drive_with: DriveWith) -> None:
+    drive = drive_with(stop_s=0.1).moving()
+    assert drive.run(StickInput(fault=Reason.STICK_TIMEOUT), 0.1) == [
+        Transition(State.ACTIVE, State.STOPPING, Reason.STICK_TIMEOUT)
+    ]
+    released = drive.tick(StickInput(enabled=False))
+    assert released == Transition(State.STOPPING, State.TRIPPED, Reason.ENABLE_LOST)
+    assert drive.axis.raw == 0
+
+
 # -- trips -----------------------------------------------------------------------------------------
 
 

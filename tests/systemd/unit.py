@@ -4,6 +4,7 @@ import json
 import re
 import subprocess
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 # Only to end a test that hangs; emulated processors are slow.
@@ -45,10 +46,11 @@ class Unit:
         """A property that is a number."""
         return int(self.show(name))
 
-    def wait(self, **properties: str) -> None:
-        """Wait until the properties match these patterns."""
+    def wait(self, meanwhile: Callable[[], object] = lambda: None, **properties: str) -> None:
+        """Wait until the properties match these patterns, and do something again and again."""
         until = time.monotonic() + ANSWER_S
         while True:
+            meanwhile()
             found = {name: self.show(name) for name in properties}
             if all(re.fullmatch(p, found[n]) for n, p in properties.items()):
                 return
@@ -64,9 +66,13 @@ class Unit:
         self.wait(ActiveState="active")
 
     def cursor(self) -> str:
-        """Where the journal ends now."""
-        shown = run("journalctl", "--lines=0", "--show-cursor", "--quiet").stdout
-        return shown.partition("cursor: ")[2].strip()
+        """Where the unit's journal ends now.
+
+        An entry of the unit itself: after another one journalctl 252 leaves out the unit's next.
+        """
+        last = ("--lines=1", "--output=cat", "--show-cursor", "--quiet")
+        shown = run("journalctl", f"--unit={self.name}", *last).stdout
+        return shown.rpartition("-- cursor: ")[2].strip()
 
     def journal(self, cursor: str = "") -> list[dict[str, object]]:
         """Entries of the unit, after a cursor."""
@@ -78,9 +84,16 @@ class Unit:
         """Messages of the journal."""
         return "\n".join(str(entry["MESSAGE"]) for entry in self.journal(cursor))
 
+    def priority(self, text: str, cursor: str = "") -> set[str]:
+        """Priorities of the messages that hold this text: 3 is an error, 6 information."""
+        return {str(e["PRIORITY"]) for e in self.journal(cursor) if text in str(e["MESSAGE"])}
+
     def wait_journal(self, pattern: str, cursor: str) -> None:
         """Wait until the journal has a message like this after the cursor."""
         until = time.monotonic() + ANSWER_S
         while not re.search(pattern, self.text(cursor)):
-            assert time.monotonic() < until, f"no {pattern!r} in:\n{self.text(cursor)}"
+            assert time.monotonic() < until, f"no {pattern!r}: {self._told(cursor)}"
             time.sleep(0.2)
+
+    def _told(self, cursor: str) -> str:
+        return f"{self.show('ActiveState')}, {self.show('StatusText')}\n{self.text(cursor)}"
