@@ -33,10 +33,11 @@ class Sticks(threading.Thread):
         self._bus = open_bus("vcan0")
         self._ended = threading.Event()
         self.x = 0.0
+        self.reset = False
 
     def run(self) -> None:
         while not self._ended.wait(0.02):
-            for frame in (bjm("BJM1", X=self.x), bjm("BJM2")):
+            for frame in (bjm("BJM1", X=self.x, Button2=int(self.reset)), bjm("BJM2")):
                 message = can.Message(arbitration_id=frame.can_id, data=frame.data)
                 with suppress(can.CanError):  # the interface may be down
                     self._bus.send(message)
@@ -82,7 +83,10 @@ def moving(daemon: Service, sticks: Sticks) -> None:
     until = time.monotonic() + ANSWER_S
     with open_bus("vcan0") as bus:
         while time.monotonic() < until:
-            sticks.x = 0.0 if slew_state(daemon) == "NEUTRAL_WAIT" else 100.0
+            state = slew_state(daemon)
+            sticks.x = 0.0 if state in ("NEUTRAL_WAIT", "TRIPPED") else 100.0
+            # pressed for half of every second: an emulated machine may stand still, and trip
+            sticks.reset = state == "TRIPPED" and time.monotonic() % 1.0 < 0.5
             message = bus.recv(1.0)
             if message and message.arbitration_id == AVC0 and message.data[0] > 20:
                 return

@@ -22,6 +22,17 @@ INIT, DISABLED, HOLD, ACTIVE, RESET = 0x8, 0x9, 0xB, 0xF, 0x3
 UP = {INIT: DISABLED, DISABLED: HOLD, HOLD: ACTIVE}
 
 
+def write_variant(tmp_path: Path, *changes: tuple[str, str]) -> Path:
+    """The shipped deployment with pieces replaced."""
+    text = (ROOT / "config" / FILE).read_text().replace("../dbc", str(ROOT / "dbc"))
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new)
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    return file
+
+
 class ValveNode:
     """State machine of a valve: one step up when told the next state, down at once.
 

@@ -1,0 +1,108 @@
+"""``canshaper calibrate --live`` on real SocketCAN: a simulated crane, a hand that holds the enable."""
+
+import signal
+from pathlib import Path
+
+import can
+import pytest
+
+from canshaper.can.binding import load_deployment
+from tests.hil.machine import (
+    DBC,
+    FILE,
+    Levers,
+    candump,
+    levers_on,
+    logged,
+    open_bus,
+    service,
+    wait_for,
+)
+
+VALVES = {DBC.get_message_by_name(f"{a}Command").frame_id for a in ("Slew", "NearFar", "Lift")}
+QUICK = ["--axis", "slew", "--rate", "10", "--top", "15", "--live", "--yes"]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    copy = tmp_path / "machine.yaml"
+    copy.write_text(FILE.read_text().replace("../dbc", str(FILE.parents[1] / "dbc")))
+    return copy
+
+
+def moving(message: can.Message) -> bool:
+    return message.arbitration_id in VALVES and message.data[0] != 0
+
+
+def last_of_each(log: Path) -> list[int]:
+    """The last command that each valve was told."""
+    found = {m.arbitration_id: m.data[0] for m in logged(log) if m.arbitration_id in VALVES}
+    return [found[valve] for valve in sorted(VALVES)]
+
+
+def wait_for_motion(bus: can.BusABC) -> None:
+    wait_for(bus, "SlewCommand", lambda s: s["Velocity"] != 0.0)
+
+
+def test_a_valve_on_the_bus_is_measured(file: Path, tmp_path: Path) -> None:
+    log = tmp_path / "bus.log"
+    options = ["--set", "slew.deadband=0.08"]
+    with (
+        service(tmp_path / "sim.log", "sim", str(file), *options),
+        levers_on("vcan0"),
+        candump(log, "vcan0"),
+        service(tmp_path / "calibrate.log", "calibrate", str(file), *QUICK, "--write") as running,
+    ):
+        assert running.process.wait() == 0, running.text()
+    limits = load_deployment(file).axes["slew"].config.limits
+    curve = limits.curve()
+    assert curve is not None, running.text()
+    # A machine that stands still now and then does not measure as well as lock-step does.
+    opens = [curve.command(v) for v in (-1e-9, 1e-9)]
+    assert opens == pytest.approx([-0.08, 0.08], abs=0.03)
+    moved = {m.arbitration_id for m in logged(log) if moving(m)}
+    assert moved == {DBC.get_message_by_name("SlewCommand").frame_id}
+    assert last_of_each(log) == [0, 0, 0]
+
+
+@pytest.mark.parametrize("end", ["enable", "silence", "stick", "ctrl-c"])
+def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end: str) -> None:
+    log = tmp_path / "bus.log"
+    slow = [*QUICK[:2], "--rate", "1", *QUICK[4:], "--write"]
+    before = file.read_text()
+    with (
+        service(tmp_path / "sim.log", "sim", str(file)),
+        levers_on("vcan0") as levers,
+        open_bus("vcan0") as bus,
+        candump(log, "vcan0"),
+        service(tmp_path / "calibrate.log", "calibrate", str(file), *slow) as running,
+    ):
+        wait_for_motion(bus)
+        make(levers, end, running)
+        assert running.process.wait() == 1, running.text()
+    assert "the measurement was not taken to its end: stopped" in running.text()
+    assert last_of_each(log) == [0, 0, 0]
+    assert file.read_text() == before
+
+
+def make(levers: Levers, end: str, running: object) -> None:
+    if end == "enable":
+        levers.switches["Enable"] = 0
+    elif end == "silence":
+        levers.silent = True
+    elif end == "stick":
+        levers.values["Slew"] = 30.0
+    else:
+        running.process.send_signal(signal.SIGINT)  # type: ignore[attr-defined]
+
+
+def test_it_asks_before_anything_moves(file: Path, tmp_path: Path) -> None:
+    log = tmp_path / "bus.log"
+    with (
+        levers_on("vcan0"),
+        candump(log, "vcan0"),
+        service(tmp_path / "calibrate.log", "calibrate", str(file), *QUICK[:-1]) as running,
+    ):
+        assert running.process.wait() == 1  # nobody answers
+    assert "will move by itself" in running.text()
+    assert not any(m.arbitration_id in VALVES for m in logged(log))
