@@ -45,7 +45,9 @@ class FeelSwitch(Input):
     """A switch or display with which the operator chooses how the crane feels."""
 
     signal: str = Field(description="signal with the code of the choice")
-    codes: dict[str, int] = Field(min_length=1, description="code of each feel by its name")
+    codes: dict[str, Annotated[int, number(0, 65535, "", "code of a feel")]] = Field(
+        min_length=1, description="code of each feel by its name"
+    )
     timeout_ms: Annotated[int, number(10, 60_000, "ms", "age at which it counts as lost")]
 
 

@@ -121,6 +121,7 @@ SLEW = "{ bus: crane, message: SlewCommand, signal: Velocity, timeout_ms: 200,"
 AVC = "{ bus: crane, message: AVC0, signal: PortFlow, timeout_ms: 200, "
 CODES = "direction: { signal: State, neutral: 0, positive: 1, negative: 2 }"
 ALIVE = " alive_counter: AliveCounter"
+NODE = "j1939: { address: 0x9C, name: { identity_number: 1, manufacturer_code: 1 } }"
 
 
 def with_valves(machine: Machine, *valves: tuple[str, str]) -> Machine:
@@ -129,6 +130,8 @@ def with_valves(machine: Machine, *valves: tuple[str, str]) -> Machine:
     machine.in_yaml("[machine.dbc]", "[machine.dbc, valves.dbc]")
     for axis, valve in valves:
         machine.in_yaml(f"message: {axis}Command, signal: Velocity, timeout_ms: 200,{ALIVE}", valve)
+    if "AVC0" in machine.yaml:
+        machine.in_yaml("bitrate: 250000", f"bitrate: 250000, {NODE}")
     return machine
 
 
@@ -136,7 +139,7 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
     valve = f"message: AVC0, signal: ExtFlow, also: [PortFlow], timeout_ms: 200, {CODES}"
     axis = with_valves(machine, ("Slew", valve)).load().axes["slew"]
     assert axis.valve.steps == 64_000
-    assert axis.valve.message.sender.key == ("crane", 0x0CFE30FE, True)
+    assert axis.valve.message.sender.key == ("crane", 0x0CFE309C, True)
 
 
 @pytest.mark.parametrize(
