@@ -7,7 +7,7 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
+.PHONY: demo test test-machines test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -27,7 +27,12 @@ demo: .venv/demo-ready
 test: lint
 	.venv/bin/python -m pytest
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
-		tests/hil/test_closed_loop.py tests/hil/test_doctor.py tests/hil/test_j1939.py
+		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
+
+# J1939, CANopen and a valve being measured, with foreign counterparts on real SocketCAN.
+test-machines: .venv/test-ready
+	.venv/bin/python -m tests.lane.hil tests/hil/test_j1939.py tests/hil/test_canopen.py \
+		tests/hil/test_calibrate.py
 
 # Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
 test-faults: .venv/test-ready
