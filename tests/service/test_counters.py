@@ -14,7 +14,18 @@ COUNTED = {
     "MissedDeadlines": {"MISSED_DEADLINE"},
 }
 # Named as the last fault only: the message has no counter for them.
-NAMED_ONLY = {"BUS_ERROR", "SECOND_SENDER", "FRAMES_LOST", "BUS_GONE", "BUS_DOWN"}
+NAMED_ONLY = {
+    "BUS_ERROR",
+    "SECOND_SENDER",
+    "FRAMES_LOST",
+    "BUS_GONE",
+    "BUS_DOWN",
+    "ADDRESS_LOST",
+    "NOT_FOLLOWING",
+    "FEEDBACK_LOST",
+    "HEARTBEAT_LOST",
+    "NODE_EMERGENCY",
+}
 
 
 def test_every_fault_is_here() -> None:

@@ -14,7 +14,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 ANSWER_S = 60.0  # only to end a test that hangs
-BUS = "{ interface: socketcan, channel: vcan0 }"
+BUS = "{ interface: socketcan, channel: vcan0, bitrate: 250000 }"
 
 
 class Daemon:
