@@ -26,7 +26,7 @@ TESTS = {
     "service": ["tests/service", *(f"--ignore-glob=*/test_{name}*.py" for name in AROUND)],
 }
 CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
-CORE_TESTS = ["test_axis*.py", "test_limits.py"]
+CORE_TESTS = ["test_axis*.py", "test_limits.py", "test_sets.py", "test_valve_curve.py"]
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
 
 

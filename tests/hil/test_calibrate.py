@@ -1,4 +1,4 @@
-"""``canshaper calibrate --live`` on real SocketCAN: simulated crane, a hand that holds the enable."""
+"""``canshaper calibrate --live`` on real SocketCAN: simulated crane, hand that holds the enable."""
 
 import signal
 from pathlib import Path

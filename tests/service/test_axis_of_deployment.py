@@ -103,3 +103,19 @@ def test_an_axis_without_sway_tells_none(changed_rig: Make) -> None:
         status = rig.run(1, Lift=1000 if tick > 2 else 0).get("LiftStatus")
         assert status is None or status["PredictedSway"] == 0.0
     assert rig.state("lift") is State.ACTIVE
+
+
+def test_an_axis_takes_its_stick_from_where_it_is_told(rig: Rig) -> None:
+    class Elsewhere:
+        command = 0.0
+
+        def stick(self, *_arguments: object) -> StickInput:
+            return StickInput(self.command)
+
+    source = Elsewhere()
+    rig.controller.axes["slew"].replace_lever(source)
+    rig.run(3)
+    source.command = 0.5
+    sent = rig.run(120)  # the real stick stands in neutral
+    assert sent["SlewCommand"]["Velocity"] > 40
+    assert sent["NearFarCommand"]["Velocity"] == 0

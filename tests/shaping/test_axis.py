@@ -222,6 +222,7 @@ RESET = StickInput(reset=True)
         [StickInput(0.8, reset=True), RESET, RESET],
         # held while its frames fail: no new press
         [StickInput(0.8, reset=True), StickInput(fault=Reason.STICK_TIMEOUT), RESET],
+        [StickInput(fault=Reason.STICK_TIMEOUT, reset=True), RESET, RESET],  # pressed then
         [StickInput(0.8, enabled=False), StickInput(0.8), CENTRED],
         [StickInput(fault=Reason.STICK_TIMEOUT, enabled=False), CENTRED],  # enable unknown
     ],

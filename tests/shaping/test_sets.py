@@ -12,7 +12,7 @@ from canshaper.shaping.fir import Fir, zv_taps
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.registry import Off, Shaper, build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
 from canshaper.shaping.smoothing import FirstOrder, SCurve
 from canshaper.shaping.states import StickInput
@@ -135,6 +135,32 @@ def test_a_change_on_the_way_makes_no_jump(kind: str) -> None:
     assert min(sent[25:]) >= sent[24] - 0.05
 
 
+@pytest.mark.parametrize("sway", [True, False])
+def test_an_output_that_is_no_number_trips_with_and_without_a_model(sway: bool) -> None:
+    class Broken:
+        def wanted(self, _command: float) -> float:
+            return math.nan
+
+    model = SwayModel(EMPTY, TICK_S) if sway else None
+    axis = Axis(TICK_S, OutputLimits(), sway=model, shaper=Broken())
+    axis.tick(StickInput())
+    axis.tick(StickInput(0.5))
+    assert (axis.state.name, axis.reason.name, axis.raw) == ("TRIPPED", "OUTPUT_INVALID", 0)
+
+
+def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
+    """Half-way through its taps: without them the output would fall to what is new."""
+    axis = axis_with("robust")
+    axis.tick(StickInput())
+    for _ in range(40):
+        axis.tick(StickInput(0.9))
+    before = axis.sent
+    axis.retune(EMPTY, lambda sway: make("robust", sway))
+    for _ in range(8):
+        axis.tick(StickInput(0.9))
+        assert axis.sent >= before - 1e-9
+
+
 def test_inherited_history_gives_the_same_output() -> None:
     old = Fir(zv_taps(EMPTY, TICK_S))
     for n in range(200):
@@ -166,6 +192,7 @@ def test_every_shaper_begins_at_a_command() -> None:
         Gff(sway, (-3.0, -2.0), -5.0),
         LimitAware(sway, Fir([0.5, 0.5])),
     ]
+    LimitAware(sway, Off()).begin_at(0.7)  # a shaper without memory
     for shaper in shapers:
         shaper.begin_at(0.7)
         assert shaper.wanted(0.7) == pytest.approx(0.7, abs=1e-9)

@@ -6,7 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.shaping.limits import on_grid, with_deadband, without_deadband
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
+from canshaper.shaping.registry import Off
+from canshaper.shaping.states import StickInput
 from canshaper.shaping.valve_curve import ValveCurve
 
 # Opens at 7 % one way and at 4 % the other, where it is slower.
@@ -103,3 +106,44 @@ def test_what_is_no_curve_is_refused(
 ) -> None:
     with pytest.raises(ValueError, match=says):
         ValveCurve(commands, speeds)
+
+
+def driven(command: float, added: float = 0.0) -> Axis:
+    limits = OutputLimits(rise_per_s=50.0, fall_per_s=50.0, curve=CURVE)
+    axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=1000)
+    axis.tick(StickInput())
+    for _ in range(5):
+        axis.tick(StickInput(command), added)
+    return axis
+
+
+@pytest.mark.parametrize(
+    ("command", "raw"), [(0.35, 400), (1.0, 1000), (-0.3, -500), (-1.0, -1000)]
+)
+def test_an_axis_sends_the_command_of_its_curve_and_knows_the_speed(
+    command: float, raw: int
+) -> None:
+    axis = driven(command)
+    assert axis.raw == raw
+    assert axis.sent == pytest.approx(max(command, -0.8))
+
+
+def test_an_added_velocity_goes_through_the_curve_too() -> None:
+    axis = driven(0.3, 0.05)
+    assert axis.raw == pytest.approx(400, abs=1)
+    assert axis.sent == pytest.approx(0.35, abs=2e-3)
+
+
+def test_rounding_never_passes_a_bound() -> None:
+    """Ten steps: 0.35 needs 4 of them, which is just within; a little less must be 3."""
+    assert on_grid(0.35, 0.0, 0.35, 0.0, 10, curve=CURVE) == (4, pytest.approx(0.35))
+    raw, sent = on_grid(0.349, 0.0, 0.349, 0.0, 10, curve=CURVE)
+    assert (raw, sent) == (3, pytest.approx(CURVE.velocity(0.3)))
+    raw, sent = on_grid(-0.29, -0.29, 0.0, 0.0, 10, curve=CURVE)
+    assert (raw, sent) == (-4, pytest.approx(CURVE.velocity(-0.4)))
+    assert on_grid(-0.3, -0.3, 0.0, 0.0, 10, curve=CURVE) == (-5, pytest.approx(-0.3))
+    assert on_grid(0.01, 0.0, 0.01, 0.0, 10, curve=CURVE) == (0, 0.0)
+    # One step of ten is 10 % of the command: beyond the dead band, and faster than is allowed.
+    assert CURVE.velocity(0.1) > 0.02
+    assert on_grid(0.02, 0.0, 0.02, 0.0, 10, curve=CURVE) == (0, 0.0)
+    assert on_grid(0.0, -1.0, 1.0, 0.0, 10, curve=CURVE) == (0, 0.0)
