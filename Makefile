@@ -1,7 +1,7 @@
 # make demo   the crane, driven with anti-sway off and on
 # make test   lint, format, types and all tests, those on real SocketCAN included
 
-# make coverage   every line and branch of what decides whether a valve moves
+# make coverage   every line and branch of what decides whether a valve moves (within make test)
 # make mutation   does a test notice every small change of it? (mutation-core: within make test)
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
@@ -26,6 +26,7 @@ demo: .venv/demo-ready
 
 test: lint
 	.venv/bin/python -m pytest
+	$(MAKE) coverage mutation-core
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
 		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
 

@@ -147,3 +147,11 @@ def test_rounding_never_passes_a_bound() -> None:
     assert CURVE.velocity(0.1) > 0.02
     assert on_grid(0.02, 0.0, 0.02, 0.0, 10, curve=CURVE) == (0, 0.0)
     assert on_grid(0.0, -1.0, 1.0, 0.0, 10, curve=CURVE) == (0, 0.0)
+
+
+def test_a_step_within_the_dead_band_is_none() -> None:
+    """The nearest step to the opening may lie before it: it would move nothing, and is not sent."""
+    curve = ValveCurve((-1.0, -0.14, 0.14, 1.0), (-1.0, 0.0, 0.0, 1.0))
+    assert round(curve.command(0.001) * 10) == 1
+    assert on_grid(0.001, -1.0, 1.0, 0.0, 10, curve=curve) == (0, 0.0)
+    assert on_grid(-0.001, -1.0, 1.0, 0.0, 10, curve=curve) == (0, 0.0)
