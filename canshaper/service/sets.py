@@ -1,5 +1,6 @@
 """Sway data and filter of an axis in motion: by the grapple, and by the operator's choice."""
 
+import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -36,9 +37,9 @@ class SwitchInput(Input):
     def heard(
         self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
     ) -> FrameFault:
-        """An error code is no value."""
+        """An error code is no value, nor is a float that is no number."""
         value = raw[self._signal.name]
-        if value in self._special:
+        if value in self._special or not math.isfinite(value):
             return FrameFault.INVALID_SIGNAL
         if counts:
             self._value = value * self._signal.scale + self._signal.offset

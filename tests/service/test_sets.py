@@ -112,6 +112,24 @@ def test_a_weight_that_is_lost_or_not_available_is_none(chosen: Rig) -> None:
     assert period_s(chosen) == pytest.approx(2.356)
 
 
+@pytest.mark.parametrize("data", ["0000c07f", "0000807f", "000080ff"])  # NaN, inf, -inf
+def test_a_weight_that_is_no_number_is_none(changed_rig: Make, data: str) -> None:
+    text = {**DBC, "BO_ 512 SlewCommand": DBC["BO_ 512 SlewCommand"].replace("0|16@1+", "0|32@1-")}
+    cycles = 'BA_ "GenMsgCycleTime" BO_ 512 20;'
+    text[cycles] = text[cycles].replace(
+        'VAL_ 1296 Weight 65535 "NotAvailable" ;', "SIG_VALTYPE_ 1296 Weight : 1;"
+    )
+    rig = changed_rig(yaml=YAML, dbc=text)
+    rig.run(3)
+    rig.receive(Frame("crane", 1296, False, bytes.fromhex("00007a44")))  # 1000.0
+    rig.run(10)
+    assert period_s(rig) == pytest.approx(2.9)
+    for _ in range(12):
+        rig.receive(Frame("crane", 1296, False, bytes.fromhex(data)))
+        rig.run(5)
+    assert period_s(rig) == pytest.approx(2.356)
+
+
 def test_the_operator_chooses(chosen: Rig) -> None:
     base = poles(chosen)
     chosen.receive(feel(1))
