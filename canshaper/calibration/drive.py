@@ -143,6 +143,14 @@ class CalibrationDrive:
         yield from self._controller.tick(now_ns, missed)
         self._controller.events.clear()
 
+    def send_failed(self, frame: Frame) -> None:
+        """A frame did not reach its bus; the axes of a valve frame trip."""
+        self._controller.send_failed(frame)
+
+    def stalled(self) -> None:
+        """The loop stood still: what moves goes to neutral."""
+        self._controller.stalled()
+
     def _sample(self, time_s: float) -> None:
         if self._latest is None:
             return

@@ -9,6 +9,7 @@ from canshaper.calibration.drive import CalibrationDrive
 from canshaper.can.binding import Deployment
 from canshaper.can.bus import Port, open_port
 from canshaper.can.frame import FrameFault
+from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.loop import run_at_deadlines
 
 # How often the end is told to every valve: a frame may be lost.
@@ -43,17 +44,12 @@ def run_live(
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, stop)
     told_ns = 0
+    tick_ns, longest_ns = deployment.config.tick_ms * 1_000_000, stall_ns(deployment)
 
     def body(now_ns: int, missed: int, _late_ns: int) -> bool:
         nonlocal told_ns
-        for port in ports.values():
-            for frame in port.frames():
-                drive.receive(frame, now_ns)
-        for frame in drive.tick(now_ns, missed):
-            ports[frame.bus].send(frame)
-        for port in ports.values():
-            for frame in port.others():
-                drive.receive(frame, now_ns)
+        stalled = missed * tick_ns > longest_ns
+        exchange(drive, ports, now_ns, missed, stalled=stalled)
         if now_ns >= told_ns:
             told_ns = now_ns + 200_000_000
             tell(drive)
@@ -64,7 +60,7 @@ def run_live(
     try:
         for name, bus in deployment.config.buses.items():
             ports[name] = open_port(name, bus, ignore)
-        run_at_deadlines(deployment.config.tick_ms * 1_000_000, body)
+        run_at_deadlines(tick_ns, body)
     finally:
         for _ in range(LAST_FRAMES if ports else 0):
             for frame in drive.neutral_frames():

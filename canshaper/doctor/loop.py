@@ -13,6 +13,7 @@ from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.service.controller import Controller
 from canshaper.service.events import Event
+from canshaper.service.exchange import stall_ns
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory
 
@@ -44,8 +45,7 @@ class Loop:
         for i, axis in enumerate(deployment.axes.values()):
             self._valves.setdefault(axis.valve.message.sender.key, []).append(i)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        shortest_ms = min(lever.config.timeout_ms for lever in deployment.levers.values())
-        self._stall_ns = shortest_ms * 1_000_000
+        self._stall_ns = stall_ns(deployment)
         self._seconds_ns = round(seconds * 1e9)
         self._until_ns = 0
         self._collector = Collector()

@@ -10,8 +10,8 @@ from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port, open_port
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.config.input import Input
 from canshaper.service.controller import Controller
+from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
 from canshaper.service.reading import Reading
@@ -84,22 +84,8 @@ class Daemon:
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
         """Take all waiting frames, tick the axes, send, then housekeeping."""
         controller = self._controller
-        ports = self._ports
-        if missed * self._tick_ns > self._stall_ns:
-            # What waits in the sockets is as old as the stall; it must not look fresh.
-            for port in ports.values():
-                for _ in port.frames():
-                    pass
-            controller.stalled()
-        for port in ports.values():
-            for frame in port.frames():
-                controller.receive(frame, now_ns)
-        for frame in controller.tick(now_ns, missed):
-            if not ports[frame.bus].send(frame):
-                controller.send_failed(frame)
-        for port in ports.values():
-            for frame in port.others():
-                controller.receive(frame, now_ns)
+        stalled = missed * self._tick_ns > self._stall_ns
+        exchange(controller, self._ports, now_ns, missed, stalled=stalled)
         self._latest_ns = max(self._latest_ns, late_ns)
         self._housekeeping(now_ns)
         return not (self._stop or (self._next and controller.neutral))
@@ -148,10 +134,7 @@ class Daemon:
         self._controller = Controller(deployment)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        inputs: list[Input] = [lever.config for lever in deployment.levers.values()]
-        if deployment.emergency_stop:
-            inputs.append(deployment.emergency_stop.config)
-        self._stall_ns = min(i.timeout_ms for i in inputs) * 1_000_000
+        self._stall_ns = stall_ns(deployment)
 
     def _open(self, deployment: Deployment, opened: dict[Bus, Port]) -> dict[str, Port]:
         """Ports of a deployment by name, those among them that are open already included."""

@@ -197,3 +197,22 @@ def test_the_ramp_is_as_quick_up_as_down_and_ends_at_zero() -> None:
     times = [i * 0.02 for i in range(round(RAMP.duration_s / 0.02))]
     steps = [abs(RAMP.command(t + 0.02) - RAMP.command(t)) for t in times]
     assert max(steps) <= 0.04 * 0.02 + 1e-9
+
+
+@pytest.mark.parametrize(("what", "reason"), [("send", "SEND_FAILED"), ("stall", "LOOP_STALLED")])
+def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
+    deployment: Deployment, what: str, reason: str
+) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    levers = hands(deployment)
+    (*_, moving) = run(drive, levers, 4.0)
+    assert moving.data[0]
+    if what == "send":
+        drive.send_failed(moving)
+    else:
+        drive.stalled()
+    for tick in range(200, 203):
+        for frame in levers.frames(tick * 20):
+            drive.receive(frame, tick * TICK_NS)
+        assert [f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200] == [0]
+    assert drive.ended == f"stopped: {reason}"
