@@ -19,7 +19,8 @@ from canshaper.service.lever import LeverInput
 from canshaper.service.network import Network
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
-from canshaper.service.sets import SetChooser, SwitchInput
+from canshaper.service.sets import SetChooser
+from canshaper.service.value import ValueInput
 from canshaper.shaping.states import Reason
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
@@ -181,7 +182,7 @@ class Controller:
     def _choose(self) -> list[tuple[BoundInput, Input]]:
         """Let grapple and operator choose sway data and filter of the axes that have a choice."""
         bound = self.deployment.grapple, self.deployment.feel
-        grapple, feel = (SwitchInput(one) if one else None for one in bound)
+        grapple, feel = (ValueInput(one, one.config.signal) if one else None for one in bound)
         codes = self.deployment.config.feel.codes if self.deployment.config.feel else {}
         for runner in self.axes.values():
             if runner.bound.config.sets or runner.bound.config.feels:
@@ -192,7 +193,7 @@ class Controller:
         """Tell when the valve no longer does what it is told, and when it does again."""
         sent = runner.axis.sent
         if feedback.check(sent, now_ns):
-            self.events.append(FeedbackEvent(name, feedback.following, feedback.value, sent))
+            self.events.append(FeedbackEvent(name, feedback.following, feedback.part, sent))
             if fault := FAULT_OF.get(feedback.following):
                 self.counters.add(fault)
 

@@ -3,15 +3,12 @@
 import math
 from collections import deque
 from enum import Enum
-from typing import Any
 
 from cantools.database.can import Signal
 
-from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundFeedback
-from canshaper.can.signals import find_signal, special_codes
-from canshaper.service.input import GOOD, Input
-from canshaper.shaping.states import Reason
+from canshaper.can.signals import find_signal
+from canshaper.service.value import ValueInput
 
 
 class Following(Enum):
@@ -25,7 +22,7 @@ class Following(Enum):
     LOST = "lost"
 
 
-class Feedback(Input):
+class Feedback(ValueInput):
     """Feedback of one valve: estimated flow, or position of the spool.
 
     Args:
@@ -34,39 +31,23 @@ class Feedback(Input):
 
     Attributes:
         following: what it says.
-        value: the last one, as a part of full.
     """
 
     def __init__(self, bound: BoundFeedback, period_s: float) -> None:
-        super().__init__(bound)
         config = bound.config
         signal = find_signal(bound.message, config.signal)
         assert signal is not None  # checked with the deployment
-        self._signal = signal
+        super().__init__(bound, signal.name, *_range(signal))
         self._full = config.full if config.full is not None else float(signal.maximum or 0.0)
-        self._special = special_codes(signal)
         self._tolerance = config.tolerance_pct / 100.0
         self._commands = deque([0.0], maxlen=1 + math.ceil(config.settle_ms / 1000.0 / period_s))
-        self._timeout = config.timeout_ms * 1_000_000
-        self._range = _range(signal)
-        self._measured_ns: int | None = None  # or since when it is waited for
-        self._heard = False
+        self._waited_for_ns: int | None = None  # the first one, since then
         self.following = Following.UNKNOWN
-        self.value = 0.0
 
-    def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
-    ) -> FrameFault:
-        """An error code is no measurement, nor is what lies beyond the range."""
-        code = raw[self._signal.name]
-        value = code * self._signal.scale + self._signal.offset
-        low, high = self._range
-        if code in self._special or not low <= value <= high:
-            return FrameFault.INVALID_SIGNAL
-        if counts:
-            self._measured_ns, self._heard = now_ns, True
-            self.value = value / self._full
-        return GOOD
+    @property
+    def part(self) -> float:
+        """The last value as a part of full."""
+        return self.value / self._full
 
     def check(self, sent: float, now_ns: int) -> bool:
         """Compare with the commands so far and this one; whether ``following`` has changed.
@@ -78,20 +59,21 @@ class Feedback(Input):
         # What the valve shows now may answer any of the commands of its settling time.
         self._commands.append(sent)
         before = self.following
-        if self._measured_ns is None:
-            self._measured_ns = now_ns
-        if now_ns - self._measured_ns > self._timeout:
+        if self._waited_for_ns is None:
+            self._waited_for_ns = now_ns
+        told_ns = self._waited_for_ns if self.measured_ns is None else self.measured_ns
+        if now_ns - told_ns > self._timeout_ns:
             self.following = Following.LOST
-        elif self._heard:
+        elif self.measured_ns is not None:
             low = min(self._commands) - self._tolerance
             high = max(self._commands) + self._tolerance
-            self.following = Following.YES if low <= self.value <= high else Following.NO
+            self.following = Following.YES if low <= self.part <= high else Following.NO
         return self.following is not before
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""
         super().forget()
-        self._measured_ns, self._heard = None, False
+        self._waited_for_ns = None
 
 
 def _range(signal: Signal) -> tuple[float, float]:

@@ -1,52 +1,10 @@
 """Radius of the tip for the radial compensation: fixed, or measured by a CAN signal."""
 
-from typing import Any
-
 from canshaper.can.binding import BoundRadial
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundRadius
-from canshaper.can.signals import find_signal, special_codes
-from canshaper.service.input import GOOD, Input
-from canshaper.shaping.states import Reason
-
-
-class MeasuredRadius(Input):
-    """A radius of the tip that comes in frames.
-
-    Attributes:
-        radius_m: the last one that counted.
-        measured_ns: when it came; None when there is none.
-    """
-
-    def __init__(self, bound: BoundRadius) -> None:
-        super().__init__(bound)
-        signal = find_signal(bound.message, bound.config.signal)
-        # All checked with the deployment.
-        assert signal is not None
-        assert signal.minimum is not None
-        assert signal.maximum is not None
-        self._signal = signal
-        self._low, self._high = signal.minimum, signal.maximum
-        self._special = special_codes(signal)
-        self.radius_m = 0.0
-        self.measured_ns: int | None = None
-
-    def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
-    ) -> FrameFault:
-        """An error code or a value outside the DBC range is no radius."""
-        value = raw[self._signal.name]
-        radius_m = value * self._signal.scale + self._signal.offset
-        if value in self._special or not self._low <= radius_m <= self._high:
-            return FrameFault.INVALID_SIGNAL
-        if counts:
-            self.radius_m, self.measured_ns = radius_m, now_ns
-        return GOOD
-
-    def forget(self) -> None:
-        """Nothing received so far counts any more."""
-        super().forget()
-        self.measured_ns = None
+from canshaper.can.signals import find_signal
+from canshaper.service.value import ValueInput
 
 
 class RadiusInput:
@@ -54,8 +12,7 @@ class RadiusInput:
 
     def __init__(self, bound: BoundRadial) -> None:
         self._fixed_m = bound.config.radius_m
-        self._measured = MeasuredRadius(bound.radius) if bound.radius else None
-        self._timeout_ns = bound.radius.config.timeout_ms * 1_000_000 if bound.radius else 0
+        self._measured = _measured(bound.radius) if bound.radius else None
 
     def receive(self, data: bytes, now_ns: int) -> FrameFault:
         """Take a frame; a fixed radius has none."""
@@ -78,9 +35,15 @@ class RadiusInput:
         """
         if self._fixed_m is not None:
             return self._fixed_m
-        measured = self._measured
-        if measured is None or measured.measured_ns is None:
-            return None
-        if now_ns - measured.measured_ns > self._timeout_ns:
-            return None
-        return measured.radius_m / tip_share
+        radius_m = self._measured.fresh(now_ns) if self._measured else None
+        return None if radius_m is None else radius_m / tip_share
+
+
+def _measured(bound: BoundRadius) -> ValueInput:
+    """A radius that comes in frames; what lies outside its DBC range is none."""
+    signal = find_signal(bound.message, bound.config.signal)
+    # All checked with the deployment.
+    assert signal is not None
+    assert signal.minimum is not None
+    assert signal.maximum is not None
+    return ValueInput(bound, signal.name, signal.minimum, signal.maximum)

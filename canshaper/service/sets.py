@@ -1,61 +1,18 @@
 """Sway data and filter of an axis in motion: by the grapple, and by the operator's choice."""
 
-import math
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 from canshaper.can.binding import BoundAxis
-from canshaper.can.frame import FrameFault
-from canshaper.can.inputs import BoundSwitch
-from canshaper.can.signals import find_signal, special_codes
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel
-from canshaper.service.input import GOOD, Input
+from canshaper.service.value import ValueInput
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import Shaper, build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
-from canshaper.shaping.states import Reason
 from canshaper.shaping.sway import SwayModel
 
 # Between two changes of one axis: a weight that trembles must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
-
-
-class SwitchInput(Input):
-    """The value of one signal, while it is fresh."""
-
-    def __init__(self, bound: BoundSwitch) -> None:
-        super().__init__(bound)
-        signal = find_signal(bound.message, bound.config.signal)
-        assert signal is not None  # checked with the deployment
-        self._signal = signal
-        self._special = special_codes(signal)
-        self._oldest_ns = bound.config.timeout_ms * 1_000_000
-        self._value = 0.0
-        self._told_ns: int | None = None
-
-    def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
-    ) -> FrameFault:
-        """An error code is no value, nor is a float that is no number."""
-        value = raw[self._signal.name]
-        if value in self._special or not math.isfinite(value):
-            return FrameFault.INVALID_SIGNAL
-        if counts:
-            self._value = value * self._signal.scale + self._signal.offset
-            self._told_ns = now_ns
-        return GOOD
-
-    def value(self, now_ns: int) -> float | None:
-        """The value; None while it is not known."""
-        if self._told_ns is None or now_ns - self._told_ns > self._oldest_ns:
-            return None
-        return self._value
-
-    def forget(self) -> None:
-        """Nothing received so far counts any more."""
-        super().forget()
-        self._told_ns = None
 
 
 class SetChooser:
@@ -77,8 +34,8 @@ class SetChooser:
         self,
         bound: BoundAxis,
         axis: Axis,
-        grapple: SwitchInput | None,
-        feel: SwitchInput | None,
+        grapple: ValueInput | None,
+        feel: ValueInput | None,
         codes: Mapping[str, int],
     ) -> None:
         config = bound.config
@@ -99,12 +56,12 @@ class SetChooser:
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
-        feel = self._feel.value(now_ns) if self._feel else None
+        feel = self._feel.fresh(now_ns) if self._feel else None
         name = self._codes.get(feel, "") if feel is not None else ""
         if name not in self._programs:
             name = ""
         base, sets = self._programs[name]
-        value = self._grapple.value(now_ns) if self._grapple and sets else None
+        value = self._grapple.fresh(now_ns) if self._grapple and sets else None
         steps = None if value is None else position(sets, value)
         if (name, steps) == self._now or now_ns < self._not_before_ns:
             return
