@@ -15,6 +15,7 @@ from canshaper.cli import (
     reproduce,
     robust,
     run,
+    set,
     sim,
     tune,
 )
@@ -46,6 +47,7 @@ def _main(
 
 
 app.command("run")(run.run)
+app.command("set")(set.set_)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)

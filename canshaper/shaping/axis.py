@@ -164,6 +164,18 @@ class Axis:
         self.sway = sway
         self._rebump = True
 
+    def limit(self, limits: OutputLimits) -> None:
+        """Change maximum and rates; of what the run-on remembers nothing changes.
+
+        Raises:
+            ValueError: the axis is in motion, where more speed would come without the operator.
+        """
+        if not self.neutral:
+            raise ValueError("limits change in neutral only")
+        self._limits = limits
+        self._rise = limits.rise_per_s * self._tick_s
+        self._fall = limits.fall_per_s * self._tick_s
+
     # -- the state machine ---------------------------------------------------------------------
 
     def _decide(self, stick: StickInput, added: float) -> None:
