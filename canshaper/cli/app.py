@@ -12,6 +12,7 @@ from canshaper.cli import (
     config_schema,
     demo,
     doctor,
+    init,
     reproduce,
     robust,
     run,
@@ -46,6 +47,7 @@ def _main(
     """Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN."""
 
 
+app.command("init")(init.init)
 app.command("run")(run.run)
 app.command("set")(set.set_)
 app.command("check")(check.check)
