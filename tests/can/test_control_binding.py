@@ -1,18 +1,10 @@
 """What a deployment lets be changed, against its axes."""
 
-from typing import Protocol
-
 import pytest
 
-from canshaper.can.binding import Deployment
+from tests.can.conftest import Machine
 
 STATUS = "status: { bus: crane, message: ShaperStatus }\n"
-
-
-class Machine(Protocol):
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 def adjustable(machine: Machine, text: str) -> int:
