@@ -64,11 +64,9 @@ def drive(
     for time_ms in range(0, round(script.duration_s * 1000.0), tick_ms):
         time_s = time_ms / 1000.0
         now_ns = time_ms * 1_000_000
-        # A lever that sends more often than the loop ticks is seen with its newest frame.
-        for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1):
-            for frame in levers.frames(ms):
-                controller.receive(frame, now_ns)
-                recorder.receive(frame, time_s)
+        for frame in levers.frames_of_tick(time_ms, tick_ms):
+            controller.receive(frame, now_ns)
+            recorder.receive(frame, time_s)
         for frame in controller.tick(now_ns):
             plant.receive(frame)
             recorder.receive(frame, time_s)
