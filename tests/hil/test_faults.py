@@ -56,13 +56,22 @@ def hand(daemon: Service, folder: Path) -> Iterator[Hand]:
 
 
 def ready(bus: can.BusABC, hand: Hand, axis: str) -> None:
-    """The way back that docs/states.md states: neutral, and a press of reset after a trip."""
+    """The way back that docs/states.md states: neutral, and a press of reset after a trip.
+
+    Pressed again where an emulated machine stood still meanwhile, so that the press was not seen.
+    """
     hand.rest()
-    for pressed in (1, 0):
-        hand.reset = pressed
-        status = f"{axis}Status"
-        wait_for(bus, status, lambda s: str(s["State"]) in ("NEUTRAL_WAIT", "READY", "TRIPPED"))
-    wait_for(bus, f"{axis}Status", lambda s: str(s["State"]) == "READY" and s["RawCommand"] == 0)
+    for _ in range(10):
+        for pressed in (1, 0):
+            hand.reset = pressed
+            hand.wait_sent(3)
+        while bus.recv(0):  # what was sent before counts no more
+            pass
+        for _ in range(10):
+            status = wait_for(bus, f"{axis}Status", lambda s: True)
+            if str(status["State"]) == "READY" and status["RawCommand"] == 0:
+                return
+    raise AssertionError(f"not ready: {status}")
 
 
 def drive(bus: can.BusABC, hand: Hand, axis: str) -> None:
