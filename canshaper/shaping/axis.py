@@ -159,7 +159,7 @@ class Axis:
         else:
             sway = self.sway.retuned(mode, self.told)
         shaper = shaper_for(sway)
-        carry_over(self._shaper, shaper, self.command)
+        carry_over(self._shaper, shaper, self._within_maximum(self.command))
         self._shaper = shaper
         self.sway = sway
         self._rebump = True
@@ -269,8 +269,16 @@ class Axis:
             raise ValueError(f"command is {command}")
         return 0.0 if abs(command) <= self._neutral_band else command
 
+    def _within_maximum(self, command: float) -> float:
+        """A command no faster than the axis may be: a filter that is cut off damps nothing."""
+        maximum = self._limits.maximum
+        if command > maximum:
+            return maximum
+        return -maximum if command < -maximum else command
+
     def _wanted(self, command: float, added: float) -> float:
         """What the filter asks for; with ``added``, no step from what was sent before a change."""
+        command = self._within_maximum(command)
         wanted = self._shaper.wanted(command)
         if self._bypassed:
             wanted = command
