@@ -12,6 +12,7 @@ from canshaper.cli import (
     config_schema,
     demo,
     doctor,
+    identify,
     init,
     reproduce,
     robust,
@@ -54,6 +55,7 @@ app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
 app.command("demo")(demo.demo)
+app.command("identify")(identify.identify)
 app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)
 app.command("compare")(compare.compare)
@@ -69,7 +71,6 @@ def main() -> None:
         app(prog_name="canshaper")
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
-        if name not in TOOLS:
             raise
-        typer.echo(f"this command needs {name}, which is missing: {INSTALL_TOOLS}", err=True)
+        typer.echo(f"this command needs {name}, which is missing: {install}", err=True)
         sys.exit(EXIT_WITHOUT_TOOLS)

@@ -1,8 +1,12 @@
-"""Logs of a crane whose swing is known: CAN logs and tables of a phone, with noise."""
+"""Logs of a crane whose swing is known: CAN logs and tables of a phone, with noise.
+
+`python -m tests.identification.machine DIRECTORY` writes those of docs/identification.md.
+"""
 
 import math
 import random
 import struct
+import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -119,3 +123,22 @@ def phone(
         lines.append(row.format(t=state.time_s, x=x, y=y, z=state.theta1_rate_rad_s + noise()))
     path.write_text("\n".join(lines) + "\n")
     return path
+
+
+EMPTY = Grapple()
+LOADED = Grapple(l2_m=1.7, m2_kg=1200.0, c5_n_m_s_rad=400.0, c6_n_m_s_rad=400.0)
+PUSHES = (Push("slew", 2.0, 1.0, 0.4), Push("near_far", 32.0, 0.7, 0.4))
+
+
+def main(directory: Path) -> None:
+    """Write the logs of docs/identification.md."""
+    directory.mkdir(parents=True, exist_ok=True)
+    for seed, (name, grapple) in enumerate((("empty", EMPTY), ("loaded", LOADED))):
+        candump(directory / f"{name}.log", driven(60.0, PUSHES, grapple=grapple), seed=seed)
+        for axis, mode in (("slew", grapple.mode5), ("near_far", grapple.mode6)):
+            period, ratio = period_of(mode), mode.zeta
+            print(f"{name}, {axis}: period {period:.4f} s, damping ratio {ratio:.4f}")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

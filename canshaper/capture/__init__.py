@@ -1,0 +1,1 @@
+"""Logs of CAN frames: reading, recording and replaying them (never in the daemon)."""

@@ -1,0 +1,62 @@
+"""A frame of a log, and what can be wrong with a log."""
+
+from collections import Counter
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import NamedTuple
+
+
+class TimedFrame(NamedTuple):
+    """A classical CAN data frame with the time of its reception.
+
+    Attributes:
+        time_ns: on the clock of the log, whatever that counts from.
+        channel: as the log names it; empty where the format has no channels.
+        can_id: 11 or 29 bits.
+        extended: whether it has 29.
+        data: up to 8 bytes.
+    """
+
+    time_ns: int
+    channel: str
+    can_id: int
+    extended: bool
+    data: bytes
+
+
+class LogError(ValueError):
+    """A log that cannot be used: says where, what was found and what is allowed."""
+
+
+class CutOffError(LogError):
+    """A log that ends in the middle; every frame before that has been handed out."""
+
+
+@dataclass
+class Place:
+    """Where in a log the reader is, for people, and what it has left out so far.
+
+    Attributes:
+        path: the log.
+        unit: what is counted: lines or frames.
+        number: the one that is being read, from 1.
+        left_out: frames that are no classical data frames, by kind.
+    """
+
+    path: Path
+    unit: str = "line"
+    number: int = 0
+    left_out: Counter[str] = field(default_factory=Counter)
+
+    def error(self, found: str, allowed: str) -> LogError:
+        """What is wrong here."""
+        return LogError(f"{self}: found {found}, allowed is {allowed}")
+
+    def cut_off(self, found: str) -> CutOffError:
+        """The log ends here, in the middle of something."""
+        return CutOffError(f"{self}: the log is cut off: {found}")
+
+    def __str__(self) -> str:
+        if self.unit == "line":
+            return f"{self.path}:{self.number}"
+        return f"{self.path}: {self.unit} {self.number}"

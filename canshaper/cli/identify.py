@@ -1,0 +1,361 @@
+"""``canshaper identify``: period, damping and full speed of the swing, from what a person has."""
+
+import json
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
+    from canshaper.can.database import Messages
+    from canshaper.identification.judge import Finding
+    from canshaper.identification.recommend import Advice
+    from canshaper.identification.series import Series
+
+# Swing of each axis as `canshaper sim` tells it.
+SIMULATED = {
+    "slew": "GrappleSway.SwayPerpendicular",
+    "near_far": "GrappleSway.SwayParallel",
+}
+EXIT_TOO_POOR = 1
+# Name of the axis where neither a deployment nor an option tells one.
+UNNAMED = "swing"
+
+
+def identify(
+    logs: list[str] | None = typer.Argument(
+        None,
+        metavar="[LABEL=]LOG...",
+        help="CAN logs (candump .log, .asc, .blf, .mf4) or tables (.csv) of a phone or logger.",
+    ),
+    file: str | None = typer.Option(
+        None, "--file", help="Deployment: its DBC files, axes, commands and grapple signal."
+    ),
+    signal: list[str] | None = typer.Option(
+        None, "--signal", metavar="AXIS=NAME", help="MESSAGE.SIGNAL of the DBC, or CSV column."
+    ),
+    axis: str | None = typer.Option(None, "--axis", help="Axis of a phone or a stopwatch."),
+    dbc: list[Path] | None = typer.Option(
+        None, "--dbc", help="DBC file of the signals, instead of those of the deployment."
+    ),
+    channel: str | None = typer.Option(
+        None, "--channel", help="Bus of the log, where it has more."
+    ),
+    about_s: float | None = typer.Option(
+        None, "--about", min=0.3, max=12.0, help="Period as far as it is known, s."
+    ),
+    swings: float | None = typer.Option(None, "--swings", help="Stopwatch: full swings counted."),
+    seconds: float | None = typer.Option(None, "--seconds", help="Stopwatch: time they took."),
+    first_deg: float | None = typer.Option(
+        None, "--first", help="Stopwatch: amplitude at the start, degrees to one side."
+    ),
+    last_deg: float | None = typer.Option(None, "--last", help="Stopwatch: amplitude at the end."),
+    out: Path = typer.Option(Path("out/identify"), "--out", help="Directory for the picture."),
+    write: bool = typer.Option(False, "--write", help="Write the sway data into the deployment."),
+    as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
+) -> None:
+    """Find period and damping of the swing, and the full speed of the tip, from logs.
+
+    Finds free swings by itself: by the commands in the log where the deployment names them, else by
+    the shape of the signal. Intervals are of 95 %. Draws OUT/identify.png. Exit code 1 where the
+    data of an axis is too poor, with what to do; 2 where a file or an option is wrong.
+
+    LABEL= tells what hangs on the crane: logs of one label count together, several labels are
+    compared. A label that is a number is the value of the grapple's signal.
+
+    Examples:
+
+      canshaper identify drive.log --file machine.yaml --write
+
+      canshaper identify drive.blf --file machine.yaml --dbc imu.dbc --signal slew=IMU.RollRate
+
+      canshaper identify Gyroscope.csv --file machine.yaml --axis slew
+
+      canshaper identify empty=a.log empty=b.log loaded=c.log --file machine.yaml
+
+      canshaper identify logger.csv --signal "near_far=Lift pressure (bar)" --about 2.4
+
+      canshaper identify --swings 10 --seconds 23.6 --first 20 --last 5 --file machine.yaml \\
+        --axis slew --write
+    """
+    from canshaper.config.source import DeploymentError
+    from canshaper.identification.recommend import advise
+
+    try:
+        deployment = loader(file)() if file else None
+        if write and (deployment is None or file is None):
+            raise ValueError("--write: allowed with --file, the deployment to write to")
+        if write and file and not Path(file).exists():
+            raise ValueError(f"{file}: shipped with the package; copy it, then write to the copy")
+        timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
+        if any(v is not None for v in timed.values()):
+            findings = [_timed(timed, logs or [], _axis(axis, deployment))]
+        else:
+            findings = _logged(
+                logs or [],
+                _signals(signal or [], deployment),
+                deployment,
+                _messages(dbc or [], deployment),
+                axis=axis,
+                channel=channel,
+                about_s=about_s,
+            )
+        names = list(dict.fromkeys(f.axis for f in findings))
+        advice = [
+            advise(
+                name,
+                [f for f in findings if f.axis == name],
+                _speed(deployment, name),
+                has_grapple=bool(deployment and deployment.grapple),
+            )
+            for name in names
+        ]
+        picture = _draw(findings, advice, out)
+        written = _write(deployment, findings, advice) if write and deployment else []
+    except (DeploymentError, OSError, ValueError) as error:
+        raise fail(error) from None
+    _tell(findings, advice, deployment, picture, written, as_json=as_json)
+    if not all(f.usable for f in findings):
+        raise typer.Exit(EXIT_TOO_POOR)
+
+
+def _timed(timed: dict[str, float | None], logs: list[str], axis: str) -> "Finding":
+    """What a stopwatch tells."""
+    from canshaper.identification.judge import Finding
+    from canshaper.identification.stopwatch import stopwatch
+
+    missing = [name for name, value in timed.items() if value is None]
+    if missing or logs:
+        found = f"without {', '.join(missing)}" if missing else f"with the log {logs[0]}"
+        raise ValueError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
+    period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
+    return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
+
+
+def _axis(axis: str | None, deployment: "Deployment | None") -> str:
+    """The axis of data that names none."""
+    if deployment is None:
+        return axis or UNNAMED
+    if axis not in deployment.axes:
+        found = repr(axis) if axis else "none"
+        raise ValueError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
+    return axis
+
+
+def _signals(pairs: Sequence[str], deployment: "Deployment | None") -> dict[str, str]:
+    """Name of the signal of each axis."""
+    signals: dict[str, str] = {}
+    for pair in pairs:
+        axis, equals, name = pair.partition("=")
+        if not (axis and equals and name):
+            raise ValueError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
+        if axis in signals:
+            raise ValueError(f"--signal: found two signals of {axis}, allowed is one")
+        signals[_axis(axis, deployment)] = name
+    return signals
+
+
+def _messages(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
+    """Messages that name the signals."""
+    from canshaper.can.database import Messages, load_dbc
+    from canshaper.config.source import DeploymentError
+
+    if not files and deployment:
+        return deployment.messages
+    loaded, problems = [], []
+    for path in files or [data_directory() / "dbc" / "forwarder.dbc"]:
+        one, faults = load_dbc(path)
+        problems += faults
+        loaded += [one] if one else []
+    if problems:
+        raise DeploymentError(problems)
+    return Messages(loaded)
+
+
+def _logged(
+    logs: Sequence[str],
+    signals: dict[str, str],
+    deployment: "Deployment | None",
+    messages: "Messages",
+    *,
+    axis: str | None,
+    channel: str | None,
+    about_s: float | None,
+) -> list["Finding"]:
+    """What logs tell, by axis and label."""
+    from canshaper.identification.canlog import read_can
+    from canshaper.identification.judge import identify as judged
+    from canshaper.identification.phone import series_of
+    from canshaper.identification.table import is_table, read_table
+
+    if not logs:
+        raise ValueError("found no log and no stopwatch; see canshaper identify --help")
+    series: dict[tuple[str, str], list[Series]] = {}
+    with _progress() as tell:
+        for text in logs:
+            label, path = _labelled(text)
+            report = tell(path.name)
+            if is_table(path):
+                table = read_table(path, report)
+                wanted: dict[str, str | None] = {**signals}
+                wanted = wanted or {_axis(axis, deployment): None}
+                found = {a: series_of(table, label, c, about_s) for a, c in wanted.items()}
+            else:
+                found = read_can(
+                    path,
+                    label,
+                    signals or _simulated(deployment, messages, axis),
+                    messages,
+                    deployment=deployment,
+                    channel=channel,
+                    progress=report,
+                )
+            for name, one in found.items():
+                series.setdefault((name, label), []).append(one)
+        findings = []
+        for (name, label), parts in series.items():
+            tell(f"{name} {label}")(0.5)
+            finding = judged(name, label, parts, about_s)
+            if finding.at is None:
+                finding.at = _number(label)
+            findings.append(finding)
+    return findings
+
+
+def _labelled(text: str) -> tuple[str, Path]:
+    """Label and path of "LABEL=LOG"; a file that is there has its name."""
+    label, equals, rest = text.partition("=")
+    if not equals or Path(text).exists():
+        return "", Path(text)
+    return label, Path(rest)
+
+
+def _number(label: str) -> float | None:
+    try:
+        return float(label)
+    except ValueError:
+        return None
+
+
+def _simulated(
+    deployment: "Deployment | None", messages: "Messages", axis: str | None
+) -> dict[str, str]:
+    """Signals of the simulated crane, where nobody named others."""
+    axes = list(deployment.axes) if deployment else list(SIMULATED)
+    there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
+    if not there or isinstance(messages.find("GrappleSway"), str):
+        raise ValueError(
+            "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL with what shows the swing"
+        )
+    return there
+
+
+def _speed(deployment: "Deployment | None", axis: str) -> float | None:
+    """Full speed that the deployment has."""
+    sway = deployment.axes[axis].config.sway if deployment else None
+    return sway.full_speed_m_s if sway else None
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], Callable[[float], None]]]:
+    """A bar on the terminal, beside the output; gone when done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def tell(what: str) -> Callable[[float], None]:
+            bar.update(task, completed=0.0, description=what)
+            return lambda done: bar.update(task, completed=done)
+
+        yield tell
+
+
+def _draw(
+    findings: Sequence["Finding"], advice: Sequence["Advice"], out: Path
+) -> Path | str | None:
+    """Draw the picture; None where there is nothing to draw, and why where it cannot be drawn."""
+    seen = [f for f in findings if f.free or f.driven]
+    if not seen:
+        return None
+    try:
+        from canshaper.identification.plot import draw
+    except ImportError:
+        return f"none, matplotlib is missing: {INSTALL_TOOLS}"
+    out.mkdir(parents=True, exist_ok=True)
+    path = out / "identify.png"
+    draw(path, seen, [a.text for a in advice])
+    return path
+
+
+def _write(
+    deployment: "Deployment", findings: Sequence["Finding"], advice: Sequence["Advice"]
+) -> list[str]:
+    """Write what is known of each axis; the axes that were written."""
+    from canshaper.config.edit import Value, set_values
+    from canshaper.identification.recommend import flow
+
+    usable = [a for a in advice if all(f.usable for f in findings if f.axis == a.axis)]
+    for one in usable:
+        if deployment.axes[one.axis].config.sway is None:
+            raise ValueError(
+                f"axis {one.axis}: found no section sway to write to; put in sway: {flow(one.sway)}"
+            )
+    for one in usable:
+        sway = deployment.axes[one.axis].config.sway
+        assert sway is not None
+        gone = sway.model_dump(exclude_none=True).keys() - one.sway.keys()
+        values: dict[str, Value] = {**dict.fromkeys(sorted(gone)), **one.sway}
+        set_values(deployment.path, ("axes", one.axis, "sway"), values)
+    return [one.axis for one in usable]
+
+
+def _tell(
+    findings: Sequence["Finding"],
+    advice: Sequence["Advice"],
+    deployment: "Deployment | None",
+    picture: Path | str | None,
+    written: Sequence[str],
+    *,
+    as_json: bool,
+) -> None:
+    from canshaper.identification.report import as_dict, lines, set_lines
+
+    if as_json:
+        result = as_dict(findings, advice)
+        result |= {"picture": str(picture) if picture else None, "written": list(written)}
+        typer.echo(json.dumps(result, indent=2))
+        return
+    for finding in findings:
+        typer.echo("\n".join(lines(finding)))
+    console = Console(soft_wrap=True)
+    for one in advice:
+        console.print(f"\n[b]{one.text}[/b]", highlight=False)
+        if one.sets:
+            typer.echo("\n".join(set_lines(one)))
+    if picture:
+        typer.echo(f"Picture: {picture}")
+    if not deployment:
+        return
+    if written:
+        typer.echo(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+    for one in advice:
+        axis = deployment.axes[one.axis].config
+        if one.axis in written and axis.sets:
+            typer.echo(f"{one.axis} has sets, which stay as they are: change them by hand.")
+        if one.sway and axis.filter.kind in ("gff", "robust"):
+            command = "tune" if axis.filter.kind == "gff" else "robust"
+            if one.cover_pct:
+                command = "robust"
+            command += f" {deployment.path} --axis {one.axis}"
+            command += f" --range {one.cover_pct}" if one.cover_pct else ""
+            typer.echo(f"Then fit the filter: canshaper {command}")

@@ -1,0 +1,159 @@
+"""A measured signal over time, with its unit, and what is known of the commands beside it."""
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+# Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
+BIN_S = 0.02
+
+
+class IdentificationError(ValueError):
+    """The data cannot be used; the message says why and what to do."""
+
+
+class Kind(Enum):
+    """What a signal is of the swing."""
+
+    ANGLE = "angle"
+    """In rad."""
+    RATE = "rate"
+    """Its rate, in rad/s."""
+    OTHER = "other"
+    """Something that swings along, such as a pressure, in its own unit."""
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """Unit of a signal as it was logged.
+
+    Attributes:
+        kind: what the signal is.
+        factor: to rad or rad/s; 1 for other signals.
+        text: its name.
+    """
+
+    kind: Kind
+    factor: float
+    text: str
+
+
+_RADIANS = math.pi / 180.0
+_UNITS = {
+    r"(deg(rees?)?|°)\s*(/|per\s*)\s*s(ec)?|°\s*s-1|dps": (Kind.RATE, _RADIANS),
+    r"rad(ians?)?\s*(/|per\s*)\s*s(ec)?|rad\s*s-1": (Kind.RATE, 1.0),
+    r"deg(rees?)?|°": (Kind.ANGLE, _RADIANS),
+    r"rad(ians?)?": (Kind.ANGLE, 1.0),
+}
+_ACCELERATION = re.compile(r"m\s*/\s*s\s*(\^?2|²|/s)|m\s*s-2|m?g", re.IGNORECASE)
+
+
+def unit_of(text: str) -> Unit:
+    """The unit of that name.
+
+    Raises:
+        IdentificationError: it is that of an acceleration, which does not show a swing.
+    """
+    text = text.strip()
+    for pattern, (kind, factor) in _UNITS.items():
+        if re.fullmatch(pattern, text, re.IGNORECASE):
+            return Unit(kind, factor, text)
+    if _ACCELERATION.fullmatch(text):
+        raise IdentificationError(
+            f"is an acceleration ({text}), and what hangs freely feels its weight along the cable"
+            " all the time: it does not show the swing; name the gyroscope (rad/s, deg/s) instead"
+        )
+    return Unit(Kind.OTHER, 1.0, text)
+
+
+@dataclass(frozen=True, slots=True)
+class Command:
+    """What an axis was told, held until the next value.
+
+    Attributes:
+        time_s: times of the commands, rising, on the clock of the signal.
+        speed: speed of the tip that each gives, part of full speed.
+    """
+
+    time_s: Array
+    speed: Array
+
+
+@dataclass(frozen=True, slots=True)
+class Series:
+    """A signal of one axis.
+
+    Attributes:
+        source: file and signal, for people.
+        label: state of the grapple it was logged in, such as "empty"; may be "".
+        unit: unit it was logged in.
+        time_s: rising times from the start of the log, s.
+        value: in rad, rad/s or its own unit.
+        command: commands of the axis, where the log has them.
+        idle: stretches in which no axis was told to move, s; None where that is not known.
+        at: value of the deployment's grapple signal, where the log has it.
+        notes: what was left out while reading.
+    """
+
+    source: str
+    label: str
+    unit: Unit
+    time_s: Array
+    value: Array
+    command: Command | None = None
+    idle: list[tuple[float, float]] | None = None
+    at: float | None = None
+    notes: list[str] = field(default_factory=list)
+
+
+def ordered(source: str, time_s: Array, value: Array, back: float = 0.1) -> tuple[Array, Array]:
+    """Times and values with numbers only, in order.
+
+    Args:
+        source: file and signal, for the error.
+        time_s: times, s.
+        value: values.
+        back: step back that is still taken for reordering by the logger, s.
+
+    Raises:
+        IdentificationError: the time goes back: two clocks or two recordings in one file.
+    """
+    good = np.isfinite(value) & np.isfinite(time_s)
+    time_s, value = time_s[good], value[good]
+    if len(time_s) < 2:
+        return time_s, value
+    latest = np.maximum.accumulate(time_s)
+    drop = latest - time_s
+    worst = int(np.argmax(drop))
+    if drop[worst] > back:
+        raise IdentificationError(
+            f"{source}: the time goes back by {drop[worst]:.3g} s after {latest[worst]:.3f} s:"
+            " two clocks, or two recordings in one file; record on one clock, or split the file"
+        )
+    order = np.argsort(time_s, kind="stable")
+    return time_s[order], value[order]
+
+
+def binned(time_s: Array, value: Array, bin_s: float = BIN_S) -> tuple[Array, Array]:
+    """Means of times and values in bins, those without samples left out; times rise strictly."""
+    if not len(time_s):
+        return time_s, value
+    number = np.floor((time_s - time_s[0]) / bin_s + 1e-6).astype(np.int64)
+    first = np.flatnonzero(np.diff(number, prepend=number[0] - 1))
+    count = np.diff(np.append(first, len(number)))
+    return np.add.reduceat(time_s, first) / count, np.add.reduceat(value, first) / count
+
+
+def pieces(time_s: Array, gap_s: float) -> list[slice]:
+    """Stretches without gaps longer than ``gap_s``."""
+    breaks = np.flatnonzero(np.diff(time_s) > gap_s) + 1
+    ends: Sequence[int] = [0, *(int(b) for b in breaks), len(time_s)]
+    return [slice(a, b) for a, b in pairwise(ends) if b > a]

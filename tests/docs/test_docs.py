@@ -1,0 +1,50 @@
+"""What README and docs name is there: files, verbs and their options, states, reasons, faults."""
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+import typer
+
+from canshaper.can.frame import FrameFault
+from canshaper.cli.app import app
+from canshaper.shaping.states import Reason, State
+
+ROOT = Path(__file__).parents[2]
+PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+COMMANDS: Any = typer.main.get_command(app)
+CODE = re.compile(r"`([^`\n]+)`|^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
+COMMAND = re.compile(r"\bcanshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")
+NAMES = {member.name for kind in (State, Reason, FrameFault) for member in kind}
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    found = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
+    local = [link for link in found if "://" not in link]
+    assert [link for link in local if not (page.parent / link).exists()] == []
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_commands_and_options_are_there(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    wrong = []
+    for code in CODE.finditer(text):
+        for verb, rest in COMMAND.findall(code[1] or code[2]):
+            command = COMMANDS.commands.get(verb)
+            if command is None:
+                wrong.append(verb)
+                continue
+            known = {option for parameter in command.params for option in parameter.opts}
+            options = re.findall(r"(?<=\s)--[a-z][a-z-]*", rest)
+            wrong += [f"{verb} {o}" for o in options if o not in {*known, "--help"}]
+    assert wrong == []
+
+
+def test_troubleshooting_names_real_states_and_reasons() -> None:
+    text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
+    found = set(re.findall(r"\b[A-Z]{2,}(?:_[A-Z]+)+\b|\b(?:TRIPPED|STOPPING|READY|START)\b", text))
+    assert found
+    assert found <= NAMES
