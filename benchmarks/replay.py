@@ -1,0 +1,122 @@
+"""How many times faster than real time a log is replayed, beside python-can only reading it.
+
+The log is a drive of the closed loop as a daemon's own bus carries it: joysticks, valves, status
+and what the simulated crane tells, some 410 frames a second. Replayed once with the ticks of that
+daemon, every frame compared, and once with those of a clock; table and picture are not in it.
+
+    python benchmarks/replay.py [--minutes 10] [--runs 3] [--config forwarder.yaml]
+"""
+
+import argparse
+import resource
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from itertools import count
+from pathlib import Path
+
+import can
+
+from canshaper.can.frame import Frame
+from canshaper.capture.log import read_log
+from canshaper.capture.replay import Replay, look
+from canshaper.cli.common import loader
+from canshaper.cli.replay import _without_collector
+from canshaper.service.controller import Controller
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import script_named
+from canshaper_sim.plant import PlantNode
+
+TICK_NS = 20_000_000
+START_NS = 1_763_750_000_000_000_000
+
+
+def write_drive(path: Path, seconds: float, config: str) -> int:
+    """The log of a drive of so many seconds; how many lines it has."""
+    load = loader(config)
+    deployment = load()
+    controller = Controller(deployment)
+    plant = PlantNode(load())
+    lines = 0
+    with path.open("w", encoding="ascii") as file:
+
+        def log(time_ns: int, frame: Frame) -> None:
+            nonlocal lines
+            lines += 1
+            second, ns = divmod(START_NS + time_ns, 10**9)
+            text = f"({second}.{ns // 1000:06d}) vcan0 {frame.can_id:03X}#"
+            file.write(f"{text}{frame.data.hex().upper()}\n")
+
+        for frame in controller.neutral_frames():
+            log(0, frame)
+        levers: LeverNode | None = None
+        ends_ms, seed = 0, count(1)
+        for number in range(round(seconds * 1e9) // TICK_NS):
+            now_ns = number * TICK_NS
+            if number * 20 >= ends_ms:
+                script = script_named(f"random-{next(seed)}", list(deployment.axes))
+                levers, begin_ms = LeverNode(deployment, script), number * 20
+                ends_ms += round(script.duration_s * 1000)
+            assert levers is not None
+            for frame in levers.frames(number * 20 - begin_ms):
+                log(now_ns + 1_000, frame)
+                controller.receive(frame, now_ns)
+            for i, frame in enumerate(controller.tick(now_ns)):
+                log(now_ns + 100_000 + 30_000 * i, frame)
+                plant.receive(frame)
+            plant.advance(0.02)
+            for i, frame in enumerate(plant.feedback()):
+                log(now_ns + 10_000_000 + 100_000 * i, frame)
+                controller.receive(frame, now_ns)
+    return lines
+
+
+def taken(run: Callable[[], object], runs: int) -> float:
+    """Median time of a run, s of its processor: other work on the machine does not count."""
+    times = []
+    for _ in range(runs):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return statistics.median(times)
+
+
+def replay(path: Path, config: str, *, by_daemon: bool) -> None:
+    """Replay all of it; with the daemon's ticks every frame has to be the same."""
+    load = loader(config)
+    one = Replay(load, look(load(), path, {}), by_daemon=by_daemon)
+    with _without_collector():
+        for _ in one.run(lambda _part: None):
+            pass
+    assert not one.verdict.different, one.verdict
+
+
+def main() -> None:
+    """Measure and print."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--minutes", type=float, default=10.0)
+    parser.add_argument("--runs", type=int, default=3)
+    parser.add_argument("--config", default="forwarder-robust.yaml")
+    arguments = parser.parse_args()
+    config = arguments.config
+    seconds = 60.0 * arguments.minutes
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "drive.log"
+        lines = write_drive(path, seconds, config)
+        print(f"{arguments.minutes:g} minutes, {lines} frames, {path.stat().st_size / 1e6:.1f} MB")
+        before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+        for title, run in (
+            ("python-can reads it", lambda: sum(1 for _ in can.LogReader(path))),
+            ("canshaper reads it", lambda: sum(1 for _ in read_log(path))),
+            ("replay, daemon's ticks, compared", lambda: replay(path, config, by_daemon=True)),
+            ("replay, ticks of a clock", lambda: replay(path, config, by_daemon=False)),
+        ):
+            time_s = taken(run, arguments.runs)
+            print(f"{title:33} {time_s:6.2f} s, {seconds / time_s:6.0f} x real time")
+        grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb
+        print(f"memory grown by {grown / 1024:.1f} MiB")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""A recording in one file to attach to a report: log, deployment, DBC files, versions, history."""
+
+import json
+import os
+import platform
+import zipfile
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from canshaper import __version__
+from canshaper.can.binding import Deployment
+from canshaper.capture.frames import LogError
+from canshaper.capture.history import History
+
+ABOUT, HISTORY, LOG = "about.json", "history.txt", "recording.log"
+FOLDER = "deployment"
+OUTSIDE = "outside"
+PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
+
+
+def pack(
+    path: Path, log: Path, deployment: Deployment, history: History, facts: dict[str, object]
+) -> None:
+    """Make a bundle.
+
+    Args:
+        path: the bundle, which is replaced where it is there.
+        log: the recorded log.
+        deployment: whose buses were recorded; its file and DBC files go in, so that the paths in
+            the file hold when it is unpacked.
+        history: what the status messages told.
+        facts: anything else about the recording.
+
+    Raises:
+        OSError: a file cannot be read or written.
+    """
+    file = deployment.path.resolve()
+    text = file.read_text(encoding="utf-8")
+    sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
+    inside = [source for name, source in sources if not Path(name).is_absolute()]
+    root = Path(os.path.commonpath([file.parent, *(source.parent for source in inside)]))
+    here = file.parent.relative_to(root)
+    about = {
+        "deployment": str(Path(FOLDER) / here / file.name),
+        "log": LOG,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "buses": {n: f"{b.interface} {b.channel}" for n, b in deployment.config.buses.items()},
+        "versions": versions(),
+        **facts,
+    }
+    part = path.with_name(path.name + ".part")
+    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
+        bundle.write(log, LOG)
+        for name, source in sources:
+            if Path(name).is_absolute():
+                bundle.write(source, str(Path(FOLDER) / OUTSIDE / source.name))
+                text = text.replace(
+                    name, os.path.relpath(root / OUTSIDE / source.name, file.parent)
+                )
+            else:
+                bundle.write(source, str(Path(FOLDER) / source.relative_to(root)))
+        bundle.writestr(str(Path(FOLDER) / here / file.name), text)
+        bundle.writestr(ABOUT, json.dumps(about, indent=2) + "\n")
+        bundle.writestr(HISTORY, "".join(f"{line}\n" for line in history_lines(history)))
+    part.replace(path)
+
+
+def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
+    """Unpack a bundle into a folder.
+
+    Returns:
+        (log, deployment file).
+
+    Raises:
+        LogError: it is no bundle.
+    """
+    try:
+        with zipfile.ZipFile(path) as bundle:
+            about = json.loads(bundle.read(ABOUT))
+            bundle.extractall(folder)
+        log, file = folder / about["log"], folder / about["deployment"]
+    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError) as error:
+        text = f"found {type(error).__name__} {error}, allowed is one of canshaper record"
+        raise LogError(f"{path}: not a bundle: {text}") from None
+    if folder not in log.resolve().parents or folder not in file.resolve().parents:
+        raise LogError(f"{path}: not a bundle: a path leads out of it")
+    return log, file
+
+
+def versions() -> dict[str, str]:
+    """What ran here: program, interpreter, packages, kernel."""
+    found = {"canshaper": __version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    found["kernel"] = f"{platform.system()} {platform.release()} {platform.version()}"
+    found["machine"] = platform.machine()
+    return found
+
+
+def history_lines(history: History) -> list[str]:
+    """Every change with its time, then the counters as they were last."""
+    lines = [f"{time_text(told.time_ns)} {told.text}" for told in history.changes]
+    if history.counted_ns is not None:
+        counters = " ".join(f"{name}={count}" for name, count in history.counters.items())
+        last = time_text(history.counted_ns)
+        lines.append(f"{last} counters {counters} last_fault={history.last_fault}")
+    return lines
+
+
+def time_text(time_ns: int) -> str:
+    """Time of the day with its date, in UTC, to the millisecond."""
+    return datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")

@@ -1,0 +1,78 @@
+"""``canshaper monitor``: a running daemon, live in the terminal."""
+
+import signal
+from types import FrameType
+
+import typer
+from rich.console import Console
+
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+
+
+def monitor(
+    file: str = FILE,
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    refresh_hz: float = typer.Option(
+        5.0, "--refresh", metavar="HZ", min=0.2, max=10.0, help="How often the picture is drawn."
+    ),
+    plain: bool = typer.Option(
+        False, "--plain", help="Lines instead of a picture: every event, and one a second."
+    ),
+) -> None:
+    """Show a running daemon: states and reasons, stick and valve, predicted sway, rates, counters.
+
+    Everything is taken from the frames on the buses of the deployment, which are only listened
+    to: the daemon does not notice. It can run on the machine's PC, over ssh, or on another computer
+    on the same bus. What is stale or missing says so. Ctrl-C ends it.
+
+    Where the output is no terminal it is --plain.
+
+    Exit code 0, 2 when the deployment is wrong, 3 when a bus cannot be opened.
+
+    Examples:
+
+      canshaper monitor config/forwarder.yaml
+
+      canshaper monitor machine.yaml --refresh 2
+
+      canshaper monitor machine.yaml --plain | tee monitor.txt
+    """
+    from canshaper.can.bus import BusError
+    from canshaper.config.source import DeploymentError
+    from canshaper.monitor.run import run_live, run_plain
+
+    stop = _Stop()
+    console = Console()
+    try:
+        deployment = loader(file, interface, channel)()
+        if plain or not console.is_terminal:
+            run_plain(deployment, _write, stop.going)
+        else:
+            run_live(deployment, console, refresh_hz, stop.going)
+    except DeploymentError as error:
+        raise fail(error) from None
+    except BusError as error:
+        raise fail(error, EXIT_NO_BUS) from None
+    except BrokenPipeError:  # who read it has enough
+        raise typer.Exit(0) from None
+
+
+def _write(line: str) -> None:
+    print(line, flush=True)
+
+
+class _Stop:
+    """Asked for by SIGTERM or SIGINT."""
+
+    def __init__(self) -> None:
+        self._asked = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+
+    def going(self) -> bool:
+        """Whether nobody has asked yet."""
+        return not self._asked
+
+    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
+        self._asked = True

@@ -1,0 +1,134 @@
+"""``canshaper record``: a log of the buses, and a bundle to attach to a report."""
+
+import signal
+from datetime import datetime
+from pathlib import Path
+from types import FrameType
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.live import Live
+
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
+    from canshaper.capture.record import Recording
+
+EXIT_NOT_WRITTEN = 1
+
+
+def record(
+    file: str = FILE,
+    seconds: float | None = typer.Option(
+        None, "--seconds", min=0.1, help="How long; by default until Ctrl-C."
+    ),
+    out: Path | None = typer.Option(
+        None, "--out", metavar="FILE", help="A bundle (.zip), or the log alone (.log)."
+    ),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+) -> None:
+    """Record every frame on the buses of a deployment; nothing is sent.
+
+    Makes a bundle for a bug report: the log, the deployment file with its DBC files, versions, and
+    what the status messages told. `canshaper replay BUNDLE` replays it. Begin before what is to be
+    seen, best before the daemon starts: what an axis did before is not in the log.
+
+    Ctrl-C or SIGTERM end it. Exit code 0, 1 when the bundle or the log cannot be written, 2 when
+    the deployment is wrong, 3 when a bus cannot be opened or read.
+
+    Examples:
+
+      canshaper record config/forwarder.yaml
+
+      canshaper record machine.yaml --seconds 600 --out stop-at-the-tree.zip
+
+      canshaper record machine.yaml --out drive.log
+    """
+    from canshaper.can.bus import BusError
+    from canshaper.capture.record import Recording
+    from canshaper.config.source import DeploymentError
+
+    out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
+    if out.suffix not in (".zip", ".log"):
+        raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
+    log = out if out.suffix == ".log" else out.with_suffix(".log")
+    try:
+        deployment = loader(file, interface, channel)()
+    except DeploymentError as error:
+        raise fail(error) from None
+    console = Console(stderr=True)
+    recording = Recording(deployment)
+    failure: Exception | None = None
+    code = EXIT_NO_BUS
+    stop = _Stop()
+    try:
+        with Live(console=console, refresh_per_second=4) as live:
+
+            def tell(so_far: "Recording") -> bool:
+                live.update(_line(so_far, log))
+                return not stop.asked
+
+            recording.run(log, seconds, tell)
+            live.update(_line(recording, log))
+    except BusError as error:
+        failure = error
+    except OSError as error:
+        failure, code = ValueError(f"{log}: {error.strerror or error}"), EXIT_NOT_WRITTEN
+    if recording.frames and out != log:  # what there is is worth having, whatever came then
+        _bundle(deployment, recording, log, out, failure)
+    if failure is not None:
+        raise fail(failure, code)
+    if not recording.frames:
+        typer.echo("nothing was heard: is the bus up, and the machine on?", err=True)
+    typer.echo(f"{out}: {_text(recording)}")
+
+
+def _bundle(
+    deployment: "Deployment",
+    recording: "Recording",
+    log: Path,
+    out: Path,
+    failure: Exception | None,
+) -> None:
+    """Put everything into one file; the log goes once it is in there."""
+    from canshaper.capture.bundle import pack
+
+    facts = {
+        "seconds": round(recording.seconds, 3),
+        "frames": {kind or "data": count for kind, count in recording.frames.items()},
+        "lost_by_the_kernel": recording.lost,
+        "ended": str(failure) if failure else "as asked",
+    }
+    try:
+        pack(out, log, deployment, recording.history, facts)
+    except OSError as error:
+        text = f"{error.filename or out}: {error.strerror or error}; the log is {log}"
+        raise fail(ValueError(text), EXIT_NOT_WRITTEN) from None
+    log.unlink()
+
+
+class _Stop:
+    """Asked for by SIGTERM or SIGINT; a second time nobody waits any more."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+        signal.signal(number, signal.SIG_DFL)
+
+
+def _line(recording: "Recording", log: Path) -> str:
+    return f"recording to {log}: {_text(recording)} (Ctrl-C ends it)"
+
+
+def _text(recording: "Recording") -> str:
+    text = f"{recording.seconds:.1f} s, {recording.frames.total()} frames"
+    others = ", ".join(f"{count} {kind}" for kind, count in recording.frames.items() if kind)
+    text += f" ({others})" if others else ""
+    return f"{text}, {recording.lost} LOST by the kernel" if recording.lost else text

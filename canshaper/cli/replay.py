@@ -1,0 +1,243 @@
+"""``canshaper replay``: what would canshaper have done with this drive?"""
+
+import gc
+import json
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
+    from canshaper.capture.replay import Drive
+    from canshaper.capture.report import Replayed
+
+EXIT_DIFFERENT = 1
+DAEMON, CLOCK = "daemon", "clock"
+# Lines on standard output; all of them are in the folder.
+MOST_EVENTS = 12
+
+
+def replay(
+    log: Path = typer.Argument(..., help="candump .log, .asc, .blf, .mf4, .csv, each also .gz;"
+    " or a bundle of canshaper record."),
+    configs: list[str] | None = typer.Option(
+        None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
+        " its own by default."
+    ),
+    channel: list[str] | None = typer.Option(
+        None, "--channel", metavar="BUS=CHANNEL", help="Channel of the log that is a bus."
+    ),
+    out: Path = typer.Option(Path("out/replay"), "--out", help="Folder for what is made."),
+    ticks: str | None = typer.Option(
+        None, "--ticks", help="daemon: the ticks of the daemon that the log is of; clock: a steady"
+        " clock. By default daemon where its frames are in the log."
+    ),
+    verify: bool = typer.Option(
+        False, "--verify", help="Exit code 1 when the daemon has sent anything else."
+    ),
+    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Table and picture from here."),
+    end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
+) -> None:  # fmt: skip
+    """Drive the controller with the joystick frames of a log, at full speed.
+
+    Writes what would have been sent as a new log (candump), the events, a picture and all numbers;
+    prints a table. Where the log has the frames that canshaper sent itself, its ticks are found
+    again and every frame is compared. Nothing is sent on any bus.
+
+    Exit code 0, with --verify 1 when anything is different, 2 when log or deployment are wrong.
+
+    Examples:
+
+      canshaper replay drive.log --config config/forwarder.yaml
+
+      canshaper replay drive.blf --config machine.yaml --channel crane=1
+
+      canshaper replay drive.asc --config machine.yaml --config robust.yaml --out out/compare
+
+      canshaper replay recording.zip --verify
+    """
+    from canshaper.capture.bundle import unpack
+    from canshaper.capture.frames import LogError
+    from canshaper.config.source import DeploymentError
+
+    if ticks not in (None, DAEMON, CLOCK):
+        raise typer.BadParameter(f"found {ticks}, allowed are {DAEMON} and {CLOCK}")
+    console = Console()
+    with tempfile.TemporaryDirectory() as folder:
+        try:
+            if log.suffix.lower() == ".zip":
+                log, own = unpack(log, Path(folder))
+                configs = configs or [str(own)]
+            if not configs:
+                raise typer.BadParameter("--config is missing: which deployment?")
+            replays = _run(log, configs, _channels(channel or []), ticks, (begin_s, end_s), out)
+            for one in replays:
+                one.measure()
+        except (LogError, DeploymentError) as error:
+            raise fail(error) from None
+        except OSError as error:
+            text = f"{error.filename or out}: {error.strerror or error}"
+            raise fail(ValueError(text)) from None
+        except KeyboardInterrupt:
+            typer.echo("interrupted; what was written so far stays", err=True)
+            raise typer.Exit(130) from None
+    different = _show(replays, out, console)
+    if verify and different:
+        raise typer.Exit(EXIT_DIFFERENT)
+
+
+def _run(
+    log: Path,
+    configs: list[str],
+    channels: dict[str, str],
+    ticks: str | None,
+    window: tuple[float, float | None],
+    out: Path,
+) -> "list[Replayed]":
+    """Replay every deployment, one after the other."""
+    from canshaper.capture.frames import LogError
+    from canshaper.capture.replay import look
+    from canshaper.capture.report import Replayed
+
+    loads = [loader(config) for config in configs]
+    names = _names([deployment_path(config) for config in configs])
+    deployments = [load() for load in loads]
+    for deployment in deployments:
+        if unknown := channels.keys() - deployment.config.buses.keys():
+            buses = ", ".join(deployment.config.buses)
+            text = f"--channel: found the bus {', '.join(unknown)}, allowed are {buses}"
+            raise LogError(text)
+    drives = [look(deployment, log, channels) for deployment in deployments]
+    out.mkdir(parents=True, exist_ok=True)
+    replays: list[Replayed] = []
+    for name, load, deployment, drive in zip(names, loads, deployments, drives, strict=True):
+        if ticks == DAEMON and not drive.daemon:
+            raise LogError(f"{log}: --ticks daemon: found {drive.why_not}")
+        by_daemon = drive.daemon and ticks != CLOCK
+        with _progress(name) as tell, _without_collector():
+            replays.append(_one(name, load, deployment, drive, by_daemon, window, out, tell))
+    return replays
+
+
+def _one(
+    name: str,
+    load: "Callable[[], Deployment]",
+    deployment: "Deployment",
+    drive: "Drive",
+    by_daemon: bool,
+    window: tuple[float, float | None],
+    out: Path,
+    tell: Callable[[float], None],
+) -> "Replayed":
+    """Replay one deployment, and write its log and its events."""
+    from canshaper.capture.replay import Replay
+    from canshaper.capture.report import Replayed
+    from canshaper.capture.trace import Trace
+    from canshaper.capture.write import LogWriter
+
+    replay = Replay(load, drive, by_daemon=by_daemon)
+    done = Replayed(name, deployment, replay, Trace(deployment, *window))
+    channel_of = {bus: channel for channel, bus in drive.channels.items()}
+    number = None
+    with (
+        (out / f"{name}.log").open("w", encoding="ascii") as log,
+        (out / f"{name}.events.txt").open("w", encoding="utf-8") as events,
+    ):
+        writer = LogWriter(log, channel_of)
+        for tick, result in replay.run(tell):
+            done.ticks += 1
+            if number is not None and tick.number > number:
+                done.missed += tick.number - number - 1
+            number = tick.number
+            writer.write(tick, result)
+            done.trace.add(tick, result)
+            for text in result.events:
+                done.events.append((tick.now_ns, text))
+                events.write(f"{(tick.now_ns - (done.trace.start_ns or 0)) / 1e9:.3f} {text}\n")
+    replay.check_levers()
+    return done
+
+
+def _show(replays: "list[Replayed]", out: Path, console: Console) -> bool:
+    """Print and write everything; whether anything was not the same as in the log."""
+    from canshaper.capture.report import print_replays, verdict_lines
+
+    first = replays[0]
+    seconds = (first.trace.end_ns - (first.trace.start_ns or 0)) / 1e9
+    console.print(f"{seconds:.1f} s of driving.", highlight=False)
+    for one in replays:
+        console.print(f"{one.name}: {one.replay.ticks_of()}", highlight=False, soft_wrap=True)
+        for warning in one.replay.warnings():
+            console.print(f"WARNING: {one.name}: {warning}", style="yellow", highlight=False)
+        if one.trace.full:
+            console.print(f"{one.name}: table and picture are of the first {one.trace.rows} ticks.")
+    print_replays(replays, console)
+    for one in replays:
+        for time_ns, text in one.events[:MOST_EVENTS]:
+            after_s = (time_ns - (one.trace.start_ns or 0)) / 1e9
+            console.print(f"{after_s:9.3f} s {one.name} {text}", highlight=False, soft_wrap=True)
+        if len(one.events) > MOST_EVENTS:
+            more = len(one.events) - MOST_EVENTS
+            console.print(f"  and {more} more in {out / one.name}.events.txt", highlight=False)
+        for line in verdict_lines(one, examples=len(replays) == 1):
+            console.print(line, highlight=False, soft_wrap=True)
+    data = {one.name: one.as_dict() for one in replays}
+    (out / "replay.json").write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    made = [f"{one.name}.log" for one in replays] + ["replay.json"]
+    try:
+        from canshaper.capture.plot import draw
+    except ImportError:
+        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
+    else:
+        if all(one.trace.rows > 1 for one in replays):
+            draw(replays, out / "replay.png")
+            made.append("replay.png")
+    console.print(f"Written to {out}: {', '.join(made)}", highlight=False, soft_wrap=True)
+    return any(one.replay.verdict.different for one in replays)
+
+
+def _names(paths: list[Path]) -> list[str]:
+    """A name for each deployment, different ones for different files."""
+    stems = [path.stem for path in paths]
+    return [
+        stem if stems.count(stem) == 1 else f"{stem}-{stems[: i + 1].count(stem)}"
+        for i, stem in enumerate(stems)
+    ]
+
+
+def _channels(given: list[str]) -> dict[str, str]:
+    """Channels by bus from BUS=CHANNEL."""
+    found = {}
+    for item in given:
+        bus, mark, channel = item.partition("=")
+        if not mark:
+            raise typer.BadParameter(f"found {item!r}, allowed is --channel BUS=CHANNEL")
+        found[bus] = channel
+    return found
+
+
+@contextmanager
+def _progress(name: str) -> Iterator[Callable[[float], None]]:
+    console = Console(stderr=True)
+    columns = (TextColumn(name), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=console, transient=True) as progress:
+        task = progress.add_task("", total=1.0)
+        yield lambda part: progress.update(task, completed=part)
+
+
+@contextmanager
+def _without_collector() -> Iterator[None]:
+    """A replay makes no rings of objects; to look for them takes a tenth of the time."""
+    gc.disable()
+    try:
+        yield
+    finally:
+        gc.enable()

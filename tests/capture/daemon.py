@@ -1,0 +1,107 @@
+"""A daemon on paper: the controller with a clock of its own, late ticks, and a bus that is logged.
+
+Everything that makes it hard to read a log: frames that come while the daemon thinks, ticks that
+are late or missing, clocks that drift apart.
+"""
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from canshaper.can.binding import Deployment
+from canshaper.can.frame import Frame
+from canshaper.service.controller import Controller
+from canshaper.service.exchange import stall_ns
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import script_named
+
+START_NS = 1_763_750_000_000_000_000
+
+
+@dataclass
+class Hardness:
+    """What makes it hard.
+
+    Attributes:
+        think_ns: from reading to the valve frame, at most.
+        late_ns: of a usual tick, at most.
+        miss: how probable it is that a tick misses deadlines.
+        lever_phase_ns: when a joystick frame comes after the deadline of a tick.
+        drift: of the lever's clock against the daemon's.
+        before_s: seconds that the levers run before the daemon starts.
+        silent: from when to when after its start the levers send nothing, s.
+    """
+
+    think_ns: int = 200_000
+    late_ns: int = 100_000
+    miss: float = 0.0
+    lever_phase_ns: int = 7_000_000
+    drift: float = 0.0
+    before_s: float = 1.0
+    silent: tuple[float, float] = (0.0, 0.0)
+
+
+def log_of(
+    load: Callable[[], Deployment],
+    seed: int,
+    hardness: Hardness,
+    *,
+    seconds: float = 20.0,
+    script: str | None = None,
+) -> list[str]:
+    """Lines of the log of such a daemon from its start to its stop."""
+    chance = random.Random(seed)
+    deployment = load()
+    controller = Controller(deployment)
+    tick_ns = deployment.config.tick_ms * 1_000_000
+    axes = list(deployment.axes)
+    levers = LeverNode(load(), script_named(script or f"random-{seed}", axes))
+    lines: list[tuple[int, int, str]] = []
+    order = iter(range(10**9))
+
+    def logged(time_ns: int, frame: Frame) -> None:
+        seconds_, ns = divmod(time_ns + START_NS, 10**9)
+        text = f"({seconds_}.{ns // 1000:06d}) {frame.bus} "
+        can_id = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
+        lines.append((time_ns // 1000, next(order), f"{text}{can_id}#{frame.data.hex().upper()}\n"))
+
+    frames: list[tuple[int, Frame]] = []
+    begin_ns = round(hardness.before_s * 1e9)
+    for number in range(round((seconds + hardness.before_s) * 1000 / levers.cycle_ms)):
+        at_ns = round(number * levers.cycle_ms * 1e6 * (1 + hardness.drift))
+        at_ns += hardness.lever_phase_ns + chance.randrange(50_000)
+        quiet = hardness.silent[0] <= at_ns / 1e9 - hardness.before_s < hardness.silent[1]
+        for frame in levers.frames(number * levers.cycle_ms):
+            at_ns += 60_000
+            if not quiet:
+                frames.append((at_ns, frame))
+    for at_ns, frame in frames:
+        logged(at_ns, frame)
+    opened_ns = begin_ns - 15_000_000
+    waiting = [f for f in frames if f[0] >= opened_ns]
+    for number, frame in enumerate(controller.neutral_frames()):
+        logged(begin_ns - 4_000_000 + 50_000 * number, frame)
+    deadline = now = begin_ns
+    end_ns = begin_ns + round(seconds * 1e9)
+    while now < end_ns:
+        late = now - deadline
+        missed = max(0, late) // tick_ns
+        deadline += missed * tick_ns
+        if missed * tick_ns > stall_ns(deployment):
+            waiting = [f for f in waiting if f[0] > now]
+            controller.stalled()
+        while waiting and waiting[0][0] <= now:
+            controller.receive(waiting.pop(0)[1], now)
+        at_ns = now + chance.randrange(20_000, 20_001 + hardness.think_ns)
+        for frame in controller.tick(now, missed):
+            logged(at_ns, frame)
+            at_ns += chance.randrange(20_000, 60_000)
+        deadline += tick_ns
+        now = deadline + chance.randrange(5_000, 5_001 + hardness.late_ns)
+        if chance.random() < hardness.miss:
+            now += chance.randrange(tick_ns * 3)
+        now = max(now, at_ns)
+    for frame in controller.neutral_frames():
+        logged(at_ns, frame)
+        at_ns += 50_000
+    return [line for _, _, line in sorted(lines)]

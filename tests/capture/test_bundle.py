@@ -1,0 +1,101 @@
+"""A bundle has all that a replay needs, wherever it is unpacked."""
+
+import json
+import shutil
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.capture.bundle import history_lines, pack, unpack
+from canshaper.capture.frames import LogError
+from canshaper.capture.history import History, Told
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    """A deployment in a tree of its own, its DBC file beside the folder of the file."""
+    (tmp_path / "here" / "config").mkdir(parents=True)
+    (tmp_path / "here" / "dbc").mkdir()
+    shutil.copy(ROOT / "dbc" / "forwarder.dbc", tmp_path / "here" / "dbc")
+    path = tmp_path / "here" / "config" / "forwarder.yaml"
+    shutil.copy(ROOT / "config" / "forwarder.yaml", path)
+    return path
+
+
+def packed(machine: Path, tmp_path: Path) -> Path:
+    log = tmp_path / "some.log"
+    log.write_text("(1.0) can0 110#00\n")
+    deployment = load_deployment(machine)
+    history = History(deployment)
+    history.changes.append(Told(1_763_750_000_123_000_000, "axis=slew state=READY"))
+    history.counted_ns = 1_763_750_001_000_000_000
+    history.counters, history.last_fault = {"MissedDeadlines": 3}, "MISSED_DEADLINE"
+    bundle = tmp_path / "bundle.zip"
+    pack(bundle, log, deployment, history, {"seconds": 1.5})
+    return bundle
+
+
+def test_a_bundle_is_unpacked_to_a_deployment_that_loads(machine: Path, tmp_path: Path) -> None:
+    bundle = packed(machine, tmp_path)
+    before = machine.read_text()
+    shutil.rmtree(tmp_path / "here")
+    log, file = unpack(bundle, tmp_path / "there")
+    assert log.read_text() == "(1.0) can0 110#00\n"
+    assert file.read_text() == before
+    assert set(load_deployment(file).axes) == {"slew", "near_far", "lift"}
+    assert not list(tmp_path.glob("*.part"))
+
+
+def test_an_absolute_path_is_made_a_relative_one(machine: Path, tmp_path: Path) -> None:
+    other = tmp_path / "elsewhere"
+    other.mkdir()
+    shutil.move(tmp_path / "here" / "dbc" / "forwarder.dbc", other)
+    text = machine.read_text().replace("../dbc/forwarder.dbc", str(other / "forwarder.dbc"))
+    machine.write_text(text)
+    bundle = packed(machine, tmp_path)
+    shutil.rmtree(other)
+    _, file = unpack(bundle, tmp_path / "there")
+    assert load_deployment(file).axes
+
+
+def test_what_else_is_in_it(machine: Path, tmp_path: Path) -> None:
+    with zipfile.ZipFile(packed(machine, tmp_path)) as bundle:
+        about = json.loads(bundle.read("about.json"))
+        history = bundle.read("history.txt").decode().splitlines()
+    assert about["seconds"] == 1.5
+    assert about["buses"] == {"crane": "socketcan vcan0"}
+    assert {"canshaper", "python", "python-can", "cantools", "kernel"} <= about["versions"].keys()
+    assert history == [
+        "2025-11-21T18:33:20.123+00:00 axis=slew state=READY",
+        "2025-11-21T18:33:21.000+00:00 counters MissedDeadlines=3 last_fault=MISSED_DEADLINE",
+    ]
+
+
+def test_without_status_the_history_is_empty(machine: Path) -> None:
+    assert history_lines(History(load_deployment(machine))) == []
+
+
+def test_what_is_no_bundle_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "x.zip"
+    path.write_bytes(b"PK no zip")
+    with pytest.raises(LogError, match=r"x.zip: not a bundle: found BadZipFile"):
+        unpack(path, tmp_path / "there")
+    with zipfile.ZipFile(path, "w") as bundle:
+        bundle.writestr("readme.txt", "nothing")
+    with pytest.raises(LogError, match="not a bundle: found KeyError"):
+        unpack(path, tmp_path / "there")
+    with pytest.raises(LogError, match="not a bundle: found FileNotFoundError"):
+        unpack(tmp_path / "none.zip", tmp_path / "there")
+
+
+def test_a_bundle_cannot_point_out_of_itself(tmp_path: Path) -> None:
+    path = tmp_path / "x.zip"
+    with zipfile.ZipFile(path, "w") as bundle:
+        about = {"log": "../../etc/passwd", "deployment": "a.yaml"}
+        bundle.writestr("about.json", json.dumps(about))
+    with pytest.raises(LogError, match="a path leads out of it"):
+        unpack(path, tmp_path / "there")

@@ -1,0 +1,147 @@
+"""Recording a real daemon on python-can's multicast bus, and nothing but listening."""
+
+import json
+import os
+import select
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import can
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.capture.listen import Listener
+from canshaper.capture.record import Recording
+from canshaper.cli.app import app
+from canshaper.cli.common import loader
+
+# Of this process alone: two runs of the tests on one machine must not hear each other.
+GROUP = f"239.74.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+BUS = ("--interface", "udp_multicast", "--channel", GROUP)
+ANSWER_S = 120.0
+
+
+@contextmanager
+def running(verb: str, *options: str, log: Path) -> Iterator[subprocess.Popen[bytes]]:
+    command = [sys.executable, "-m", "canshaper", verb, "forwarder.yaml", *BUS, *options]
+    with log.open("wb") as file:
+        process = subprocess.Popen(command, stdout=file, stderr=file)
+    try:
+        yield process
+    finally:
+        process.terminate()
+        process.wait(ANSWER_S)
+
+
+def test_what_a_daemon_does_is_recorded_and_replayed_to_the_last_bit(tmp_path: Path) -> None:
+    recording = Recording(loader("forwarder.yaml", "udp_multicast", [GROUP])())
+    log = tmp_path / "drive.log"
+    until = time.monotonic() + 2 * ANSWER_S
+    with ExitStack() as processes:
+        operators: list[subprocess.Popen[bytes]] = []
+
+        def going(so_far: Recording) -> bool:
+            assert time.monotonic() < until
+            if so_far.history.axes and not operators:  # the daemon is there
+                one = running("operator", "--script", "pulse-slew", log=tmp_path / "operator")
+                operators.append(processes.enter_context(one))
+            return not operators or operators[0].poll() is None
+
+        processes.enter_context(running("run", log=tmp_path / "run"))
+        recording.run(log, None, going)
+    assert recording.lost == 0
+    texts = [told.text for told in recording.history.changes]
+    assert any(text.startswith("axis=slew state=READY") for text in texts)
+    result = CliRunner().invoke(
+        app,
+        ["replay", str(log), "--config", "forwarder.yaml", "--verify", "--out", str(tmp_path)],
+    )
+    data = json.loads((tmp_path / "replay.json").read_text())["forwarder"]
+    missed, ticks = data["missed_deadlines"], data["ticks"]
+    if missed > 0.05 * ticks:
+        pytest.skip(f"this PC is too busy for a daemon: {missed} deadlines of {ticks} were missed")
+    assert result.exit_code == 0, result.output
+    assert "every one the same to the last bit" in result.output
+
+
+def test_the_command_makes_a_bundle_and_ends_with_ctrl_c(tmp_path: Path) -> None:
+    out = tmp_path / "bundle.zip"
+    with (
+        running("operator", log=tmp_path / "operator"),
+        running("record", "--out", str(out), log=tmp_path / "record") as record,
+    ):
+        log, until = out.with_suffix(".log"), time.monotonic() + ANSWER_S
+        while not log.exists() or log.stat().st_size < 5000:
+            assert time.monotonic() < until, (tmp_path / "record").read_text()
+            time.sleep(0.05)
+        record.send_signal(signal.SIGINT)
+        assert record.wait(ANSWER_S) == 0, (tmp_path / "record").read_text()
+    assert not log.exists()
+    with zipfile.ZipFile(out) as bundle:
+        about = json.loads(bundle.read("about.json"))
+        rows = bundle.read("recording.log").decode().splitlines()
+    assert about["ended"] == "as asked"
+    assert about["frames"]["data"] == len(rows) > 100
+    assert {row.split()[2][:4] for row in rows} == {"110#", "111#"}
+    assert {row.split()[1] for row in rows} == {GROUP}
+
+
+def test_a_bus_that_cannot_be_opened_ends_with_3(tmp_path: Path) -> None:
+    arguments = ["record", "forwarder.yaml", "--interface", "nothing", "--channel", "x"]
+    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "x.zip")])
+    assert result.exit_code == 3
+    assert "bus crane: cannot open nothing channel x" in result.output
+
+
+def test_a_log_that_cannot_be_written_ends_with_1(tmp_path: Path) -> None:
+    arguments = ["record", "forwarder.yaml", *BUS, "--seconds", "0.2"]
+    result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "no" / "x.zip")])
+    assert result.exit_code == 1
+    assert "No such file or directory" in result.output
+
+
+def test_only_zip_and_log(tmp_path: Path) -> None:
+    result = CliRunner().invoke(app, ["record", "forwarder.yaml", "--out", "x.tar"])
+    assert result.exit_code == 2
+    assert "allowed are .zip and .log" in result.output
+
+
+def test_a_listener_hears_everything_and_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    sent: list[can.Message] = []
+    bus_type = can.interfaces.udp_multicast.UdpMulticastBus
+    really = bus_type.send
+    monkeypatch.setattr(bus_type, "send", lambda self, m, timeout=None: sent.append(m))
+    listener = Listener(loader("forwarder.yaml", "udp_multicast", [GROUP])().config.buses.items())
+    other = can.Bus(interface="udp_multicast", channel=GROUP, ignore_config=True)
+    wanted = [
+        can.Message(arbitration_id=0x110, is_extended_id=False, data=b"\x01\x02"),
+        can.Message(arbitration_id=0x1ABCDEF0, data=b""),
+        can.Message(arbitration_id=0x111, is_extended_id=False, is_remote_frame=True, dlc=0),
+    ]
+    try:
+        for message in wanted:
+            really(other, message)
+        heard = []
+        while len(heard) < len(wanted):
+            assert select.select([other.fileno()], [], [], ANSWER_S)[0]
+            heard += listener.frames()
+    finally:
+        listener.close()
+        other.shutdown()
+    assert [(h.can_id, h.extended, h.data, h.kind) for h in heard] == [
+        (0x110, False, b"\x01\x02", ""),
+        (0x1ABCDEF0, True, b"", ""),
+        (0x111, False, b"", "remote"),
+    ]
+    assert [h.line().split(" ", 1)[1] for h in heard] == [
+        f"{GROUP} 110#0102\n",
+        f"{GROUP} 1ABCDEF0#\n",
+        f"{GROUP} 111#R\n",
+    ]
+    assert sent == []

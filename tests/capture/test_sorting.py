@@ -1,0 +1,69 @@
+"""Channels of a log and buses of a deployment."""
+
+from dataclasses import replace
+
+import pytest
+
+from canshaper.can.binding import Deployment
+from canshaper.capture.frames import LogError
+from canshaper.capture.sorting import Kind, Sorter, bus_of_channel
+from canshaper.cli.common import loader
+
+
+@pytest.fixture(scope="module")
+def one() -> Deployment:
+    return loader("forwarder.yaml")()
+
+
+@pytest.fixture(scope="module")
+def two(one: Deployment) -> Deployment:
+    crane = one.config.buses["crane"]
+    buses = {"crane": crane, "joy": crane.model_copy(update={"channel": "can1"})}
+    return replace(one, config=one.config.model_copy(update={"buses": buses}))
+
+
+def test_the_deployments_own_channel_counts(one: Deployment, two: Deployment) -> None:
+    assert bus_of_channel(one, {"can3", "vcan0"}, {}) == {"vcan0": "crane"}
+    assert bus_of_channel(two, {"can1", "vcan0"}, {}) == {"vcan0": "crane", "can1": "joy"}
+
+
+def test_then_the_name_of_the_bus_then_the_only_one(one: Deployment) -> None:
+    assert bus_of_channel(one, {"can3", "crane"}, {}) == {"crane": "crane"}
+    assert bus_of_channel(one, {"can3"}, {}) == {"can3": "crane"}
+    assert bus_of_channel(one, {""}, {}) == {"": "crane"}
+
+
+def test_what_the_command_line_says_goes_first(one: Deployment, two: Deployment) -> None:
+    assert bus_of_channel(one, {"can3", "vcan0"}, {"crane": "can3"}) == {"can3": "crane"}
+    assert bus_of_channel(two, {"1", "2"}, {"crane": "2", "joy": "1"}) == {"2": "crane", "1": "joy"}
+
+
+def test_a_bus_without_a_channel_is_told_with_what_there_is(
+    one: Deployment, two: Deployment
+) -> None:
+    with pytest.raises(LogError, match="bus crane: found the channels 'can3', 'can4' in the log"):
+        bus_of_channel(one, {"can3", "can4"}, {})
+    with pytest.raises(LogError, match="none is 'can9'; allowed is --channel crane=CHANNEL"):
+        bus_of_channel(one, {"can3"}, {"crane": "can9"})
+    with pytest.raises(LogError, match="found channel 'can3', which is that of bus crane"):
+        bus_of_channel(two, {"can3"}, {"crane": "can3", "joy": "can3"})
+
+
+def test_what_a_frame_is_to_the_daemon(one: Deployment) -> None:
+    sorter = Sorter(one)
+    kinds = {
+        0x110: Kind.TAKEN,  # a lever
+        0x200: Kind.SENT,  # a valve
+        0x300: Kind.SENT,  # a status
+        0x310: Kind.SENT,
+        0x400: Kind.IGNORED,  # known to the DBC file, and nothing to the daemon
+        0x123: Kind.OTHER,  # unknown: read when the valves have been told
+    }
+    assert {i: sorter.kind(("crane", i, False)) for i in kinds} == kinds
+    assert sorter.kind(("crane", 0x110, True)) is Kind.OTHER
+
+
+def test_other_interfaces_than_socketcan_have_one_queue(one: Deployment) -> None:
+    bus = one.config.buses["crane"].model_copy(update={"interface": "udp_multicast"})
+    config = one.config.model_copy(update={"buses": {"crane": bus}})
+    assert Sorter(replace(one, config=config)).kind(("crane", 0x123, False)) is Kind.TAKEN
