@@ -7,14 +7,14 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-machines test-faults test-service lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
+.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
 	@touch $@
 
 .venv/test-ready: pyproject.toml tools/venv.sh
-	tools/venv.sh tools,dev
+	tools/venv.sh tools,studio,dev
 	@touch $@
 
 .venv/fuzz-ready: pyproject.toml tools/venv.sh
@@ -42,6 +42,10 @@ test-faults: .venv/test-ready
 # The package and its units under a real systemd.
 test-service: .venv/test-ready
 	.venv/bin/python -m tests.lane.services
+
+# The live page in a real browser: Debian's Chromium.
+test-studio: .venv/test-ready
+	CANSHAPER_BROWSER=1 .venv/bin/python -m pytest tests/studio
 
 lint: .venv/test-ready
 	.venv/bin/ruff check
@@ -80,6 +84,7 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/lockstep.py
+	.venv/bin/python benchmarks/replay.py
 	.venv/bin/python benchmarks/tune.py
 	.venv/bin/python benchmarks/frames.py
 	.venv/bin/python benchmarks/kilohertz.py

@@ -14,11 +14,15 @@ from canshaper.cli import (
     doctor,
     identify,
     init,
+    monitor,
+    record,
+    replay,
     reproduce,
     robust,
     run,
     set,
     sim,
+    studio,
     tune,
 )
 from canshaper.cli.common import EXIT_WITHOUT_TOOLS, INSTALL_TOOLS, TOOLS
@@ -56,8 +60,12 @@ app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
 app.command("demo")(demo.demo)
 app.command("identify")(identify.identify)
+app.command("replay")(replay.replay)
+app.command("record")(record.record)
+app.command("monitor")(monitor.monitor)
 app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)
+app.command("studio")(studio.studio)
 app.command("compare")(compare.compare)
 app.command("tune")(tune.tune)
 app.command("robust")(robust.robust)
@@ -71,6 +79,8 @@ def main() -> None:
         app(prog_name="canshaper")
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
+        install = INSTALL_TOOLS if name in TOOLS else studio.INSTALL
+        if name not in (*TOOLS, *studio.NEEDS):
             raise
         typer.echo(f"this command needs {name}, which is missing: {install}", err=True)
         sys.exit(EXIT_WITHOUT_TOOLS)

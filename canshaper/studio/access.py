@@ -1,0 +1,70 @@
+"""Who may see the page, and who may open its connection. Pure: headers in, a fault out.
+
+A browser lets any page of the web send requests to this machine, so being on loopback is not
+enough: the name that was asked for (Host) has to be one of ours, or else another name could be made
+to point here, and a connection has to come from our own page (Origin). From other machines a token
+is needed too.
+"""
+
+import ipaddress
+import secrets
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+LOOPBACK = ("127.0.0.1", "localhost", "[::1]")
+
+
+@dataclass(frozen=True)
+class Access:
+    """The rules.
+
+    Args:
+        port: of the server.
+        names: host names besides loopback and, with a token, any IP address.
+        token: the secret that a page has to show; None on loopback.
+    """
+
+    port: int
+    names: tuple[str, ...] = ()
+    token: str | None = None
+
+    @property
+    def cookie(self) -> str:
+        """Name of the cookie that keeps the token; browsers share them between ports."""
+        return f"canshaper-studio-{self.port}"
+
+    def host_fault(self, host: str) -> str | None:
+        """Why a request for this host is refused, or None."""
+        name, colon, port = host.rpartition(":")
+        if not colon or port.endswith("]"):
+            name, port = host, "80"
+        known = name in LOOPBACK or name in self.names or (self.token and _is_address(name))
+        if not known or port != str(self.port):
+            return f"found the host {host[:60]!r}; open the address that canshaper studio printed"
+        return None
+
+    def origin_fault(self, host: str, origin: str | None) -> str | None:
+        """Why a connection from this origin is refused, or None."""
+        if origin != f"http://{host}":
+            found = f"found the origin {origin[:60]!r}" if origin else "found no origin"
+            return f"{found}; only the page of this studio may connect"
+        return None
+
+    def token_fault(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> str | None:
+        """Why a request without the right token is refused, or None."""
+        if self.token is None:
+            return None
+        for shown in (query.get("token"), cookies.get(self.cookie)):
+            if shown and secrets.compare_digest(shown.encode(), self.token.encode()):
+                return None
+        return (
+            "found no token, or a wrong one; open the whole address that canshaper studio printed"
+        )
+
+
+def _is_address(name: str) -> bool:
+    try:
+        ipaddress.ip_address(name.removeprefix("[").removesuffix("]"))
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,149 @@
+"""The driver's seat: which page drives, and what its sticks count for. No clock, no sockets.
+
+Nothing moves by accident: a page that falls silent, sends nonsense or is replaced by another one
+has its sticks put in neutral, and they count again only after they were in neutral. Enable is
+released when the run-on of the axes is over, so that they come to rest through the filter; only a
+page that was silent and comes back in time, with its sticks in neutral, keeps it.
+"""
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, TypeGuard
+
+from canshaper.studio.hand import Held
+
+SILENT_S = 0.2
+"""A page that drives sends every 20 ms."""
+RELEASE_S = 3.0
+"""From sticks in neutral to enable released: the longest usual run-on after release."""
+RESET_S = 0.3
+"""How long the reset switch is held: some messages of a lever."""
+NEUTRAL = 0.02
+"""Below it a stick of the page counts as neutral."""
+
+Tell = Callable[[str], None]
+
+
+class NonsenseError(ValueError):
+    """What a page sent is no message; says what was found and what is allowed."""
+
+
+def is_number(value: object) -> TypeGuard[int | float]:
+    """Whether a value of a JSON message is a number."""
+    return isinstance(value, int | float) and not isinstance(value, bool)
+
+
+class Cab:
+    """The seat of one driver.
+
+    Args:
+        axes: axes that have a stick.
+        tell: called with what is to be told of the driver.
+    """
+
+    def __init__(self, axes: Iterable[str], tell: Tell) -> None:
+        self._axes = frozenset(axes)
+        self._tell = tell
+        self.driver: int | None = None
+        self.enable = False
+        self.anti_sway = True
+        self._sticks: dict[str, float] = {}
+        self._centred = False  # seen in neutral since they last stopped counting
+        self._heard_s = 0.0
+        self._release_at_s: float | None = None
+        self._silent = False  # why enable is about to be released
+        self._reset_until_s = -math.inf
+
+    def take(self, page: int, now_s: float) -> None:
+        """Let a page drive; a driver that is there loses the sticks, and enable is released."""
+        if page == self.driver:
+            return
+        if self.driver is not None:
+            self._tell(f"page {page} takes the sticks from page {self.driver}")
+            self._let_go(now_s)
+        self.driver = page
+        self._heard_s = now_s
+        self._centred = False
+
+    def leave(self, page: int, now_s: float) -> None:
+        """A page has gone, or has to let go."""
+        if page == self.driver:
+            self._tell(f"page {page} leaves the sticks; they go to neutral")
+            self._let_go(now_s)
+            self.driver = None
+
+    def sticks(self, page: int, sticks: Mapping[str, Any], now_s: float) -> None:
+        """Take the positions of all sticks; those of a page that does not drive count for nothing.
+
+        Raises:
+            NonsenseError: they are no positions.
+        """
+        for name, value in sticks.items():
+            if name not in self._axes:
+                allowed = ", ".join(sorted(self._axes))
+                raise NonsenseError(f"found the stick {name[:20]!r}, there are {allowed}")
+            if not (is_number(value) and -1.0 <= value <= 1.0):  # false of NaN, too
+                found = repr(value)[:20]
+                raise NonsenseError(f"found {found} for the stick {name}, allowed is -1 to 1")
+        if page != self.driver:
+            return
+        self._watch(now_s)
+        self._heard_s = now_s
+        if all(abs(value) <= NEUTRAL for value in sticks.values()):
+            self._centred = True
+            if self._silent:
+                self._silent, self._release_at_s = False, None
+                self._tell(f"page {page} is back")
+        self._sticks = {n: float(v) for n, v in sticks.items()} if self._centred else {}
+
+    def nonsense(self, page: int, now_s: float) -> None:
+        """A page has sent what it should not: it loses the sticks until they are in neutral."""
+        if page == self.driver:
+            self._let_go(now_s)
+
+    def press_enable(self, page: int, on: bool, now_s: float) -> None:
+        """Press or release the enable switch; released, everything stops at once."""
+        if page != self.driver:
+            return
+        if not on:
+            self._sticks, self._centred, self._silent = {}, False, False
+            self.enable, self._release_at_s = False, None
+        elif self._release_at_s is None or now_s >= self._release_at_s:
+            self.enable, self._release_at_s = True, None
+
+    def press_reset(self, page: int, now_s: float) -> None:
+        """Press the reset switch for a moment."""
+        if page == self.driver:
+            self._reset_until_s = now_s + RESET_S
+
+    def switch_anti_sway(self, page: int, on: bool) -> None:
+        """Move the anti-sway switch."""
+        if page == self.driver and on is not self.anti_sway:
+            self.anti_sway = on
+            self._tell(f"anti-sway switched {'on' if on else 'off'}")
+
+    def held(self, now_s: float) -> Held:
+        """What the hand does now."""
+        self._watch(now_s)
+        reset = now_s < self._reset_until_s
+        return Held(dict(self._sticks), self.enable, reset, self.anti_sway)
+
+    def _watch(self, now_s: float) -> None:
+        """Let go when the driver is silent; release enable when it is time."""
+        silent = self.driver is not None and now_s - self._heard_s > SILENT_S
+        if silent and self.enable and self._release_at_s is None:
+            self._tell(f"page {self.driver} is silent; sticks in neutral")
+            self._let_go(now_s)
+            self._silent = True
+        elif silent:
+            self._sticks, self._centred = {}, False
+        if self._release_at_s is not None and now_s >= self._release_at_s:
+            self._release_at_s, self._silent = None, False
+            if self.enable:
+                self.enable = False
+                self._tell("enable released")
+
+    def _let_go(self, now_s: float) -> None:
+        self._sticks, self._centred, self._silent = {}, False, False
+        if self.enable and self._release_at_s is None:
+            self._release_at_s = now_s + RELEASE_S

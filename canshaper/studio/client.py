@@ -1,0 +1,197 @@
+"""One open page: what it sends, checked, and what it is shown, thirty times a second."""
+
+import asyncio
+import json
+import time
+from collections.abc import Callable
+from typing import Any
+
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from canshaper.control.client import ControlError
+from canshaper.studio.cab import Cab, NonsenseError, is_number
+from canshaper.studio.stage import Stage
+
+SHOW_S = 1.0 / 30.0
+MOST_PER_S = 120
+"""Messages a second that a page may send for long; its sticks are 50."""
+BURST = 240
+"""Messages at once: what a page sends after a stall."""
+MOST_NONSENSE = 20
+"""Refused messages after which a page is closed."""
+MOST_BYTES = 2048
+"""Of one message; sticks take less than 200."""
+
+# RFC 6455, 5.5.1 and 7.4.1
+MOST_REASON = 123
+POLICY_VIOLATION = 1008
+TRY_AGAIN_LATER = 1013
+
+Action = Callable[[Cab, float], None]
+
+
+class Client:
+    """A page on its connection.
+
+    Args:
+        socket: the connection, accepted.
+        stage: what it drives and watches.
+        number: tells pages apart.
+        hello: what it is told first.
+    """
+
+    def __init__(self, socket: WebSocket, stage: Stage, number: int, hello: dict[str, Any]) -> None:
+        self._socket = socket
+        self._stage = stage
+        self._number = number
+        self._hello = hello
+        self._refusals: list[str] = []
+        self._nonsense = 0
+        self._closed = False
+        self._allowance = float(BURST)
+        self._filled_s = time.monotonic()
+        self._wanted: dict[str, float] = {}
+        self._slid = asyncio.Event()
+
+    async def serve(self) -> None:
+        """Serve the page until it is gone."""
+        tasks = [asyncio.create_task(t) for t in (self._receive(), self._show(), self._slide())]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            ends = await asyncio.gather(*tasks, return_exceptions=True)
+            self._stage.with_cab(lambda cab, now_s: cab.leave(self._number, now_s))
+        for end in ends:
+            # Sending fails once the page has gone, or was closed; all else is a fault of ours.
+            usual = isinstance(end, asyncio.CancelledError | WebSocketDisconnect)
+            if isinstance(end, BaseException) and not usual and not self._closed:
+                raise end
+
+    # -- from the page -------------------------------------------------------------------------
+
+    async def _receive(self) -> None:
+        while True:
+            message = await self._socket.receive()
+            if message["type"] == "websocket.disconnect":
+                return
+            if why := self._too_fast():
+                await self._close(why)
+                return
+            try:
+                self._take(message.get("text"))
+            except NonsenseError as error:
+                self._stage.with_cab(lambda cab, now_s: cab.nonsense(self._number, now_s))
+                self._refusals.append(str(error))
+                self._nonsense += 1
+                if self._nonsense >= MOST_NONSENSE:
+                    await self._close(f"{MOST_NONSENSE} messages were no messages; last: {error}")
+                    return
+
+    def _too_fast(self) -> str | None:
+        """Why a page that has just sent a message is closed, or None."""
+        now_s = time.monotonic()
+        self._allowance = min(BURST, self._allowance + MOST_PER_S * (now_s - self._filled_s))
+        self._filled_s = now_s
+        self._allowance -= 1.0
+        return (
+            f"too many messages; allowed are {MOST_PER_S} a second" if self._allowance < 0 else None
+        )
+
+    def _take(self, text: str | None) -> None:
+        """Do what a message asks for.
+
+        Raises:
+            NonsenseError: it is none.
+        """
+        message = parsed(text)
+        number = self._number
+        if (sticks := message.get("sticks")) is not None:
+            if not isinstance(sticks, dict):
+                raise NonsenseError("found sticks that are no object")
+            self._stage.with_cab(lambda cab, now_s: cab.sticks(number, sticks, now_s))
+        elif (word := message.get("do")) is not None:
+            self._stage.with_cab(_action(word, number))
+        elif isinstance(on := message.get("antisway"), bool):
+            self._stage.with_cab(lambda cab, _: cab.switch_anti_sway(number, on))
+        else:
+            name, factor = message.get("slide"), message.get("to")
+            known = isinstance(name, str) and name in self._stage.sliders
+            if not known or not is_number(factor):
+                raise NonsenseError("found no message that is known")
+            self._wanted[str(name)] = factor
+            self._slid.set()
+
+    async def _slide(self) -> None:
+        """Pass on where the sliders are, the last position only; a daemon takes its time."""
+        while True:
+            await self._slid.wait()
+            self._slid.clear()
+            while self._wanted:
+                name = next(iter(self._wanted))
+                factor = self._wanted.pop(name)
+                if self._stage.snapshot()["driver"] != self._number:
+                    self._refusals.append("only the page that drives may move the sliders")
+                    continue
+                try:
+                    await asyncio.to_thread(self._stage.slide, name, factor)
+                except (ValueError, ControlError) as error:
+                    self._refusals.append(str(error))
+
+    # -- to the page ---------------------------------------------------------------------------
+
+    async def _show(self) -> None:
+        """Send what there is to see; a page that is slow gets fewer pictures, never old ones."""
+        await self._send({"hello": {**self._hello, "page": self._number}})
+        last = 0
+        while True:
+            shown = self._stage.snapshot()
+            events = self._stage.events.since(last)
+            if events:
+                last = events[-1].number
+                shown["events"] = [list(event) for event in events]
+            if self._refusals:
+                shown["refused"], self._refusals = self._refusals[-5:], []
+            await self._send(shown)
+            await asyncio.sleep(SHOW_S)
+
+    async def _send(self, what: dict[str, Any]) -> None:
+        await self._socket.send_text(json.dumps(what, separators=(",", ":")))
+
+    async def _close(self, why: str) -> None:
+        self._stage.events.add("page", f"page {self._number} is closed: {why}", "warn")
+        self._stage.with_cab(lambda cab, now_s: cab.nonsense(self._number, now_s))
+        self._closed = True
+        reason = why.encode()[:MOST_REASON].decode(errors="ignore")
+        await self._socket.close(POLICY_VIOLATION, reason)
+
+
+def parsed(text: str | None) -> dict[str, Any]:
+    """A message of a page.
+
+    Raises:
+        NonsenseError: it is no JSON object.
+    """
+    if text is None:
+        raise NonsenseError("found bytes, allowed is JSON")
+    try:
+        message = json.loads(text)
+    except (ValueError, RecursionError):
+        raise NonsenseError(f"found {text[:40]!r}, allowed is JSON") from None
+    if not isinstance(message, dict):
+        raise NonsenseError(f"found {text[:40]!r}, allowed is an object")
+    return message
+
+
+def _action(word: object, number: int) -> Action:
+    actions: dict[object, Action] = {
+        "take": lambda cab, now_s: cab.take(number, now_s),
+        "leave": lambda cab, now_s: cab.leave(number, now_s),
+        "enable": lambda cab, now_s: cab.press_enable(number, True, now_s),
+        "release": lambda cab, now_s: cab.press_enable(number, False, now_s),
+        "reset": lambda cab, now_s: cab.press_reset(number, now_s),
+    }
+    if not isinstance(word, str) or word not in actions:
+        raise NonsenseError(f"found {str(word)[:20]!r}, allowed are {', '.join(map(str, actions))}")
+    return actions[word]

@@ -1,0 +1,185 @@
+"""One simulated crane behind a real daemon: the processes, their bus, and what they tell."""
+
+import contextlib
+import json
+import os
+import re
+import socket
+import subprocess
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.config.load import load_config
+from canshaper.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
+from canshaper.studio.sliders import adjustable, sliders
+from canshaper.studio.view import Tell
+from canshaper_sim.processes import Transport
+
+STOP_LIMIT_S = 10.0
+# From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
+RESTART_S = 1.0
+_LATE = re.compile(r"\blate (\d+) us")
+# A child ends with its parent (prctl(2), PR_SET_PDEATHSIG): the daemon leaves the valves neutral.
+_CODE = (
+    "import ctypes, os, signal, sys;"
+    "ctypes.CDLL(None).prctl(1, signal.SIGTERM);"
+    "sys.exit(1) if os.getppid() != int(sys.argv.pop(1)) else None;"
+    "from canshaper.cli.app import main; main()"
+)
+CANSHAPER = (sys.executable, "-c", _CODE, str(os.getpid()))
+"""How ``canshaper`` is started, tied to this process."""
+
+
+def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
+    """A copy of a deployment file whose numbers the sliders may change.
+
+    Args:
+        path: the file.
+        directory: where the copy is written.
+
+    Raises:
+        DeploymentError: the file is not valid.
+    """
+    load_deployment(path)  # its own problems, with its own lines
+    config, source = load_config(path)
+    data = dict(source.data)
+    data["dbc"] = [str(path.resolve().parent / name) for name in config.dbc]
+    ranges = adjustable(sliders(config))
+    if config.control:
+        ranges |= config.control.adjustable
+    if ranges:
+        data["control"] = {"socket": str(directory / "control.sock"), "adjustable": ranges}
+    copy = directory / path.name
+    copy.write_text(json.dumps(data, indent=1), encoding="utf-8")  # JSON is YAML
+    return copy, load_deployment(copy)
+
+
+@dataclass
+class Child:
+    """A process, or when it starts again."""
+
+    command: list[str]
+    log: Path
+    process: subprocess.Popen[bytes] | None = None
+    start_at_s: float = 0.0
+
+
+class Crane:
+    """``canshaper sim`` and ``canshaper run`` on a bus of their own, started again when they end.
+
+    Args:
+        name: of the crane, for logs and sockets.
+        file: the deployment file.
+        transport: the bus.
+        directory: for logs and sockets; it has to outlive this object.
+        tell: called with what happens to the processes.
+        changes: parameters of the crane, NAME=VALUE.
+        program: how the daemon is started; a benchmark puts its own around it.
+
+    Attributes:
+        control: control socket of the daemon.
+        starts: how often the daemon was started.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        file: Path,
+        transport: Transport,
+        directory: Path,
+        *,
+        tell: Tell,
+        changes: Sequence[str] = (),
+        program: Sequence[str] = CANSHAPER,
+    ) -> None:
+        self.control = directory / f"{name}.sock"
+        self._tell = tell
+        self._stopping = False
+        self.starts = 0
+        bus = ["--interface", transport.interface, "--channel", transport.channel]
+        run = ["run", str(file), *bus]
+        if load_config(file)[0].control:
+            run += ["--control", str(self.control)]
+        sim = ["sim", str(file), *bus, *(word for c in changes for word in ("--set", c))]
+        self._children = {
+            "sim": Child([*CANSHAPER, *sim], directory / f"{name}-sim.log"),
+            "run": Child([*program, *run], directory / f"{name}-run.log"),
+        }
+        # What the daemon tells its service manager once a second.
+        self._status = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
+        self._status_path = directory / f"{name}-notify.sock"
+        self._status.bind(str(self._status_path))
+
+    def check(self, now_s: float) -> None:
+        """Start what does not run and is due; tell of what has ended."""
+        for verb, child in self._children.items():
+            if child.process is None:
+                if now_s >= child.start_at_s and not self._stopping:
+                    self._start(verb, child, now_s)
+            elif (status := child.process.poll()) is not None:
+                child.process, child.start_at_s = None, now_s + RESTART_S
+                if not self._stopping:
+                    last = _last_line(child.log)
+                    text = f"canshaper {verb} ended with status {status}; it starts again. {last}"
+                    self._tell(text.strip(), "bad")
+
+    def _start(self, verb: str, child: Child, now_s: float) -> None:
+        environment = {**os.environ, "NOTIFY_SOCKET": str(self._status_path)}
+        if verb != "run":
+            del environment["NOTIFY_SOCKET"]
+        try:
+            with child.log.open("wb") as log:
+                child.process = subprocess.Popen(
+                    child.command, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=environment
+                )
+        except OSError as error:
+            child.start_at_s = now_s + RESTART_S
+            self._tell(f"canshaper {verb} cannot start: {error.strerror}; tried again", "bad")
+            return
+        self.starts += verb == "run"
+        # The daemon as its unit does it, the crane as little delayed as the levers: where that is
+        # permitted. A browser that draws without a graphics card takes every processor.
+        priority = LOOP_PRIORITY if verb == "run" else LEVERS_PRIORITY
+        with contextlib.suppress(OSError):
+            os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
+
+    def late_us(self) -> int | None:
+        """Largest lateness of a tick in the last second, when the daemon has told one."""
+        late = None
+        with contextlib.suppress(BlockingIOError):
+            while True:
+                text = self._status.recv(4096).decode(errors="replace")
+                if match := _LATE.search(text):
+                    late = int(match[1])
+        return late
+
+    def stop(self) -> None:
+        """End both; the daemon goes first and leaves the valves neutral."""
+        self._stopping = True
+        for verb in ("run", "sim"):
+            process = self._children[verb].process
+            if process is None:
+                continue
+            process.terminate()
+            try:
+                process.wait(STOP_LIMIT_S)
+            except subprocess.TimeoutExpired:
+                process.kill()
+                process.wait()
+        self._status.close()
+
+
+def _last_line(log: Path) -> str:
+    lines = log.read_text(errors="replace").strip().splitlines()
+    return lines[-1][:200] if lines else ""
+
+
+def groups(count: int) -> list[Transport]:
+    """Multicast groups of this process alone: two studios on one machine do not meet."""
+    pid = os.getpid()  # at most 2 ** 22
+    first = 100 + count * (pid // 65536) % 128
+    names = [f"239.{first + i}.{pid // 256 % 256}.{pid % 256}" for i in range(count)]
+    return [Transport("udp_multicast", name, "udp_multicast (python-can)") for name in names]

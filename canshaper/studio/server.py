@@ -1,0 +1,173 @@
+"""The web server of the page: files, and one connection a page. No internet at run time."""
+
+import itertools
+import socket
+from pathlib import Path
+from typing import Any
+
+import uvicorn
+from starlette.applications import Starlette
+from starlette.datastructures import URL, Headers, MutableHeaders
+from starlette.requests import HTTPConnection
+from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
+from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.staticfiles import StaticFiles
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+from starlette.websockets import WebSocket
+
+from canshaper import __version__
+from canshaper.studio.access import Access
+from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
+from canshaper.studio.sliders import RANGES
+from canshaper.studio.stage import MACHINE, Stage
+from canshaper.studio.view import SWAY_OF
+from canshaper_sim.crane import CraneParameters
+
+STATIC = Path(__file__).parent / "static"
+MOST_PAGES = 8
+SHUTDOWN_S = 2
+HEADERS = {
+    # Whatever a page loads comes from here; uPlot sets styles of its elements.
+    "Content-Security-Policy": "default-src 'self'; style-src 'self' 'unsafe-inline';"
+    " img-src 'self' data: blob:; connect-src 'self'; frame-ancestors 'none'; base-uri 'none'",
+    "X-Content-Type-Options": "nosniff",
+    "Referrer-Policy": "no-referrer",
+    "Cache-Control": "no-cache",
+}
+
+
+def build_app(stage: Stage, access: Access, parameters: CraneParameters) -> ASGIApp:
+    """The page of a stage.
+
+    Args:
+        stage: what is driven or watched.
+        access: who may.
+        parameters: the crane that is drawn.
+    """
+    hello = _hello(stage, parameters)
+    numbers = itertools.count(1)
+    open_pages: set[int] = set()
+
+    async def page(_request: HTTPConnection) -> Response:
+        return FileResponse(STATIC / "index.html")
+
+    async def connection(websocket: WebSocket) -> None:
+        await websocket.accept()
+        if len(open_pages) >= MOST_PAGES:
+            await websocket.close(TRY_AGAIN_LATER, f"{MOST_PAGES} pages are open already")
+            return
+        number = next(numbers)
+        open_pages.add(number)
+        try:
+            await Client(websocket, stage, number, hello).serve()
+        finally:
+            open_pages.discard(number)
+
+    routes = [
+        Route("/", page),
+        WebSocketRoute("/ws", connection),
+        Mount("/static", StaticFiles(directory=STATIC)),
+    ]
+    return Guard(Starlette(routes=routes), access)
+
+
+class Guard:
+    """Lets nobody in who may not, and puts the headers of every answer."""
+
+    def __init__(self, app: ASGIApp, access: Access) -> None:
+        self._app = app
+        self._access = access
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        """Serve one request or connection."""
+        if scope["type"] not in ("http", "websocket"):
+            await self._app(scope, receive, send)
+            return
+        connection = HTTPConnection(scope)
+        fault = self._fault(scope, connection)
+        if fault is None and scope["type"] == "http" and "token" in connection.query_params:
+            answer: Response = RedirectResponse("/", 303)  # the secret leaves the address line
+            token = self._access.token or ""
+            answer.set_cookie(self._access.cookie, token, httponly=True, samesite="strict")
+            await answer(scope, receive, _with_headers(send))
+        elif fault is None:
+            await self._app(scope, receive, _with_headers(send))
+        elif scope["type"] == "http":
+            await PlainTextResponse(f"{fault}\n", 403)(scope, receive, send)
+        else:
+            answer = PlainTextResponse(f"{fault}\n", 403)
+            await WebSocket(scope, receive, send).send_denial_response(answer)
+
+    def _fault(self, scope: Scope, connection: HTTPConnection) -> str | None:
+        headers = Headers(scope=scope)
+        host = headers.get("host", "")
+        fault = self._access.host_fault(host)
+        fault = fault or self._access.token_fault(connection.query_params, connection.cookies)
+        if not fault and scope["type"] == "websocket":
+            fault = self._access.origin_fault(host, headers.get("origin"))
+        return fault
+
+
+def _with_headers(send: Send) -> Send:
+    async def sending(message: Message) -> None:
+        if message["type"] == "http.response.start":
+            MutableHeaders(scope=message).update(HEADERS)
+        await send(message)
+
+    return sending
+
+
+def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
+    """What a page is told first: what there is, and how long the links are."""
+    joints, grapple = parameters.joints, parameters.grapple
+    return {
+        "version": __version__,
+        "file": stage.deployment.path.name,
+        "axes": list(stage.deployment.axes),
+        "sway_of": SWAY_OF,
+        "cranes": list(stage.cranes),
+        "drives": stage.cab is not None,
+        "machine": MACHINE in stage.cranes,
+        "boom": joints.boom._asdict(),
+        "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
+        "sliders": {
+            name: {"range": RANGES[name], "numbers": [list(n) for n in _numbers(stage, name)]}
+            for name in stage.sliders
+        },
+    }
+
+
+def _numbers(stage: Stage, name: str) -> list[tuple[str, float, float]]:
+    return [(n.key, n.value, n.power) for n in stage.sliders[name]]
+
+
+def listening(host: str, port: int) -> socket.socket:
+    """A socket that the server listens on.
+
+    Raises:
+        OSError: the address cannot be used.
+    """
+    family = socket.AF_INET6 if ":" in host else socket.AF_INET
+    return socket.create_server((host, port), family=family, backlog=64)
+
+
+def address(host: str, port: int, token: str | None) -> str:
+    """What to open in the browser."""
+    name = f"[{host}]" if ":" in host else host
+    query = f"?token={token}" if token else ""
+    return str(URL(f"http://{name}:{port}/{query}"))
+
+
+def server(app: ASGIApp) -> uvicorn.Server:
+    """The server; ``run(sockets=[...])`` serves until it is stopped."""
+    config = uvicorn.Config(
+        app,
+        log_level="error",
+        ws="websockets-sansio",
+        ws_max_size=MOST_BYTES,
+        lifespan="off",
+        proxy_headers=False,
+        server_header=False,
+        timeout_graceful_shutdown=SHUTDOWN_S,
+    )
+    return uvicorn.Server(config)

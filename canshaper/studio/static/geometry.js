@@ -1,0 +1,48 @@
+// Where the parts of a crane are: metres, z upwards, the boom in the plane of radius and height.
+// As in sim/canshaper_sim/kinematics.py and grapple.py.
+
+const RAD = Math.PI / 180;
+const COMFORT = 0.94; // of the reach: a straight arm is hardly ever driven
+
+/** Pivots of the boom as [radius, height]: lift joint, knuckle, telescope, tip. */
+export function boomPoints(boom, pose, joints) {
+  const start = [boom.pillar_offset_m, boom.pillar_m];
+  if (joints) {
+    const [lift, knuckle] = [joints[0] * RAD, joints[1] * RAD];
+    return fromJoints(boom, start, lift, knuckle, joints[2]);
+  }
+  // Only the tip is known: an arm that reaches it, folded upwards, its telescope as far out as needed.
+  const out = pose[1] - start[0];
+  const up = pose[2] - start[1];
+  const distance = Math.hypot(out, up);
+  const outer = Math.max(boom.outer_boom_m, distance / COMFORT - boom.main_boom_m);
+  const main = boom.main_boom_m;
+  const fold = Math.acos(clamp((distance ** 2 - main ** 2 - outer ** 2) / (2 * main * outer)));
+  const lift = Math.atan2(up, out) + Math.atan2(outer * Math.sin(fold), main + outer * Math.cos(fold));
+  return fromJoints({ ...boom, knuckle_offset_m: 0 }, start, lift, -fold, outer - boom.outer_boom_m);
+}
+
+function fromJoints(boom, start, lift, knuckle, extension) {
+  const turn = lift + knuckle;
+  const [s, c] = [Math.sin(turn), Math.cos(turn)];
+  const elbow = [start[0] + boom.main_boom_m * Math.cos(lift), start[1] + boom.main_boom_m * Math.sin(lift)];
+  const base = [elbow[0] + boom.knuckle_offset_m * s, elbow[1] - boom.knuckle_offset_m * c];
+  const along = (length) => [base[0] + length * c, base[1] + length * s];
+  return { start, elbow, base, end: along(boom.outer_boom_m), tip: along(boom.outer_boom_m + extension) };
+}
+
+/** Link joint and grapple relative to the tip, as [outwards, in slew direction, upwards]. */
+export function grapplePoints(grapple, sway) {
+  const across = (sway?.[0] ?? 0) * RAD;
+  const along = (sway?.[1] ?? 0) * RAD;
+  const { l1, l2 } = grapple;
+  const l3 = l1 + l2 * Math.cos(along);
+  return {
+    joint: [0, l1 * Math.sin(across), -l1 * Math.cos(across)],
+    grapple: [-l2 * Math.sin(along), l3 * Math.sin(across), -l3 * Math.cos(across)],
+  };
+}
+
+function clamp(value) {
+  return Math.max(-1, Math.min(1, value));
+}

@@ -1,0 +1,132 @@
+// States, events, sliders and the large numbers.
+
+const MOST_EVENTS = 300;
+const SHOW_MS = 150; // nobody reads faster
+const CRANE = { shaped: "shaped", raw: "raw", machine: "machine" };
+const WORDS = {
+  calm: ["Filter", "fast", "calm"],
+  length: ["Pendulum length that the filter believes", "shorter", "longer"],
+};
+
+const make = (tag, attributes = {}, ...children) => {
+  const element = document.createElement(tag);
+  for (const [key, value] of Object.entries(attributes)) {
+    if (key in element) element[key] = value;
+    else element.setAttribute(key, value);
+  }
+  element.append(...children);
+  return element;
+};
+const set = (element, text) => {
+  if (element.textContent !== text) element.textContent = text;
+};
+
+export class Panel {
+  constructor(hello, slide) {
+    this.hello = hello;
+    this.shownAt = -SHOW_MS;
+    this.cells = {};
+    const body = document.querySelector("#axes tbody");
+    body.replaceChildren(make("tr", {}, make("th"), ...hello.cranes.map((c) => make("th", { className: `from-${c}` }, CRANE[c]))));
+    for (const axis of hello.axes) {
+      const row = make("tr", {}, make("td", {}, axis.replace("_", "-")));
+      for (const crane of hello.cranes) {
+        const state = make("span", { className: "state" });
+        const reason = make("div", { className: "quiet" });
+        this.cells[`${crane} ${axis}`] = { state, reason };
+        row.append(make("td", {}, state, reason));
+      }
+      body.append(row);
+    }
+    const swings = document.getElementById("swings");
+    this.swings = Object.fromEntries([...hello.cranes].reverse().map((crane) => [crane, make("b", { id: `swing-${crane}` }, "–")]));
+    swings.replaceChildren(...Object.entries(this.swings).map(([crane, number]) => {
+      const box = make("div", { className: "swing" }, `${CRANE[crane]}: swing now`, number);
+      box.style.setProperty("--color", `var(--${crane === "raw" ? "raw" : "shaped"})`);
+      return box;
+    }));
+    this.buildSliders(slide);
+    document.getElementById("events").replaceChildren();
+  }
+
+  buildSliders(slide) {
+    this.sliders = {};
+    const host = document.getElementById("sliders");
+    host.replaceChildren();
+    for (const [name, { range, numbers }] of Object.entries(this.hello.sliders)) {
+      const [title, low, high] = WORDS[name];
+      // By its logarithm: half and double are as far from the middle.
+      const input = make("input", { type: "range", id: `slider-${name}`, min: Math.log2(range[0]), max: Math.log2(range[1]), step: 0.01, value: 0 });
+      const value = make("b");
+      const found = make("span", { className: "numbers" });
+      const factor = () => Math.min(range[1], Math.max(range[0], 2 ** input.value));
+      const tell = (f) => {
+        set(value, `× ${f.toFixed(2)}`);
+        const byAxis = {};
+        for (const [key, v, p] of numbers) {
+          const [, axis, , number] = key.split(".");
+          (byAxis[axis.replace("_", "-")] ??= []).push(`${number.replace(/_(s|m|rad_s)$/, "")} ${(v * f ** p).toPrecision(3)}`);
+        }
+        set(found, Object.entries(byAxis).map(([axis, all]) => `${axis} ${all.join(" ")}`).join(" · "));
+      };
+      input.addEventListener("input", () => {
+        this.touched = performance.now();
+        tell(factor());
+        slide(name, factor());
+      });
+      const label = make("label", { htmlFor: input.id }, `${title} `, value);
+      host.append(make("div", { className: "slider" }, label, input,
+        make("div", { className: "ends" }, make("span", {}, low), found, make("span", {}, high))));
+      this.sliders[name] = { input, tell };
+      tell(1);
+    }
+    if (!host.children.length && this.hello.drives) {
+      host.append(make("p", { className: "quiet" }, "No filter of this deployment has numbers for sliders."));
+    }
+  }
+
+  show(shown, mine) {
+    const now = performance.now();
+    if (now - this.shownAt < SHOW_MS && mine === this.mine) return;
+    this.shownAt = now;
+    this.mine = mine;
+    for (const [name, crane] of Object.entries(shown.cranes)) {
+      set(this.swings[name], crane.swing == null || !crane.sway ? "–" : `±${crane.swing.toFixed(1)}°`);
+      for (const [axis, values] of Object.entries(crane.axes)) {
+        const { state, reason } = this.cells[`${name} ${axis}`];
+        set(state, values.state ?? (crane.daemon ? "not told" : "daemon silent"));
+        state.dataset.level = values.level;
+        set(reason, values.reason ?? "");
+      }
+    }
+    for (const [name, { input, tell }] of Object.entries(this.sliders)) {
+      input.disabled = !mine;
+      // While a hand is on it, it shows what is wanted; then what the daemon has.
+      if (performance.now() - (this.touched ?? -1e9) > 1000) {
+        input.value = Math.log2(shown.sliders[name]);
+        tell(shown.sliders[name]);
+      }
+    }
+    const first = Object.values(shown.cranes)[0];
+    const late = first?.late_us == null ? "" : `daemon: latest tick of the last second ${(first.late_us / 1000).toFixed(2)} ms, ${first.missed} missed`;
+    set(document.getElementById("late"), late);
+    const silent = Object.entries(shown.cranes).filter(([, crane]) => !crane.crane).map(([name]) => name);
+    let note = "";
+    if (silent.length) {
+      note = this.hello.drives
+        ? `Not heard: the crane (${silent.join(", ")}); its pose is not measured, its sway that of the model`
+        : "Position and sway are not on the bus: pose not measured, sway that of the model";
+    }
+    set(document.getElementById("note"), note);
+  }
+
+  event(time, source, text, level) {
+    const list = document.getElementById("events");
+    const stamp = new Date(time * 1000).toTimeString().slice(0, 8);
+    const down = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
+    list.append(make("li", {}, make("time", {}, stamp), make("span", { className: `source from-${source}` }, source),
+      make("span", { className: level }, text)));
+    while (list.children.length > MOST_EVENTS) list.firstChild.remove();
+    if (down) list.scrollTop = list.scrollHeight;
+  }
+}

@@ -1,0 +1,145 @@
+// Where the sticks are: mouse on two pads, keyboard, gamepad. The largest deflection counts.
+
+const RAMP_S = 0.12; // a hand moves a stick from neutral to full in that time
+const FINE = 0.4; // with Shift
+const GAMEPAD_DEAD = 0.1;
+const SVG = "http://www.w3.org/2000/svg";
+
+// Four ways of two pads: axis of the deployment by its number, sign of right or up, keys, gamepad.
+const WAYS = [
+  { pad: 0, way: "x", keys: ["d", "a"], gamepad: 0 },
+  { pad: 0, way: "y", keys: ["w", "s"], gamepad: 1 },
+  { pad: 1, way: "y", keys: ["arrowup", "arrowdown"], gamepad: 3 },
+  { pad: 1, way: "x", keys: ["arrowright", "arrowleft"], gamepad: 2 },
+];
+const NAMES = { slew: ["right", "left"], near_far: ["out", "in"], lift: ["up", "down"],
+  lift_cylinder: ["up", "down"], knuckle: ["out", "in"], extension: ["out", "in"] };
+
+export class Sticks {
+  /** @param axes names of the axes, in the order of the deployment. */
+  constructor(axes, pads, keys) {
+    this.ways = axes.slice(0, 4).map((axis, i) => ({
+      axis, ...WAYS[i], key: 0, mouse: 0,
+      // Positive slewing is counter-clockwise from above, to the left.
+      sign: axis === "slew" ? -1 : 1,
+    }));
+    this.down = new Set();
+    this.at = performance.now();
+    this.pads = [];
+    pads.replaceChildren();
+    for (const number of [0, 1]) {
+      const ways = this.ways.filter((w) => w.pad === number);
+      if (ways.length) pads.append(this.buildPad(number, ways));
+    }
+    const keyName = (k) => k.replace("arrow", "").replace(/^(up|down|left|right)$/,
+      (n) => ({ up: "↑", down: "↓", left: "←", right: "→" })[n]).toUpperCase();
+    keys.innerHTML = "";
+    const rows = this.ways.map((w) => [w.keys.map(keyName), `${w.axis.replace("_", "-")} ${(NAMES[w.axis] ?? ["+", "−"]).join(" / ")}`]);
+    for (const [names, text] of [...rows, [["⇧"], "gently"], [["Space"], "release enable: stop"]]) {
+      const left = document.createElement("span");
+      for (const name of names) left.append(Object.assign(document.createElement("kbd"), { textContent: name }), " ");
+      keys.append(left, Object.assign(document.createElement("span"), { textContent: text }));
+    }
+  }
+
+  buildPad(number, ways) {
+    const box = document.createElement("div");
+    box.className = "pad";
+    const svg = document.createElementNS(SVG, "svg");
+    svg.setAttribute("viewBox", "-60 -60 120 120");
+    svg.setAttribute("role", "application");
+    svg.setAttribute("aria-label", `Stick for ${ways.map((w) => w.axis).join(" and ")}; keys as shown`);
+    svg.id = `pad${number}`;
+    const add = (name, attributes) => {
+      const element = document.createElementNS(SVG, name);
+      for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+      svg.append(element);
+      return element;
+    };
+    add("rect", { class: "plate", x: -59, y: -59, width: 118, height: 118, rx: 10 });
+    if (ways.some((w) => w.way === "x")) add("line", { class: "cross", x1: -46, x2: 46, y1: 0, y2: 0 });
+    if (ways.some((w) => w.way === "y")) add("line", { class: "cross", x1: 0, x2: 0, y1: -46, y2: 46 });
+    for (const w of ways) {
+      const label = add("text", { class: "label", "text-anchor": "middle",
+        x: w.way === "x" ? 38 : 0, y: w.way === "x" ? -6 : -50 });
+      label.textContent = w.axis.replace("_", "-");
+    }
+    const knob = add("circle", { class: "knob", r: 13 });
+    const sent = add("circle", { class: "sent", r: 3.5 });
+    const move = (event) => {
+      const at = svg.getBoundingClientRect();
+      const x = ((event.clientX - at.left) / at.width - 0.5) * 2 * (60 / 46);
+      const y = -((event.clientY - at.top) / at.height - 0.5) * 2 * (60 / 46);
+      for (const w of ways) w.mouse = limited(w.way === "x" ? x : y);
+    };
+    const release = () => ways.forEach((w) => { w.mouse = 0; });
+    svg.addEventListener("pointerdown", (event) => {
+      svg.setPointerCapture(event.pointerId);
+      move(event);
+    });
+    svg.addEventListener("pointermove", (event) => {
+      if (svg.hasPointerCapture(event.pointerId)) move(event);
+    });
+    for (const name of ["pointerup", "pointercancel", "lostpointercapture"]) svg.addEventListener(name, release);
+    this.pads.push({ ways, knob, sent });
+    box.append(svg);
+    return box;
+  }
+
+  /** Take a key; whether it moves a stick. */
+  press(key, isDown) {
+    const known = this.ways.some((w) => w.keys.includes(key));
+    if (isDown && (known || key === "shift")) this.down.add(key);
+    else this.down.delete(key);
+    return known;
+  }
+
+  /** Let go of everything: the page has lost the focus. */
+  release() {
+    this.down.clear();
+    for (const w of this.ways) w.mouse = 0;
+  }
+
+  /** Positions now, -1 .. 1 by axis. */
+  read() {
+    const now = performance.now();
+    const step = Math.min(0.1, (now - this.at) / 1000) / RAMP_S;
+    this.at = now;
+    const gamepad = [...(navigator.getGamepads?.() ?? [])].find((g) => g?.connected);
+    const found = {};
+    for (const w of this.ways) {
+      const aim = (this.down.has(w.keys[0]) - this.down.has(w.keys[1])) * (this.down.has("shift") ? FINE : 1);
+      w.key += limited(aim - w.key, step);
+      let pad = gamepad?.axes[w.gamepad] ?? 0;
+      if (w.way === "y") pad = -pad;
+      pad = Math.abs(pad) < GAMEPAD_DEAD ? 0 : (pad - Math.sign(pad) * GAMEPAD_DEAD) / (1 - GAMEPAD_DEAD);
+      const all = [w.key, w.mouse, limited(pad)];
+      w.now = all.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
+      found[w.axis] = Math.round(w.now * w.sign * 1000) / 1000;
+    }
+    return found;
+  }
+
+  /** Draw the knobs where the hand is, and what counts of it. */
+  draw(counted) {
+    for (const { ways, knob, sent } of this.pads) {
+      for (const w of ways) {
+        const own = (w.now ?? 0) * 46;
+        const there = (counted?.[w.axis]?.stick ?? 0) * w.sign * 46;
+        const key = w.way === "x" ? "cx" : "cy";
+        place(knob, key, w.way === "x" ? own : -own);
+        place(sent, key, w.way === "x" ? there : -there);
+      }
+    }
+  }
+}
+
+/** Change an attribute only where it is another: each change draws the pad anew. */
+function place(element, key, value) {
+  const text = value.toFixed(1);
+  if (element.getAttribute(key) !== text) element.setAttribute(key, text);
+}
+
+function limited(value, most = 1) {
+  return Math.max(-most, Math.min(most, value));
+}

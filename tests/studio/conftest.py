@@ -1,0 +1,222 @@
+"""A studio as a user starts it, and a page without a browser."""
+
+import json
+import os
+import re
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.sync.client import ClientConnection, connect
+
+from canshaper.can.bus import Port, open_port
+from canshaper.can.frame import Frame
+from canshaper.config.schema import Bus
+
+# Only to end a test that hangs.
+WAIT_S = 60.0
+HERE = Path(__file__).parent
+ROOT = HERE.parents[1]
+
+
+def free_groups() -> tuple[str, str]:
+    """Two multicast groups that no other test of this machine uses: named after a free port."""
+    with socket.create_server(("127.0.0.1", 0)) as one:
+        port = one.getsockname()[1]
+    return f"239.250.{port // 256}.{port % 256}", f"239.251.{port // 256}.{port % 256}"
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    if "CANSHAPER_BROWSER" in os.environ:
+        return
+    skip = pytest.mark.skip(reason="takes minutes in a real browser: run make test-studio")
+    for item in items:
+        if item.path == HERE / "test_browser.py":  # this hook sees the items of all directories
+            item.add_marker(skip)
+
+
+class Studio:
+    """``canshaper studio`` as a process."""
+
+    def __init__(self, *options: str, file: str = "forwarder.yaml") -> None:
+        self.groups = free_groups()
+        self._command = [sys.executable, "-m", "canshaper", "studio", file, "--port", "0"]
+        self._command += ["--interface", "udp_multicast", *options]
+        if "--shadow" not in options:
+            self._command += [word for g in self.groups for word in ("--channel", g)]
+        else:
+            self._command += ["--channel", self.groups[0]]
+        self.start()
+
+    def start(self, port: int = 0) -> None:
+        """Start it, at a port."""
+        command = [str(port) if w == "0" else w for w in self._command]
+        self.process = subprocess.Popen(
+            command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
+        )
+        assert self.process.stdout
+        self.first_line = self.process.stdout.readline()
+        found = re.search(r"open (http://([^/]+):(\d+)/\S*)", self.first_line)
+        assert found, self.first_line + self.process.stdout.read()
+        self.url, self.port = found[1], int(found[3])
+        self.host = f"127.0.0.1:{self.port}"
+
+    def children(self, verb: str | None = None) -> list[int]:
+        """Its processes, those that run a verb."""
+        path = f"/proc/{self.process.pid}/task"
+        found = []
+        for task in Path(path).iterdir():
+            found += [int(pid) for pid in (task / "children").read_text().split()]
+        return sorted(pid for pid in found if verb is None or verb in command_of(pid))
+
+    @contextmanager
+    def page(self, **options: Any) -> Iterator["Page"]:
+        """A page that is connected."""
+        options = {"origin": f"http://{self.host}", "open_timeout": WAIT_S, **options}
+        options["max_queue"] = None  # a page that is not looked at can still be closed
+        with connect(f"ws://{self.host}/ws", **options) as connection:
+            yield Page(connection)
+
+    def stop(self) -> str:
+        """End it as a service manager does; what it printed. It has to end well."""
+        children = self.children()
+        self.process.send_signal(signal.SIGTERM)
+        out, _ = self.process.communicate(timeout=WAIT_S)
+        assert self.process.returncode == 0, out
+        assert not any(Path(f"/proc/{pid}").exists() for pid in children)
+        return str(out)
+
+
+def command_of(pid: int) -> list[str]:
+    """Words of a process' command line; none where it has gone."""
+    try:
+        return Path(f"/proc/{pid}/cmdline").read_text().split("\0")
+    except OSError:
+        return []
+
+
+class Page:
+    """What a page does, without a browser."""
+
+    def __init__(self, connection: ClientConnection) -> None:
+        self.connection = connection
+        self.events: list[list[Any]] = []
+        self.refused: list[str] = []
+        self.sticks: dict[str, float] | None = None
+        hello = json.loads(connection.recv(timeout=WAIT_S))["hello"]
+        self.hello: dict[str, Any] = hello
+        self.shown = self.look()
+
+    def send(self, **message: Any) -> None:
+        """Send one message."""
+        self.connection.send(json.dumps(message))
+
+    def look(self) -> dict[str, Any]:
+        """The next picture; a hand that holds the sticks goes on holding them."""
+        self.shown = json.loads(self.connection.recv(timeout=WAIT_S))
+        self.events += self.shown.get("events", [])
+        self.refused += self.shown.get("refused", [])
+        if self.sticks is not None:
+            self.send(sticks=self.sticks)
+        return self.shown
+
+    def until(self, condition: Callable[[dict[str, Any]], bool], what: str = "") -> dict[str, Any]:
+        """Look until something is so."""
+        limit = time.monotonic() + WAIT_S
+        while not condition(self.look()):
+            assert time.monotonic() < limit, f"{what} not within {WAIT_S} s: {self.shown}"
+        return self.shown
+
+    def now(self) -> dict[str, Any]:
+        """What is to be seen now; a page that was not looked at for a while has old pictures."""
+        now_s = time.monotonic()  # the studio's clock, too
+        return self.until(lambda s: s["t"] >= now_s, "now")
+
+    def for_s(self, duration_s: float) -> list[dict[str, Any]]:
+        """Every picture of so long, by the clock of the studio."""
+        end = self.shown["t"] + duration_s
+        found = []
+        while self.shown["t"] < end:
+            found.append(self.look())
+        return found
+
+    def drive(self) -> None:
+        """Take the sticks and press enable, with the axes ready."""
+        self.until(lambda s: all(c["daemon"] and c["crane"] for c in s["cranes"].values()))
+        self.send(do="take")
+        self.sticks = dict.fromkeys(self.hello["axes"], 0.0)
+        self.until(lambda s: s["driver"] == self.hello["page"], "driver")
+        self.until(lambda s: not s["enable"], "enable released by the last one")
+        self.send(do="enable")
+        self.until(lambda s: self.states() == {"ready"}, "axes ready")
+
+    def states(self) -> set[str]:
+        """Levels of all axes."""
+        return {axis["level"] for c in self.shown["cranes"].values() for axis in c["axes"].values()}
+
+    def texts(self) -> list[str]:
+        """What happened."""
+        return [event[3] for event in self.events]
+
+
+@pytest.fixture(scope="session")
+def shared() -> Iterator[Studio]:
+    """One studio for the tests that leave it as it was."""
+    studio = Studio()
+    try:
+        yield studio
+    finally:
+        studio.stop()
+
+
+@pytest.fixture
+def own() -> Iterator[Callable[..., Studio]]:
+    """Starts studios for one test."""
+    started: list[Studio] = []
+
+    def start(*options: str, **more: Any) -> Studio:
+        started.append(Studio(*options, **more))
+        return started[-1]
+
+    try:
+        yield start
+    finally:
+        for studio in started:
+            if studio.process.poll() is None:
+                studio.stop()
+
+
+class Listener:
+    """Somebody else on a bus: every frame there."""
+
+    def __init__(self, group: str) -> None:
+        bus = Bus(interface="udp_multicast", channel=group)
+        self.port: Port = open_port("crane", bus, lambda _: None)
+
+    def frames(self) -> list[Frame]:
+        """What has come since the last look."""
+        found: list[Frame] = []
+        while some := list(self.port.frames()):
+            found += some
+        return found
+
+
+@pytest.fixture
+def listen() -> Iterator[Callable[[str], Listener]]:
+    """Opens listeners."""
+    opened: list[Listener] = []
+
+    def open_one(group: str) -> Listener:
+        opened.append(Listener(group))
+        return opened[-1]
+
+    yield open_one
+    for one in opened:
+        one.port.close()

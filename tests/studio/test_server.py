@@ -1,0 +1,433 @@
+"""The real server with real daemons and cranes, and pages that behave and that do not."""
+
+import json
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.error
+import urllib.request
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from pathlib import Path
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed, InvalidStatus
+from websockets.sync.client import connect
+
+from canshaper.can.binding import load_deployment
+from canshaper.studio.client import MOST_BYTES, MOST_NONSENSE, MOST_PER_S
+from canshaper.studio.hand import Hand, Held
+from canshaper.studio.server import MOST_PAGES
+from tests.studio.conftest import ROOT, WAIT_S, Listener, Page, Studio, command_of
+
+NONSENSE = [
+    "",
+    "x",
+    "{",
+    "[]",
+    "null",
+    "0.5",
+    '"take"',
+    "{}",
+    '{"do": "go"}',
+    '{"do": 1}',
+    '{"do": ["take"]}',
+    '{"sticks": 1}',
+    '{"sticks": {"slew": 2}}',
+    '{"sticks": {"slew": NaN}}',
+    '{"sticks": {"slew": 1e999}}',
+    '{"sticks": {"slew": "1"}}',
+    '{"sticks": {"tower": 1}}',
+    '{"antisway": 1}',
+    '{"slide": "calm", "to": "fast"}',
+    '{"slide": "speed", "to": 1}',
+    '{"slide": "calm", "to": NaN}',
+    '{"slide": "calm", "to": 1' + "0" * 400 + "}",
+    '{"sticks": {"slew": 1' + "0" * 400 + "}}",
+    '{"sticks": {"\\ud800": 1}}',
+    '{"do": "\\ud800"}',
+    "日本" * 200,
+    "[" * 1000,
+    "\u0000",
+]
+
+
+def pose(shown: dict[str, Any]) -> list[Any]:
+    return [crane["pose"] for crane in shown["cranes"].values()]
+
+
+def valves(shown: dict[str, Any], crane: str) -> list[float]:
+    return [axis["valve"] for axis in shown["cranes"][crane]["axes"].values()]
+
+
+def settled(page: Page) -> None:
+    """Wait until no grapple swings: the tests share one machine."""
+    page.until(lambda s: all((c["swing"] or 0.0) < 0.5 for c in s["cranes"].values()), "rest")
+
+
+def test_it_shows_both_cranes(shared: Studio) -> None:
+    with shared.page() as page:
+        shown = page.until(lambda s: all(c["crane"] for c in s["cranes"].values()))
+        assert page.hello["cranes"] == ["shaped", "raw"] == list(shown["cranes"])
+        assert page.hello["axes"] == ["slew", "near_far", "lift"]
+        for crane in shown["cranes"].values():
+            assert crane["measured"] and len(crane["pose"]) == 3
+            assert {a["state"] for a in crane["axes"].values()} == {"waiting for neutral"}
+            assert {a["reason"] for a in crane["axes"].values()} == {"enable is off"}
+
+
+def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
+    own: Callable[..., Studio],
+) -> None:
+    """Half a second of slewing; then the same, with anti-sway switched off on the way."""
+    with own().page() as page:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["slew"] = 0.5
+        page.for_s(0.8)
+        page.sticks["slew"] = 0.0
+        page.until(lambda _: page.states() == {"ready"}, "at rest")
+        swings = {name: crane["swing"] for name, crane in page.for_s(3.0)[-1]["cranes"].items()}
+        assert swings["raw"] > 10.0
+        assert swings["shaped"] < swings["raw"] / 4
+        page.sticks["slew"] = 0.5
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, shaped")
+        page.send(antisway=False)
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, unshaped")
+        page.send(antisway=True)
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, shaped")
+        assert page.shown["cranes"]["raw"]["axes"]["slew"]["state"] == "moving, unshaped"
+        assert "anti-sway switched off" in page.texts()
+
+
+def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> None:
+    with own().page() as page:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["slew"] = 0.3
+        page.until(lambda s: valves(s, "shaped")[0] > 0.1)
+        page.send(slide="calm", to=2.0)
+        page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
+        assert any("axes.slew.filter.a2 = 0.48" in text for text in page.texts())
+        page.send(slide="calm", to=3.0)
+        page.until(lambda _: any("allowed is 0.5 to 2" in text for text in page.refused))
+        assert page.look()["sliders"]["calm"] == 2.0
+
+
+def test_without_a_driver_nobody_moves_the_sliders(shared: Studio) -> None:
+    with shared.page() as page:
+        page.send(slide="calm", to=2.0)
+        page.until(lambda _: any("only the page that drives" in text for text in page.refused))
+        assert page.shown["sliders"]["calm"] == 1.0
+
+
+@pytest.mark.parametrize("start", range(0, len(NONSENSE), MOST_NONSENSE - 5))
+def test_nonsense_is_refused_with_a_word_and_nothing_moves(shared: Studio, start: int) -> None:
+    with shared.page() as page:
+        page.drive()
+        settled(page)
+        before = pose(page.shown)
+        for text in NONSENSE[start : start + MOST_NONSENSE - 5]:
+            page.refused.clear()
+            page.connection.send(text)
+            page.until(lambda _: bool(page.refused), "refusal")
+            assert "found" in page.refused[0], text
+            assert valves(page.shown, "shaped") == valves(page.shown, "raw") == [0.0] * 3
+        page.for_s(0.3)
+        assert pose(page.shown) == before
+
+
+def test_bytes_are_nonsense(shared: Studio) -> None:
+    with shared.page() as page:
+        page.connection.send(b"\x00\xff" * 40)
+        page.until(lambda _: "found bytes, allowed is JSON" in page.refused)
+
+
+def test_nonsense_of_the_driver_takes_its_sticks_to_neutral(shared: Studio) -> None:
+    with shared.page() as page:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["lift"] = 0.5
+        page.until(lambda s: valves(s, "shaped")[2] > 0.3)
+        page.connection.send("nonsense")
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        # The stick is still held out, and counts for nothing; then enable goes.
+        page.until(lambda s: not s["enable"], "enable released")
+        assert valves(page.shown, "shaped")[2] == 0.0
+
+
+def test_too_much_nonsense_closes_the_page_and_the_others_go_on(shared: Studio) -> None:
+    with shared.page() as page, shared.page() as other:
+        for _ in range(MOST_NONSENSE):
+            page.connection.send("日" * 40)  # the reason of the end is as long as one may be
+        with pytest.raises(ConnectionClosed) as closed:
+            page.until(lambda _: False)
+        assert closed.value.rcvd and closed.value.rcvd.code == 1008
+        assert "no messages" in closed.value.rcvd.reason
+        other.until(lambda _: any("is closed" in text for text in other.texts()))
+
+
+def test_a_page_that_sends_too_fast_is_closed_and_its_sticks_go_to_neutral(shared: Studio) -> None:
+    with shared.page() as page, shared.page() as other:
+        page.drive()
+        message = json.dumps({"sticks": {"slew": 0.0, "near_far": 0.0, "lift": 0.5}})
+
+        def flood() -> None:
+            with suppress(ConnectionClosed, OSError):
+                while True:
+                    page.connection.send(message)
+
+        flooding = threading.Thread(target=flood)
+        flooding.start()
+        page.sticks = None
+        with pytest.raises(ConnectionClosed) as closed:
+            page.until(lambda _: False)
+        flooding.join(WAIT_S)
+        assert not flooding.is_alive()
+        assert closed.value.rcvd and closed.value.rcvd.code == 1008
+        assert f"allowed are {MOST_PER_S} a second" in closed.value.rcvd.reason
+        other.now()
+        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        other.until(lambda s: not s["enable"])
+        assert all(crane["daemon"] for crane in other.shown["cranes"].values())
+
+
+def test_a_huge_message_closes_the_page(shared: Studio) -> None:
+    with shared.page() as page:
+        page.connection.send("x" * (MOST_BYTES + 1))
+        with pytest.raises(ConnectionClosed) as closed:
+            page.until(lambda _: False)
+        assert closed.value.rcvd and closed.value.rcvd.code == 1009
+
+
+def test_a_silent_page_loses_the_sticks_then_enable(shared: Studio) -> None:
+    with shared.page() as page:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["lift"] = -0.4
+        page.until(lambda s: valves(s, "shaped")[2] < -0.2)
+        page.sticks = None
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        assert page.shown["enable"]
+        page.until(lambda s: not s["enable"])
+        # At rest by then, so it is no trip.
+        page.until(lambda _: page.states() == {"wait"}, "enable off")
+        assert any("is silent; sticks in neutral" in text for text in page.texts())
+
+
+def test_a_second_driver_stops_the_first(shared: Studio) -> None:
+    with shared.page() as page, shared.page() as other:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["lift"] = 0.4
+        page.until(lambda s: valves(s, "shaped")[2] > 0.2)
+        other.send(do="take")
+        page.until(lambda s: s["driver"] == other.hello["page"])
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        page.until(lambda s: not s["enable"], "enable released")
+        assert any("takes the sticks from" in text for text in page.texts())
+
+
+def test_a_page_that_is_closed_leaves_the_sticks_in_neutral(shared: Studio) -> None:
+    with shared.page() as other:
+        with shared.page() as page:
+            page.drive()
+            assert page.sticks is not None
+            page.sticks["lift"] = -0.4
+            page.until(lambda s: valves(s, "shaped")[2] < -0.2)
+        other.now()
+        other.until(lambda s: s["driver"] is None, "no driver")
+        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        other.until(lambda s: not s["enable"], "enable released")
+
+
+def test_pages_beyond_the_most_are_told_so(shared: Studio) -> None:
+    with ExitStack() as stack:
+        for _ in range(MOST_PAGES):
+            stack.enter_context(shared.page())
+        late = stack.enter_context(
+            connect(f"ws://{shared.host}/ws", origin=f"http://{shared.host}")
+        )
+        with pytest.raises(ConnectionClosed) as closed:
+            late.recv(timeout=WAIT_S)
+        assert closed.value.rcvd and "pages are open already" in closed.value.rcvd.reason
+    with shared.page() as page:
+        assert page.look()
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", None])
+def test_a_connection_from_elsewhere_is_refused(shared: Studio, origin: Any) -> None:
+    with (
+        pytest.raises(InvalidStatus) as refused,
+        connect(f"ws://{shared.host}/ws", origin=origin),
+    ):
+        pass
+    assert refused.value.response.status_code == 403
+    assert b"only the page of this studio" in refused.value.response.body
+
+
+@pytest.mark.parametrize("path", ["/", "/static/main.js", "/static/../server.py"])
+def test_another_host_gets_no_page(shared: Studio, path: str) -> None:
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        fetch(shared, path, Host="evil.example")
+    with refused.value as answer:
+        assert answer.code == 403
+        assert b"found the host 'evil.example'" in answer.read()
+
+
+@pytest.mark.parametrize(
+    "path", ["/static/../server.py", "/static/%2e%2e/server.py", "/etc/passwd"]
+)
+def test_nothing_but_the_page_is_served(shared: Studio, path: str) -> None:
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        fetch(shared, path)
+    with refused.value as answer:
+        assert answer.code == 404
+
+
+def test_a_request_that_is_none_harms_nobody(shared: Studio) -> None:
+    for data in (
+        b"\0\xff" * 100,
+        b"GET / HTTP/9.9\r\n\r\n",
+        b"GET /ws HTTP/1.1\r\nUpgrade: websocket",
+    ):
+        with socket.create_connection(("127.0.0.1", shared.port)) as one:
+            one.sendall(data)
+    with shared.page() as page:
+        assert page.look()
+
+
+def fetch(studio: Studio, path: str, **headers: str) -> bytes:
+    request = urllib.request.Request(f"http://{studio.host}{path}", headers=headers)
+    with urllib.request.urlopen(request, timeout=WAIT_S) as answer:
+        return bytes(answer.read())
+
+
+def test_the_page_may_load_from_here_only(shared: Studio) -> None:
+    with urllib.request.urlopen(shared.url, timeout=WAIT_S) as answer:
+        policy = answer.headers["Content-Security-Policy"]
+        text = answer.read().decode()
+    assert "default-src 'self'" in policy
+    assert "//" not in text.replace("<!doctype", "")
+
+
+def test_a_daemon_that_ends_is_told_and_starts_again(own: Callable[..., Studio]) -> None:
+    studio = own()
+    with studio.page() as page:
+        page.drive()
+        page.send(slide="calm", to=2.0)
+        page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
+        first = next(pid for pid in studio.children("run") if studio.groups[0] in command_of(pid))
+        os.kill(first, signal.SIGKILL)
+        page.until(lambda s: not s["cranes"]["shaped"]["daemon"], "silent")
+        page.until(lambda s: s["cranes"]["shaped"]["daemon"], "back")
+        assert any("canshaper run ended with status -9" in text for text in page.texts())
+        assert page.shown["cranes"]["raw"]["daemon"]
+        assert page.shown["sliders"]["calm"] == 1.0  # it has the numbers of its file
+        page.until(lambda _: page.states() == {"ready"}, "ready again")
+
+
+def test_the_processes_end_with_a_studio_that_is_killed(own: Callable[..., Studio]) -> None:
+    studio = own()
+    with studio.page() as page:
+        page.until(lambda s: all(c["daemon"] and c["crane"] for c in s["cranes"].values()))
+    children = studio.children()
+    assert len(children) == 4
+    studio.process.kill()
+    studio.process.communicate(timeout=WAIT_S)
+    limit = time.monotonic() + WAIT_S
+    while any("canshaper.cli.app" in " ".join(command_of(pid)) for pid in children):
+        assert time.monotonic() < limit
+
+
+def test_from_other_machines_a_token_is_needed(own: Callable[..., Studio]) -> None:
+    studio = own("--host", "0.0.0.0")
+    token = studio.url.partition("token=")[2]
+    assert len(token) > 20
+    with pytest.raises(urllib.error.HTTPError) as refused:
+        fetch(studio, "/")
+    with refused.value as answer:
+        assert answer.code == 403
+        assert b"found no token" in answer.read()
+    with (
+        pytest.raises(InvalidStatus) as no,
+        connect(f"ws://{studio.host}/ws", origin=f"http://{studio.host}"),
+    ):
+        pass
+    assert no.value.response.status_code == 403
+    opener = urllib.request.build_opener(urllib.request.HTTPCookieProcessor())
+    with opener.open(f"http://{studio.host}/?token={token}", timeout=WAIT_S) as answer:
+        assert b"canshaper" in answer.read()
+        assert "token" not in answer.url
+    cookie = {"Cookie": f"canshaper-studio-{studio.port}={token}"}
+    with studio.page(additional_headers=cookie) as page:
+        assert page.look()
+
+
+def test_the_shadow_shows_a_machine_and_never_sends(
+    own: Callable[..., Studio], listen: Callable[[str], Listener]
+) -> None:
+    """A hand on the bus of a machine is seen; whatever pages ask for, nothing comes from us."""
+    studio = own("--shadow")
+    assert studio.children() == []
+    machine, hand = listen(studio.groups[0]), Hand(load_deployment(ROOT / "config/forwarder.yaml"))
+    with studio.page() as page:
+        assert page.hello["cranes"] == ["machine"] and not page.hello["drives"]
+        page.send(do="take")
+        page.send(do="enable")
+        page.send(sticks={"slew": 1.0})
+        page.connection.send("nonsense")
+        page.send(slide="calm", to=1.0)
+        for frame in hand.frames(0, Held({"slew": 0.25})):
+            machine.port.send(frame)
+        page.until(lambda s: s["cranes"]["machine"]["axes"]["slew"]["stick"] == 0.25)
+        assert page.shown["driver"] is None
+        page.for_s(0.5)
+    assert machine.frames() == []
+
+
+def test_a_channel_of_a_real_machine_is_refused() -> None:
+    """Loopback is no CAN interface, and no virtual bus either."""
+    command = [sys.executable, "-m", "canshaper", "studio", "--channel", "lo"]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert "would move a real machine" in done.stderr
+
+
+def test_a_port_in_use_is_told(shared: Studio) -> None:
+    command = [sys.executable, "-m", "canshaper", "studio", "--port", str(shared.port)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 1
+    assert f"cannot serve at 127.0.0.1 port {shared.port}" in done.stderr
+
+
+def test_nothing_is_left_in_the_temporary_directory(
+    own: Callable[..., Studio], tmp_path: Path
+) -> None:
+    os.environ["TMPDIR"] = str(tmp_path)
+    try:
+        studio = own()
+    finally:
+        del os.environ["TMPDIR"]
+    assert list(tmp_path.iterdir())
+    studio.stop()
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    "file", ["forwarder-robust", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
+)
+def test_every_shipped_machine_can_be_driven(own: Callable[..., Studio], file: str) -> None:
+    with own(file=f"{file}.yaml").page() as page:
+        page.drive()
+        assert page.sticks is not None
+        page.sticks["slew"] = 0.3
+        page.until(lambda s: s["cranes"]["shaped"]["pose"][0] > 1.0, "shaped crane")
+        page.until(lambda s: s["cranes"]["raw"]["pose"][0] > 1.0, "raw crane")
+        assert page.shown["cranes"]["raw"]["axes"]["slew"]["state"] == "moving, unshaped"
+        assert page.shown["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, shaped"

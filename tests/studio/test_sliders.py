@@ -1,0 +1,94 @@
+"""Sliders as factors on numbers of the file, and the daemon's own view of them."""
+
+import math
+from pathlib import Path
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.config.sets import Feel
+from canshaper.service.adjust import Adjuster
+from canshaper.service.controller import Controller
+from canshaper.shaping.gff import poles_from_denominator
+from canshaper.studio.crane import copied
+from canshaper.studio.sliders import CALM, LENGTH, RANGES, adjustable, sliders, values
+
+CONFIG = Path(__file__).parents[2] / "config"
+FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.read_text())
+
+
+def test_calm_moves_the_poles_along_their_rays() -> None:
+    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    before, after = values(found, CALM, 1.0), values(found, CALM, 1.5)
+    place = "axes.slew.filter"
+    assert before == {n.key: n.value for n in found[CALM]}
+    old = poles_from_denominator(before[f"{place}.a1"], before[f"{place}.a2"])
+    new = poles_from_denominator(after[f"{place}.a1"], after[f"{place}.a2"])
+    for one, other in zip(sorted(old), sorted(new), strict=True):
+        assert other * 1.5 == pytest.approx(one)
+
+
+def test_length_is_that_of_the_pendulum() -> None:
+    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    after = values(found, LENGTH, 2.0)
+    assert after["axes.slew.sway.period_s"] == pytest.approx(2.356 * math.sqrt(2.0))
+    assert after["axes.near_far.sway.length_m"] == pytest.approx(2.4)
+    assert len(after) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "factor"),
+    [("calm", 2.1), ("calm", 0.4), ("calm", math.nan), ("calm", 10**400), ("speed", 1.0)],
+)
+def test_what_is_no_position_of_a_slider_is_refused(name: str, factor: float) -> None:
+    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    with pytest.raises(ValueError, match="found"):
+        values(found, name, factor)
+
+
+@pytest.mark.parametrize("file", FILES)
+def test_the_copy_of_every_shipped_file_is_a_deployment(file: str, tmp_path: Path) -> None:
+    """Same machine, with the sliders' numbers adjustable and the DBC files found."""
+    original = load_deployment(CONFIG / file)
+    path, copy = copied(CONFIG / file, tmp_path)
+    assert path.parent == tmp_path
+    same = {"dbc": original.config.dbc, "control": original.config.control}
+    assert copy.config.model_copy(update=same) == original.config
+    wanted = adjustable(sliders(original.config))
+    allowed = copy.config.control.adjustable if copy.config.control else {}
+    assert wanted.items() <= allowed.items()
+
+
+def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
+    text = (CONFIG / "forwarder.yaml").read_text()
+    text = text.replace("../dbc", str(CONFIG.parent / "dbc"))
+    text += "\ncontrol: { adjustable: { axes.slew.limits.max_pct: [50, 100] } }\n"
+    file = tmp_path / "own.yaml"
+    file.write_text(text)
+    (tmp_path / "copy").mkdir()
+    _, copy = copied(file, tmp_path / "copy")
+    assert copy.config.control
+    assert copy.config.control.adjustable["axes.slew.limits.max_pct"] == [50, 100]
+    assert "axes.slew.filter.a1" in copy.config.control.adjustable
+
+
+@pytest.mark.parametrize("name", RANGES)
+def test_the_daemon_takes_both_ends(name: str, tmp_path: Path) -> None:
+    _, deployment = copied(CONFIG / "forwarder.yaml", tmp_path)
+    adjuster = Adjuster(Controller(deployment))
+    found = sliders(deployment.config)
+    for factor in (*RANGES[name], 1.0):
+        wanted = values(found, name, factor)
+        adjuster.change(wanted)
+        table = adjuster.table()
+        assert {key: table[key]["now"] for key in wanted} == pytest.approx(wanted)
+
+
+def test_an_axis_with_feels_has_no_sliders() -> None:
+    """What is in force there changes with the machine, and the daemon refuses to adjust it."""
+    config = load_deployment(CONFIG / "forwarder.yaml").config
+    calm = Feel.model_validate({"filter": {"kind": "gff", "a1": 1.2, "a2": 0.3}})
+    slew = config.axes["slew"].model_copy(update={"feels": {"calm": calm}})
+    config = config.model_copy(update={"axes": {**config.axes, "slew": slew}})
+    keys = {number.key.split(".")[1] for numbers in sliders(config).values() for number in numbers}
+    assert keys == {"near_far"}

@@ -1,0 +1,195 @@
+"""Frames of a crane, and what the page is shown of them."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.service.counters import Counters
+from canshaper.shaping.states import Reason, State
+from canshaper.studio.hand import Hand, Held
+from canshaper.studio.view import SILENT_S, CraneView
+from canshaper.studio.words import FAULTS, REASONS, STATES, fault_words, reason_words, state_words
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import Sway
+from canshaper_sim.plant import PlantNode
+
+CONFIG = Path(__file__).parents[2] / "config"
+FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
+
+
+class Watched:
+    """A view and what it told."""
+
+    def __init__(self, name: str = "forwarder") -> None:
+        self.deployment: Deployment = load_deployment(CONFIG / f"{name}.yaml")
+        self.told: list[tuple[str, str]] = []
+        self.view = CraneView(self.deployment, lambda text, level: self.told.append((text, level)))
+
+    def take(self, frames: list[Frame], now_s: float = 0.0) -> dict[str, Any]:
+        for frame in frames:
+            self.view.receive(frame, now_s)
+        return self.view.values(now_s)
+
+    def status(
+        self, state: State, reason: Reason, sway_deg: float = 0.0, axis: str = "slew"
+    ) -> Frame:
+        codec = self.deployment.axes[axis].status
+        assert codec
+        return codec.frame(state, reason, 0.0, 0.0, sway_deg)
+
+    def valve(self, axis: str, steps: int) -> Frame:
+        bound = self.deployment.axes[axis]
+        return bound.valve.message.sender.frame({bound.config.valve.signal: steps})
+
+    def sway(self, across_deg: float, along_deg: float = 0.0) -> list[Frame]:
+        across, along = (value * 3.14159265 / 180.0 for value in (across_deg, along_deg))
+        return PlantNode(self.deployment, sway=Sway(across, along)).feedback()
+
+
+@pytest.fixture
+def watched() -> Watched:
+    return Watched()
+
+
+def test_nothing_is_known_at_the_start(watched: Watched) -> None:
+    shown = watched.view.values(0.0)
+    assert not shown["daemon"] and not shown["crane"]
+    assert shown["pose"] is shown["sway"] is shown["swing"] is None
+    assert {axis["level"] for axis in shown["axes"].values()} == {"off"}
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_sticks_of_every_kind_of_joystick(name: str) -> None:
+    watched = Watched(name)
+    sticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0), strict=False))
+    shown = watched.take(Hand(watched.deployment).frames(0, Held(sticks)))
+    found = {axis: values["stick"] for axis, values in shown["axes"].items()}
+    assert found == pytest.approx({axis: sticks.get(axis, 0.0) for axis in found}, abs=0.005)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_pose_and_joints_are_those_of_the_crane(name: str) -> None:
+    watched = Watched(name)
+    crane = CraneParameters()
+    shown = watched.take(PlantNode(watched.deployment).feedback())
+    assert shown["crane"]
+    assert shown["pose"] == pytest.approx((0.0, crane.start_radius_m, crane.start_height_m))
+    if name != "forwarder-joints":
+        assert shown["joints"] is None
+        return
+    lift, knuckle = crane.joints.boom.angles(3.0, 4.0, crane.joints.start_extension_m)
+    degrees = 180.0 / 3.14159265
+    expected = (lift * degrees, knuckle * degrees, crane.joints.start_extension_m)
+    assert shown["joints"] == pytest.approx(expected, abs=0.01)
+
+
+def test_the_valve_is_shown_as_the_speed_that_results(watched: Watched) -> None:
+    """5 % of dead band: 5 % command gives nothing, full command full speed."""
+    for steps, speed in ((0, 0.0), (6, 0.0), (-125, -1.0), (125, 1.0), (66, (0.528 - 0.05) / 0.95)):
+        shown = watched.take([watched.valve("near_far", steps)])
+        assert shown["axes"]["near_far"]["valve"] == pytest.approx(speed, abs=1e-4)
+        assert shown["axes"]["slew"]["valve"] is None
+
+
+def test_states_are_words_and_changes_are_events(watched: Watched) -> None:
+    shown = watched.take([watched.status(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)])
+    assert shown["axes"]["slew"]["state"] == "waiting for neutral"
+    assert shown["axes"]["slew"]["reason"] == "enable is off"
+    assert watched.told == []
+    watched.take([watched.status(State.READY, Reason.STICK_NEUTRAL)] * 3)
+    watched.take([watched.status(State.STOPPING, Reason.STICK_TIMEOUT)])
+    watched.take([watched.status(State.TRIPPED, Reason.ENABLE_LOST)])
+    assert watched.told == [
+        ("slew: ready — stick in neutral", "info"),
+        ("slew: stopping — no joystick message", "warn"),
+        ("slew: tripped: neutral — enable released in motion", "bad"),
+    ]
+
+
+def test_swing_is_the_largest_sway_of_the_last_period(watched: Watched) -> None:
+    watched.take(watched.sway(6.0, 8.0), 0.0)
+    assert watched.take(watched.sway(-3.0), 1.0)["swing"] == pytest.approx(10.0, abs=0.02)
+    shown = watched.take(watched.sway(1.0), 2.4)  # a period, of 2.36 s, later
+    assert shown["swing"] == pytest.approx(3.0, abs=0.02)
+    assert shown["sway"] == pytest.approx((1.0, 0.0), abs=0.01)
+
+
+def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -> None:
+    """Its lag is counted positive; across the boom the grapple then hangs to the other side."""
+    shown = watched.take(
+        [
+            watched.status(State.ACTIVE, Reason.STICK_MOVED, 4.0),
+            watched.status(State.ACTIVE, Reason.STICK_MOVED, 3.0, "near_far"),
+        ]
+    )
+    assert not shown["measured"]
+    assert shown["sway"] == pytest.approx((-4.0, 3.0))
+    assert shown["swing"] == pytest.approx(5.0)
+    assert watched.take(watched.sway(1.0))["measured"]
+
+
+def test_a_daemon_that_falls_silent_is_told_and_its_states_are_forgotten(watched: Watched) -> None:
+    watched.take([watched.status(State.READY, Reason.STICK_NEUTRAL)], 0.0)
+    watched.view.told(120)
+    watched.view.check(0.0)
+    watched.view.check(SILENT_S - 0.01)
+    assert watched.view.values(0.1)["late_us"] == 120
+    watched.view.check(SILENT_S)
+    watched.view.check(SILENT_S + 1.0)
+    shown = watched.view.values(SILENT_S + 1.0)
+    assert not shown["daemon"] and shown["late_us"] is None
+    assert shown["axes"]["slew"]["state"] is None
+    watched.take([watched.status(State.NEUTRAL_WAIT, Reason.START)], 2.0)
+    watched.view.check(2.0)
+    assert [level for _, level in watched.told] == ["info", "bad", "info"]
+
+
+def test_a_crane_that_falls_silent_is_told_and_its_sway_is_measured_no_more(
+    watched: Watched,
+) -> None:
+    watched.take(watched.sway(20.0), 0.0)
+    watched.view.check(0.0)
+    assert watched.view.values(0.0)["measured"]
+    watched.view.check(SILENT_S)
+    shown = watched.view.values(SILENT_S)
+    assert not shown["crane"] and not shown["measured"]
+    assert shown["sway"] is shown["swing"] is None
+    assert shown["pose"] is not None
+    assert [level for _, level in watched.told] == ["bad"]
+
+
+def test_faults_are_told_once(watched: Watched) -> None:
+    codec = watched.deployment.status
+    assert codec
+    counters = Counters()
+    counters.add(FrameFault.COUNTER_JUMP)
+    frame = codec.frame({"LastFault": int(counters.last_fault), **counters.values})
+    shown = watched.take([frame, frame])
+    assert shown["fault"] == "counter jump"
+    assert watched.told == [("fault: counter jump", "warn")]
+
+
+def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
+    frames = [
+        *Hand(watched.deployment).frames(0, Held({"slew": 1.0})),
+        watched.status(State.READY, Reason.STICK_NEUTRAL),
+        watched.valve("slew", 50),
+        *watched.sway(5.0),
+    ]
+    for frame in frames:
+        for length in range(len(frame.data)):
+            watched.take([frame._replace(data=frame.data[:length])])
+    shown = watched.view.values(0.0)
+    assert shown["sway"] is shown["pose"] is None
+    assert {axis["stick"] for axis in shown["axes"].values()} == {None}
+
+
+def test_every_state_reason_and_fault_has_words() -> None:
+    assert STATES.keys() == {*State} and REASONS.keys() == {*Reason}
+    assert FAULTS.keys() == {*FrameFault}
+    assert state_words(15) == "state 15"
+    assert reason_words(99) == "reason 99"
+    assert fault_words(99) == "fault 99" and fault_words(0) == ""
