@@ -12,6 +12,7 @@ from canshaper.cli import (
     config_schema,
     demo,
     doctor,
+    gateway,
     reproduce,
     robust,
     run,
@@ -49,6 +50,7 @@ app.command("run")(run.run)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
+app.command("gateway")(gateway.gateway)
 app.command("demo")(demo.demo)
 app.command("sim")(sim.sim)
 app.command("operator")(sim.operator)

@@ -67,8 +67,10 @@ def drive(
         # A lever that sends more often than the loop ticks is seen with its newest frame.
         for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1):
             for frame in levers.frames(ms):
-                controller.receive(frame, now_ns)
                 recorder.receive(frame, time_s)
+                if (passed := controller.receive(frame, now_ns)) is not None:  # by a gateway
+                    plant.receive(passed)
+                    recorder.receive(passed, time_s)
         for frame in controller.tick(now_ns):
             plant.receive(frame)
             recorder.receive(frame, time_s)
