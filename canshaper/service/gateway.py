@@ -130,7 +130,7 @@ class InLine:
         self._deployment = deployment
         self._bridge: Bridge | None = None
         self._check_ns = 0
-        self._told = ""
+        self._told: str | None = None
         first, second = (deployment.config.buses[bus] for bus in gateway.between)
         self._kernel = gateway.passing == "kernel"
         self._real = {first.interface, second.interface} == {"socketcan"}
