@@ -94,10 +94,10 @@ def rules() -> list[Rule]:
     Raises:
         GatewayError: it cannot be asked.
     """
-    found = []
+    names: dict[int, str] = {}
     try:
-        for body in _talk(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)):
-            found.append(_read(body))
+        bodies = list(_talk(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
+        found = [_read(body, names) for body in bodies]
     except OSError as error:
         raise GatewayError(f"rules of can-gw cannot be listed: {error.strerror}") from error
     return found
@@ -152,13 +152,15 @@ def _message(rule: Rule, source: int, destination: int) -> bytes:
     return b"".join(parts)
 
 
-def _read(body: bytes) -> Rule:
+def _read(body: bytes, names: dict[int, str]) -> Rule:
     flags = _RULE.unpack_from(body)[2]
     attributes = dict(_attributes(body[_RULE.size :]))
-    ends = [
-        socket.if_indextoname(struct.unpack("=I", attributes[kind])[0])
-        for kind in (SOURCE, DESTINATION)
-    ]
+    ends = []
+    for kind in (SOURCE, DESTINATION):
+        (index,) = struct.unpack("=I", attributes[kind])
+        if index not in names:
+            names[index] = socket.if_indextoname(index)
+        ends.append(names[index])
     value, mask = _WORDS.unpack(attributes.get(FILTER, bytes(8)))
     changes = tuple((kind, attributes[kind]) for kind in sorted(MODIFYING & attributes.keys()))
     hops = attributes.get(LIMIT_HOPS, b"\0")[0]
@@ -205,17 +207,22 @@ def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule],
     Raises:
         GatewayError: the kernel refuses.
     """
-    more = between(interfaces, rules())
-    missing = []
+    more, missing = difference(between(interfaces, rules()), wanted)
+    for rule in more:
+        remove(rule)
+    for rule in missing:
+        add(rule)
+    return more, missing
+
+
+def difference(found: Iterable[Rule], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+    """(rules that are too many, rules that are missing)."""
+    more, missing = list(found), []
     for rule in wanted:
         if rule in more:
             more.remove(rule)  # one of them: the same rule twice would pass each frame twice
         else:
             missing.append(rule)
-    for rule in more:
-        remove(rule)
-    for rule in missing:
-        add(rule)
     return more, missing
 
 

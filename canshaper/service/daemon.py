@@ -125,7 +125,7 @@ class Daemon:
         if self._reload or self._reading or self._next:
             self._prepare_reload()
         if self._line:
-            self._line.check(now_ns)
+            self._line.check(now_ns, neutral=controller.neutral)
         if now_ns >= self._told_ns:
             self._told_ns = now_ns + SECOND_NS
             self._manager.status(self._summary())

@@ -9,7 +9,7 @@ from contextlib import suppress
 
 from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port
-from canshaper.can.cangw import GatewayError, between, rules
+from canshaper.can.cangw import GatewayError, Rule, between, difference, rules
 from canshaper.can.frame import FrameFault
 from canshaper.can.gateway import excluded, passing_rules
 from canshaper.can.passing import Pattern
@@ -127,13 +127,13 @@ class InLine:
     def __init__(self, deployment: Deployment, on_fault: Callable[[FrameFault], None]) -> None:
         gateway = deployment.config.gateway
         assert gateway is not None  # only such deployments have one
-        self._deployment = deployment
         self._bridge: Bridge | None = None
         self._check_ns = 0
         self._told: str | None = None
         first, second = (deployment.config.buses[bus] for bus in gateway.between)
         self._kernel = gateway.passing == "kernel"
         self._real = {first.interface, second.interface} == {"socketcan"}
+        self._wanted = passing_rules(deployment)
         if not self._real:
             log.warning("gateway=nothing-passes others are passed on with socketcan only")
         elif not self._kernel:
@@ -161,12 +161,15 @@ class InLine:
         """Pass on a few frames of others, where that is our part; how many there were."""
         return self._bridge.pass_on() if self._bridge else 0
 
-    def check(self, now_ns: int) -> None:
-        """Tell now and then when the rules of the kernel are not those that they should be."""
-        if not self._kernel or not self._real or now_ns < self._check_ns:
+    def check(self, now_ns: int, *, neutral: bool) -> None:
+        """Tell when the rules of the kernel are not those that they should be.
+
+        Looked at now and then, and only while nothing moves: it takes a part of a tick.
+        """
+        if not self._kernel or not self._real or not neutral or now_ns < self._check_ns:
             return
         self._check_ns = now_ns + CHECK_NS
-        if (found := rules_fault(self._deployment)) != self._told:
+        if (found := rules_fault(self._wanted)) != self._told:
             self._told = found
             level = logging.WARNING if found else logging.INFO
             log.log(level, "gateway=%s", found or "rules-right")
@@ -177,14 +180,13 @@ class InLine:
             self._bridge.close()
 
 
-def rules_fault(deployment: Deployment) -> str:
+def rules_fault(wanted: list[Rule]) -> str:
     """What is wrong with the kernel's rules while the daemon runs; empty where nothing is."""
-    wanted = passing_rules(deployment)
     try:
         found = between({rule.source for rule in wanted}, rules())
     except GatewayError as error:
         return f"rules-not-known {error}"
-    missing, more = [r for r in wanted if r not in found], [r for r in found if r not in wanted]
+    more, missing = difference(found, wanted)
     faults = [f"rules-missing {len(missing)} of {len(wanted)}"] if missing else []
     faults += [f"rules-too-many {', '.join(map(str, more))}"] if more else []
     return "; ".join(faults)
