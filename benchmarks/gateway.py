@@ -7,7 +7,7 @@ same message on the other.
 
 The other gateways pass every frame as it is; canshaper puts its velocities into the joystick's.
 Gateways have FIFO priority 40, everything else none, but the client 45: as from a wire, its frames
-come while a gateway is at work too. What the client does after a frame counts as well.
+come while a gateway is at work too. Its way back to sleep counts as well.
 
     python benchmarks/gateway.py
     python benchmarks/gateway.py --load same      and foreign frames that fill 250 kbit/s on vcan0
@@ -98,6 +98,7 @@ class Line:
             self._hand.send(FRAME.pack(LEVER_RIGHT, 8, right))
             sleep_until(at + step // 2)
             self._hand.send(FRAME.pack(FOREIGN, 8, bytes(8)))
+            sleep_until(at + step * 3 // 4)  # all have passed; nothing of this delays a gateway
             at += step
             for can_id, found in times.items():
                 _, in_ns, _ = receive_stamped(self._in[can_id])
