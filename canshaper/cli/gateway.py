@@ -29,9 +29,9 @@ def gateway(
 
     Examples:
 
-      sudo canshaper gateway config/gateway-forwarder.yaml running
-
       canshaper gateway config/gateway-forwarder.yaml
+
+      sudo canshaper gateway config/gateway-forwarder.yaml running
     """
     from canshaper.can.cangw import GatewayError, between, load_module, make, rules
     from canshaper.can.gateway import channels, fallback_rules, passing_rules

@@ -47,7 +47,8 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         (
             "{ lever: left,",
             "{ lever: left, deadzone: 1,",
-            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, flags, negative, neutral_pct",
+            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, flags, negative, "
+            "neutral_pct",
         ),
         (
             "kind: gff,",
