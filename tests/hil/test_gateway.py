@@ -335,3 +335,24 @@ def test_pass_lets_the_joystick_through_while_the_daemon_is_away(tmp_path: Path)
     with levers_on(NEAR) as levers, open_bus(FAR) as far:
         levers.values["Slew"] = 80.0
         wait(far, "LeverLeft", lambda v: v["Slew"] == 80.0)
+
+
+@pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
+def test_an_interface_that_was_removed(tmp_path: Path, who: tuple[str, str]) -> None:
+    """Back again the daemon passes on; rules of the kernel went with it, which is told."""
+    with in_the_line(tmp_path, who, STOP) as (daemon, file):
+        subprocess.run(["ip", "link", "del", FAR], check=True)
+        try:
+            daemon.wait_log("bus=machine state=gone")
+        finally:
+            subprocess.run(["ip", "link", "add", FAR, "type", "vcan"], check=True)
+            subprocess.run(["ip", "link", "set", FAR, "mtu", "72", "up"], check=True)
+        daemon.wait_log("bus=machine state=up")
+        if who == KERNEL:
+            daemon.wait_log("gateway=rules-missing 42 of 42")
+            rules(file, "running")
+            daemon.wait_log("rules-right(.|\n)*rules-missing(.|\n)*rules-right")
+        with levers_on(NEAR), open_bus(NEAR) as near, open_bus(FAR) as far:
+            wait(far, "LeverLeft", lambda v: v["Enable"] == "On")
+            message = can.Message(arbitration_id=0x7E1, is_extended_id=False, data=[1])
+            assert exchanged(near, far, [message]) == [key(message)]
