@@ -50,7 +50,7 @@ lint: .venv/test-ready
 
 # Tests that take seconds of pure reckoning add no line, nor do those of the daemon around the
 # controller, which start processes and threads; few examples will do.
-AROUND = cli journal loop notify reading realtime
+AROUND = cli init journal live loop notify reading realtime
 coverage: .venv/test-ready
 	@mkdir -p out
 	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \

@@ -34,7 +34,9 @@ BO_ 515 RotateCommand: 2 SHAPER
 CM_ "Example"""
 FOURTH_AXIS = """  rotate:
     stick: { lever: right, signal: Rotate }
-    valve: { bus: crane, message: RotateCommand, signal: Velocity, alive_counter: AliveCounter }
+    valve:
+      { bus: crane, message: RotateCommand, signal: Velocity, timeout_ms: 200,
+        alive_counter: AliveCounter }
     sway: { period_s: 2.0, damping_ratio: 0.05, full_speed_m_s: 1.0 }
     filter: { kind: gff, a1: 0.708, a2: 0.12 }
 

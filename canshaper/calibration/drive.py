@@ -190,7 +190,7 @@ class CalibrationDrive:
                 raise CalibrationError(f"{direction} commands: {error}") from None
         if found[0][0] != found[1][0]:
             raise CalibrationError("both directions moved the same way; is the feedback signed?")
-        return Calibration(found[0][1], found[1][1], noise)
+        return Calibration(found[0][1], found[1][1])
 
 
 def _problem(

@@ -50,7 +50,6 @@ class Calibration:
 
     positive: Direction
     negative: Direction
-    noise: float
 
     def curve(self) -> tuple[list[float], list[float]]:
         """Commands and speeds in % for the deployment file, full speed that of the faster one."""
@@ -109,8 +108,7 @@ def fit(
         speed = 0.5 * (_speed_at(rising, at, top) + _speed_at(falling, at, top))
         points.append((at, speed))
     points.append((top, sum(s.speed for s in held) / len(held)))
-    rising_points = [p for p in pairwise([(opens, 0.0), *points]) if p[1][1] > p[0][1]]
-    if len(rising_points) < len(points):
+    if any(b[1] <= a[1] for a, b in pairwise([(opens, 0.0), *points])):
         raise CalibrationError("the speed does not rise with the command; is the axis at its end?")
     (c0, s0), (c1, s1) = points[0], points[-1]
     full = s1 + (1.0 - c1) * (s1 - s0) / (c1 - c0) if c1 < 1.0 else s1
@@ -129,7 +127,7 @@ def _opening(samples: Sequence[Sample], moving: float) -> float:
     else:
         raise CalibrationError("the axis did not move steadily; is the feedback that of this axis?")
     above = [s for s in samples[first:] if s.speed < 6.0 * moving] or list(samples[first:])
-    command, slope = _line(above[: max(len(above), LASTING)])
+    command, slope = _line(above)
     return command if slope > 0.0 else samples[first].command
 
 

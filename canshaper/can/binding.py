@@ -1,6 +1,6 @@
 """Deployment file and DBC files brought together: codecs, or every problem at once."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cantools.database.can import Message
@@ -87,6 +87,8 @@ class Deployment:
     grapple: BoundSwitch | None
     feel: BoundSwitch | None
     on_bus: dict[str, list[Message]]
+    listen_only: bool = False
+    """Nothing is sent but status: another controller drives the machine, or nobody does."""
 
     def load(self, bus: str) -> BusLoad | None:
         """Load of a bus by the messages of the deployment; None where its bit rate is not given."""
@@ -99,13 +101,16 @@ class Deployment:
         inputs = [i for i in (*self.inputs(), *radii) if i.key[0] == bus]
         taken = [i.key for i in inputs if not i.by_group]
         valves = [a.valve.message.sender.key for a in self.axes.values()]
+        if self.listen_only:  # they are those of another
+            valves = []
         sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
         canopen = self.config.buses[bus].canopen
         if canopen:
             nodes = [n.id for n in canopen.nodes.values()]
             taken += [(bus, base + n, False) for n in nodes for base in (HEARTBEAT, EMERGENCY)]
-            sent.append((bus, HEARTBEAT + canopen.node, False))
-            sent += [(bus, NMT, False)] if canopen.master else []
+            if not self.listen_only:
+                sent.append((bus, HEARTBEAT + canopen.node, False))
+                sent += [(bus, NMT, False)] if canopen.master else []
         own = self.config.buses[bus].j1939
         if own:
             sent += [(bus, can_id, True) for can_id in sent_by(own.address)]
@@ -148,8 +153,24 @@ class Deployment:
         return {
             group_of(axis.valve.message.sender.key[1])
             for axis in self.axes.values()
-            if axis.config.valve.bus == bus and is_j1939(axis.valve_message) and not axis.rewrites
+            if axis.config.valve.bus == bus and is_j1939(axis.valve_message)
+            if not axis.rewrites and not self.listen_only
         }
+
+    def listening(self) -> "Deployment":
+        """The same machine for one who only listens, and tells what it would do.
+
+        What valves say of themselves answers another controller's commands, so it is not compared
+        with ours. A node of ours on J1939 stays where a status message needs its address.
+        """
+        told = {s.sender.key[0] for s in (self.status, *self._axis_status()) if s}
+        buses = {
+            name: bus if name in told else bus.model_copy(update={"j1939": None})
+            for name, bus in self.config.buses.items()
+        }
+        axes = {n: replace(a, feedback=None, status_word=None) for n, a in self.axes.items()}
+        config = self.config.model_copy(update={"buses": buses})
+        return replace(self, config=config, axes=axes, listen_only=True)
 
     def _axis_status(self) -> list[AxisStatusCodec | None]:
         return [axis.status for axis in self.axes.values()]
@@ -183,6 +204,8 @@ class _Binder(FilterBinder):
         service = self._status(("status",), config.status, ServiceStatusCodec)
         if config.gateway:
             self._check_gateway(config.gateway, [a.valve.message for a in axes.values() if a])
+        if config.control:
+            self.check_control(config.control)
         if self.problems:
             raise DeploymentError(self.problems)
         return Deployment(

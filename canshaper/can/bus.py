@@ -33,7 +33,10 @@ class Port(Protocol):
     """One open bus."""
 
     name: str
-    state: BusState
+
+    @property
+    def state(self) -> BusState:
+        """How the bus is."""
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -82,6 +85,48 @@ def open_port(
         raise BusError(
             f"bus {name}: cannot open {where}: {text or type(error).__name__}"
         ) from error
+
+
+class ListeningPort:
+    """A port that sends only what a deployment that listens may send; all else is left out.
+
+    The last thing before the bus: whatever is asked of it, no valve hears of it.
+    """
+
+    def __init__(self, port: Port, ids: Ids) -> None:
+        self._port = port
+        self._sent = ids.sent | ids.claims
+        self.name = port.name
+
+    @property
+    def state(self) -> BusState:
+        """State of the bus."""
+        return self._port.state
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits."""
+        return self._port.frames()
+
+    def others(self) -> Iterator[Frame]:
+        """What can wait."""
+        return self._port.others()
+
+    def send(self, frame: Frame) -> bool:
+        """Send a status; of anything else only say so."""
+        return frame[1:3] not in self._sent or self._port.send(frame)
+
+    def watch(self, name: str, ids: Ids) -> None:
+        """Serve another deployment."""
+        self.name, self._sent = name, ids.sent | ids.claims
+        self._port.watch(name, ids)
+
+    def fileno(self) -> int:
+        """File descriptor to wait on."""
+        return self._port.fileno()
+
+    def close(self) -> None:
+        """Close the bus."""
+        self._port.close()
 
 
 class PythonCanPort:

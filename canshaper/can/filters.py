@@ -1,6 +1,8 @@
 """Filters of a deployment against the period of the valve that they drive."""
 
 from canshaper.can.valves import ValveBinder
+from canshaper.config.adjust import Key, faults
+from canshaper.config.control import Control
 from canshaper.config.filters import Filter, RobustFilter
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel
@@ -35,6 +37,20 @@ class FilterBinder(ValveBinder):
             if name not in codes:
                 allowed = ", ".join(codes) or "none: there is no feel at the top level"
                 self.add((*place, "feels", name), f"found {name!r}, feels are {allowed}")
+
+    def check_control(self, control: Control) -> None:
+        """Every adjustable number has to be one that can be changed in motion."""
+        for text, (low, high) in control.adjustable.items():
+            place = ("control", "adjustable", text)
+            key = Key.parsed(text)
+            if key is None:
+                self.add(place, "found no key of an axis; allowed is axes.AXIS.SECTION.NAME")
+            elif key.axis not in self.config.axes:
+                names = ", ".join(self.config.axes)
+                self.add(place, f"found axis {key.axis!r}, axes are {names}")
+            else:
+                for fault in faults(key, self.config.axes[key.axis], low, high):
+                    self.add(place, fault)
 
 
 def filter_fault(

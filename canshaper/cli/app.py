@@ -13,9 +13,11 @@ from canshaper.cli import (
     demo,
     doctor,
     gateway,
+    init,
     reproduce,
     robust,
     run,
+    set,
     sim,
     tune,
 )
@@ -46,7 +48,9 @@ def _main(
     """Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN."""
 
 
+app.command("init")(init.init)
 app.command("run")(run.run)
+app.command("set")(set.set_)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)

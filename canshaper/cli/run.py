@@ -1,17 +1,35 @@
 """``canshaper run``: the daemon."""
 
+from collections.abc import Callable
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import typer
+
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
 
 
 def run(
     file: str = FILE,
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    listen_only: bool = typer.Option(
+        False, "--listen-only", help="Reckon and tell the status; send no valve frame."
+    ),
+    control: str | None = typer.Option(
+        None, "--control", metavar="PATH", help="Control socket instead of the file's."
+    ),
 ) -> None:
     """Shape the joystick commands of a deployment until SIGTERM or Ctrl-C.
 
     SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral. An
     interface that goes away is used again when it is back.
+
+    With --listen-only it can run beside the controller that drives the machine now: nothing is
+    sent but the status messages, which tell what the valves would be told.
 
     Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened.
 
@@ -20,6 +38,8 @@ def run(
       canshaper run config/forwarder.yaml
 
       canshaper run config/forwarder.yaml --interface socketcan --channel can0
+
+      canshaper run machine.yaml --listen-only
     """
     from canshaper.can.bus import BusError
     from canshaper.config.source import DeploymentError
@@ -28,9 +48,33 @@ def run(
 
     journal.set_up()
     try:
-        daemon = Daemon(loader(file, interface, channel))
+        load = loader(file, interface, channel)
+        daemon = Daemon(_changed(load, listen_only=listen_only, control=control))
     except DeploymentError as error:
         raise fail(error) from None
     except BusError as error:
         raise fail(error, EXIT_NO_BUS) from None
     daemon.run()
+
+
+def _changed(
+    load: "Callable[[], Deployment]", *, listen_only: bool, control: str | None
+) -> "Callable[[], Deployment]":
+    """The same with these options put in."""
+    from canshaper.config.source import DeploymentError, Problem
+
+    def changed() -> "Deployment":
+        deployment = load()
+        if listen_only:
+            deployment = deployment.listening()
+        if control is None:
+            return deployment
+        section = deployment.config.control
+        if section is None:
+            text = "the deployment file has no control section, so nothing may be changed"
+            raise DeploymentError([Problem("command line", None, "--control", text)])
+        section = section.model_copy(update={"socket": control})
+        config = deployment.config.model_copy(update={"control": section})
+        return replace(deployment, config=config)
+
+    return changed

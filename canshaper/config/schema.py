@@ -5,6 +5,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from canshaper.config.bus import Bus
+from canshaper.config.control import Control
 from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
@@ -266,3 +267,4 @@ class DeploymentConfig(Section):
     grapple: Grapple | None = None
     feel: FeelSwitch | None = None
     status: Status | None = None
+    control: Control | None = None

@@ -3,13 +3,16 @@
 import logging
 import signal
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from types import FrameType
+from typing import Any
 
 from canshaper.can.binding import Deployment
-from canshaper.can.bus import BusError, Port, open_port
+from canshaper.can.bus import BusError, ListeningPort, Port, open_port
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.control.server import ControlServer
+from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
 from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.gateway import InLine
@@ -32,6 +35,7 @@ class Daemon:
 
     Args:
         load: reads the deployment, at the start and, in another process, at every SIGHUP.
+            One that only listens sends no valve frame.
 
     Raises:
         DeploymentError: the deployment is not valid.
@@ -55,6 +59,7 @@ class Daemon:
         deployment = load()
         self._ports = self._open(deployment, {})
         self._use(deployment)
+        self._control = self._open_control(deployment)
 
     def run(self) -> None:
         """Run until SIGTERM or SIGINT; then every valve is told neutral and the buses close."""
@@ -62,6 +67,8 @@ class Daemon:
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, the end of a Reading would be lost
         names = ",".join(self._controller.axes)
+        if self._controller.deployment.listen_only:
+            log.warning("listen-only=yes valves=none: nothing is sent but status")
         why = lock_memory()
         log.info("memory=%s", f"not-locked ({why})" if why else "locked")
         self._collector.freeze()
@@ -81,7 +88,10 @@ class Daemon:
                 self._line.close()
             if self._reading:
                 self._reading.end()
-        log.info("stopped valves=neutral")
+            if self._control:
+                self._control.close()
+        listened = self._controller.deployment.listen_only
+        log.info("stopped valves=%s", "not-sent" if listened else "neutral")
 
     # -- one tick ------------------------------------------------------------------------------
 
@@ -126,6 +136,8 @@ class Daemon:
             self._prepare_reload()
         if self._line:
             self._line.check(now_ns, neutral=controller.neutral)
+        if self._control:
+            self._control.serve(self._answer, now_ns)
         if now_ns >= self._told_ns:
             self._told_ns = now_ns + SECOND_NS
             self._manager.status(self._summary())
@@ -139,9 +151,25 @@ class Daemon:
         axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
         buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
         missed = self._controller.counters.values["MissedDeadlines"]
+        first = ["listen-only"] if self._controller.deployment.listen_only else []
         return ", ".join(
-            [*axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
+            [*first, *axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
         )
+
+    def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
+        """One request from the control socket."""
+        values = request.get("set", {})
+        if request.keys() - {"set"} or not isinstance(values, dict):
+            raise ValueError('allowed is {} or {"set": {KEY: VALUE}}')
+        if "set" in request:
+            try:
+                changes = self._adjuster.change(values)
+            except ValueError as error:
+                log.warning("set=refused %s %s", peer, error)
+                raise
+            for change in changes:
+                log.info("set %s %s", change, peer)
+        return {"adjustable": self._adjuster.table()}
 
     # -- deployments ---------------------------------------------------------------------------
 
@@ -149,7 +177,9 @@ class Daemon:
         self._controller = Controller(deployment)
         if self._line:
             self._line.close()
-        self._line = InLine(deployment, self._on_fault) if deployment.config.gateway else None
+        in_line = deployment.config.gateway and not deployment.listen_only
+        self._line = InLine(deployment, self._on_fault) if in_line else None
+        self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._stall_ns = stall_ns(deployment)
@@ -159,12 +189,26 @@ class Daemon:
         ports: dict[str, Port] = {}
         try:
             for name, bus in deployment.config.buses.items():
-                port = opened.get(bus)
-                ports[name] = port or open_port(name, bus, self._on_fault, deployment.ids(name))
+                ids = deployment.ids(name)
+                port = opened.get(bus) or open_port(name, bus, self._on_fault, ids)
+                listens = deployment.listen_only and bus not in opened
+                ports[name] = ListeningPort(port, ids) if listens else port
         except BusError:
             self._close(port for port in ports.values() if port not in opened.values())
             raise
         return ports
+
+    def _open_control(self, deployment: Deployment) -> ControlServer | None:
+        """The control socket, where there shall be one; a machine works without it too."""
+        control = deployment.config.control
+        if control is None:
+            return None
+        path = control.path(deployment.path)
+        try:
+            return ControlServer(path, int(control.mode, 8))
+        except OSError as error:
+            log.error("control=none socket=%s %s", path, error.strerror or error)
+            return None
 
     def _prepare_reload(self) -> None:
         """A step towards the deployment as its files are now: the loop never waits for it.
@@ -211,7 +255,10 @@ class Daemon:
             for name, port in ports.items():
                 port.watch(name, deployment.ids(name))
             self._ports = ports
+            if self._control:
+                self._control.close()
             self._use(deployment)
+            self._control = self._open_control(deployment)
             log.info("reload=applied file=%s", deployment.path)
             self._manager.ready("reload applied")
             self._told_ns = time.monotonic_ns() + SECOND_NS

@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Protocol
 
 from canshaper.can.binding import BoundAxis
 from canshaper.can.frame import Frame
+from canshaper.config.schema import AxisConfig
 from canshaper.service.cia408 import ValveControl
 from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
@@ -39,6 +41,8 @@ class AxisRunner:
     """One axis with its codecs: when it is due, what it sends.
 
     Attributes:
+        bound: the axis with its codecs, and with the configuration that is in force.
+        period_s: time between two commands to its valve.
         trip: a cause for neutral at once, noted since the last tick.
         lost: the input was lost since the last tick, though it may be back: neutral comes first.
         contested_ns: when a frame of another sender with the id of this valve was last seen.
@@ -58,7 +62,7 @@ class AxisRunner:
         self._ticked_ns = -1
         self._signal = config.stick.signal
         self._neutral_band = config.stick.neutral_pct / 100.0
-        period_s = tick_s * bound.period_ticks
+        self.period_s = period_s = tick_s * bound.period_ticks
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         self.axis = Axis(
             period_s,
@@ -94,6 +98,29 @@ class AxisRunner:
     def replace_lever(self, lever: StickSource) -> None:
         """Take the stick from somewhere else."""
         self._lever = lever
+
+    def adjust(self, config: AxisConfig) -> None:
+        """Go on with another configuration of sway, filter and limits, all else as before.
+
+        Args:
+            config: one whose filter runs at this period; with other limits only in neutral.
+        """
+        limits = config.limits
+        if limits != self.bound.config.limits:
+            self.axis.limit(limits.output_limits())
+        if config.sway is not None:
+            self.axis.retune(
+                config.sway.mode(),
+                lambda sway: build_shaper(
+                    config.filter.kind,
+                    self.period_s,
+                    sway,
+                    valve_rate_per_s=limits.slowest_per_s,
+                    **config.filter.parameters(),
+                ),
+            )
+            self._full_speed_m_s = config.sway.full_speed_m_s
+        self.bound = replace(self.bound, config=config)
 
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
@@ -174,19 +201,23 @@ class Compensator:
     """
 
     def __init__(self, slew: AxisRunner, near_far: AxisRunner, radius: RadiusInput) -> None:
-        radial, sway = slew.bound.radial, near_far.bound.config.sway
-        assert radial is not None  # only such axes have one
-        assert sway is not None  # checked with the deployment
         self._slew = slew
         self._near_far = near_far
         self._radius = radius
+        self._share = 1.0
+        self.adjust()
+
+    def adjust(self) -> None:
+        """Take the sway data of the near-far axis as it is now."""
+        radial, sway = self._slew.bound.radial, self._near_far.bound.config.sway
+        assert radial is not None  # only such axes have one
+        assert sway is not None  # checked with the deployment
         self._radial = RadialCompensation(
             sway.mode(),
             radial.config.full_speed_rad_s,
             sway.full_speed_m_s,
             radial.config.max_pct / 100.0,
         )
-        self._share = 1.0
 
     def before_slew(self) -> None:
         """Tell the slew axis what to add in this tick."""

@@ -159,10 +159,22 @@ class Axis:
         else:
             sway = self.sway.retuned(mode, self.told)
         shaper = shaper_for(sway)
-        carry_over(self._shaper, shaper, self.command)
+        carry_over(self._shaper, shaper, self._within_maximum(self.command))
         self._shaper = shaper
         self.sway = sway
         self._rebump = True
+
+    def limit(self, limits: OutputLimits) -> None:
+        """Change maximum and rates; of what the run-on remembers nothing changes.
+
+        Raises:
+            ValueError: the axis is in motion, where more speed would come without the operator.
+        """
+        if not self.neutral:
+            raise ValueError("limits change in neutral only")
+        self._limits = limits
+        self._rise = limits.rise_per_s * self._tick_s
+        self._fall = limits.fall_per_s * self._tick_s
 
     # -- the state machine ---------------------------------------------------------------------
 
@@ -257,8 +269,16 @@ class Axis:
             raise ValueError(f"command is {command}")
         return 0.0 if abs(command) <= self._neutral_band else command
 
+    def _within_maximum(self, command: float) -> float:
+        """A command no faster than the axis may be: a filter that is cut off damps nothing."""
+        maximum = self._limits.maximum
+        if command > maximum:
+            return maximum
+        return -maximum if command < -maximum else command
+
     def _wanted(self, command: float, added: float) -> float:
         """What the filter asks for; with ``added``, no step from what was sent before a change."""
+        command = self._within_maximum(command)
         wanted = self._shaper.wanted(command)
         if self._bypassed:
             wanted = command

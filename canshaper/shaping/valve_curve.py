@@ -21,7 +21,7 @@ class ValveCurve:
     __slots__ = ("_commands", "_zero", "speeds")
 
     def __init__(self, commands: Sequence[float], speeds: Sequence[float]) -> None:
-        if fault := curve_fault(commands, speeds):
+        if fault := next(_faults(commands, speeds), None):
             raise ValueError(fault)
         self._commands = tuple(commands)
         self.speeds = tuple(speeds)
@@ -37,8 +37,7 @@ class ValveCurve:
         if velocity <= speeds[0]:
             return commands[0]
         # Of the two points with speed zero the right one is found for each direction.
-        high = bisect_right(speeds, velocity) if velocity > 0.0 else self._above(velocity)
-        return _between(velocity, speeds, commands, high)
+        return _between(velocity, speeds, commands, bisect_right(speeds, velocity))
 
     def velocity(self, command: float) -> float:
         """Velocity that a command gives; zero within the dead band."""
@@ -51,18 +50,9 @@ class ValveCurve:
             return speeds[0]
         return _between(command, commands, speeds, bisect_right(commands, command))
 
-    def _above(self, velocity: float) -> int:
-        """First point that is above a negative velocity."""
-        return min(bisect_right(self.speeds, velocity), self._zero)
-
-
-def curve_fault(commands: Sequence[float], speeds: Sequence[float]) -> str | None:
-    """Why points are no curve of a valve, or None."""
-    return next(_faults(commands, speeds), None)
-
 
 def _faults(commands: Sequence[float], speeds: Sequence[float]) -> Iterator[str]:
-    """Faults of the points; each takes it that those before were none."""
+    """Why points are no curve of a valve; each fault takes it that those before were none."""
     if len(commands) != len(speeds):
         yield f"found {len(commands)} commands and {len(speeds)} speeds, allowed is one for each"
     if len(commands) < 4 or commands[0] != -1.0 or commands[-1] != 1.0:

@@ -30,9 +30,8 @@ def run_simulated(
     time_ms = 0
     while not drive.ended:
         now_ns = time_ms * 1_000_000
-        for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1):
-            for frame in levers.frames(ms):
-                drive.receive(frame, now_ns)
+        for frame in levers.frames_of_tick(time_ms, tick_ms):
+            drive.receive(frame, now_ns)
         for frame in drive.tick(now_ns):
             plant.receive(frame)
         plant.advance(tick_ms / 1000.0)

@@ -117,3 +117,11 @@ class LeverNode:
             for message in self._messages
             if time_ms % message.cycle_ms == 0
         ]
+
+    def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
+        """Frames that came since the last tick, in order; the newest of each lever counts."""
+        return [
+            frame
+            for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1)
+            for frame in self.frames(ms)
+        ]

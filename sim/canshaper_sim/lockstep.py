@@ -72,13 +72,11 @@ def drive(
     for time_ms in range(0, round(script.duration_s * 1000.0), tick_ms):
         time_s = time_ms / 1000.0
         now_ns = time_ms * 1_000_000
-        # A lever that sends more often than the loop ticks is seen with its newest frame.
-        for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1):
-            for frame in (frame for hand in hands for frame in hand.frames(ms)):
-                recorder.receive(frame, time_s)
-                if (passed := controller.receive(frame, now_ns)) is not None:  # by a gateway
-                    plant.receive(passed)
-                    recorder.receive(passed, time_s)
+        for frame in (f for hand in hands for f in hand.frames_of_tick(time_ms, tick_ms)):
+            recorder.receive(frame, time_s)
+            if (passed := controller.receive(frame, now_ns)) is not None:  # by a gateway
+                plant.receive(passed)
+                recorder.receive(passed, time_s)
         for frame in controller.tick(now_ns):
             plant.receive(frame)
             recorder.receive(frame, time_s)

@@ -2,12 +2,11 @@
 
 import re
 from pathlib import Path
-from typing import Protocol
 
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.service.controller import Controller
+from tests.can.conftest import Machine
 
 VALVE = """VERSION ""
 
@@ -23,17 +22,6 @@ BA_ "GenMsgCycleTime" BO_ 1536 20;
 """
 SHIPPED = (Path(__file__).parents[2] / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
 MESSAGES = ", ".join(sorted(re.findall(r"^BO_ \d+ (\w+)", SHIPPED, re.MULTILINE)))
-
-
-class Machine(Protocol):
-    directory: Path
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 def test_the_shipped_machine_binds(machine: Machine) -> None:

@@ -1,25 +1,11 @@
 """DBC files: those that are none, and messages that cannot do what a deployment asks of them."""
 
-from pathlib import Path
-from typing import Protocol
-
 import pytest
 
-from canshaper.can.binding import Deployment
+from tests.can.conftest import Machine
 
 SLEW_STICK = "Slew : 0|16@1- (0.1,0) [-100|100]"
 SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
-
-
-class Machine(Protocol):
-    directory: Path
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,16 @@
 
 import itertools
 import math
-from typing import Any, Protocol
+from typing import Any
 
 import cantools
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import LeverCodec
 from canshaper.can.flags import FlaggedVelocity
 from canshaper.can.signals import VelocitySignal
 from canshaper.shaping.states import Reason
+from tests.can.conftest import Machine
 
 # X axis of a basic joystick message of J1939-71, a wide and a float one.
 DBC = """VERSION ""
@@ -150,16 +150,6 @@ def test_a_zero_that_is_rounded_is_zero() -> None:
 
 
 # -- deployment ------------------------------------------------------------------------------------
-
-
-class Machine(Protocol):
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 STICK = "signal: Slew, neutral_pct: 2"

@@ -1,14 +1,11 @@
 """Protection of levers and the emergency stop in a deployment: every problem with file and line."""
 
-from pathlib import Path
-from typing import Protocol
-
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.can.protection import UNPROTECTED, Checksum, Protection
 from canshaper.service.controller import Controller
+from tests.can.conftest import Machine
 
 COUNTER = "alive_counter: AliveCounter"
 # Signals that the tests add to the left lever, in bytes that it does not use.
@@ -25,17 +22,6 @@ STOP_DBC = """BO_ 64 Stop: 8 LEVERS
 
 """
 STOP = "emergency_stop: { bus: crane, message: Stop, signal: Pressed, timeout_ms: 100"
-
-
-class Machine(Protocol):
-    directory: Path
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 @pytest.fixture

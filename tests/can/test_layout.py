@@ -1,7 +1,7 @@
 """Bits of random messages, judged by cantools both ways."""
 
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import bitstruct
 import cantools
@@ -15,6 +15,7 @@ from canshaper.can import layout
 from canshaper.can.codecs import Sender
 from canshaper.can.layout import Layout, layout_fault
 from canshaper.can.signals import raw_limits
+from tests.can.conftest import Machine
 
 SHIPPED: Any = cantools.database.load_file(Path(__file__).parents[2] / "dbc" / "forwarder.dbc")
 
@@ -174,13 +175,6 @@ def test_what_has_no_layout() -> None:
     assert layout_fault(message) is None
     (message,) = cantools.database.load_string(DBC.replace("32|32@1-", "32|24@1-"), "dbc").messages
     assert layout_fault(message) == "Ratio is a float of 24 bits, allowed are 16, 32 and 64"
-
-
-class Machine(Protocol):
-    dbc: str
-
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def problems(self) -> list[str]: ...
 
 
 @pytest.mark.parametrize(

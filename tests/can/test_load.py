@@ -1,23 +1,11 @@
 """Load of a bus by its messages, beside the table of frame times and a hand-made bit stuffing."""
 
-from pathlib import Path
-from typing import Protocol
-
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import Deployment
 from canshaper.can.load import longest_frame_bits
 from canshaper.cli.app import app
-
-
-class Machine(Protocol):
-    directory: Path
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
+from tests.can.conftest import Machine
 
 
 # us at 250 kbit/s and 1 Mbit/s, 8 bytes: 11-bit id 540 and 135, 29-bit id 640 and 160.

@@ -2,13 +2,13 @@
 
 import math
 import struct
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.service.radius import RadiusInput
+from tests.can.conftest import Machine
 
 SWAY = "    sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
 NEAR_SWAY = "    sway: { length_m: 1.2, damping_nms: 120, mass_kg: 300, full_speed_m_s: 1.0 }\n"
@@ -18,16 +18,6 @@ TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
 MEASURED = f"axis: near_far, full_speed_rad_s: 0.5, radius: {{ {TIP} }}"
 RADIUS = 'Radius : 16|16@1+ (0.001,0) [0|60] "m"'
 MS = 1_000_000
-
-
-class Machine(Protocol):
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def in_dbc(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 def compensated(machine: Machine, text: str, after: str = SWAY) -> int:

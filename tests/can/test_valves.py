@@ -1,18 +1,17 @@
 """Valve messages: direction by codes, the same in two resolutions, axes that share a message."""
 
-from pathlib import Path
-from typing import Any, Protocol
+from typing import Any
 
 import cantools
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
 from canshaper.can.frame import Frame
 from canshaper.can.valve import DirectionCodec, ValveCodec, ValveMessage
 from canshaper.service.controller import Controller
+from tests.can.conftest import Machine
 
 # ISO 11783-7 auxiliary valve command 0; the reserved bits and bytes 6 to 8 have no signals.
 DBC = """VERSION ""
@@ -47,16 +46,6 @@ VAL_ 2365468926 State 0 "Block" 1 "Extend" 2 "Retract" 3 "Float" 15 "DontCare" ;
 """
 network: Any = cantools.database.load_string(DBC, "dbc")
 STATE = DirectionCodec("State", (0, 1, 2))
-
-
-class Machine(Protocol):
-    directory: Path
-    yaml: str
-    dbc: str
-
-    def in_yaml(self, old: str, new: str) -> int: ...
-    def load(self) -> Deployment: ...
-    def problems(self) -> list[str]: ...
 
 
 def avc(signal: str, *also: str) -> ValveCodec:

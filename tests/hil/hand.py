@@ -88,6 +88,7 @@ class Hand(threading.Thread):
         self._dbc = cantools.database.load_file(dbc)
         self._end = threading.Event()
         self._count = 0
+        self._rounds = threading.Semaphore(0)
         self.rest()
 
     def rest(self) -> None:
@@ -106,6 +107,14 @@ class Hand(threading.Thread):
                         self._bus.send(
                             can.Message(arbitration_id=can_id, is_extended_id=False, data=sent)
                         )
+            self._rounds.release()
+
+    def wait_sent(self, rounds: int) -> None:
+        """Wait until everything has been sent so many times from now on."""
+        while self._rounds.acquire(blocking=False):
+            pass
+        for _ in range(rounds):
+            self._rounds.acquire()
 
     def _frames(self) -> list[tuple[int, bytes]]:
         switches = {"Enable": self.enable, "AntiSwayOff": 0, "Reset": self.reset}

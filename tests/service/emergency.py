@@ -1,11 +1,11 @@
 """A machine with an emergency stop on its bus."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 VALVES = ("SlewCommand", "NearFarCommand", "LiftCommand")
 AXES = ("slew", "near_far", "lift")
@@ -17,6 +17,7 @@ STOP = (
     "emergency_stop: { bus: crane, message: Stop, signal: Pressed, timeout_ms: 60,"
     " alive_counter: Count }\n"
 )
+
 CYCLE = 'BA_ "GenMsgCycleTime" BO_ 272 20;\n'
 DBC = {
     "BO_ 512 SlewCommand": (
@@ -28,19 +29,6 @@ DBC = {
     ),
     CYCLE: CYCLE + CYCLE.replace("272", "64"),
 }
-
-
-class Rig(Protocol):
-    controller: Controller
-    now_ns: int
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

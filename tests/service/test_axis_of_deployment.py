@@ -1,34 +1,21 @@
 """What a deployment says of an axis gets to the axis: tick, neutral band, grid, filter, limits."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.fir import Fir
 from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.smoothing import FirstOrder
 from canshaper.shaping.states import State, StickInput
 from canshaper.shaping.sway import SwayModel
+from tests.service.conftest import Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0 }"
 SLEW = "BO_ 512 SlewCommand: 2 SHAPER\n SG_ Velocity : 0|8@1- (0.8,0)"
-
-
-class Rig(Protocol):
-    deployment: Deployment
-    controller: Controller
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def state(self, axis: str = ...) -> State: ...
 
 
 Make = Callable[..., Rig]

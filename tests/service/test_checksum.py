@@ -3,14 +3,14 @@
 from collections.abc import Callable
 from functools import reduce
 from operator import xor
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 # timeout_ms of the shipped levers, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
@@ -21,19 +21,6 @@ CHECK = {
         ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n SG_ Check : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
     )
 }
-
-
-class Rig(Protocol):
-    controller: Controller
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

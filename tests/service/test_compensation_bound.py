@@ -1,21 +1,14 @@
 """How much of near-far's speed the radial compensation may take."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import pytest
 
-from canshaper.service.controller import Controller
+from tests.service.conftest import Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 RADIAL = "    radial_compensation: {{ axis: near_far, {}, radius_m: 6.0, max_pct: {} }}\n"
 SPEED = "full_speed_rad_s: 0.5"
-
-
-class Rig(Protocol):
-    controller: Controller
-
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
 
 
 @pytest.mark.parametrize("max_pct", [2, 3.5])

@@ -1,35 +1,18 @@
 """The controller on real frames: what it sends each tick, and what stops it."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 VALVES = ("SlewCommand", "NearFarCommand", "LiftCommand")
 TICK_NS = 20_000_000
 # stop_s of the shipped machine, 2 s, in ticks, and one in which it ends
 STOP_TICKS = 100
-
-
-class Rig(Protocol):
-    deployment: Deployment
-    controller: Controller
-    now_ns: int
-    messages: dict[str, Any]
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 def still(sent: dict[str, dict[str, Any]]) -> bool:

@@ -1,31 +1,14 @@
 """The controller when the machine PC fails it: frames not sent, ticks missed, two buses, status."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 VALVES = ("SlewCommand", "NearFarCommand", "LiftCommand")
-
-
-class Rig(Protocol):
-    deployment: Deployment
-    controller: Controller
-    now_ns: int
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

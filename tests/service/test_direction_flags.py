@@ -1,24 +1,12 @@
 """A stick with direction flags at the controller: what moves, and what a contradiction stops."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
-
-
-class Rig(Protocol):
-    controller: Controller
-    now_ns: int
-
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
-
+from tests.service.conftest import Rig
 
 Make = Callable[..., Rig]
 

@@ -1,30 +1,15 @@
 """A stick that stands still: in neutral for ever, deflected for ``frozen_s`` at most."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
-from canshaper.can.frame import Frame
 from canshaper.service.lever import LeverInput
 from canshaper.shaping.states import Reason, State
+from tests.service.conftest import Rig
 
 LEFT = "    alive_counter: AliveCounter\n  right:"
-
-
-class Rig(Protocol):
-    deployment: Deployment
-    counts: dict[str, int]
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

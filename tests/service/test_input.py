@@ -1,31 +1,17 @@
 """What a lever's frames are worth: sequence, silence, and an enable seen released."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 # timeout_ms of the shipped levers, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
 LEFT = "    alive_counter: AliveCounter\n  right:"
-
-
-class Rig(Protocol):
-    controller: Controller
-    counts: dict[str, int]
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

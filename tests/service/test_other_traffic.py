@@ -1,33 +1,21 @@
 """A bus is shared, and a machine need not show everything: what passes by, and what is left out."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import pytest
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 TIP_ID = 0x401  # TipPosition of the shipped DBC: the shipped machine has no use for it
 RADIAL = (
     "    radial_compensation: { axis: near_far, full_speed_rad_s: 0.5, radius:"
     " { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 } }\n"
 )
+
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 STATUS = "    status: { bus: crane, message: SlewStatus }\n"
-
-
-class Rig(Protocol):
-    controller: Controller
-    now_ns: int
-
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

@@ -1,30 +1,17 @@
 """Missed deadlines: a few are tolerated, many stop what moves through the filter."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
 from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 STOP_TICKS = 100  # stop_s of the shipped slew axis
 # Late ticks in a row that are an overrun, and punctual ones that end it.
 MANY, RECOVERY = 10, 50
-
-
-class Rig(Protocol):
-    controller: Controller
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

@@ -2,14 +2,12 @@
 
 import math
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import Reason, State
+from tests.service.conftest import Rig
 
 TICK_S = 0.02
 FULL_SPEED_RAD_S = 0.5
@@ -18,22 +16,6 @@ FIXED = "axis: near_far, full_speed_rad_s: 0.5, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
 MEASURED = f"axis: near_far, full_speed_rad_s: 0.5, radius: {{ {TIP} }}"
 NEAR_STICK = "stick: { lever: left, signal: NearFar, neutral_pct: 2 }"
-
-
-class Rig(Protocol):
-    deployment: Deployment
-    controller: Controller
-    now_ns: int
-    messages: dict[str, Any]
-
-    def message(self, name: str) -> Any: ...
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
 
 
 Make = Callable[..., Rig]

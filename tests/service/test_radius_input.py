@@ -1,13 +1,13 @@
 """The radius of the tip, measured: which frames are a radius, for how long, and of what."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
+from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.service.radius import RadiusInput
+from tests.service.conftest import Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 RADIAL = "    radial_compensation: {{ axis: near_far, full_speed_rad_s: 0.5, {} }}\n"
@@ -19,12 +19,6 @@ DBC = {
 }
 NOW_NS = 7_000_000_000
 TIMEOUT_NS = 100_000_000
-
-
-class Rig(Protocol):
-    deployment: Deployment
-
-    def message(self, name: str) -> Any: ...
 
 
 Make = Callable[..., Rig]

@@ -1,24 +1,10 @@
 """An enable that was seen released: no fault, and not forgotten while frames cannot be trusted."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
-
-
-class Rig(Protocol):
-    controller: Controller
-    counts: dict[str, int]
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
-    def count(self, name: str) -> int: ...
+from tests.service.conftest import Rig
 
 
 def test_a_released_enable_is_no_fault_of_the_frame(rig: Rig) -> None:

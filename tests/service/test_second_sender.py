@@ -1,28 +1,15 @@
 """Frames of another sender with the id of a valve: two controllers must not drive one crane."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import pytest
 
 from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
+from tests.service.conftest import Rig
 
 # How long the other one must be silent before a reset counts: 1 s, in ticks.
 SILENT_TICKS = 50
-
-
-class Rig(Protocol):
-    controller: Controller
-
-    def lever(self, name: str = ..., **raw: int) -> Frame: ...
-    def receive(self, *frames: Frame) -> None: ...
-    def tick(self, missed: int = ...) -> dict[str, dict[str, Any]]: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
-    def moving(self) -> "Rig": ...
-    def state(self, axis: str = ...) -> State: ...
-    def reason(self, axis: str = ...) -> str: ...
 
 
 Make = Callable[..., Rig]

@@ -1,14 +1,13 @@
 """Grapple and operator choose sway data and filter, by frames; what does not fit is told."""
 
 from collections.abc import Callable
-from typing import Any, Protocol
 
 import pytest
 
 from canshaper.can.frame import Frame
 from canshaper.config.source import DeploymentError
-from canshaper.service.controller import Controller
 from canshaper.shaping.gff import Gff
+from tests.service.conftest import Rig
 
 DBC = {
     "BO_ 512 SlewCommand": """BO_ 1296 Load: 4 PLANT
@@ -47,13 +46,6 @@ YAML = {
         " codes: { balanced: 0, fast: 1, calm: 2 } }"
     ),
 }
-
-
-class Rig(Protocol):
-    controller: Controller
-
-    def receive(self, *frames: Frame) -> None: ...
-    def run(self, ticks: int = ..., **raw: int) -> dict[str, dict[str, Any]]: ...
 
 
 Make = Callable[..., Rig]

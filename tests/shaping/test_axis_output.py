@@ -248,3 +248,24 @@ def test_the_default_output_stays_between_zero_and_the_recent_command(drive: Dri
     falling = [v for v in drive.sent[before:] if v > 0.0]
     assert falling == sorted(falling, reverse=True)
     assert min(drive.sent[before:]) >= -0.4
+
+
+@pytest.mark.parametrize("bypass", [False, True])
+def test_a_stick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -> None:
+    """Cut off behind the filter, two thirds of the swing would come back."""
+    limits = OutputLimits(maximum=0.4, rise_per_s=5.0, fall_per_s=5.0)
+
+    def sent(full: float) -> list[float]:
+        sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
+        axis = Axis(0.02, limits, sway=sway, shaper=Gff(sway, (-2.0, -2.5)))
+        found = []
+        for number in range(500):
+            if number == 250:
+                new = SwayMode(2.5, 0.03)
+                axis.retune(new, lambda model: Gff(model, (-2.2, -2.7)))
+            command = 0.0 if number < 2 else (full, -full, 0.0)[number // 100 % 3]
+            axis.tick(StickInput(command, bypass=bypass))
+            found.append(axis.sent)
+        return found
+
+    assert sent(1.0) == sent(0.4)

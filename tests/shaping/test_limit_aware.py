@@ -72,7 +72,7 @@ def test_residual_swing_where_a_limit_acts(
 
     bare, aware, off = (residual(kind) for kind in ("bare", "aware", "off"))
     print(f"residual: off {off:.3f}, bare ZV {bare:.4f}, limit-aware {aware:.5f}")
-    assert bare > 0.04
+    assert bare > 0.02  # the limit acts
     assert aware < most_of_bare * bare
 
 

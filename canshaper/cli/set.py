@@ -1,0 +1,116 @@
+"""``canshaper set``: numbers of a running daemon."""
+
+import json
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+from rich.console import Console
+from rich.table import Table
+
+from canshaper.cli.common import FILE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.binding import Deployment
+
+EXIT_REFUSED = 1
+
+
+def set_(
+    file: str = FILE,
+    changes: list[str] | None = typer.Argument(
+        None, metavar="[KEY=VALUE]...", help="What to change; without any, show what can be."
+    ),
+    control: Path | None = typer.Option(
+        None, "--control", metavar="PATH", help="Control socket instead of the file's."
+    ),
+    write: bool = typer.Option(
+        False, "--write", help="Write the numbers into the file too, once the daemon has them."
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print JSON."),
+) -> None:
+    """Show or change numbers of a running daemon, without a jump of any valve.
+
+    What may be changed, and how far, stands in the file's section "control". All numbers of one
+    call change together, or none does. They are lost when the daemon ends or reads its file again,
+    unless they are written. Limits of an axis change while it is in neutral.
+
+    Exit code 0 when it is done, 1 when the daemon refuses or does not answer, 2 when the file or
+    the command line is wrong.
+
+    Examples:
+
+      canshaper set machine.yaml
+
+      canshaper set machine.yaml axes.slew.sway.period_s=2.45
+
+      canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
+    """
+    from canshaper.config.source import DeploymentError
+    from canshaper.control import client
+
+    try:
+        deployment = loader(file)()
+        path = control or _socket(deployment)
+        values = dict(_parsed(change) for change in changes or [])
+        before = client.table(path)
+        if values:
+            client.change(path, values)
+        table = client.table(path)
+        if values and write:
+            _write(deployment.path, values)
+    except DeploymentError as error:
+        raise fail(error) from None
+    except client.ControlError as error:
+        raise fail(error, EXIT_REFUSED) from None
+    if as_json:
+        typer.echo(json.dumps(table, indent=2))
+        return
+    if not values:
+        Console().print(_table(table))
+        return
+    for key, number in values.items():
+        typer.echo(f"{key}: {before[key]['now']:g} -> {number:g}")
+    lost = "lost when the daemon ends or reads its file again; --write keeps them"
+    typer.echo(f"Written to {deployment.path}." if write else f"Not written: {lost}.")
+
+
+def _socket(deployment: "Deployment") -> Path:
+    section = deployment.config.control
+    if section is None:
+        text = (
+            "this file has no control section; it says which numbers may be changed, for example"
+            " control: { adjustable: { axes.slew.sway.period_s: [1.8, 3.0] } }"
+        )
+        raise fail(ValueError(f"{deployment.path}: {text}"))
+    return section.path(deployment.path)
+
+
+def _parsed(text: str) -> tuple[str, float]:
+    key, _, number = text.partition("=")
+    try:
+        return key.strip(), float(number)
+    except ValueError:
+        text = f"found {text!r}, allowed is KEY=NUMBER, as in axes.slew.sway.period_s=2.45"
+        raise fail(ValueError(text)) from None
+
+
+def _table(adjustable: dict[str, dict[str, float]]) -> Table:
+    table = Table("number", "now", "in the file", "from", "to", box=None, pad_edge=False)
+    for key, one in adjustable.items():
+        numbers = (one["now"], one["file"], one["low"], one["high"])
+        table.add_row(key, *(f"{number:g}" for number in numbers))
+    return table
+
+
+def _write(path: Path, values: dict[str, float]) -> None:
+    from canshaper.config.adjust import Key
+    from canshaper.config.edit import set_values
+
+    sections: dict[tuple[str, str, str], dict[str, float]] = {}
+    for text, number in values.items():
+        key = Key.parsed(text)
+        assert key is not None  # the daemon took it
+        sections.setdefault(("axes", key.axis, key.section), {})[key.name] = number
+    for place, numbers in sections.items():
+        set_values(path, place, numbers)

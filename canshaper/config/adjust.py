@@ -1,0 +1,85 @@
+"""Numbers of an axis by their keys: which may be changed while it runs, and the result."""
+
+import re
+from collections.abc import Iterator, Mapping
+from typing import NamedTuple, Self
+
+from pydantic import ValidationError
+
+from canshaper.config.schema import AxisConfig
+
+# Limits that no filter and no run-on has in its memory.
+LIMITS = ("max_pct", "rise_per_s", "fall_per_s")
+_SECTIONS = ("sway", "filter", "limits")
+_KEY = re.compile(r"axes\.(.+)\.(\w+)\.(\w+)")
+
+
+class Key(NamedTuple):
+    """Where a number stands: ``axes.AXIS.SECTION.NAME``."""
+
+    axis: str
+    section: str
+    name: str
+
+    @classmethod
+    def parsed(cls, text: str) -> Self | None:
+        """A key by its text; None where it cannot be one of an axis."""
+        match = _KEY.fullmatch(text)
+        return cls(*match.groups()) if match else None
+
+    def __str__(self) -> str:
+        return f"axes.{self.axis}.{self.section}.{self.name}"
+
+
+def value(config: AxisConfig, key: Key) -> float | None:
+    """The number at a key; None where none stands."""
+    section = getattr(config, key.section, None) if key.section in _SECTIONS else None
+    found = getattr(section, key.name, None)
+    return found if isinstance(found, float) else None
+
+
+def adjusted(config: AxisConfig, values: Mapping[Key, float]) -> AxisConfig:
+    """The configuration of an axis with other numbers.
+
+    Raises:
+        ValueError: that is no valid configuration; the message says where and why.
+    """
+    parts = {}
+    for name in {key.section for key in values}:
+        section = getattr(config, name)
+        new = {key.name: float(one) for key, one in values.items() if key.section == name}
+        try:
+            parts[name] = type(section).model_validate(section.model_dump(exclude_none=True) | new)
+        except ValidationError as error:
+            first = error.errors()[0]
+            where = ".".join((name, *(str(part) for part in first["loc"])))
+            raise ValueError(
+                f"{where}: {first.get('ctx', {}).get('error', first['msg'])}"
+            ) from None
+    return config.model_copy(update=parts)
+
+
+def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[str]:
+    """Why a number of an axis cannot be adjustable within a range."""
+    now = value(config, key)
+    if now is None:
+        yield "found no number of that name in the axis' sway, filter or limits"
+    elif key.section == "limits" and key.name not in LIMITS:
+        yield f"found {key.name}; adjustable limits are {', '.join(LIMITS)}"
+    elif config.sets or config.feels:
+        yield f"axis {key.axis} has sets or feels, which choose its numbers"
+    elif config.sway is None and key.section == "filter":
+        yield f"axis {key.axis} has no sway data; adjustable are its limits"
+    elif not low <= now <= high:
+        yield f"found {low:g} to {high:g}, and the number itself is {now:g}, outside of it"
+    else:
+        section = getattr(config, key.section)
+        for end in (low, high):
+            try:
+                type(section).model_validate(
+                    section.model_dump(exclude_none=True) | {key.name: end}
+                )
+            except ValidationError as error:
+                # Whether two numbers go together is known when both are changed.
+                if any(one["loc"] == (key.name,) for one in error.errors()):
+                    yield f"found the end {end:g}, which is out of the range of this key"

@@ -1,0 +1,169 @@
+"""The control socket: whatever comes in, the loop goes on and others are served."""
+
+import json
+import os
+import socket
+import stat
+import subprocess
+import sys
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.control import client
+from canshaper.control.server import LEAST_BETWEEN_NS, MOST_BYTES, MOST_CLIENTS, ControlServer
+
+
+class Rig:
+    """A server with its clock, and what it was asked."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        self.server = ControlServer(path, 0o600)
+        self.now_ns = 0
+        self.asked: list[Mapping[str, Any]] = []
+        self.peers: list[str] = []
+        self.reply: dict[str, Any] = {"adjustable": {}}
+
+    def answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
+        self.asked.append(request)
+        self.peers.append(peer)
+        if "bad" in request:
+            raise ValueError("no such thing")
+        return self.reply
+
+    def serve(self, ticks: int = 1) -> None:
+        for _ in range(ticks):
+            self.server.serve(self.answer, self.now_ns)
+            self.now_ns += LEAST_BETWEEN_NS
+
+    def connected(self) -> socket.socket:
+        one = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        one.settimeout(0)
+        one.connect(str(self.path))
+        self.serve()
+        return one
+
+
+@pytest.fixture
+def rig(tmp_path: Path) -> Iterator[Rig]:
+    made = Rig(tmp_path / "control.sock")
+    yield made
+    made.server.close()
+
+
+def test_a_request_is_answered_and_says_who_asks(rig: Rig) -> None:
+    with rig.connected() as one:
+        one.send(b'{"set": {"a": 1, "b": 1e400}}')
+        rig.serve()
+        assert json.loads(one.recv(MOST_BYTES)) == rig.reply
+    assert rig.asked == [{"set": {"a": 1.0, "b": float("inf")}}]
+    assert rig.peers == [f"uid={os.getuid()} pid={os.getpid()}"]
+
+
+@pytest.mark.parametrize(
+    ("data", "why"),
+    [
+        (b"nonsense", "Expecting value"),
+        (b"\xff\xfe\x00", "codec"),
+        (b"[1]", "found no object"),
+        (b'{"bad": 1}', "no such thing"),
+        (b"[" * 60000, "recursion"),
+        (b'{"a": ' + b"9" * 50000 + b', "bad": 1}', "no such thing"),
+    ],
+)
+def test_nonsense_is_told_and_the_next_request_served(rig: Rig, data: bytes, why: str) -> None:
+    with rig.connected() as one:
+        one.send(data)
+        rig.serve()
+        assert why in json.loads(one.recv(MOST_BYTES))["error"]
+        one.send(b"{}")
+        rig.serve()
+        assert json.loads(one.recv(MOST_BYTES)) == rig.reply
+
+
+def test_requests_come_one_at_a_time_and_not_too_often(rig: Rig) -> None:
+    with rig.connected() as one, rig.connected() as other:
+        for _ in range(3):
+            one.send(b"{}")
+            other.send(b"{}")
+        begin = rig.now_ns
+        for ms in range(0, 150, 5):
+            rig.server.serve(rig.answer, begin + ms * 1_000_000)
+    assert len(rig.asked) == 3
+
+
+def test_more_clients_than_there_is_room_for_are_sent_away(rig: Rig) -> None:
+    clients = [rig.connected() for _ in range(MOST_CLIENTS)]
+    with rig.connected() as late:
+        assert late.recv(10) == b""
+    clients.pop().close()
+    rig.serve()
+    with rig.connected() as next_one:
+        next_one.send(b"{}")
+        rig.serve()
+        assert next_one.recv(MOST_BYTES)
+    for one in clients:
+        one.close()
+
+
+def test_a_client_that_reads_no_answers_is_dropped(rig: Rig) -> None:
+    rig.reply = {"adjustable": "x" * 40000}
+    with rig.connected() as one:
+        for _ in range(100):
+            try:
+                one.send(b"{}")
+            except OSError:
+                break
+            rig.serve(2)
+        else:
+            pytest.fail("never dropped")
+    with rig.connected() as other:
+        other.send(b"{}")
+        rig.serve()
+        assert other.recv(MOST_BYTES)
+
+
+def test_only_its_owner_may_write(tmp_path: Path) -> None:
+    for mode in (0o600, 0o660, 0o666):
+        path = tmp_path / f"{mode:o}"
+        mask = os.umask(0o077)
+        server = ControlServer(path, mode)
+        assert os.umask(mask) == 0o077
+        assert stat.S_IMODE(path.stat().st_mode) == mode
+        server.close()
+        assert not path.exists()
+
+
+def test_the_socket_of_a_daemon_that_was_killed_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    code = "import sys, os; from pathlib import Path\n"
+    code += "from canshaper.control.server import ControlServer\n"
+    code += "server = ControlServer(Path(sys.argv[1]), 0o600); os._exit(0)"
+    subprocess.run([sys.executable, "-c", code, str(path)], check=True)
+    assert path.is_socket()
+    ControlServer(path, 0o600).close()
+
+
+def test_the_socket_of_a_daemon_that_runs_is_left_alone(rig: Rig) -> None:
+    with pytest.raises(OSError, match="in use"):
+        ControlServer(rig.path, 0o600)
+    with rig.connected() as one:
+        one.send(b"{}")
+        rig.serve(4)  # whoever looked whether somebody is there comes first
+        assert one.recv(MOST_BYTES)
+
+
+def test_a_file_that_is_no_socket_is_left_alone(tmp_path: Path) -> None:
+    path = tmp_path / "control.sock"
+    path.write_text("precious", encoding="utf-8")
+    with pytest.raises(OSError, match="in use"):
+        ControlServer(path, 0o600)
+    assert path.read_text(encoding="utf-8") == "precious"
+
+
+def test_a_client_without_a_daemon_says_where_it_looked(tmp_path: Path) -> None:
+    with pytest.raises(client.ControlError, match=r"none\.sock: No such file"):
+        client.table(tmp_path / "none.sock")
