@@ -30,10 +30,10 @@ test: lint
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
 		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
 
-# J1939, CANopen and a valve being measured, with foreign counterparts on real SocketCAN.
+# J1939, CANopen, a valve being measured, a gateway: foreign counterparts on real SocketCAN.
 test-machines: .venv/test-ready
 	.venv/bin/python -m tests.lane.hil tests/hil/test_j1939.py tests/hil/test_canopen.py \
-		tests/hil/test_calibrate.py
+		tests/hil/test_calibrate.py tests/hil/test_gateway.py
 
 # Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
 test-faults: .venv/test-ready
@@ -96,6 +96,7 @@ bench-realtime: .venv/test-ready
 	.venv/bin/python benchmarks/lateness.py --ticks 1000
 	.venv/bin/python benchmarks/lateness.py --ticks 1000 --kernel rt
 	.venv/bin/python benchmarks/frames.py --bus can
+	.venv/bin/python benchmarks/gateway.py
 	.venv/bin/python benchmarks/memory.py --minutes 60 --every 30
 
 # dist/canshaper_VERSION_ARCH.deb: docs/service.md

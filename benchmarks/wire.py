@@ -68,8 +68,8 @@ class Wire:
         self._hand = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self._hand.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"")
         self._hand.bind((far,))
-        self._in = _port(near, LEVER_LEFT)
-        self._out = _port(far, SLEW_COMMAND)
+        self._in = stamped_port(near, LEVER_LEFT)
+        self._out = stamped_port(far, SLEW_COMMAND)
         database = cantools.database.load_file(DBC)
         left, right = (database.get_message_by_frame_id(i) for i in (LEVER_LEFT, LEVER_RIGHT))
         on = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
@@ -104,7 +104,7 @@ class Wire:
                 break
         else:
             raise SystemExit(f"the valve does not follow the stick: it stays at {self._steps}")
-        _, in_ns, _ = _receive(self._in)
+        _, in_ns, _ = receive_stamped(self._in)
         return Exchange(send_ns, in_ns, out_ns, back_ns)
 
     def forget(self) -> int:
@@ -114,7 +114,7 @@ class Wire:
             port.setblocking(False)
             while True:
                 try:
-                    self._valve() if port is self._out else _receive(port)
+                    self._valve() if port is self._out else receive_stamped(port)
                 except BlockingIOError:
                     break
                 dropped += port is self._out
@@ -123,13 +123,14 @@ class Wire:
 
     def _valve(self) -> tuple[int, int, int]:
         """Take a valve frame: when it came, when we had it, its steps against the one before."""
-        data, at_ns, back_ns = _receive(self._out)
+        data, at_ns, back_ns = receive_stamped(self._out)
         steps = int.from_bytes(data[8:9], signed=True)
         rise, self._steps = steps - self._steps, steps
         return at_ns, back_ns, rise
 
 
-def _port(channel: str, can_id: int) -> socket.socket:
+def stamped_port(channel: str, can_id: int) -> socket.socket:
+    """A socket that hears one message, with the kernel's stamps."""
     port = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     wanted = struct.pack("=II", can_id, 0xC00007FF)
     port.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, wanted)
@@ -139,7 +140,7 @@ def _port(channel: str, can_id: int) -> socket.socket:
     return port
 
 
-def _receive(port: socket.socket) -> tuple[bytes, int, int]:
+def receive_stamped(port: socket.socket) -> tuple[bytes, int, int]:
     """A frame, when it arrived, and when we had it."""
     data, extra, _, _ = port.recvmsg(16, ROOM)
     back_ns = time.monotonic_ns()

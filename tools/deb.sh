@@ -63,13 +63,14 @@ mv "$library/canshaper/data/config" "$library/canshaper/data/dbc" "$root/usr/sha
 rmdir "$library/canshaper/data"
 ln -s ../../../share/canshaper "$library/canshaper/data"
 mv "$root/usr/share/canshaper/config/systemd"/*.service "$root/lib/systemd/system"
+mv "$root/usr/share/canshaper/config/systemd"/*.conf "$root/usr/share/canshaper"
 mv "$root/usr/share/canshaper/config/networkd" "$root/usr/share/canshaper"
 rmdir "$root/usr/share/canshaper/config/systemd"
 
 # The administrator's copies: DBC files in a directory beside the deployments.
 cp "$root/usr/share/canshaper/dbc"/* "$root/etc/canshaper/dbc"
 for file in $(grep -l '^dbc:' "$root/usr/share/canshaper/config"/*.yaml); do
-    sed -e 's|\.\./dbc/|dbc/|g' -e 's|\bconfig/\(forwarder[a-z-]*\.yaml\)|/etc/canshaper/\1|g' \
+    sed -e 's|\.\./dbc/|dbc/|g' -e 's|\bconfig/\([a-z0-9-]*\.yaml\)|/etc/canshaper/\1|g' \
         "$file" >"$root/etc/canshaper/${file##*/}"
 done
 

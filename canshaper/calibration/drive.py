@@ -110,9 +110,9 @@ class CalibrationDrive:
         """What the axis still waits for, before the ramp begins."""
         return "" if self._begun_ns is not None else self._runner.axis.reason.name
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame from a bus."""
-        self._controller.receive(frame, now_ns)
+    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
+        """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
+        passed = self._controller.receive(frame, now_ns)
         known = self._message.frame_id
         mine = group_of(frame.can_id) == group_of(known) if self._any else frame.can_id == known
         if (
@@ -123,6 +123,7 @@ class CalibrationDrive:
             raw: Any = self._layout.decode(frame.data)[self._signal.name]
             if raw not in self._special:
                 self._latest = raw * self._signal.scale + self._signal.offset
+        return passed
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send."""

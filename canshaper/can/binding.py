@@ -19,12 +19,15 @@ from canshaper.can.inputs import (
     BoundSwitch,
 )
 from canshaper.can.j1939 import CLAIMED, REQUEST, claims_of, group_of, sent_by
+from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.layout import is_j1939
 from canshaper.can.load import BusLoad, bus_load
+from canshaper.can.rewrite import RewrittenMessage
 from canshaper.can.signals import status_faults
 from canshaper.can.socketcan import Ids
-from canshaper.can.valve import ValveCodec
+from canshaper.can.valve import ValveCodec, ValveMessage
 from canshaper.config.bus import LAST_SPN, J1939Name
+from canshaper.config.gateway import Gateway
 from canshaper.config.load import load_config
 from canshaper.config.schema import (
     AxisConfig,
@@ -62,6 +65,11 @@ class BoundAxis:
     radial: BoundRadial | None = None
     feedback: BoundFeedback | None = None
     status_word: BoundStatusWord | None = None
+
+    @property
+    def rewrites(self) -> bool:
+        """Whether its command leaves in the frames of its own lever, through a gateway."""
+        return isinstance(self.valve.message, RewrittenMessage)
 
 
 @dataclass(frozen=True)
@@ -117,7 +125,13 @@ class Deployment:
             frozenset((can_id, True) for can_id in (claims_of(own.address) if own else ())),
             self.is_j1939(bus),
             canopen is not None,
+            self.in_line(bus),
         )
+
+    def in_line(self, bus: str) -> bool:
+        """Whether a bus is one of the gateway: what nobody knows there is what it passes on."""
+        gateway = self.config.gateway
+        return gateway is not None and bus in gateway.between
 
     def is_j1939(self, bus: str) -> bool:
         """Whether a bus is one of J1939: we have an address there, or know a message of it."""
@@ -132,12 +146,15 @@ class Deployment:
         return [*self.levers.values(), *(i for i in others if i)]
 
     def sent_groups(self, bus: str) -> set[int]:
-        """Groups of J1939 that command a valve of ours, from whatever address they come."""
+        """Groups of J1939 that command a valve of ours, from whatever address they come.
+
+        Not those of joysticks whose frames we pass on: others send the same group.
+        """
         return {
             group_of(axis.valve.message.sender.key[1])
             for axis in self.axes.values()
             if axis.config.valve.bus == bus and is_j1939(axis.valve_message)
-            if not self.listen_only
+            if not axis.rewrites and not self.listen_only
         }
 
     def listening(self) -> "Deployment":
@@ -185,6 +202,8 @@ class _Binder(FilterBinder):
         grapple = self.switch(("grapple",), config.grapple) if config.grapple else None
         feel = self.switch(("feel",), config.feel) if config.feel else None
         service = self._status(("status",), config.status, ServiceStatusCodec)
+        if config.gateway:
+            self._check_gateway(config.gateway, [a.valve.message for a in axes.values() if a])
         if config.control:
             self.check_control(config.control)
         if self.problems:
@@ -219,6 +238,26 @@ class _Binder(FilterBinder):
                     self.add(("buses", bus, "canopen", *where), f"{text}; allowed is another one")
                 seen.setdefault(number, name)
 
+    def _check_gateway(self, gateway: Gateway, valves: list[ValveMessage]) -> None:
+        for i, bus in enumerate(gateway.between):
+            if bus not in self.config.buses:
+                names = ", ".join(self.config.buses)
+                self.add(("gateway", "between", i), f"found {bus!r}, buses are {names}")
+        for i, name in enumerate(gateway.blocked):
+            if isinstance(found := self.messages.find(name), str):
+                self.add(("gateway", "blocked", i), found)
+        if gateway.fallback == "stop":
+            return
+        rewritten = [m.sender for m in valves if isinstance(m, RewrittenMessage)]
+        if not rewritten:
+            text = f"found {gateway.fallback}, and no valve has the message of a lever on the other"
+            self.add(("gateway", "fallback"), f"{text} bus; allowed is stop")
+        faults = {neutral_fault(s.protection, s.fields.message.length): s for s in rewritten}
+        for fault, sender in faults.items():
+            if fault and gateway.fallback == "neutral":
+                name = sender.fields.message.name
+                self.add(("gateway", "fallback"), f"found neutral; {fault}, which {name} has")
+
     def _check_buses(self) -> None:
         seen: dict[tuple[str, str], str] = {}
         names: dict[J1939Name, str] = {}
@@ -244,7 +283,7 @@ class _Binder(FilterBinder):
         if axis.stick.lever not in self.config.levers:
             names = ", ".join(self.config.levers)
             self.add((*place, "stick", "lever"), f"found {axis.stick.lever!r}, levers are {names}")
-        bound = self.valve((*place, "valve"), axis.valve)
+        bound = self.valve((*place, "valve"), axis.valve, axis.stick)
         status = self._status((*place, "status"), axis.status, AxisStatusCodec)
         if bound is None or len(self.problems) > before:
             return None

@@ -6,7 +6,7 @@ from typing import Any, ClassVar
 
 from cantools.database.can import Message
 
-from canshaper.can.flags import FlaggedVelocity
+from canshaper.can.flags import FlaggedVelocity, RockerVelocity
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.j1939 import with_source
 from canshaper.can.layout import Layout, is_j1939
@@ -23,7 +23,9 @@ class LeverCodec:
     """Joystick message to raw values and switches."""
 
     def __init__(
-        self, message: Message, velocities: Sequence[VelocitySignal | FlaggedVelocity]
+        self,
+        message: Message,
+        velocities: Sequence[VelocitySignal | FlaggedVelocity | RockerVelocity],
     ) -> None:
         self._length = message.length
         self._layout = Layout(message)

@@ -56,6 +56,9 @@ class Profile1(E2e):
             ``nibble``: the low one, then a zero; four bits of the high one are sent in the upper
             half of byte 1.
 
+    Attributes:
+        starts: register of the CRC after the data ID, for even and for odd counters.
+
     The profile starts the CRC with 0 and does not invert its result, unlike the algorithm of that
     name in catalogues.
     """
@@ -72,7 +75,7 @@ class Profile1(E2e):
             odd = (high,)
         elif mode == "nibble":
             even = odd = (low, 0)
-        self._start = tuple(SAE_J1850.run(0, bytes(first)) for first in (even, odd))
+        self.starts = tuple(SAE_J1850.run(0, bytes(first)) for first in (even, odd))
         self._nibble = (high & 0x0F) << 4 if mode == "nibble" else None
         self.bits = 12 if self._nibble is None else 16
 
@@ -88,7 +91,7 @@ class Profile1(E2e):
 
     def crc(self, data: bytes, count: int) -> int:
         """CRC of a frame."""
-        return SAE_J1850.run(self._start[count & 1], data[1:])
+        return SAE_J1850.run(self.starts[count & 1], data[1:])
 
 
 class Profile2(E2e):
@@ -96,13 +99,16 @@ class Profile2(E2e):
 
     Args:
         data_ids: 16 data IDs of 8 bits, by the counter.
+
+    Attributes:
+        ids: them as bytes.
     """
 
     counts = 16
 
     def __init__(self, data_ids: Sequence[int]) -> None:
-        self._ids = tuple(bytes((i,)) for i in data_ids)
+        self.ids = tuple(bytes((i,)) for i in data_ids)
 
     def crc(self, data: bytes, count: int) -> int:
         """CRC of a frame."""
-        return AUTOSAR.of(data[1:] + self._ids[count])
+        return AUTOSAR.of(data[1:] + self.ids[count])

@@ -1,4 +1,4 @@
-"""Sticks as J1939-71 sends them: a magnitude without sign, and flags for its direction."""
+"""Sticks without a sign: a magnitude with flags as in J1939-71, or a signal for each direction."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -61,6 +61,40 @@ class FlaggedVelocity:
         if size > largest:
             return Reason.STICK_CONTRADICTORY
         return sign * size if size > ROUNDING else 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class RockerVelocity:
+    """Velocity of a rocker with a signal for each direction, be they proportional or two buttons.
+
+    Attributes:
+        positive: signal of the positive direction (``magnitude_range``).
+        negative: signal of the negative one.
+    """
+
+    positive: VelocitySignal
+    negative: VelocitySignal
+
+    @property
+    def name(self) -> str:
+        """Name of the signal of the positive direction."""
+        return self.positive.name
+
+    def read(self, raw: dict[str, Any]) -> float | Reason:
+        """Command in [-1, 1] from the raw values of a frame, or why there is none.
+
+        One part cannot be pressed both ways: then neither counts.
+        """
+        positive, negative = self.positive.read(raw), self.negative.read(raw)
+        if isinstance(positive, Reason):
+            return positive
+        if isinstance(negative, Reason):
+            return negative
+        if min(positive, negative) < -ROUNDING:
+            return Reason.STICK_OUT_OF_RANGE
+        if min(positive, negative) > SMALL_IN_NEUTRAL:
+            return Reason.STICK_CONTRADICTORY
+        return positive - negative
 
 
 def _fault(flags: tuple[int, int, int]) -> Reason:

@@ -6,7 +6,7 @@ from cantools.database.can import Message
 
 from canshaper.can.codecs import LeverCodec
 from canshaper.can.database import DbcFile
-from canshaper.can.flags import FlaggedVelocity
+from canshaper.can.flags import FlaggedVelocity, RockerVelocity
 from canshaper.can.j1939 import NULL, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Guard, Protection
@@ -18,10 +18,11 @@ from canshaper.can.signals import (
     symmetrical_range,
 )
 from canshaper.config.input import Input
-from canshaper.config.schema import EmergencyStop, Feedback, Lever, Radius, StatusWord
+from canshaper.config.schema import EmergencyStop, Feedback, Lever, Radius, StatusWord, Stick
 from canshaper.config.sets import FeelSwitch, Grapple
 from canshaper.config.source import Place
 
+Velocity = VelocitySignal | FlaggedVelocity | RockerVelocity
 # Two frames may be lost in a row; more is no longer the noise of a bus.
 USUAL_MAX_STEP = 3
 
@@ -123,13 +124,19 @@ class InputBinder(ProtectionBinder):
 
     def _velocities(
         self, lever: str, file: DbcFile, message: Message, use: dict[str, str]
-    ) -> list[VelocitySignal | FlaggedVelocity]:
+    ) -> list[Velocity]:
         """What the axes take from a lever; ``use`` is what its other signals are."""
-        found: list[VelocitySignal | FlaggedVelocity] = []
+        found: list[Velocity] = []
         sticks = {n: a.stick for n, a in self.config.axes.items() if a.stick.lever == lever}
         moves = {s.signal: f"the stick of {axis}" for axis, s in reversed(sticks.items())}
         for axis, stick in sticks.items():
             place: Place = ("axes", axis, "stick")
+            if stick.negative:
+                if rocker := self._rocker(place, stick, file, message, (moves, use)):
+                    use[stick.negative] = f"the negative direction of {axis}"
+                    use[stick.signal] = moves[stick.signal]
+                    found.append(rocker)
+                continue
             flags = stick.flags.model_dump() if stick.flags else {}
             for key, name in flags.items():
                 if flag := self.signal((*place, "flags", key), message, name):
@@ -150,6 +157,31 @@ class InputBinder(ProtectionBinder):
                 use[signal.name] = moves[signal.name]  # with other flags it would be another one
             found.append(FlaggedVelocity(velocity, **flags) if flags else velocity)
         return found
+
+    def _rocker(
+        self,
+        place: Place,
+        stick: Stick,
+        file: DbcFile,
+        message: Message,
+        used: tuple[dict[str, str], dict[str, str]],
+    ) -> RockerVelocity | None:
+        """A rocker with a signal for each direction; ``used`` are sticks, and all else."""
+        moves, use = used
+        velocities = []
+        for key, name, others in (
+            ("signal", stick.signal, use),
+            ("negative", stick.negative, {**moves, **use}),
+        ):
+            signal = self.signal((*place, key), message, name)
+            if signal is None:
+                continue
+            if why := magnitude_range(signal):
+                self.problems.append(file.problem(message, why))
+                continue
+            self.alone((*place, key), signal, others)
+            velocities.append(VelocitySignal.of(signal))
+        return RockerVelocity(*velocities) if len(velocities) == 2 else None
 
     def stop(self, stop: EmergencyStop) -> BoundStop | None:
         """The emergency stop."""

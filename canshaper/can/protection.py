@@ -85,11 +85,18 @@ class Protector:
         Raises:
             OverflowError: a value is not within the bits of its signal.
         """
+        self.count(raw)
+        return self.seal(self._encode(raw))
+
+    def count(self, raw: dict[str, Any]) -> None:
+        """Go on to the next frame, and put its counter among the raw values."""
         if self._counts:
             self._count = (self._count + 1) % self._counts
             if self._counter is not None:
                 raw[self._counter] = self._count
-        data = self._encode(raw)
+
+    def seal(self, data: bytes) -> bytes:
+        """The same frame with the check of the count it has come to."""
         return data if self._check is None else self._check.seal(data, self._count)
 
 

@@ -41,6 +41,7 @@ class Ids:
         claims: what we send of the groups that are taken: it comes back among them.
         j1939: the bus is one of J1939, where ids of 29 bits that nobody knows are daily life.
         canopen: the bus is one of CANopen, where that is so for SDO, SYNC and the like.
+        in_line: the bus is one of a gateway, where that is so for all.
     """
 
     taken: frozenset[tuple[int, bool]]
@@ -52,6 +53,7 @@ class Ids:
     claims: frozenset[tuple[int, bool]] = frozenset()
     j1939: bool = False
     canopen: bool = False
+    in_line: bool = False
 
 
 def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
@@ -106,8 +108,15 @@ def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
             words.append((EFF, EFF))
         if flag and ids.canopen:
             words += [(base, mask | EFF) for base, mask, _ in SERVICES]
-        filters = b"".join(_FILTER.pack(word | flag, mask) for word, mask in words)
+        if flag and ids.in_line:
+            words = []  # no filter at all: nothing is heard
+        filters = filter_words((word | flag, mask) for word, mask in words)
         one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
+
+
+def filter_words(words: Iterable[tuple[int, int]]) -> bytes:
+    """Filters as the kernel takes them: an id and the mask of its bits that matter, each."""
+    return b"".join(_FILTER.pack(word, mask) for word, mask in words)
 
 
 def dropped_frames(sockets: list[socket.socket]) -> int:

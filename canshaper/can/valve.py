@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 from cantools.database.can import Signal
 
@@ -31,6 +31,16 @@ class ValveMessage:
         return new_frame(Frame, (self._bus, self._id, self._extended, data))
 
 
+class Direction(Protocol):
+    """What tells the direction of a magnitude."""
+
+    def put(self, raw: dict[str, Any], sign: int) -> None:
+        """Tell a sign: 0 for neutral, 1 or -1."""
+
+    def read(self, raw: Mapping[str, Any]) -> int | None:
+        """The sign that is told; None where it is none."""
+
+
 @dataclass(frozen=True, slots=True)
 class DirectionCodec:
     """Signal that tells the direction of a magnitude, as the valve state of ISO 11783-7 does.
@@ -43,6 +53,35 @@ class DirectionCodec:
     signal: str
     codes: tuple[int, int, int]
 
+    def put(self, raw: dict[str, Any], sign: int) -> None:
+        """Tell a sign: 0 for neutral, 1 or -1."""
+        raw[self.signal] = self.codes[sign]  # the last one is that of -1
+
+    def read(self, raw: Mapping[str, Any]) -> int | None:
+        """The sign that is told; None where it is none."""
+        return dict(zip(self.codes, (0, 1, -1), strict=True)).get(raw[self.signal])
+
+
+@dataclass(frozen=True, slots=True)
+class FlagsCodec:
+    """Three flags that tell the direction of a magnitude, as joysticks of J1939-71 do.
+
+    Attributes:
+        signals: names of the flags of neutral, of positive and of negative, in this order.
+    """
+
+    signals: tuple[str, str, str]
+
+    def put(self, raw: dict[str, Any], sign: int) -> None:
+        """Tell a sign: 0 for neutral, 1 or -1."""
+        for name, of in zip(self.signals, (0, 1, -1), strict=True):
+            raw[name] = int(of == sign)
+
+    def read(self, raw: Mapping[str, Any]) -> int | None:
+        """The sign that is told; None where it is none."""
+        told = [of for n, of in zip(self.signals, (0, 1, -1), strict=True) if raw[n] == 1]
+        return told[0] if len(told) == 1 else None
+
 
 class ValveCodec:
     """Command of one axis: a whole number of steps, to its signals and back.
@@ -51,6 +90,8 @@ class ValveCodec:
         message: the message it is sent in.
         signal: the command; with a direction its magnitude.
         direction: where the direction is told, if not by the sign.
+        negative: magnitude of negative commands, where they have a signal of their own, which is
+            like that of the positive ones.
         also: signals that tell the same in another resolution.
 
     Attributes:
@@ -61,8 +102,9 @@ class ValveCodec:
         self,
         message: ValveMessage,
         signal: Signal,
-        direction: DirectionCodec | None = None,
+        direction: Direction | None = None,
         also: Sequence[Signal] = (),
+        negative: Signal | None = None,
     ) -> None:
         self.message = message
         self.steps = _steps(signal)
@@ -70,6 +112,7 @@ class ValveCodec:
         self._signal = signal.name
         self._zero, self._sign = _zero(signal), 1 if signal.scale > 0 else -1
         self._direction = direction
+        self._negative = negative.name if negative else None
         self._also = [(s.name, _zero(s), _steps(s) * (1 if s.scale > 0 else -1)) for s in also]
         self.put(0)
 
@@ -86,10 +129,11 @@ class ValveCodec:
             raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
         raw, size = self._raw, steps
         if self._direction is not None:
-            raw[self._direction.signal] = self._direction.codes[
-                0 if steps == 0 else 1 if steps > 0 else 2
-            ]
+            self._direction.put(raw, (steps > 0) - (steps < 0))
             size = abs(steps)
+        elif self._negative is not None:
+            size = max(steps, 0)
+            raw[self._negative] = self._zero + self._sign * max(-steps, 0)
         raw[self._signal] = self._zero + self._sign * size
         for name, zero, full in self._also:
             raw[name] = zero + round(full * size / self.steps)
@@ -98,11 +142,15 @@ class ValveCodec:
         """Steps of a command from the raw values of a message; None where it is no command."""
         steps = self._sign * (int(raw[self._signal]) - self._zero)
         if self._direction is not None:
-            codes = dict(zip(self._direction.codes, (0, 1, -1), strict=True))
-            sign = codes.get(raw[self._direction.signal])
+            sign = self._direction.read(raw)
             if sign is None or steps < 0:
                 return None
             steps *= sign
+        elif self._negative is not None:
+            back = self._sign * (int(raw[self._negative]) - self._zero)
+            if min(steps, back) != 0:
+                return None
+            steps -= back
         return steps if abs(steps) <= self.steps else None
 
 

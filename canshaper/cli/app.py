@@ -12,6 +12,7 @@ from canshaper.cli import (
     config_schema,
     demo,
     doctor,
+    gateway,
     identify,
     init,
     monitor,
@@ -58,6 +59,7 @@ app.command("set")(set.set_)
 app.command("check")(check.check)
 app.command("calibrate")(calibrate.calibrate)
 app.command("doctor")(doctor.doctor)
+app.command("gateway")(gateway.gateway)
 app.command("demo")(demo.demo)
 app.command("identify")(identify.identify)
 app.command("replay")(replay.replay)

@@ -6,6 +6,13 @@ from canshaper.can.binding import Deployment
 from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 
+# What joysticks do while the daemon is away.
+FALLBACKS = {
+    "stop": "no joystick does without us",
+    "neutral": "neutral joysticks do without us",
+    "pass": "WARNING: without us the raw joystick moves the machine",
+}
+
 
 def check(file: str = FILE) -> None:
     """Load a deployment against its DBC files and report every problem at once.
@@ -31,6 +38,9 @@ def check(file: str = FILE) -> None:
     typer.echo(f"{deployment.path}: good")
     for name, bus in config.buses.items():
         typer.echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
+    if gateway := config.gateway:
+        ends, away = " and ".join(gateway.between), FALLBACKS[gateway.fallback]
+        typer.echo(f"  gateway between {ends}: others pass by the {gateway.passing}, {away}")
     for name, axis in deployment.axes.items():
         valve, stick = axis.config.valve, axis.config.stick
         period_ms = axis.period_ticks * config.tick_ms

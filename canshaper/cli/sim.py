@@ -7,6 +7,11 @@ from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
 )
+CRANE = typer.Option(
+    None,
+    "--crane",
+    help="Which one, where the deployment has several: the first part of axis names.",
+)
 
 
 def sim(
@@ -21,6 +26,7 @@ def sim(
         " the joints; joints: a valve for each joint. By default tip, or joints where the"
         " deployment has joint axes.",
     ),
+    crane: str | None = CRANE,
     show: bool = typer.Option(False, "--show", help="Print all parameters and exit."),
 ) -> None:
     """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
@@ -42,6 +48,7 @@ def sim(
     """
     from canshaper.can.bus import BusError
     from canshaper.config.source import DeploymentError
+    from canshaper_sim.cranes import one_crane
     from canshaper_sim.parameters import changed_parameters, parameter_names
     from canshaper_sim.realtime import run_plant
 
@@ -51,7 +58,9 @@ def sim(
             for name, value in parameter_names(parameters).items():
                 typer.echo(f"{name}={value:g}")
             return
-        run_plant(loader(file, interface, channel)(), parameters, machine)
+        deployment = loader(file, interface, channel)()
+        driven = one_crane(deployment, crane) if crane else deployment
+        run_plant(driven, parameters, machine)
     except (DeploymentError, BusError, ValueError) as error:
         raise fail(error) from None
 
@@ -62,6 +71,7 @@ def operator(
     bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway switched off."),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    crane: str | None = CRANE,
     show: bool = typer.Option(False, "--list", help="List the scripts and exit."),
 ) -> None:
     """Play a scripted operator: joystick frames with the enable switch held.
@@ -79,6 +89,7 @@ def operator(
     from canshaper.can.bus import BusError
     from canshaper.config.source import DeploymentError
     from canshaper_sim.axes import ALL_AXES
+    from canshaper_sim.cranes import one_crane
     from canshaper_sim.operator import SCRIPTS, script_named
     from canshaper_sim.realtime import run_operator
 
@@ -89,6 +100,8 @@ def operator(
         return
     try:
         deployment = loader(file, interface, channel)()
+        if crane:
+            deployment = one_crane(deployment, crane)
         axes = [axis for axis in ALL_AXES if axis in deployment.axes]
         run_operator(deployment, script_named(script, axes), bypass=bypass)
     except (DeploymentError, BusError, ValueError) as error:

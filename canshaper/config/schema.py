@@ -7,6 +7,7 @@ from pydantic import Field, model_validator
 from canshaper.config.bus import Bus
 from canshaper.config.control import Control
 from canshaper.config.filters import Filter
+from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
 from canshaper.config.protection import Protected
 from canshaper.config.section import Section, number
@@ -64,9 +65,18 @@ class Stick(Section):
     signal: str = Field(description="signal with the velocity; its DBC range is full stick")
     flags: DirectionFlags | None = None
     """Only where the velocity has no sign of its own."""
+    negative: str | None = Field(
+        None, description="rocker of two signals: that of the negative direction"
+    )
     neutral_pct: Annotated[
         float, number(0.1, 20, "% of full stick", "deflection that still counts as neutral")
     ] = 2.0
+
+    @model_validator(mode="after")
+    def _one_direction(self) -> Self:
+        if self.flags and self.negative:
+            raise ValueError("found flags and negative; allowed is one of them")
+        return self
 
 
 class DirectionCodes(Section):
@@ -252,6 +262,7 @@ class DeploymentConfig(Section):
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     levers: dict[str, Lever] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
+    gateway: Gateway | None = None
     emergency_stop: EmergencyStop | None = None
     grapple: Grapple | None = None
     feel: FeelSwitch | None = None

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.frame import Frame
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.service.controller import Controller
@@ -76,14 +77,10 @@ class Loop:
         for name, port in ports.items():
             for frame in port.frames():
                 self._frames[name] += 1
-                controller.receive(frame, now_ns)
-        tick = len(self._late)
+                if (passed := controller.receive(frame, now_ns)) is not None:
+                    self._send(passed)
         for frame in controller.tick(now_ns, missed):
-            if not ports[frame.bus].send(frame):
-                controller.send_failed(frame)
-            else:
-                for axis in self._valves.get(frame[:3], ()):
-                    self._sent.extend((tick, axis, time.monotonic_ns()))
+            self._send(frame)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
@@ -91,6 +88,14 @@ class Loop:
         self._missed += missed
         self._ended.append(time.monotonic_ns())
         return now_ns < self._until_ns
+
+    def _send(self, frame: Frame) -> None:
+        if not self._ports[frame.bus].send(frame):
+            self._controller.send_failed(frame)
+            return
+        tick = len(self._late)
+        for axis in self._valves.get(frame[:3], ()):
+            self._sent.extend((tick, axis, time.monotonic_ns()))
 
     def _housekeeping(self, now_ns: int) -> None:
         for event in self._controller.events:

@@ -16,6 +16,7 @@ from canshaper.service.feedback import Feedback, Following
 from canshaper.service.groups import Taken
 from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
+from canshaper.service.line import Line
 from canshaper.service.network import Network
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
@@ -97,6 +98,12 @@ class Controller:
             self._by_message.setdefault(key, []).append(runner)
         for runners in self._by_message.values():
             runners[-1].sends = True  # when all axes of the message have moved
+        self._lines = {
+            key: Line(runners[0].bound.valve.message, levers[_lever(runners[0])], runners)
+            for key, runners in self._by_message.items()
+            if runners[0].bound.rewrites
+        }
+        self._in_line = {bus for bus in deployment.config.buses if deployment.in_line(bus)}
         self._canopen = canopen_buses(deployment, self.axes)
         for bus, nodes in self._canopen.items():
             self._inputs |= {(bus, n, False): one for n, one in nodes.inputs.items()}
@@ -111,8 +118,12 @@ class Controller:
         """Whether no axis can move without the operator."""
         return all(runner.axis.neutral for runner in self.axes.values())
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception."""
+    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
+        """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception.
+
+        Returns:
+            What it leaves as on the other bus of a gateway, to be sent at once.
+        """
         key = frame[:3]
         entry = self._inputs.get(key)
         if entry is not None:
@@ -124,14 +135,20 @@ class Controller:
         elif frame.extended and (group := self._network.entry(key[0], key[1])):
             fault = group.receive(frame, now_ns)
         elif key[1:] in self._others or self._usual(frame):
-            return
+            return None
         else:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
+        for line in self._lines.values():
+            if line.news():
+                return line.pass_on(frame.data, now_ns)
+        return None
 
     def _usual(self, frame: Frame) -> bool:
         """Whether such a frame is daily life of its bus, known to the DBC files or not."""
+        if frame.bus in self._in_line:
+            return True
         if frame.extended:
             return frame.bus in self._j1939
         return frame.bus in self._canopen and service_of(frame.can_id) is not None
@@ -162,8 +179,8 @@ class Controller:
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
-                if runner.sends and runner.bound.config.valve.bus not in silent:
-                    yield runner.bound.valve.message.frame()
+                if runner.sends and (frame := self._command(runner, now_ns, silent)):
+                    yield frame
                 if runner.feedback is not None:
                     self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:
@@ -178,6 +195,13 @@ class Controller:
                 self.counters.add(FrameFault.HEARTBEAT_LOST, lost)
             yield from nodes.frames(now_ns)
             self.events += nodes.changes()
+
+    def _command(self, runner: AxisRunner, now_ns: int, silent: frozenset[str]) -> Frame | None:
+        """The frame of a valve message whose axes have moved."""
+        message = runner.bound.valve.message
+        if (line := self._lines.get(message.sender.key)) is not None:
+            return line.own(now_ns)
+        return None if runner.bound.config.valve.bus in silent else message.frame()
 
     def _choose(self) -> list[tuple[BoundInput, Input]]:
         """Let grapple and operator choose sway data and filter of the axes that have a choice."""
@@ -250,8 +274,17 @@ class Controller:
             runner.bound.valve.put(0)
             if runner.control is not None:
                 runner.control.hold()
-        frames = (runners[-1].bound.valve.message.frame() for runners in self._by_message.values())
-        return [frame for frame in frames if frame.bus not in self._network.silent]
+        frames = []
+        for key, runners in self._by_message.items():
+            if (line := self._lines.get(key)) is not None:
+                frames += line.last()
+            elif key[0] not in self._network.silent:
+                frames.append(runners[-1].bound.valve.message.frame())
+        return frames
+
+
+def _lever(runner: AxisRunner) -> str:
+    return runner.bound.config.stick.lever
 
 
 def _passed(last: int, now: int, period: int) -> int:

@@ -15,6 +15,7 @@ from canshaper.control.server import ControlServer
 from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
 from canshaper.service.exchange import exchange, stall_ns
+from canshaper.service.gateway import InLine
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
 from canshaper.service.reading import Reading
@@ -54,6 +55,7 @@ class Daemon:
         self._log_again_ns = 0
         self._told_ns = 0
         self._latest_ns = 0
+        self._line: InLine | None = None
         deployment = load()
         self._ports = self._open(deployment, {})
         self._use(deployment)
@@ -75,13 +77,15 @@ class Daemon:
         self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
-                run_at_deadlines(self._tick_ns, self._body)
+                run_at_deadlines(self._tick_ns, self._body, self._wait)
                 if self._next and not self._stop:
                     self._apply(self._next)
         finally:
             self._manager.stopping()
             self._send_neutral()
             self._close(self._ports.values())
+            if self._line:
+                self._line.close()
             if self._reading:
                 self._reading.end()
             if self._control:
@@ -96,9 +100,18 @@ class Daemon:
         controller = self._controller
         stalled = missed * self._tick_ns > self._stall_ns
         exchange(controller, self._ports, now_ns, missed, stalled=stalled)
+        if self._line:
+            self._line.pass_others()
         self._latest_ns = max(self._latest_ns, late_ns)
         self._housekeeping(now_ns)
         return not (self._stop or (self._next and controller.neutral))
+
+    def _wait(self, seconds: float) -> None:
+        """Until the next deadline; in a gateway frames are passed on meanwhile."""
+        if self._line:
+            self._line.wait(seconds, self._controller, self._ports)
+        else:
+            time.sleep(seconds)
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""
@@ -121,6 +134,8 @@ class Daemon:
             log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
         if self._reload or self._reading or self._next:
             self._prepare_reload()
+        if self._line:
+            self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
             self._control.serve(self._answer, now_ns)
         if now_ns >= self._told_ns:
@@ -160,6 +175,10 @@ class Daemon:
 
     def _use(self, deployment: Deployment) -> None:
         self._controller = Controller(deployment)
+        if self._line:
+            self._line.close()
+        in_line = deployment.config.gateway and not deployment.listen_only
+        self._line = InLine(deployment, self._on_fault) if in_line else None
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000

@@ -11,8 +11,8 @@ from canshaper.can.frame import Frame
 class Reckons(Protocol):
     """Frames in, frames out: a ``Controller``, or what stands around one."""
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame from a bus."""
+    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
+        """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
         """The loop stood still for longer than any input may be old."""
@@ -32,6 +32,22 @@ def stall_ns(deployment: Deployment) -> int:
     return min(inputs) * 1_000_000
 
 
+def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int) -> int:
+    """Take all waiting frames; those of a lever that pass a gateway leave at once.
+
+    Returns:
+        How many there were.
+    """
+    count = 0
+    for port in ports.values():
+        for frame in port.frames():
+            count += 1
+            passed = reckons.receive(frame, now_ns)
+            if passed is not None and not ports[passed.bus].send(passed):
+                reckons.send_failed(passed)
+    return count
+
+
 def exchange(
     reckons: Reckons, ports: Mapping[str, Port], now_ns: int, missed: int, *, stalled: bool
 ) -> None:
@@ -49,9 +65,7 @@ def exchange(
             for _ in port.frames():
                 pass
         reckons.stalled()
-    for port in ports.values():
-        for frame in port.frames():
-            reckons.receive(frame, now_ns)
+    take(reckons, ports, now_ns)
     for frame in reckons.tick(now_ns, missed):
         if not ports[frame.bus].send(frame):
             reckons.send_failed(frame)

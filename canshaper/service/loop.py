@@ -4,7 +4,11 @@ import time
 from collections.abc import Callable
 
 
-def run_at_deadlines(period_ns: int, body: Callable[[int, int, int], bool]) -> None:
+def run_at_deadlines(
+    period_ns: int,
+    body: Callable[[int, int, int], bool],
+    wait: Callable[[float], None] | None = None,
+) -> None:
     """Call ``body`` at every deadline until it returns False.
 
     The deadlines are fixed in advance, so lateness does not add up. Deadlines that have passed
@@ -14,6 +18,7 @@ def run_at_deadlines(period_ns: int, body: Callable[[int, int, int], bool]) -> N
         period_ns: time between two deadlines.
         body: called with the monotonic time, the number of deadlines missed since its last call,
             and how late it is, in ns after the first deadline it has not yet been called for.
+        wait: lets so many seconds pass; by default it sleeps.
     """
     clock = time.monotonic_ns
     deadline = now = clock()
@@ -26,5 +31,5 @@ def run_at_deadlines(period_ns: int, body: Callable[[int, int, int], bool]) -> N
         deadline += period_ns
         left = deadline - clock()
         if left > 0:
-            time.sleep(left / 1e9)
+            (wait or time.sleep)(left / 1e9)
         now = clock()

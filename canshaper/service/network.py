@@ -66,7 +66,9 @@ class Network:
         self._any: list[AnySource] = []
         for bus, node in self.nodes.items():
             self._groups |= {(bus, group): node for group in GROUPS}
-            there = [r for r in axes.values() if r.bound.config.valve.bus == bus]
+            there = [
+                r for r in axes.values() if r.bound.config.valve.bus == bus and not r.bound.rewrites
+            ]
             for runner in there:
                 runner.gates.append(node.gate)
             for group in deployment.sent_groups(bus):

@@ -12,6 +12,7 @@ LIFT: Final = "lift"  # positive: upwards
 LIFT_CYLINDER: Final = "lift_cylinder"  # joint theta2; positive: the main boom rises
 KNUCKLE: Final = "knuckle"  # joint theta3; positive: the outer boom folds out
 EXTENSION: Final = "extension"  # joint d4; positive: the telescope goes out
+ROTATOR: Final = "rotator"  # turns the grapple about itself, which no model here needs
 
 TIP_AXES: Final = (SLEW, NEAR_FAR, LIFT)
 JOINT_AXES: Final = (SLEW, LIFT_CYLINDER, KNUCKLE, EXTENSION)

@@ -9,6 +9,7 @@ from canshaper.can.binding import Deployment
 from canshaper.report.recording import Recording
 from canshaper.service.controller import Controller
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Sway
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import Script
@@ -29,6 +30,7 @@ def drive(
     machine: str | None = None,
     sway: Sway | None = None,
     prepare: Callable[[Controller], None] | None = None,
+    crane: str | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a script through a deployment.
@@ -40,6 +42,7 @@ def drive(
         parameters: the crane; by default the nominal one.
         machine: tip, tip-controller or joints; by default what the axes of the deployment say.
         sway: swing of the grapple at the start; by default it hangs still.
+        crane: which one moves, where the deployment has several; the others' levers stand still.
         prepare: called with the fresh controller, to put another filter in.
         progress: called with the simulated seconds now and then.
 
@@ -54,19 +57,26 @@ def drive(
     if prepare:
         prepare(controller)
     try:
-        plant = PlantNode(deployment, parameters, machine, sway)
-        levers = LeverNode(deployment, script, bypass=bypass)
+        driven = one_crane(deployment, crane) if crane else deployment
+        plant = PlantNode(driven, parameters, machine, sway)
+        hands = [LeverNode(driven, script, bypass=bypass)]
+        for other in cranes(deployment):
+            if other != crane:
+                still = Script("still", (), script.duration_s)
+                hands.append(LeverNode(one_crane(deployment, other), still))
     except ValueError as error:
         raise DriveError(str(error)) from None
-    recorder = Recorder(deployment, parameters)
+    recorder = Recorder(driven, parameters)
     tick_ms = deployment.config.tick_ms
     step_s = tick_ms / 1000.0
     for time_ms in range(0, round(script.duration_s * 1000.0), tick_ms):
         time_s = time_ms / 1000.0
         now_ns = time_ms * 1_000_000
-        for frame in levers.frames_of_tick(time_ms, tick_ms):
-            controller.receive(frame, now_ns)
+        for frame in (f for hand in hands for f in hand.frames_of_tick(time_ms, tick_ms)):
             recorder.receive(frame, time_s)
+            if (passed := controller.receive(frame, now_ns)) is not None:  # by a gateway
+                plant.receive(passed)
+                recorder.receive(passed, time_s)
         for frame in controller.tick(now_ns):
             plant.receive(frame)
             recorder.receive(frame, time_s)

@@ -12,6 +12,7 @@ from canshaper.can.protection import UNPROTECTED, Guard
 from canshaper.can.signals import find_signal
 from canshaper.can.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
+from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.grapple import Sway
@@ -165,7 +166,8 @@ class PlantNode:
                 valve.command = 0.0
             valve.age_s += dt_s
             closed = self._canopen.closed(valve.axis)
-            commands[valve.axis] = 0.0 if closed else valve.command
+            if valve.axis != ROTATOR:
+                commands[valve.axis] = 0.0 if closed else valve.command
         self._machine.step(dt_s, commands)
 
     def feedback(self) -> list[Frame]:
@@ -208,5 +210,5 @@ def _axis_problems(deployment: Deployment, machine: str, *, named: bool) -> list
     return [
         Problem(str(deployment.path), None, f"axes.{name}", has)
         for name in deployment.axes
-        if name not in AXES_OF[machine]
+        if name not in (*AXES_OF[machine], ROTATOR)
     ]

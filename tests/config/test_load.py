@@ -13,7 +13,7 @@ from canshaper.config.source import DeploymentError
 Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
-TOP = "tick_ms, buses, dbc, levers, axes, emergency_stop, grapple, feel, status"
+TOP = "tick_ms, buses, dbc, levers, axes, gateway, emergency_stop, grapple, feel, status, control"
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (
     "allowed are length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
@@ -47,7 +47,8 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         (
             "{ lever: left,",
             "{ lever: left, deadzone: 1,",
-            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, flags, neutral_pct",
+            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, flags, negative, "
+            "neutral_pct",
         ),
         (
             "kind: gff,",
@@ -154,7 +155,7 @@ def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
     assert problems(text) == [
         f"machine.yaml:{line}: axes.{name}.stik: unknown key; allowed are {AXIS}",
         f"machine.yaml:{line + 1}: axes.{name}.stick.leva: unknown key; allowed are"
-        " lever, signal, flags, neutral_pct",
+        " lever, signal, flags, negative, neutral_pct",
         f"machine.yaml:{line + 1}: axes.{name}.stick.lever: missing: name of a lever",
     ]
 

@@ -150,3 +150,19 @@ def test_time_and_count_stay_together(work_ms: list[int], late_us: list[int]) ->
         assert late == at - first
         deadline += 1 + missed
         assert 0 <= at - deadline * PERIOD_NS < PERIOD_NS
+
+
+def test_who_waits_otherwise_is_told_for_how_long() -> None:
+    clock = Clock()
+    waited: list[float] = []
+    left = iter((True, True, False))
+
+    def wait(seconds: float) -> None:
+        waited.append(seconds)
+        clock.now_ns += round(seconds * 1e9)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "time", clock)
+        loop.run_at_deadlines(PERIOD_NS, lambda *_: next(left), wait)
+    assert waited == [0.02, 0.02]
+    assert clock.slept == []

@@ -1,0 +1,68 @@
+"""``canshaper gateway``: the kernel's rules of a gateway in the line."""
+
+from typing import Literal
+
+import typer
+
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+
+EXIT_OTHER_RULES = 1
+
+
+def gateway(
+    file: str = FILE,
+    state: Literal["running", "away", "down", "show"] = typer.Argument(
+        "show",
+        help="running: pass what is not ours; away: and the deployment's fallback for the levers;"
+        " down: nothing; show: tell what is there.",
+    ),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+) -> None:
+    """Set up, show or remove the rules of can-gw that pass frames between the buses of a gateway.
+
+    Other rules between the two interfaces are removed, and told. The service does this before the
+    daemon starts (running) and after it has ended, however it ended (away).
+
+    Exit code 0 when the rules are as asked, with show when they are those of running or away; 1
+    when they are others; 2 when the file is wrong; 3 when the kernel refuses.
+
+    Examples:
+
+      canshaper gateway config/gateway-forwarder.yaml
+
+      sudo canshaper gateway config/gateway-forwarder.yaml running
+    """
+    from canshaper.can.cangw import GatewayError, between, load_module, make, rules
+    from canshaper.can.gateway import channels, fallback_rules, passing_rules
+    from canshaper.config.source import DeploymentError
+
+    try:
+        deployment = loader(file, interface, channel)()
+    except DeploymentError as error:
+        raise fail(error) from None
+    if deployment.config.gateway is None:
+        raise fail(ValueError(f"{deployment.path}: found no gateway; allowed is a file with one"))
+    kernel = deployment.config.gateway.passing == "kernel"
+    passing = passing_rules(deployment) if kernel else []
+    fallback = fallback_rules(deployment) if kernel else []
+    wanted = {"running": passing, "away": passing + fallback, "down": []}
+    ends = channels(deployment)
+    try:
+        if state == "show":
+            found = between(ends, rules())
+            states = [name for name, those in wanted.items() if sorted(found) == sorted(those)]
+            typer.echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
+            for rule in found:
+                typer.echo(f"  {rule}")
+            if not {"running", "away"} & {*states}:
+                raise typer.Exit(EXIT_OTHER_RULES)
+            return
+        if wanted[state]:
+            load_module()
+        removed, added = make(ends, wanted[state])
+    except GatewayError as error:
+        raise fail(error, EXIT_NO_BUS) from None
+    typer.echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
+    for rule in (rule for rule in removed if rule not in passing + fallback):
+        typer.echo(f"  removed {rule}")

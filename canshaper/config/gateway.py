@@ -1,0 +1,41 @@
+"""Schema of a gateway in the line: two buses, and what passes between them."""
+
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from canshaper.config.section import Section
+
+
+class Gateway(Section):
+    """Two buses with us between them: the joystick's frames leave with our velocity in them."""
+
+    between: Annotated[list[str], Field(min_length=2, max_length=2, description="the two buses")]
+    passing: Literal["kernel", "daemon"] = Field(
+        "kernel",
+        description="who passes on all other frames: can-gw of the kernel, or the daemon itself",
+    )
+    fallback: Literal["stop", "neutral", "pass"] = Field(
+        "stop",
+        description="while the daemon is away the joystick's frames do not pass, pass with neutral"
+        " velocities, or pass as they are",
+    )
+    blocked: list[str] = Field([], description="messages that are not passed on")
+
+    @model_validator(mode="after")
+    def _possible(self) -> Self:
+        first, second = self.between
+        if first == second:
+            raise ValueError(f"between has {first} twice, allowed are two different buses")
+        if self.passing == "daemon" and self.fallback != "stop":
+            raise ValueError(
+                f"fallback is {self.fallback}, which only passing: kernel can do; allowed is stop:"
+                " without the daemon nothing passes"
+            )
+        return self
+
+    def other(self, bus: str) -> str | None:
+        """The bus on the other side; None for one that is not of the gateway."""
+        if bus not in self.between:
+            return None
+        return self.between[1 - self.between.index(bus)]

@@ -1,0 +1,75 @@
+"""The frames of one lever on their way through a gateway, and what is sent when none come."""
+
+from collections.abc import Sequence
+
+from canshaper.can.frame import Frame
+from canshaper.can.rewrite import RewrittenMessage
+from canshaper.can.valve import ValveMessage
+from canshaper.service.lever import LeverInput
+from canshaper.service.runner import AxisRunner
+from canshaper.shaping.states import MOVING, State
+
+# Cycles without a frame of the lever after which a trip does not wait for the next one.
+LATE_CYCLES = 2
+
+
+class Line:
+    """One lever message between two buses.
+
+    A frame of the lever that counts leaves at once with the velocities of the last tick. Without
+    one there is no frame, but for the end of a motion: the shaped stop after the lever was lost,
+    and neutral after a trip.
+
+    Args:
+        message: what leaves.
+        lever: the lever.
+        runners: the axes with their velocities in it.
+    """
+
+    def __init__(
+        self, message: ValveMessage, lever: LeverInput, runners: Sequence[AxisRunner]
+    ) -> None:
+        assert isinstance(message, RewrittenMessage)  # only such axes have one
+        self._message = message
+        self._lever = lever
+        self._runners = runners
+        self._seen = lever.raw
+        self._moved = False  # by the last frame
+        self._passed_ns = 0
+        cycle_ms = message.sender.fields.message.cycle_time or 0
+        self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
+
+    def news(self) -> bool:
+        """Whether a frame of the lever has counted since this was asked last."""
+        before, self._seen = self._seen, self._lever.raw
+        return self._seen is not before
+
+    def pass_on(self, data: bytes, now_ns: int) -> Frame:
+        """A frame of the lever as it leaves; nothing else in it is changed."""
+        self._passed_ns = now_ns
+        for runner in self._runners:
+            if runner.trip is not None:  # the loop stood still, or the like: this is old
+                runner.bound.valve.put(0)
+        self._moved = self._moves()
+        return self._message.onto(data)
+
+    def own(self, now_ns: int) -> Frame | None:
+        """A frame of our own, where the axes have just moved and the lever has none."""
+        stopping = any(runner.axis.state in MOVING for runner in self._runners)
+        tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
+        lost = self._lever.lost(now_ns) is not None
+        late = tripped and now_ns - self._passed_ns > self._late_ns
+        if not (lost or late) or not (stopping or self._moved):
+            return None
+        self._moved = self._moves()
+        return self._message.own(enabled=stopping)
+
+    def last(self) -> list[Frame]:
+        """What is sent before we go: neutral, where the last frame was not."""
+        if not self._moved:
+            return []
+        self._moved = False
+        return [self._message.own(enabled=False)]
+
+    def _moves(self) -> bool:
+        return any(runner.axis.raw and runner.trip is None for runner in self._runners)

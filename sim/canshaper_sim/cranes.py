@@ -1,0 +1,50 @@
+"""Several cranes in one deployment: the part of it that is one of them.
+
+The crane of an axis is the first part of its name, where what follows is the name of an axis:
+``front_slew`` and ``rear_slew`` are the slew axes of the cranes ``front`` and ``rear``.
+"""
+
+from dataclasses import replace
+
+from canshaper.can.binding import BoundAxis, Deployment
+from canshaper_sim.axes import ALL_AXES, ROTATOR
+
+
+def cranes(deployment: Deployment) -> list[str]:
+    """Names of the cranes of a deployment; none where its axes are those of one."""
+    found: dict[str, None] = {}
+    for name in deployment.axes:
+        for axis in (*ALL_AXES, ROTATOR):
+            if name.endswith(f"_{axis}") and name not in ALL_AXES:
+                found[name.removesuffix(f"_{axis}")] = None
+    return list(found)
+
+
+def one_crane(deployment: Deployment, crane: str) -> Deployment:
+    """The same deployment with one crane's axes, under their own names, its levers and buses.
+
+    Raises:
+        ValueError: no such crane.
+    """
+    names = cranes(deployment)
+    if crane not in names:
+        raise ValueError(f"crane {crane!r}, allowed {', '.join(names) or 'none: there is one'}")
+    axes: dict[str, BoundAxis] = {
+        name.removeprefix(f"{crane}_"): axis
+        for name, axis in deployment.axes.items()
+        if name.startswith(f"{crane}_")
+    }
+    levers = {axis.config.stick.lever for axis in axes.values()}
+    own = {n: lever for n, lever in deployment.levers.items() if n in levers}
+    buses = {axis.config.valve.bus for axis in axes.values()} | {one.key[0] for one in own.values()}
+    config = deployment.config.model_copy(
+        update={"buses": {n: b for n, b in deployment.config.buses.items() if n in buses}}
+    )
+    stop = deployment.emergency_stop
+    return replace(
+        deployment,
+        config=config,
+        axes=axes,
+        levers=own,
+        emergency_stop=stop if stop and stop.key[0] in buses else None,
+    )

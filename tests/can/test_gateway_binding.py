@@ -1,0 +1,192 @@
+"""A deployment with a gateway: what `canshaper check` refuses, and the rules that it makes."""
+
+from pathlib import Path
+
+import cantools
+import pytest
+
+from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.cangw import AND, CS_CRC8, CS_XOR, OR
+from canshaper.can.gateway import excluded, fallback_rules, passing_rules
+from canshaper.can.kernel_check import neutral_fault
+from canshaper.can.passing import EFF
+from canshaper.can.protection import Checksum, Protection
+from canshaper.can.rewrite import RewrittenMessage
+from canshaper.config.source import DeploymentError
+
+ROOT = Path(__file__).parents[2]
+SLEW = "bus: machine, message: LeverLeft, signal: Slew, timeout_ms: 200,"
+COUNTER = "alive_counter: AliveCounter"
+
+
+def load(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> Deployment:
+    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text()
+    network = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    assert dbc[0] in network
+    (folder / "machine.dbc").write_text(network.replace(*dbc, 1), "cp1252")
+    file = folder / "machine.yaml"
+    file.write_text(text.replace("../dbc/forwarder.dbc", "machine.dbc"))
+    return load_deployment(file)
+
+
+def problems(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> list[str]:
+    with pytest.raises(DeploymentError) as caught:
+        load(folder, *changes, dbc=dbc)
+    return [str(p).rpartition(f"{folder}/")[2] for p in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "told"),
+    [
+        ("[levers, machine]", "[levers, levers]", "has levers twice"),
+        ("[levers, machine]", "[levers, crane]", "found 'crane', buses are levers, machine"),
+        ("passing: kernel", "passing: daemon", "only passing: kernel can do"),
+        ("fallback: neutral", "fallback: neutral\n  blocked: [Nobody]", "found 'Nobody'"),
+        (SLEW, SLEW.replace("Slew", "NearFar"), "allowed is that of the stick, 'Slew'"),
+        (f"{SLEW} {COUNTER}", f"{SLEW}", "alive_counter: differs from that of lever left"),
+        (SLEW, SLEW.replace("200", "100"), "more than the 100 ms of lever left"),
+        (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
+         "direction: found in the message of lever left"),
+        (f"{SLEW} {COUNTER}",
+         "bus: machine, message: SlewCommand, signal: Velocity, timeout_ms: 200",
+         "with this stick unshaped in them"),
+        ("lever: left, signal: Slew", "lever: right, signal: Rotate",
+         "whose frames leave with its own sticks"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+    found = problems(tmp_path, (old, new))
+    assert any(told in problem for problem in found), found
+
+
+def test_a_fallback_needs_a_lever_that_is_passed_on(tmp_path: Path) -> None:
+    text = (ROOT / "config" / "forwarder.yaml").read_text()
+    text = text.replace("../dbc", str(ROOT / "dbc")).replace(
+        "\ndbc:", "  far: { interface: socketcan, channel: vcan1 }\n"
+        "gateway: { between: [crane, far], fallback: neutral }\ndbc:",
+    )  # fmt: skip
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    with pytest.raises(DeploymentError, match="no valve has the message of a lever"):
+        load_deployment(file)
+
+
+@pytest.mark.parametrize(
+    ("kind", "byte", "possible"),
+    [
+        ("xor", 3, True),
+        ("sum", 7, False),
+        ("crc8_autosar", 0, True),
+        ("crc8_autosar", 7, True),
+        ("crc8_autosar", 6, False),
+    ],
+)
+def test_checksums_that_the_kernel_can_make(kind: str, byte: int, possible: bool) -> None:
+    fault = neutral_fault(Protection(check=Checksum(kind, byte)), 8)
+    assert (fault is None) == possible
+
+
+def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -> None:
+    """A checksum in byte 6 of 8."""
+    checksum = "checksum: { signal: Checksum, kind: crc8_autosar }"
+    changes = [("left:\n", f"left:\n    {checksum}\n"), (SLEW, f"{SLEW} {checksum},")]
+    changes += [("NearFar, timeout_ms: 200,", f"NearFar, timeout_ms: 200, {checksum},")]
+    dbc = ("\nBO_ 273", ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273')
+    (found,) = problems(tmp_path, *changes, dbc=dbc)
+    assert "gateway.fallback: found neutral; can-gw of the kernel reckons crc8_autosar in" in found
+    assert load(tmp_path, *changes, ("fallback: neutral", "fallback: stop"), dbc=dbc)
+
+
+def test_rules_pass_what_is_not_ours_and_neutral_levers(tmp_path: Path) -> None:
+    deployment = load(tmp_path)
+    ours = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310}
+    assert {p.value for p in excluded(deployment)} == ours
+    rules = passing_rules(deployment)
+    for can_id in range(0x800):
+        ends = [(r.source, r.destination) for r in rules if r.pattern.fits(can_id)]
+        both = [("vcan0", "vcan1"), ("vcan1", "vcan0")]
+        assert sorted(ends) == ([] if can_id in ours else both)
+    left, right = sorted(fallback_rules(deployment), key=lambda rule: rule.pattern)
+    assert (left.source, left.destination, left.pattern.value) == ("vcan0", "vcan1", 0x110)
+    assert [kind for kind, _ in left.changes] == [AND, OR]
+    assert left.changes[0][1][8:16] == b"\0\0\0\0\xff\xff\xff\xff"
+    assert right.changes[0][1][8:16] == b"\0\0\xff\xff\xff\xff\xff\xff"
+
+
+def test_without_a_fallback_there_is_no_rule_for_a_lever(tmp_path: Path) -> None:
+    assert fallback_rules(load(tmp_path, ("fallback: neutral", "fallback: stop"))) == []
+
+
+def test_pass_changes_nothing(tmp_path: Path) -> None:
+    rules = fallback_rules(load(tmp_path, ("fallback: neutral", "fallback: pass")))
+    assert [rule.changes for rule in rules] == [(), ()]
+
+
+@pytest.mark.parametrize(("kind", "number"), [("xor", CS_XOR), ("crc8_sae_j1850", CS_CRC8)])
+def test_the_neutral_rule_makes_the_checksum(tmp_path: Path, kind: str, number: int) -> None:
+    checksum = f"checksum: {{ signal: Checksum, kind: {kind} }}"
+    changes = [("left:\n", f"left:\n    {checksum}\n"), (SLEW, f"{SLEW} {checksum},")]
+    changes += [("NearFar, timeout_ms: 200,", f"NearFar, timeout_ms: 200, {checksum},")]
+    dbc = (' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273',
+           ' SG_ AliveCounter : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
+           ' SG_ Checksum : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273')  # fmt: skip
+    rules = fallback_rules(load(tmp_path, *changes, dbc=dbc))
+    kinds = [kind for rule in rules for kind, _ in rule.changes]
+    assert kinds.count(number) == 1
+
+
+def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_path: Path) -> None:
+    """Magnitude and flags are ours, the address is the joystick's, who is not on that bus."""
+    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
+    found = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+    lever = next(iter(found.config.levers))
+    axis = next(a for a in found.config.axes.values() if a.stick.lever == lever)
+    assert axis.stick.flags
+    flags = axis.stick.flags
+    message = found.levers[lever].message
+    file = tmp_path / "machine.yaml"
+    file.write_text(f"""
+buses:
+  near: {{ interface: socketcan, channel: vcan0 }}
+  far: {{ interface: socketcan, channel: vcan1 }}
+dbc: [{", ".join(str((ROOT / "config" / d).resolve()) for d in found.config.dbc)}]
+gateway: {{ between: [near, far], fallback: neutral }}
+levers:
+  left: {{ bus: near, message: {message.name}, timeout_ms: 100, source: 51,
+    enable: {found.config.levers[lever].enable} }}
+axes:
+  slew:
+    stick: {{ lever: left, signal: {axis.stick.signal}, flags: {{ neutral: {flags.neutral},
+      positive: {flags.positive}, negative: {flags.negative} }} }}
+    valve: {{ bus: far, message: {message.name}, signal: {axis.stick.signal}, timeout_ms: 200 }}
+    filter: {{ kind: 'off' }}
+""")
+    assert text
+    deployment = load_deployment(file)
+    sent = deployment.axes["slew"].valve.message
+    assert isinstance(sent, RewrittenMessage)
+    assert sent.sender.key[1] & 0xFF == 51
+    assert sent.ours == {axis.stick.signal, flags.neutral, flags.positive, flags.negative}
+    group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
+    assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF
+    assert group.mask == 0x03FFFFFF | EFF
+    assert deployment.sent_groups("far") == set()
+    neutral = sent.onto(bytes(8))
+    network = cantools.database.load_file((ROOT / "config" / found.config.dbc[0]).resolve())
+    values = network.decode_message(message.frame_id, neutral.data, decode_choices=False)
+    assert isinstance(values, dict)
+    assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (1, 0, 0)
+    deployment.axes["slew"].valve.put(-sent_steps(deployment))
+    values = network.decode_message(
+        message.frame_id, sent.onto(bytes(8)).data, decode_choices=False
+    )
+    assert isinstance(values, dict)
+    assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (0, 0, 1)
+    assert values[axis.stick.signal] == pytest.approx(100.0, abs=0.5)
+
+
+def sent_steps(deployment: Deployment) -> int:
+    return deployment.axes["slew"].valve.steps

@@ -1,0 +1,54 @@
+"""Which frames pass: every id but those that are excluded, and each of them once."""
+
+import socket
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.can.passing import EFF, EVERYTHING, Pattern, all_but, exactly
+
+narrow = st.integers(0, 0x7FF)
+wide = st.integers(0, 0x1FFFFFFF).map(lambda i: i | EFF)
+words = narrow | wide
+
+
+@st.composite
+def holes(draw: st.DrawFn) -> Pattern:
+    """A pattern with any bits that do not matter."""
+    word = draw(words)
+    mask = draw(st.integers(0, 0x1FFFFFFF if word & EFF else 0x7FF)) | EFF
+    return Pattern(word & mask, mask)
+
+
+@given(st.lists(holes(), max_size=6), words)
+def test_a_frame_passes_once_unless_it_is_excluded(excluded: list[Pattern], word: int) -> None:
+    passes = sum(pattern.fits(word) for pattern in all_but(excluded))
+    assert passes == (not any(hole.fits(word) for hole in excluded))
+
+
+@given(st.sets(words, max_size=6), words)
+def test_ids_of_both_widths_are_told_apart(excluded: set[int], word: int) -> None:
+    hidden = [exactly(i & ~EFF, bool(i & EFF)) for i in excluded]
+    passes = any(pattern.fits(word) for pattern in all_but(hidden))
+    assert passes == (word not in excluded)
+
+
+@given(st.lists(holes(), min_size=1, max_size=4))
+def test_what_is_excluded_does_not_pass(excluded: list[Pattern]) -> None:
+    for hole in excluded:
+        assert not any(pattern.fits(hole.value) for pattern in all_but(excluded))
+
+
+def test_without_an_exclusion_everything_passes() -> None:
+    assert all_but([]) == sorted(EVERYTHING)
+
+
+def test_remote_frames_of_an_excluded_id_do_not_pass_either() -> None:
+    """Its flag is in no mask."""
+    word = 0x110 | socket.CAN_RTR_FLAG
+    assert not any(pattern.fits(word) for pattern in all_but([exactly(0x110, False)]))
+    assert any(pattern.fits(word + 1) for pattern in all_but([exactly(0x110, False)]))
+
+
+def test_a_few_ids_take_a_few_patterns() -> None:
+    assert len(all_but(exactly(i, False) for i in (0x110, 0x111))) == 11

@@ -1,0 +1,127 @@
+"""A rocker with a signal for each direction: one command, or none; and back into both signals."""
+
+from pathlib import Path
+from typing import Any
+
+import cantools
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.codecs import Sender
+from canshaper.can.flags import RockerVelocity
+from canshaper.can.signals import VelocitySignal
+from canshaper.can.valve import FlagsCodec, ValveCodec, ValveMessage
+from canshaper.config.source import DeploymentError
+from canshaper.shaping.states import Reason
+
+ROOT = Path(__file__).parents[2]
+network: Any = cantools.database.load_file(ROOT / "dbc" / "rotator.dbc")
+ROCKER = network.get_message_by_name("RotatorRocker")
+LEFT, RIGHT = (
+    next(s for s in ROCKER.signals if s.name == n) for n in ("RotateLeft", "RotateRight")
+)
+rocker = RockerVelocity(VelocitySignal.of(LEFT), VelocitySignal.of(RIGHT))
+
+
+def read(left: int, right: int) -> float | Reason:
+    return rocker.read({"RotateLeft": left, "RotateRight": right})
+
+
+@pytest.mark.parametrize(
+    ("left", "right", "command"),
+    [
+        (0, 0, 0.0),
+        (250, 0, 1.0),
+        (0, 250, -1.0),
+        (0, 125, -0.5),
+        (12, 12, 0.0),  # noise in neutral
+        (13, 13, Reason.STICK_CONTRADICTORY),
+        (250, 250, Reason.STICK_CONTRADICTORY),
+        (251, 0, Reason.STICK_OUT_OF_RANGE),
+        (0, 251, Reason.STICK_OUT_OF_RANGE),
+        (254, 0, Reason.STICK_ERROR),
+        (0, 255, Reason.STICK_NOT_AVAILABLE),
+    ],
+)
+def test_it_is_one_command(left: int, right: int, command: float | Reason) -> None:
+    assert read(left, right) == command
+
+
+def test_a_signal_below_its_range_is_no_command() -> None:
+    """An offset may reach below 0."""
+    low = VelocitySignal("Low", 0.4, -10.0, 100.0, {})
+    assert (
+        RockerVelocity(low, VelocitySignal.of(RIGHT)).read({"Low": 0, "RotateRight": 0})
+        is Reason.STICK_OUT_OF_RANGE
+    )
+
+
+@given(st.integers(-250, 250))
+def test_what_is_put_is_read(steps: int) -> None:
+    """As a valve, in a gateway: both signals hold what one command says."""
+    message = ValveMessage(Sender("b", ROCKER))
+    codec = ValveCodec(message, LEFT, negative=RIGHT)
+    codec.put(steps)
+    assert (message.raw["RotateLeft"], message.raw["RotateRight"]) == (
+        max(steps, 0),
+        max(-steps, 0),
+    )
+    assert codec.read(message.raw) == steps
+    assert read(message.raw["RotateLeft"], message.raw["RotateRight"]) == pytest.approx(steps / 250)
+
+
+def test_both_directions_at_once_are_no_command() -> None:
+    codec = ValveCodec(ValveMessage(Sender("b", ROCKER)), LEFT, negative=RIGHT)
+    assert codec.read({"RotateLeft": 5, "RotateRight": 5}) is None
+
+
+@pytest.mark.parametrize(
+    ("flags", "steps"),
+    [((1, 0, 0), 0), ((0, 1, 0), 40), ((0, 0, 1), -40), ((0, 0, 0), None), ((0, 1, 1), None)],
+)
+def test_flags_of_a_direction(flags: tuple[int, int, int], steps: int | None) -> None:
+    """Neutral, positive, negative, as a joystick of J1939 has them."""
+    names = ("N", "P", "M")
+    codec = ValveCodec(ValveMessage(Sender("b", ROCKER)), LEFT, FlagsCodec(names))
+    raw = {"RotateLeft": 0 if flags[0] else 40, **dict(zip(names, flags, strict=True))}
+    assert codec.read(raw) == steps
+    if steps is not None:
+        codec.put(steps)
+        assert tuple(codec.message.raw[n] for n in names) == flags
+        assert codec.message.raw["RotateLeft"] == abs(steps)
+
+
+def problems(folder: Path, *changes: tuple[str, str]) -> str:
+    text = (ROOT / "config" / "two-cranes.yaml").read_text().replace("../dbc", str(ROOT / "dbc"))
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    file = folder / "machine.yaml"
+    file.write_text(text)
+    with pytest.raises(DeploymentError) as caught:
+        load_deployment(file)
+    return "\n".join(map(str, caught.value.problems))
+
+
+@pytest.mark.parametrize(
+    ("new", "told"),
+    [
+        ("signal: RotateLeft, negative: RotateLeft", "which is the stick of front_rotator already"),
+        ("signal: RotateLeft, negative: Enable", "which is enable already"),
+        ("signal: Enable, negative: RotateRight", "which is enable already"),
+        ("signal: RotateLeft, negative: Nothing", "found 'Nothing', signals of RotatorRocker"),
+        ("signal: Nothing, negative: RotateRight", "found 'Nothing', signals of RotatorRocker"),
+        ("signal: RotateLeft, negative: RotateRight, flags: { neutral: A, negative: B, "
+         "positive: C }", "found flags and negative"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_told(tmp_path: Path, new: str, told: str) -> None:
+    assert told in problems(tmp_path, ("signal: RotateLeft, negative: RotateRight", new))
+
+
+def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:
+    sign = ("lever: front_rocker, signal: RotateLeft, negative: RotateRight",
+            "lever: front_right, signal: Lift, negative: Rotate")  # fmt: skip
+    assert "allowed with direction flags is one from 0" in problems(tmp_path, sign)

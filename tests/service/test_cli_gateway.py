@@ -1,0 +1,56 @@
+"""The verb of the gateway without SocketCAN, and what the check tells about a gateway."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.can import cangw
+from canshaper.can.cangw import GatewayError, Rule, difference
+from canshaper.can.passing import Pattern
+from canshaper.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "config" / "gateway-forwarder.yaml"
+
+
+def invoke(*arguments: str) -> Any:
+    return CliRunner().invoke(app, list(arguments), prog_name="canshaper")
+
+
+def test_a_file_without_a_gateway_has_no_rules() -> None:
+    result = invoke("gateway", str(ROOT / "config" / "forwarder.yaml"), "running")
+    assert result.exit_code == 2
+    assert "found no gateway" in result.stderr
+
+
+def test_a_kernel_that_refuses_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    def refuse() -> list[Rule]:
+        raise GatewayError("rules of can-gw cannot be listed: no")
+
+    monkeypatch.setattr(cangw, "rules", refuse)
+    result = invoke("gateway", str(FILE))
+    assert result.exit_code == 3
+    assert result.stderr == "rules of can-gw cannot be listed: no\n"
+
+
+@pytest.mark.parametrize(
+    ("fallback", "told"),
+    [("stop", "no joystick does"), ("neutral", "neutral joysticks do"), ("pass", "WARNING: ")],
+)
+def test_the_check_tells_what_passes(tmp_path: Path, fallback: str, told: str) -> None:
+    text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("fallback: neutral", f"fallback: {fallback}"))
+    result = invoke("check", str(file))
+    assert result.exit_code == 0
+    line = "gateway between levers and machine: others pass by the kernel, "
+    assert f"{line}{told}" in result.stdout
+
+
+def test_the_same_rule_twice_is_one_too_many() -> None:
+    """It would pass every frame twice."""
+    one, other = (Rule("a", "b", Pattern(i, 0x7FF)) for i in (1, 2))
+    assert difference([one, one, other], [one]) == ([one, other], [])
+    assert difference([one], [one, one]) == ([], [one])

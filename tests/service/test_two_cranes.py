@@ -1,0 +1,107 @@
+"""Two cranes in one deployment: a fault of one does not stop the other; and a rotator's rocker."""
+
+from pathlib import Path
+from typing import Any
+
+import cantools
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.frame import Frame
+from canshaper.service.controller import Controller
+
+ROOT = Path(__file__).parents[2]
+TICK_NS = 20_000_000
+MESSAGES = {
+    "LeverLeft": {"Slew": 0, "NearFar": 0, "AntiSwayOff": 0},
+    "LeverRight": {"Lift": 0, "Rotate": 0, "AntiSwayOff": 0},
+    "RotatorRocker": {"RotateLeft": 0, "RotateRight": 0},
+}
+CRANES = ("front", "rear")
+
+
+class Rig:
+    """Both cranes; ``silent`` and ``released`` name buses whose levers are so."""
+
+    def __init__(self) -> None:
+        self.controller = Controller(load_deployment(ROOT / "config" / "two-cranes.yaml"))
+        self.dbc: Any = cantools.database.Database()
+        for name in ("forwarder", "rotator"):
+            self.dbc.add_dbc_file(ROOT / "dbc" / f"{name}.dbc")
+        self.now_ns = self.count = 0
+        self.silent: set[str] = set()
+        self.released: set[str] = set()
+
+    def run(self, ticks: int, **raw: int) -> dict[tuple[str, str], int]:
+        """So many ticks with these sticks on both cranes; the velocities sent last."""
+        sent = {}
+        for _ in range(ticks):
+            self.count = (self.count + 1) % 256
+            for bus in (bus for bus in CRANES if bus not in self.silent):
+                for name, sticks in MESSAGES.items():
+                    message = self.dbc.get_message_by_name(name)
+                    on = {"Enable": int(bus not in self.released), "Reset": 0}
+                    moved = {k: v for k, v in raw.items() if k in sticks}
+                    data = message.encode(
+                        {**sticks, **on, "AliveCounter": self.count, **moved}, scaling=False
+                    )
+                    frame = Frame(bus, message.frame_id, False, data)
+                    self.controller.receive(frame, self.now_ns)
+            for frame in self.controller.tick(self.now_ns):
+                message = self.dbc.get_message_by_frame_id(frame.can_id)
+                if "Command" in message.name:
+                    values = message.decode(frame.data, scaling=False)
+                    sent[frame.bus, message.name] = int(values["Velocity"])
+            self.now_ns += TICK_NS
+        return sent
+
+    def states(self, crane: str) -> set[str]:
+        return {
+            runner.axis.state.name
+            for name, runner in self.controller.axes.items()
+            if name.startswith(crane)
+        }
+
+
+@pytest.fixture
+def rig() -> Rig:
+    rig = Rig()
+    rig.run(3)
+    return rig
+
+
+MOVING = {"Slew": 1000, "NearFar": 1000, "Lift": 1000, "RotateRight": 250}
+
+
+def test_both_move_each_by_its_own_levers(rig: Rig) -> None:
+    rig.silent = {"rear"}
+    sent = rig.run(60, **MOVING)
+    assert sent["front", "SlewCommand"] > 50
+    assert sent["front", "RotatorCommand"] < -100  # to the right is negative
+    assert [v for (bus, _), v in sent.items() if bus == "rear"] == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize("what", ["silent", "released"])
+def test_a_fault_of_one_crane_does_not_stop_the_other(rig: Rig, what: str) -> None:
+    rig.run(60, **MOVING)
+    getattr(rig, what).add("front")
+    sent = rig.run(150, **MOVING)
+    assert {v for (bus, _), v in sent.items() if bus == "front"} == {0}
+    assert rig.states("front") <= {"TRIPPED", "NEUTRAL_WAIT"}
+    assert min(abs(v) for (bus, _), v in sent.items() if bus == "rear") > 100
+    assert rig.states("rear") == {"ACTIVE"}
+
+
+def test_a_second_sender_trips_its_own_valve_only(rig: Rig) -> None:
+    rig.run(60, **MOVING)
+    rig.controller.receive(Frame("rear", 0x200, False, bytes(2)), rig.now_ns)
+    rig.run(5, **MOVING)
+    tripped = [n for n, r in rig.controller.axes.items() if r.axis.state.name == "TRIPPED"]
+    assert tripped == ["rear_slew"]
+
+
+def test_a_rocker_pressed_both_ways_stops_its_axis(rig: Rig) -> None:
+    assert rig.run(60, RotateLeft=250)["front", "RotatorCommand"] > 100
+    assert rig.run(60, RotateLeft=250, RotateRight=250)["front", "RotatorCommand"] == 0
+    axis = rig.controller.axes["front_rotator"].axis
+    assert (axis.state.name, axis.reason.name) == ("NEUTRAL_WAIT", "STICK_CONTRADICTORY")
