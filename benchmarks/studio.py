@@ -160,10 +160,18 @@ def with_page(stage: Stage, one: Browser, url: str, seconds: float, result: Cond
 
 
 def enable(stage: Stage, page: int) -> None:
-    """Press enable as a page, once that of the driver before is released."""
+    """Press enable as a page, once that of the driver before is released.
+
+    Again, where the page was silent for a moment and lost it.
+    """
     until(lambda: not stage.snapshot()["enable"], "enable released")
-    stage.with_cab(lambda cab, now_s: cab.press_enable(page, True, now_s))
-    until(lambda: levels(stage) == {"ready"}, "axes ready")
+
+    def ready() -> bool:
+        if not stage.snapshot()["enable"]:
+            stage.with_cab(lambda cab, now_s: cab.press_enable(page, True, now_s))
+        return levels(stage) == {"ready"}
+
+    until(ready, "axes ready")
 
 
 def measured(result: Condition, work: Callable[[], Any]) -> None:

@@ -149,7 +149,9 @@ class PythonCanPort:
         self._echoes: deque[Frame] | None = None
         if config.interface == "udp_multicast":
             self._echoes = deque(maxlen=MOST_ECHOES)
-            _hear_one_group(self._bus.fileno())
+            hear_one_group(self._bus.fileno())
+            while self._bus.recv(0) is not None:  # of other groups, until now
+                pass
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -211,7 +213,7 @@ class PythonCanPort:
             return
 
 
-def _hear_one_group(fileno: int) -> None:
+def hear_one_group(fileno: int) -> None:
     """Let a multicast socket hear its own group only.
 
     Linux hands it the frames of every group that any program of this machine has joined at the

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import can
 
-from canshaper.can.bus import BusError, _hear_one_group
+from canshaper.can.bus import BusError, hear_one_group
 from canshaper.can.raw import CAN_FRAME
 from canshaper.can.socketcan import dropped_frames, open_sockets
 from canshaper.capture.text import ERROR_FLAG
@@ -97,7 +97,7 @@ class Listener:
             interface=bus.interface, channel=bus.channel, ignore_config=True, **options
         )
         if bus.interface == "udp_multicast":
-            _hear_one_group(opened.fileno())
+            hear_one_group(opened.fileno())
             while opened.recv(0) is not None:  # of other groups, until now
                 pass
         self._sockets[opened] = name, bus.channel

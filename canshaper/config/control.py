@@ -5,10 +5,11 @@ from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
-from canshaper.config.section import Section
+from canshaper.config.section import Section, number
 
 # Where the service has a directory for each instance (RuntimeDirectory of the unit).
 RUNTIME = Path("/run/canshaper")
+End = Annotated[float, number(-1e6, 1e6, "", "end of the range, in the number's own unit")]
 
 
 class Control(Section):
@@ -19,7 +20,7 @@ class Control(Section):
     mode: str = Field(
         "0600", pattern="^0[0-7]{3}$", description="file mode of the socket, octal, in quotes"
     )
-    adjustable: dict[str, Annotated[list[float], Field(min_length=2, max_length=2)]] = Field(
+    adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field(
         min_length=1, description="least and most of each number, by its keys with dots between"
     )
 

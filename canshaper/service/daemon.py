@@ -55,9 +55,9 @@ class Daemon:
         self._log_again_ns = 0
         self._told_ns = 0
         self._latest_ns = 0
-        self._line: InLine | None = None
         deployment = load()
         self._ports = self._open(deployment, {})
+        self._line = self._in_line(deployment)
         self._use(deployment)
         self._control = self._open_control(deployment)
 
@@ -175,10 +175,6 @@ class Daemon:
 
     def _use(self, deployment: Deployment) -> None:
         self._controller = Controller(deployment)
-        if self._line:
-            self._line.close()
-        in_line = deployment.config.gateway and not deployment.listen_only
-        self._line = InLine(deployment, self._on_fault) if in_line else None
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -197,6 +193,11 @@ class Daemon:
             self._close(port for port in ports.values() if port not in opened.values())
             raise
         return ports
+
+    def _in_line(self, deployment: Deployment) -> InLine | None:
+        """What passes frames on, where we stand in a line."""
+        in_line = deployment.config.gateway and not deployment.listen_only
+        return InLine(deployment, self._on_fault) if in_line else None
 
     def _open_control(self, deployment: Deployment) -> ControlServer | None:
         """The control socket, where there shall be one; a machine works without it too."""
@@ -244,9 +245,12 @@ class Daemon:
         self._next = None
         config = self._controller.deployment.config
         opened = {bus: self._ports[name] for name, bus in config.buses.items()}
+        ports: dict[str, Port] = {}
         try:
             ports = self._open(deployment, opened)
+            line = self._in_line(deployment)
         except BusError as error:
+            self._close(port for port in ports.values() if port not in opened.values())
             self._manager.ready("as before")
             self._refuse(str(error))
         else:
@@ -255,6 +259,9 @@ class Daemon:
             for name, port in ports.items():
                 port.watch(name, deployment.ids(name))
             self._ports = ports
+            if self._line:
+                self._line.close()
+            self._line = line
             if self._control:
                 self._control.close()
             self._use(deployment)
