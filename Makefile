@@ -26,7 +26,7 @@ demo: .venv/demo-ready
 
 test: lint
 	.venv/bin/python -m pytest
-	$(MAKE) coverage mutation-core
+	$(MAKE) test-studio coverage mutation-core
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
 		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
 
@@ -45,7 +45,7 @@ test-service: .venv/test-ready
 
 # The live page in a real browser: Debian's Chromium.
 test-studio: .venv/test-ready
-	CANSHAPER_BROWSER=1 .venv/bin/python -m pytest tests/studio
+	CANSHAPER_BROWSER=1 .venv/bin/python -m pytest tests/studio/test_browser.py
 
 lint: .venv/test-ready
 	.venv/bin/ruff check

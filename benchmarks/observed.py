@@ -80,7 +80,9 @@ def main() -> None:
     """Run ``canshaper run`` with the rest of the command line."""
     notes = {"ticks": Ticks, "blocks": Blocks}[sys.argv[1]](sys.argv[2])
     loop = daemon_module.run_at_deadlines
-    daemon_module.run_at_deadlines = lambda period_ns, body: loop(period_ns, notes.around(body))
+    daemon_module.run_at_deadlines = lambda period_ns, body, wait: loop(
+        period_ns, notes.around(body), wait
+    )
     sys.argv = ["canshaper", "run", *sys.argv[3:]]
     try:
         canshaper()

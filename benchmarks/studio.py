@@ -118,10 +118,10 @@ class Hand(threading.Thread):
 
 def until(condition: Callable[[], bool], what: str) -> None:
     """Wait for something."""
-    limit = time.monotonic() + 120.0
+    limit = time.monotonic() + 30.0
     while not condition():
         if time.monotonic() > limit:
-            raise SystemExit(f"not within two minutes: {what}")
+            raise SystemExit(f"not within half a minute: {what}")
         time.sleep(0.05)
 
 
@@ -171,7 +171,11 @@ def enable(stage: Stage, page: int) -> None:
             stage.with_cab(lambda cab, now_s: cab.press_enable(page, True, now_s))
         return levels(stage) == {"ready"}
 
-    until(ready, "axes ready")
+    try:
+        until(ready, "axes ready")
+    except SystemExit as error:
+        told = "\n".join(f"{e.source}: {e.text}" for e in stage.events.since(0)[-20:])
+        raise SystemExit(f"{error}; last events:\n{told}") from None
 
 
 def measured(result: Condition, work: Callable[[], Any]) -> None:

@@ -88,6 +88,10 @@ class _Lever:
                 raw[flags.negative] = int(command < 0.0)
                 raw[flags.positive] = int(command > 0.0)
                 command = abs(command)
+            elif stick.negative:  # a rocker with a signal for each direction
+                back = max(-command, 0.0)
+                raw[stick.negative] = fields.raw(stick.negative, self._full[stick.negative] * back)
+                command = max(command, 0.0)
             raw[stick.signal] = fields.raw(stick.signal, self._full[stick.signal] * command)
         return self._sender.frame(raw)
 

@@ -269,3 +269,22 @@ def test_a_stick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -> N
         return found
 
     assert sent(1.0) == sent(0.4)
+
+
+def test_limits_change_in_neutral_and_hold_from_then_on() -> None:
+    sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
+    axis = Axis(0.02, OutputLimits(), sway=sway, shaper=Off(), grid_steps=10_000)
+    slow = OutputLimits(maximum=0.5, rise_per_s=1.0, fall_per_s=2.0)
+    axis.tick(StickInput(0.0))
+    axis.limit(slow)
+    sent = []
+    for number in range(100):
+        axis.tick(StickInput(1.0 if number < 50 else 0.0))
+        sent.append(axis.sent)
+        if number == 10:
+            with pytest.raises(ValueError, match=r"^limits change in neutral only$"):
+                axis.limit(OutputLimits())
+    assert max(sent) == pytest.approx(0.5, abs=1e-4)
+    steps = [b - a for a, b in itertools.pairwise([0.0, *sent])]
+    assert max(steps) == pytest.approx(1.0 * 0.02, abs=2e-4)
+    assert min(steps) == pytest.approx(-2.0 * 0.02, abs=2e-4)

@@ -61,10 +61,10 @@ def test_nothing_is_known_at_the_start(watched: Watched) -> None:
     assert {axis["level"] for axis in shown["axes"].values()} == {"off"}
 
 
-@pytest.mark.parametrize("name", FILES)
+@pytest.mark.parametrize("name", [*FILES, "two-cranes"])
 def test_sticks_of_every_kind_of_joystick(name: str) -> None:
     watched = Watched(name)
-    sticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0), strict=False))
+    sticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0, -0.75), strict=False))
     shown = watched.take(Hand(watched.deployment).frames(0, Held(sticks)))
     found = {axis: values["stick"] for axis, values in shown["axes"].items()}
     assert found == pytest.approx({axis: sticks.get(axis, 0.0) for axis in found}, abs=0.005)
