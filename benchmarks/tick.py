@@ -17,8 +17,9 @@ from pathlib import Path
 
 import can
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
 from canshaper.can.bus import Port, open_port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.common import data_directory
 from canshaper.config.bus import Bus

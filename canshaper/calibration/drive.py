@@ -10,7 +10,7 @@ from typing import Any
 
 from canshaper.calibration.fit import Calibration, CalibrationError, Sample, fit
 from canshaper.calibration.ramp import Ramp
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.j1939 import group_of
 from canshaper.can.layout import Layout, is_j1939

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from types import FrameType
 
 from canshaper.calibration.drive import CalibrationDrive
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import Port, open_port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.loop import run_at_deadlines

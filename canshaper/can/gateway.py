@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator
 
-from canshaper.can.binding import Deployment
 from canshaper.can.cangw import Rule, changed_bytes
+from canshaper.can.deployment import Deployment
 from canshaper.can.inputs import BoundLever
 from canshaper.can.j1939 import NULL, group_mask, group_of
 from canshaper.can.kernel_check import kernel_check

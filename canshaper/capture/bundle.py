@@ -9,7 +9,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 
 from canshaper import __version__
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.capture.frames import LogError
 from canshaper.capture.history import History
 

@@ -3,8 +3,8 @@
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import ACTIVE_SET, ServiceStatusCodec
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.capture.listen import Heard
 from canshaper.capture.sorting import Key

@@ -8,7 +8,7 @@ from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, new_frame
 from canshaper.can.j1939 import group_of
 from canshaper.capture.frames import CutOffError, LogError, TimedFrame

@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.capture.replay import Replay
 from canshaper.capture.stepper import Difference
 from canshaper.capture.trace import Trace

@@ -6,8 +6,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
+from canshaper.can.deployment import Deployment
 from canshaper.can.e2e import COUNTER, E2e
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.capture.sorting import Key

@@ -3,7 +3,7 @@
 import math
 from array import array
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.capture.stepper import Result
 from canshaper.capture.ticks import Tick
 from canshaper.report.recording import AxisTrace, Recording

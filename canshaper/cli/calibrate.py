@@ -12,7 +12,7 @@ from canshaper.cli.sim import SET
 if TYPE_CHECKING:
     from canshaper.calibration.drive import CalibrationDrive
     from canshaper.calibration.fit import Calibration
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
 
 # Speed of each axis as `canshaper sim` tells it.
 SIMULATED = {

@@ -2,7 +2,7 @@
 
 import typer
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 

@@ -6,7 +6,8 @@ from pathlib import Path
 
 import typer
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError, Problem
 
 EXIT_BAD_DEPLOYMENT = 2

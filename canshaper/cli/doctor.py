@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
     from canshaper.doctor.finding import Finding
 
 EXIT_NOT_FIT = 1

@@ -13,8 +13,8 @@ from rich.progress import BarColumn, Progress, TextColumn
 from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
     from canshaper.can.database import Messages
+    from canshaper.can.deployment import Deployment
     from canshaper.identification.judge import Finding
     from canshaper.identification.recommend import Advice
     from canshaper.identification.series import Series

@@ -13,7 +13,7 @@ from rich.live import Live
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
     from canshaper.capture.record import Recording
 
 EXIT_NOT_WRITTEN = 1

@@ -15,7 +15,7 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
     from canshaper.capture.replay import Drive
     from canshaper.capture.report import Replayed
 

@@ -9,7 +9,7 @@ import typer
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
 
 
 def run(

@@ -11,7 +11,7 @@ from rich.table import Table
 from canshaper.cli.common import FILE, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import Deployment
+    from canshaper.can.deployment import Deployment
 
 EXIT_REFUSED = 1
 

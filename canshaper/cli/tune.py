@@ -13,7 +13,7 @@ from rich.progress import BarColumn, Progress, TextColumn
 from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.binding import BoundAxis, Deployment
+    from canshaper.can.deployment import BoundAxis, Deployment
     from canshaper.tuning.deploy import Setting
     from canshaper.tuning.evaluate import Machine
     from canshaper.tuning.formulation import Task

@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.doctor.figures import quantile, summary
 from canshaper.doctor.finding import Finding, Level
 from canshaper.doctor.measure import Run

@@ -9,7 +9,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.raw import CAN_FRAME
 from canshaper.doctor.processes import LEVERS_PRIORITY, real_time, say_ready
 from canshaper.service.loop import run_at_deadlines

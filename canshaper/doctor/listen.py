@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from itertools import pairwise
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.inputs import BoundInput
 from canshaper.can.raw import CAN_FRAME
 from canshaper.can.socketcan import open_sockets

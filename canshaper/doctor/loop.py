@@ -8,7 +8,8 @@ from array import array
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready

@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.raw import CAN_FRAME
 from canshaper.doctor.load import load_kinds
 from canshaper.doctor.processes import Children, MeasureError, output, ready

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.doctor.figures import Summary, histogram, summary
 from canshaper.doctor.finding import Finding, Level, fit
 from canshaper.doctor.measure import Run

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from cantools.database.can import Message, Signal
 
-from canshaper.can.binding import Deployment
 from canshaper.can.database import Messages
+from canshaper.can.deployment import Deployment
 from canshaper.can.j1939 import NULL, group_of
 from canshaper.can.layout import Layout, is_j1939
 from canshaper.can.signals import find_signal, special_codes

@@ -6,8 +6,8 @@ from typing import Any
 
 import numpy as np
 
-from canshaper.can.binding import BoundAxis, Deployment
 from canshaper.can.codecs import WrongLengthError
+from canshaper.can.deployment import BoundAxis, Deployment
 from canshaper.can.layout import Layout
 from canshaper.identification.driven import STANDS
 from canshaper.identification.series import Array, Command

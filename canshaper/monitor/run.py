@@ -6,8 +6,8 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.live import Live
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError
+from canshaper.can.deployment import Deployment
 from canshaper.capture.listen import Listener
 from canshaper.monitor.state import Monitor
 from canshaper.monitor.view import clock, screen, status_line

@@ -3,7 +3,7 @@
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.j1939 import group_of
 from canshaper.capture.history import History, Told
 from canshaper.capture.listen import Heard

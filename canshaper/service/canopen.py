@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
-from canshaper.can.binding import Deployment
 from canshaper.can.canopen import (
     EMERGENCY,
     GENERIC_ERROR,
@@ -14,6 +13,7 @@ from canshaper.can.canopen import (
     STATE_MASK,
     NodeState,
 )
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.config.bus import Canopen, CanopenNode
 from canshaper.service.cia408 import ValveControl

@@ -5,8 +5,8 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 
 from collections.abc import Iterator
 
-from canshaper.can.binding import Deployment
 from canshaper.can.canopen import service_of
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
 from canshaper.service.canopen import canopen_buses

@@ -7,8 +7,8 @@ from collections.abc import Callable, Iterable, Mapping
 from types import FrameType
 from typing import Any
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, ListeningPort, Port, open_port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.control.server import ControlServer

@@ -3,8 +3,8 @@
 from collections.abc import Iterator, Mapping
 from typing import Protocol
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import Port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 
 

@@ -7,9 +7,9 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port
 from canshaper.can.cangw import GatewayError, Rule, between, difference, rules
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.can.gateway import excluded, passing_rules
 from canshaper.can.passing import Pattern

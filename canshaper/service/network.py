@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput, BoundLever
 from canshaper.can.j1939 import CLAIMED, group_of, pgn_of

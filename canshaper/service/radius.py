@@ -1,6 +1,6 @@
 """Radius of the tip for the radial compensation: fixed, or measured by a CAN signal."""
 
-from canshaper.can.binding import BoundRadial
+from canshaper.can.deployment import BoundRadial
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundRadius
 from canshaper.can.signals import find_signal

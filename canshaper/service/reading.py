@@ -12,7 +12,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import BinaryIO, NoReturn
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError
 
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Protocol
 
-from canshaper.can.binding import BoundAxis
+from canshaper.can.deployment import BoundAxis
 from canshaper.can.frame import Frame
 from canshaper.config.schema import AxisConfig
 from canshaper.service.cia408 import ValveControl

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 
-from canshaper.can.binding import BoundAxis
+from canshaper.can.deployment import BoundAxis
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel
 from canshaper.service.value import ValueInput

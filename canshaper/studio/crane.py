@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.load import load_config
 from canshaper.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
 from canshaper.studio.sliders import adjustable, sliders

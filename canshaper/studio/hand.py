@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput, BoundLever
 from canshaper_sim.levers import JOYSTICK_ADDRESS

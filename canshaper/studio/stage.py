@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import Port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.control import client
 from canshaper.doctor.processes import LEVERS_PRIORITY

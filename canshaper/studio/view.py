@@ -8,7 +8,7 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundLever
 from canshaper.can.j1939 import NULL, with_source

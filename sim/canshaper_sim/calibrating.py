@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from canshaper.calibration.drive import CalibrationDrive
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import Script

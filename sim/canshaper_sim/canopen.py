@@ -3,9 +3,9 @@
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.can.binding import BoundAxis, Deployment
 from canshaper.can.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
 from canshaper.can.codecs import Sender
+from canshaper.can.deployment import BoundAxis, Deployment
 from canshaper.can.frame import Frame
 
 # Heartbeats are sent three times as often as they are asked for.

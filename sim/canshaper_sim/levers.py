@@ -2,8 +2,8 @@
 
 import math
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput, BoundLever, BoundStop
 from canshaper_sim.axes import JOINT_AXES, SLEW

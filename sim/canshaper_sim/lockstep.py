@@ -5,7 +5,7 @@ The controller is the daemon's own, and everything passes through the same frame
 
 from collections.abc import Callable
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.report.recording import Recording
 from canshaper.service.controller import Controller
 from canshaper_sim.crane import CraneParameters

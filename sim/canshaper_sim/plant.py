@@ -4,8 +4,8 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from canshaper.can.binding import Deployment
 from canshaper.can.codecs import Sender
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import USUAL_MAX_STEP, BoundFeedback
 from canshaper.can.protection import UNPROTECTED, Guard

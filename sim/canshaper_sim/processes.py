@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import BusError, Port
+from canshaper.can.deployment import Deployment
 from canshaper.report.recording import Recording
 from canshaper_sim.lockstep import DriveError
 from canshaper_sim.operator import Script

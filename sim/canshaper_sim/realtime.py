@@ -3,8 +3,8 @@
 import signal
 from types import FrameType
 
-from canshaper.can.binding import Deployment
 from canshaper.can.bus import Port, open_port
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.service.loop import run_at_deadlines
 from canshaper_sim.crane import CraneParameters

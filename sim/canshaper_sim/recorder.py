@@ -7,7 +7,7 @@ none. With joint commands the three boom joints thus show the same sway, each wi
 
 from typing import Any
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundLever
 from canshaper.can.j1939 import NULL, with_source

@@ -8,7 +8,8 @@ from typer.testing import CliRunner
 from canshaper.calibration.drive import CalibrationDrive
 from canshaper.calibration.fit import Calibration, CalibrationError, Sample, fit
 from canshaper.calibration.ramp import Ramp
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.app import app
 from canshaper.config.source import DeploymentError

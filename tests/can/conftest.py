@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError
 
 ROOT = Path(__file__).parents[2]

@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError
 
 IDS = list(range(0x10, 0x20))

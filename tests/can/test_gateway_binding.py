@@ -5,8 +5,9 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
 from canshaper.can.cangw import AND, CS_CRC8, CS_XOR, OR
+from canshaper.can.deployment import Deployment
 from canshaper.can.gateway import excluded, fallback_rules, passing_rules
 from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.passing import EFF

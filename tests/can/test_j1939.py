@@ -9,7 +9,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import BusState, Frame
 from canshaper.can.j1939 import (
     CLAIMED,

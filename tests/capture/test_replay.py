@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.capture.bundle import unpack
 from canshaper.capture.frames import LogError
 from canshaper.capture.replay import Replay, look

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.capture.frames import LogError
 from canshaper.capture.sorting import Kind, Sorter, bus_of_channel
 from canshaper.cli.common import loader

@@ -7,7 +7,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.report.metrics import compare
 from canshaper.service.controller import Controller
 from canshaper.shaping.gff import poles_from_denominator

@@ -4,7 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.report.recording import Recording
 from canshaper.tuning.robust import least_residual
 from canshaper_sim.lockstep import drive

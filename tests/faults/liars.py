@@ -6,7 +6,7 @@ They change what goes in or comes out, so they stay what they are however the co
 from collections.abc import Iterable
 from typing import Any
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.service.controller import Controller
 from tests.faults.machine import Lever, Machine

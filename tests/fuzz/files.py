@@ -3,7 +3,8 @@
 import re
 from pathlib import Path
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.config.source import DeploymentError
 from canshaper.service.controller import Controller

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from tests.fuzz.files import SHIPPED, SMALL, Files, texts
 from tests.fuzz.mutate import DBC_WORDS, YAML_WORDS, changed
 

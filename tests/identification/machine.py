@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Grapple, Sway, SwayMode
 

@@ -8,8 +8,9 @@ import can
 import numpy as np
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
 from canshaper.can.database import Messages, load_dbc
+from canshaper.can.deployment import Deployment
 from canshaper.capture.log import LogError
 from canshaper.config.source import DeploymentError
 from canshaper.identification.canlog import bind, read_can

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8SaeJ1850
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.service.radius import RadiusInput
 from tests.can.protected_machine import load

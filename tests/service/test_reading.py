@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
 from canshaper.config.source import DeploymentError, Problem

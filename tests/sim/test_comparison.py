@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.cli.app import app
 from canshaper.report.pareto import Limits, Point, draw, figure
 from canshaper_sim.comparison.candidates import candidates, nominal_mode, with_candidate

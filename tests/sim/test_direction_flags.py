@@ -2,7 +2,8 @@
 
 from pathlib import Path
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper_sim.lockstep import drive
 from canshaper_sim.operator import random_script
 

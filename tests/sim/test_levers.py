@@ -9,7 +9,8 @@ from typing import Any
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode

@@ -7,7 +7,8 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.app import app
 from canshaper.config.source import DeploymentError

@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.service.controller import Controller
 from canshaper.shaping.states import State

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.studio.hand import Hand, Held
 from canshaper_sim.axes import ALL_AXES

@@ -5,7 +5,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import Deployment, load_deployment
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.service.counters import Counters
 from canshaper.shaping.states import Reason, State

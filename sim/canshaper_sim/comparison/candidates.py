@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 from pydantic import TypeAdapter
 
-from canshaper.can.binding import BoundRadial, Deployment
+from canshaper.can.deployment import BoundRadial, Deployment
 from canshaper.config.filters import Filter, RobustFilter
 from canshaper.config.schema import RadialConfig
 from canshaper.shaping.fir import zv_taps

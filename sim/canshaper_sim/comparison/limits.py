@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.report.pareto import Limits
 from canshaper.tuning.robust import least_residual, time_optimal_s
 from canshaper_sim.comparison.candidates import nominal_mode

@@ -14,7 +14,7 @@ from dataclasses import replace
 from functools import cache
 from typing import Final
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.config.filters import GffFilter
 from canshaper.report.recording import AxisTrace, Recording
 from canshaper.report.runs import Run

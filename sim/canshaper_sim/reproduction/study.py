@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, Final
 
-from canshaper.can.binding import Deployment
+from canshaper.can.deployment import Deployment
 from canshaper.report.runs import Plane, Run
 from canshaper_sim.axes import NEAR_FAR, SLEW
 from canshaper_sim.grapple import Grapple
