@@ -72,13 +72,18 @@ def settled(page: Page) -> None:
 
 def test_it_shows_both_cranes(shared: Studio) -> None:
     with shared.page() as page:
-        shown = page.until(lambda s: all(c["crane"] for c in s["cranes"].values()))
+        at_rest = ("waiting for neutral", "enable is off")
+        shown = page.until(  # the daemons, the levers and the cranes do not begin at once
+            lambda s: all(
+                c["crane"] and {(a["state"], a["reason"]) for a in c["axes"].values()} == {at_rest}
+                for c in s["cranes"].values()
+            ),
+            "both cranes at rest",
+        )
         assert page.hello["cranes"] == ["shaped", "raw"] == list(shown["cranes"])
         assert page.hello["axes"] == ["slew", "near_far", "lift"]
         for crane in shown["cranes"].values():
             assert crane["measured"] and len(crane["pose"]) == 3
-            assert {a["state"] for a in crane["axes"].values()} == {"waiting for neutral"}
-            assert {a["reason"] for a in crane["axes"].values()} == {"enable is off"}
 
 
 def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
