@@ -4,6 +4,7 @@ cantools reads the DBC files. Its own decode and encode reach the compiled part 
 several layers of Python for every frame; here bitstruct is called directly.
 """
 
+import math
 from typing import Any
 
 from cantools.database.can import Message, Signal
@@ -16,7 +17,14 @@ except ImportError:  # no compiled part for this machine: the same in Python, an
 
 def layout_fault(message: Message) -> str | None:
     """Why the bits of a message cannot be read, or None; cantools tells with a frame only."""
+    if not isinstance(message.cycle_time, int | None):
+        return f"GenMsgCycleTime is {message.cycle_time!r}, allowed is a whole number of ms"
     for signal in message.signals:
+        if signal.start < 0:
+            return f"{signal.name} begins at bit {signal.start}, allowed is 0 or more"
+        first = signal.raw_initial or 0
+        if not isinstance(first, int | float) or not math.isfinite(first):
+            return f"GenSigStartValue of {signal.name} is {first!r}, allowed is a number"
         if signal.is_float and signal.length not in (16, 32, 64):
             return f"{signal.name} is a float of {signal.length} bits, allowed are 16, 32 and 64"
     return None

@@ -288,3 +288,22 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
         "axes.slew.valve.alive_counter: AliveCounter has a sign, allowed is an unsigned integer"
         " signal"
     )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message", "says"),
+    [
+        ("Slew : 0|16", "Slew : -1|16", "LeverLeft", "Slew begins at bit -1, allowed is 0 or more"),
+        (
+            '"GenMsgCycleTime" INT',  # a type that there is not: everything is text
+            '"GenMsgCycleTime" nanINT',
+            "LeverLeft",
+            "GenMsgCycleTime is '20', allowed is a whole number of ms",
+        ),
+    ],
+)
+def test_numbers_that_are_none_are_told(
+    machine: Machine, old: str, new: str, message: str, says: str
+) -> None:
+    machine.in_dbc(old, new)
+    assert any(f"{message}: {says}" in problem for problem in machine.problems())
