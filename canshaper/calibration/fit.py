@@ -71,6 +71,10 @@ POINTS = (0.25, 0.5, 0.75)
 # Above the noise of the feedback by so many standard deviations counts as moving, for so long.
 SIGMAS = 5.0
 LASTING = 5
+# Part of the speed at the largest command over which a line is laid to find the opening, and the
+# most that may lie below it as bent by the lag of the valve.
+WINDOW = 0.3
+MOST_BENT = 0.3
 # Less than this part of the largest speed seen is resolution, not motion.
 LEAST = 0.01
 
@@ -100,35 +104,66 @@ def fit(
             f"the axis did not move up to {top:.0%} of the command, or its feedback trembles as"
             f" much: largest speed {largest:g}, noise {noise:g}; try a higher top"
         )
-    opens_up, opens_down = _opening(rising, moving), _opening(falling, moving)
-    opens = max(0.0, 0.5 * (opens_up + opens_down))
+    for way in (rising, falling):
+        _moves_steadily(way, moving)
+    settled = sum(s.speed for s in held) / len(held)
+    # A lag bends the foot of both ways, up later and down longer; three of its times on they run
+    # straight, as far before and behind the valve.
+    opens, delay = _opening(rising, falling, 0.5, settled, moving)
+    low = min(3.0 * delay / (top - opens), MOST_BENT) if top > opens else MOST_BENT
+    opens, delay = _opening(rising, falling, low + 0.5 * WINDOW, settled, moving)
+    opens = max(0.0, opens)
     points = []
     for share in POINTS:
         at = opens + share * (top - opens)
         speed = 0.5 * (_speed_at(rising, at, top) + _speed_at(falling, at, top))
         points.append((at, speed))
-    points.append((top, sum(s.speed for s in held) / len(held)))
+    points.append((top, settled))
     if any(b[1] <= a[1] for a, b in pairwise([(opens, 0.0), *points])):
         raise CalibrationError("the speed does not rise with the command; is the axis at its end?")
     (c0, s0), (c1, s1) = points[0], points[-1]
     full = s1 + (1.0 - c1) * (s1 - s0) / (c1 - c0) if c1 < 1.0 else s1
     kept = tuple(points if top < FULL else points[:-1])
-    return Direction(opens, kept, opens_up - opens_down, full)
+    return Direction(opens, kept, delay, full)
 
 
-def _opening(samples: Sequence[Sample], moving: float) -> float:
-    """Command at which the speed would be zero, by the line of what moves first."""
+def _moves_steadily(samples: Sequence[Sample], moving: float) -> None:
     run = 0
-    for i, sample in enumerate(samples):
+    for sample in samples:
         run = run + 1 if sample.speed > moving else 0
         if run == LASTING:
-            first = i - LASTING + 1
-            break
-    else:
-        raise CalibrationError("the axis did not move steadily; is the feedback that of this axis?")
-    above = [s for s in samples[first:] if s.speed < 6.0 * moving] or list(samples[first:])
-    command, slope = _line(above)
-    return command if slope > 0.0 else samples[first].command
+            return
+    raise CalibrationError("the axis did not move steadily; is the feedback that of this axis?")
+
+
+def _opening(
+    rising: Sequence[Sample],
+    falling: Sequence[Sample],
+    middle: float,
+    settled: float,
+    moving: float,
+) -> tuple[float, float]:
+    """Command at which the valve opens, and the delay: the difference between both ways.
+
+    Args:
+        rising: samples of the way up.
+        falling: samples of the way down.
+        middle: part of the speed at the largest command about which the lines are laid.
+        settled: that speed.
+        moving: the least speed that is motion.
+    """
+    low = max((middle - 0.5 * WINDOW) * settled, moving)
+    high = (middle + 0.5 * WINDOW) * settled
+    ends = []
+    for way in (rising, falling):
+        part = [s for s in way if low <= s.speed <= high]
+        if len(part) < LASTING:
+            raise CalibrationError("too few samples of the feedback on the ramp; try a slower one")
+        command, slope = _line(part)
+        if slope <= 0.0:
+            raise CalibrationError("the speed does not rise with the command")
+        ends.append(command)
+    return 0.5 * (ends[0] + ends[1]), max(0.0, ends[0] - ends[1])
 
 
 def _line(samples: Sequence[Sample]) -> tuple[float, float]:

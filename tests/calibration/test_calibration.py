@@ -69,6 +69,27 @@ def test_a_known_valve_is_found(
     assert found.positive.delay == pytest.approx(2 * RAMP.rate_per_s * (0.1 + dead_time), abs=0.01)
 
 
+@pytest.mark.parametrize(("rate_per_s", "top"), [(0.1, 0.15), (0.1, 0.4), (0.05, 0.15)])
+def test_a_quick_or_low_ramp_finds_the_same_valve(
+    deployment: Deployment, rate_per_s: float, top: float
+) -> None:
+    ramp = Ramp(rate_per_s=rate_per_s, top=top, rest_s=1.0)
+    found = measured(deployment, "slew.deadband=0.08", ramp=ramp)
+    for direction in (found.positive, found.negative):
+        assert direction.opens == pytest.approx(0.08, abs=0.008)
+        assert direction.full == pytest.approx(0.5, rel=0.1)
+        assert direction.delay == pytest.approx(2 * rate_per_s * 0.1, abs=0.01)
+
+
+def test_a_ramp_too_quick_for_the_feedback_is_told() -> None:
+    def samples(commands: list[float]) -> list[Sample]:
+        return [Sample(command, max(0.0, command - 0.1)) for command in commands]
+
+    steps = [0.04 * n for n in range(11)]
+    with pytest.raises(CalibrationError, match="too few samples of the feedback on the ramp"):
+        fit(samples(steps), samples([0.4] * 20), samples(steps[::-1]), 0.0)
+
+
 def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     file.write_text(FILE.read_text().replace("../dbc", str(ROOT / "dbc")))
