@@ -81,7 +81,7 @@ def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
             **{"bus": "crane", "message": f"Lever{n}", "timeout_ms": 1000},
             **{"enable": "Enable", "alive_counter": "AliveCounter"},
         }
-        valve = {"bus": "crane", "message": f"Valve{n}", "signal": "Velocity"}
+        valve = {"bus": "crane", "message": f"Valve{n}", "signal": "Velocity", "timeout_ms": 200}
         config["axes"][f"axis{n}"] = {
             "stick": {"lever": f"lever{n}", "signal": "Stick"},
             "valve": {**valve, "alive_counter": "AliveCounter"},
