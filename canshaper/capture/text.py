@@ -38,8 +38,9 @@ def lines(file: BinaryIO, place: Place) -> Iterator[bytes]:
 
 # -- candump -L --------------------------------------------------------------------------------
 
-# What nearly every line is: microseconds, and a data frame.
-_QUICK = re.compile(rb"\((\d+)\.(\d{6})\) (\S+ [0-9A-Fa-f]+)#((?:[0-9A-Fa-f]{2}){0,8})(?: [RT])?\n")
+# What nearly every line is: microseconds, and a data frame. Whether its digits are pairs is left to
+# who reads them: that is three times as quick as an expression of pairs.
+_QUICK = re.compile(rb"\((\d+)\.(\d{6})\) (\S+ [0-9A-Fa-f]+)#([0-9A-Fa-f]{0,16})(?: [RT])?\n")
 _CANDUMP = re.compile(
     rb"\((\d+)\.(\d{1,9})\) (\S+ [0-9A-Fa-f]+)#"
     rb"(?:((?:[0-9A-Fa-f]{2}){0,8})(?:_[0-9A-Fa-f])?|(R[0-9]?(?:_[0-9A-Fa-f])?)"
@@ -72,8 +73,11 @@ def candump(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         elif data is None:
             place.left_out["remote" if remote else "CAN FD"] += 1
         else:
-            time_ns = int(seconds) * SECOND_NS + ns
-            yield _new(TimedFrame, (time_ns, *known, unhexlify(data)))
+            try:
+                content = unhexlify(data)
+            except ValueError:
+                raise place.error(_shown(line), CANDUMP_ALLOWED) from None
+            yield _new(TimedFrame, (int(seconds) * SECOND_NS + ns, *known, content))
 
 
 def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:

@@ -18,7 +18,7 @@ from canshaper.capture.ticks import Tick
 
 # Ticks that can be gone through again, and how often the state is noted: seldom, because that
 # takes as long as twenty ticks, but often where a search has just been needed.
-KEPT, SELDOM, OFTEN = 512, 128, 16
+KEPT, SELDOM, OFTEN = 512, 512, 16
 # A frame that came so long before the valve frame, as a part of the tick, may not have been read.
 OPEN_PART = 0.5
 # Ages are compared with time limits of whole ticks: a little lateness decides.
