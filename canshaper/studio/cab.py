@@ -10,7 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeGuard
 
-from canshaper.studio.hand import Held
+from canshaper_sim.hand import Held
 
 SILENT_S = 0.2
 """A page that drives sends every 20 ms."""

@@ -18,9 +18,9 @@ from canshaper.service.loop import run_at_deadlines
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.events import Events
-from canshaper.studio.hand import Hand, Held
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.view import CraneView
+from canshaper_sim.hand import Hand, Held
 from canshaper_sim.processes import Transport, on_transport
 from canshaper_sim.realtime import open_ports
 

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.studio.cab import RELEASE_S, RESET_S, SILENT_S, Cab, NonsenseError
-from canshaper.studio.hand import Held
+from canshaper_sim.hand import Held
 
 AXES = ("slew", "near_far", "lift")
 NEUTRAL = dict.fromkeys(AXES, 0.0)

@@ -21,8 +21,8 @@ from websockets.sync.client import connect
 
 from canshaper.can.binding import load_deployment
 from canshaper.studio.client import MOST_BYTES, MOST_NONSENSE, MOST_PER_S
-from canshaper.studio.hand import Hand, Held
 from canshaper.studio.server import MOST_PAGES
+from canshaper_sim.hand import Hand, Held
 from tests.studio.conftest import ROOT, WAIT_S, Listener, Page, Studio, command_of
 
 NONSENSE = [

@@ -10,11 +10,11 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.service.counters import Counters
 from canshaper.shaping.states import Reason, State
-from canshaper.studio.hand import Hand, Held
 from canshaper.studio.view import SILENT_S, CraneView
 from canshaper.studio.words import FAULTS, REASONS, STATES, fault_words, reason_words, state_words
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
+from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
 
 CONFIG = Path(__file__).parents[2] / "config"

@@ -1,4 +1,4 @@
-"""The levers of the page send what the levers of the scripted operator send."""
+"""What a hand does with the levers is in their frames, as a daemon reads them."""
 
 from pathlib import Path
 from typing import Any
@@ -8,10 +8,7 @@ import pytest
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.studio.hand import Hand, Held
-from canshaper_sim.axes import ALL_AXES
-from canshaper_sim.levers import LeverNode
-from canshaper_sim.operator import random_script
+from canshaper_sim.hand import Hand, Held
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = [
@@ -20,6 +17,7 @@ FILES = [
     "forwarder-robust",
     "j1939-forwarder",
     "canopen-forwarder",
+    "gateway-forwarder",
 ]
 
 
@@ -28,19 +26,20 @@ def deployment(request: pytest.FixtureRequest) -> Deployment:
     return load_deployment(CONFIG / f"{request.param}.yaml")
 
 
-@pytest.mark.parametrize("bypass", [False, True])
-def test_same_frames_as_the_scripted_operator(deployment: Deployment, *, bypass: bool) -> None:
-    axes = [axis for axis in ALL_AXES if axis in deployment.axes]
-    script = random_script(3, 10.0, axes)
-    node, hand = LeverNode(deployment, script, bypass=bypass), Hand(deployment)
-    assert hand.cycle_ms == node.cycle_ms
-    for time_ms in range(0, 10_000, hand.cycle_ms):
-        sticks = {axis: script.stick(axis, time_ms / 1000.0) for axis in axes}
-        held = Held(sticks, enable=True, anti_sway=not bypass)
-        pairs = zip(hand.frames(time_ms, held), node.frames(time_ms), strict=True)
-        for ours, theirs in pairs:
-            assert ours[:3] == theirs[:3]
-            assert _values(deployment, ours) == _values(deployment, theirs)
+@pytest.mark.parametrize("position", [-1.0, -0.4, 0.0, 0.7, 1.0])
+@pytest.mark.parametrize("anti_sway", [False, True])
+def test_a_daemon_reads_what_the_hand_holds(
+    deployment: Deployment, position: float, *, anti_sway: bool
+) -> None:
+    hand = Hand(deployment)
+    sticks = dict.fromkeys(deployment.axes, position)
+    frames = {frame[:3]: frame for frame in hand.frames(0, Held(sticks, anti_sway=anti_sway))}
+    moved = {axis.config.stick.signal for axis in deployment.axes.values()}
+    for lever in deployment.levers.values():
+        raw, commands = lever.codec.decode(_frame_of(frames, lever.key).data)
+        assert lever.config.anti_sway_off is None or raw[lever.config.anti_sway_off] != anti_sway
+        for signal, command in commands.items():
+            assert command == pytest.approx(position if signal in moved else 0.0, abs=0.005)
 
 
 def test_at_rest_nothing_is_enabled(deployment: Deployment) -> None:
@@ -60,16 +59,6 @@ def test_reset_and_enable_are_in_the_frame(deployment: Deployment) -> None:
         raw, _ = lever.codec.decode(_frame_of(frames, lever.key).data)
         assert raw[lever.config.enable] == 1
         assert lever.config.reset is None or raw[lever.config.reset] == 1
-
-
-def _values(deployment: Deployment, frame: Frame) -> dict[str, Any]:
-    """Raw values of a frame; the scripted operator leaves a reset button "not available"."""
-    found = [m for m in deployment.on_bus[frame.bus] if _fits(frame, (m.frame_id, frame.extended))]
-    raw = dict(found[0].decode(frame.data, decode_choices=False, scaling=False))
-    for lever in deployment.levers.values():
-        if lever.message is found[0] and lever.config.reset:
-            del raw[lever.config.reset]
-    return raw
 
 
 def _fits(frame: Frame, key: tuple[int, bool]) -> bool:

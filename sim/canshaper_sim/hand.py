@@ -1,4 +1,4 @@
-"""The levers as they are held on the page: stick positions in, joystick frames out."""
+"""The levers of a deployment as they are held: stick positions in, joystick frames out."""
 
 import math
 from collections.abc import Mapping
@@ -7,8 +7,10 @@ from dataclasses import dataclass, field
 from canshaper.can.codecs import Sender
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput, BoundLever
-from canshaper_sim.levers import JOYSTICK_ADDRESS
+from canshaper.can.inputs import BoundInput, BoundLever, BoundStop
+
+# Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
+JOYSTICK_ADDRESS = 0x33
 
 
 @dataclass(frozen=True)
@@ -33,33 +35,48 @@ class Hand:
 
     Args:
         deployment: names the joystick messages and their switches.
+
+    Attributes:
+        cycle_ms: frames are due at multiples of it only.
     """
 
     def __init__(self, deployment: Deployment) -> None:
-        self._levers = [_Lever(lever, deployment) for lever in deployment.levers.values()]
-        self._stop = deployment.emergency_stop
-        cycles = [lever.cycle_ms for lever in self._levers]
-        if self._stop:
-            self._stop_sender = _sender(self._stop)
-            self._stop_cycle_ms = self._stop.message.cycle_time or 20
-            cycles.append(self._stop_cycle_ms)
-        self.cycle_ms = math.gcd(*cycles)
+        self._messages: list[_Message] = [
+            _Lever(lever, deployment) for lever in deployment.levers.values()
+        ]
+        if deployment.emergency_stop:
+            self._messages.append(_Stop(deployment.emergency_stop))
+        self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
 
     def frames(self, time_ms: int, held: Held) -> list[Frame]:
-        """Frames that are due at this multiple of ``cycle_ms``."""
-        frames = [lever.frame(held) for lever in self._levers if time_ms % lever.cycle_ms == 0]
-        if self._stop and time_ms % self._stop_cycle_ms == 0:
-            frames.append(self._stop_sender.frame({self._stop.config.signal: 0}))
-        return frames
+        """Frames that are due at this time."""
+        return [one.frame(held) for one in self._messages if time_ms % one.cycle_ms == 0]
 
 
-class _Lever:
+class _Message:
+    """A message with its protection."""
+
+    def __init__(self, bound: BoundInput) -> None:
+        self.cycle_ms = bound.message.cycle_time or 20
+        # Of J1939 from the address that is asked for.
+        source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
+        self._sender = Sender(bound.config.bus, bound.message, source, bound.protection)
+
+    def frame(self, held: Held) -> Frame:
+        """The next frame."""
+        return self._sender.frame(self._raw(held))
+
+    def _raw(self, held: Held) -> dict[str, int]:
+        """Raw values of the signals that a hand moves."""
+        raise NotImplementedError
+
+
+class _Lever(_Message):
     """One joystick message."""
 
     def __init__(self, lever: BoundLever, deployment: Deployment) -> None:
-        self.cycle_ms = lever.message.cycle_time or 20
+        super().__init__(lever)
         self._config = lever.config
-        self._sender = _sender(lever)
         self._sticks = {
             name: axis.config.stick
             for name, axis in deployment.axes.items()
@@ -73,8 +90,7 @@ class _Lever:
             if s.maximum is not None and s.minimum is not None and s.minimum < 0 < s.maximum
         }
 
-    def frame(self, held: Held) -> Frame:
-        """The next frame."""
+    def _raw(self, held: Held) -> dict[str, int]:
         raw, fields, config = dict(self._base), self._sender.fields, self._config
         raw[config.enable] = int(held.enable)
         if config.reset:
@@ -93,10 +109,15 @@ class _Lever:
                 raw[stick.negative] = fields.raw(stick.negative, self._full[stick.negative] * back)
                 command = max(command, 0.0)
             raw[stick.signal] = fields.raw(stick.signal, self._full[stick.signal] * command)
-        return self._sender.frame(raw)
+        return raw
 
 
-def _sender(bound: BoundInput) -> Sender:
-    # Of J1939 from the address that is asked for.
-    source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
-    return Sender(bound.config.bus, bound.message, source, bound.protection)
+class _Stop(_Message):
+    """The emergency stop, never pressed."""
+
+    def __init__(self, stop: BoundStop) -> None:
+        super().__init__(stop)
+        self._released = {stop.config.signal: 0}
+
+    def _raw(self, held: Held) -> dict[str, int]:
+        return self._released
