@@ -17,9 +17,8 @@ from canshaper.config.load import load_config
 from canshaper.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
 from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import Tell
-from canshaper_sim.processes import Transport
+from canshaper_sim.processes import Transport, end
 
-STOP_LIMIT_S = 10.0
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
 _LATE = re.compile(r"\blate (\d+) us")
@@ -161,15 +160,8 @@ class Crane:
         """End both; the daemon goes first and leaves the valves neutral."""
         self._stopping = True
         for verb in ("run", "sim"):
-            process = self._children[verb].process
-            if process is None:
-                continue
-            process.terminate()
-            try:
-                process.wait(STOP_LIMIT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            if (process := self._children[verb].process) is not None:
+                end(process)
         self._status.close()
 
 

@@ -179,12 +179,15 @@ class Crew:
     def stop(self) -> None:
         """End all processes; the daemon goes first and leaves the valves neutral."""
         for verb in ("run", "operator", "sim"):
-            process = self._processes.get(verb)
-            if process is None:
-                continue
-            process.terminate()
-            try:
-                process.wait(STOP_LIMIT_S)
-            except subprocess.TimeoutExpired:
-                process.kill()
-                process.wait()
+            if (process := self._processes.get(verb)) is not None:
+                end(process)
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    """End a process: asked first, so that a daemon leaves the valves neutral, then for good."""
+    process.terminate()
+    try:
+        process.wait(STOP_LIMIT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
