@@ -5,23 +5,62 @@ import select
 import socket
 import time
 from array import array
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.service.controller import Controller
 from canshaper.service.events import Event
-from canshaper.service.exchange import stall_ns
+from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory
 
 
+class WatchedPort(RawPort):
+    """A bus on one end of a pair of sockets, whose frames are counted and noted.
+
+    Args:
+        name: of the bus.
+        one: the end.
+        on_fault: called with every fault of the bus.
+        on_sent: called with every frame as soon as it was sent.
+
+    Attributes:
+        taken: frames so far.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        one: socket.socket,
+        on_fault: Callable[[FrameFault], None],
+        on_sent: Callable[[Frame], None],
+    ) -> None:
+        self.taken = 0
+        self._on_sent = on_sent
+        super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False)
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits."""
+        for frame in super().frames():
+            self.taken += 1
+            yield frame
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame, or not at all; whether it was sent."""
+        sent = super().send(frame)
+        if sent:
+            self._on_sent(frame)
+        return sent
+
+
 class Loop:
-    """One tick as in the daemon: take all that waits, tick, send; and what happened when.
+    """The ticks of the daemon, and what happened when.
 
     Args:
         deployment: what is run.
@@ -33,15 +72,9 @@ class Loop:
         self, deployment: Deployment, sockets: dict[str, socket.socket], seconds: float
     ) -> None:
         self._controller = Controller(deployment)
+        faults = self._controller.counters.add
         self._ports = {
-            name: RawPort(
-                name,
-                lambda _ids, one=one: [one],  # type: ignore[misc]
-                None,
-                self._controller.counters.add,
-                confirms=False,
-            )
-            for name, one in sockets.items()
+            name: WatchedPort(name, one, faults, self._note) for name, one in sockets.items()
         }
         self._valves: dict[tuple[str, int, bool], list[int]] = {}
         for i, axis in enumerate(deployment.axes.values()):
@@ -54,7 +87,6 @@ class Loop:
         # Arrays, not lists: the collector has nothing to look through in them.
         self._late, self._began, self._ended = array("q"), array("q"), array("q")
         self._taken, self._sent = array("q"), array("q")
-        self._frames = dict.fromkeys(sockets, 0)
         self._missed = 0
         self._events: list[tuple[str, str, str]] = []
         self._moved: set[str] = set()
@@ -70,30 +102,17 @@ class Loop:
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        controller, ports = self._controller, self._ports
-        if missed * self._tick_ns > self._stall_ns:
-            for name, port in ports.items():
-                self._frames[name] += sum(1 for _ in port.frames())
-            controller.stalled()
-        for name, port in ports.items():
-            for frame in port.frames():
-                self._frames[name] += 1
-                if (passed := controller.receive(frame, now_ns)) is not None:
-                    self._send(passed)
-        for frame in controller.tick(now_ns, missed):
-            self._send(frame)
+        stalled = missed * self._tick_ns > self._stall_ns
+        exchange(self._controller, self._ports, now_ns, missed, stalled=stalled)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
-        self._taken.extend(self._frames.values())
+        self._taken.extend(port.taken for port in self._ports.values())
         self._missed += missed
         self._ended.append(time.monotonic_ns())
         return now_ns < self._until_ns
 
-    def _send(self, frame: Frame) -> None:
-        if not self._ports[frame.bus].send(frame):
-            self._controller.send_failed(frame)
-            return
+    def _note(self, frame: Frame) -> None:
         tick = len(self._late)
         for axis in self._valves.get(frame[:3], ()):
             self._sent.extend((tick, axis, time.monotonic_ns()))
