@@ -27,6 +27,8 @@ from canshaper.shaping.states import MOVING, Reason, State, StickInput
 NEUTRAL_BAND = 1e-4
 # Fall of the command when the measurement ends early, full commands per second.
 FALL_PER_S = 5.0
+# Feedback older than that says nothing of the axis, which must not go on unseen.
+SILENT_NS = 500_000_000
 
 
 class _RampLever:
@@ -87,6 +89,7 @@ class CalibrationDrive:
         self._ramp = ramp
         self._begun_ns: int | None = None
         self._latest: float | None = None
+        self._heard_ns = 0
         self._samples: dict[str, list[Sample]] = {}
         self.ended = ""
         self.progress = 0.0
@@ -108,7 +111,10 @@ class CalibrationDrive:
     @property
     def waiting_for(self) -> str:
         """What the axis still waits for, before the ramp begins."""
-        return "" if self._begun_ns is not None else self._runner.axis.reason.name
+        if self._begun_ns is not None:
+            return ""
+        axis = self._runner.axis
+        return "feedback" if axis.state is State.READY else axis.reason.name
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
@@ -123,13 +129,15 @@ class CalibrationDrive:
             raw: Any = self._layout.decode(frame.data)[self._signal.name]
             if raw not in self._special:
                 self._latest = raw * self._signal.scale + self._signal.offset
+                self._heard_ns = now_ns
         return passed
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send."""
         axis = self._runner.axis
         state = axis.state
-        if self._begun_ns is None and state is State.READY and self._latest is not None:
+        heard = self._latest is not None and now_ns - self._heard_ns <= SILENT_NS
+        if self._begun_ns is None and state is State.READY and heard:
             self._begun_ns = now_ns
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
@@ -140,6 +148,9 @@ class CalibrationDrive:
                 self.ended = "done"
             elif state not in MOVING and state is not State.READY:
                 self.ended = f"stopped: {axis.reason.name}"
+            elif not heard:
+                self.ended = "stopped: the feedback fell silent, or tells an error"
+            if self.ended:
                 self._lever.command = 0.0
         yield from self._controller.tick(now_ns, missed)
         self._controller.events.clear()

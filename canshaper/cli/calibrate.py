@@ -129,8 +129,10 @@ def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: f
     """The result for people, beside what the file has."""
     limits = deployment.axes[axis].config.limits
     now = f"deadband_pct {limits.deadband_pct:g}"
-    if limits.curve_command_pct:
-        now = f"a curve with the dead band at {_dead_band(limits.curve_command_pct, limits)}"
+    if limits.curve_command_pct and limits.curve_speed_pct:
+        pairs = zip(limits.curve_command_pct, limits.curve_speed_pct, strict=True)
+        ends = [f"{command:g}" for command, speed in pairs if speed == 0.0]
+        now = f"a curve with the dead band at {' to '.join(ends)} %"
     typer.echo(f"axis {axis}: the file has {now}")
     full = max(result.positive.full, result.negative.full)
     for name, one in (("positive", result.positive), ("negative", result.negative)):
@@ -143,12 +145,6 @@ def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: f
     typer.echo(f"  curve_command_pct: {commands}\n  curve_speed_pct: {speeds}")
     if top_pct < 100:
         typer.echo(f"  above {top_pct:g} % of the command this is a straight line, not measured")
-
-
-def _dead_band(commands: list[float], limits: object) -> str:
-    speeds = getattr(limits, "curve_speed_pct", None) or []
-    ends = [f"{c:g}" for c, s in zip(commands, speeds, strict=False) if s == 0.0]
-    return " to ".join(ends) + " %"
 
 
 def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
