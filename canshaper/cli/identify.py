@@ -1,32 +1,21 @@
 """``canshaper identify``: period, damping and full speed of the swing, from what a person has."""
 
 import json
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
+from canshaper.cli.common import INSTALL_TOOLS, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.database import Messages
     from canshaper.can.deployment import Deployment
     from canshaper.identification.judge import Finding
     from canshaper.identification.recommend import Advice
-    from canshaper.identification.series import Series
 
-# Swing of each axis as `canshaper sim` tells it.
-SIMULATED = {
-    "slew": "GrappleSway.SwayPerpendicular",
-    "near_far": "GrappleSway.SwayParallel",
-}
 EXIT_TOO_POOR = 1
-# Name of the axis where neither a deployment nor an option tells one.
-UNNAMED = "swing"
 
 
 def identify(
@@ -85,6 +74,13 @@ def identify(
       canshaper identify --swings 10 --seconds 23.6 --first 20 --last 5 --file machine.yaml \\
         --axis slew --write
     """
+    from canshaper.cli.identify_data import (
+        axis_named,
+        logged,
+        messages_of,
+        signals_named,
+        timed_by_hand,
+    )
     from canshaper.config.source import DeploymentError
     from canshaper.identification.recommend import advise
 
@@ -96,13 +92,13 @@ def identify(
             raise ValueError(f"{file}: shipped with the package; copy it, then write to the copy")
         timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
         if any(v is not None for v in timed.values()):
-            findings = [_timed(timed, logs or [], _axis(axis, deployment))]
+            findings = [timed_by_hand(timed, logs or [], axis_named(axis, deployment))]
         else:
-            findings = _logged(
+            findings = logged(
                 logs or [],
-                _signals(signal or [], deployment),
+                signals_named(signal or [], deployment),
                 deployment,
-                _messages(dbc or [], deployment),
+                messages_of(dbc or [], deployment),
                 axis=axis,
                 channel=channel,
                 about_s=about_s,
@@ -126,158 +122,10 @@ def identify(
         raise typer.Exit(EXIT_TOO_POOR)
 
 
-def _timed(timed: dict[str, float | None], logs: list[str], axis: str) -> "Finding":
-    """What a stopwatch tells."""
-    from canshaper.identification.judge import Finding
-    from canshaper.identification.stopwatch import stopwatch
-
-    missing = [name for name, value in timed.items() if value is None]
-    if missing or logs:
-        found = f"without {', '.join(missing)}" if missing else f"with the log {logs[0]}"
-        raise ValueError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
-    period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
-    return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
-
-
-def _axis(axis: str | None, deployment: "Deployment | None") -> str:
-    """The axis of data that names none."""
-    if deployment is None:
-        return axis or UNNAMED
-    if axis not in deployment.axes:
-        found = repr(axis) if axis else "none"
-        raise ValueError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
-    return axis
-
-
-def _signals(pairs: Sequence[str], deployment: "Deployment | None") -> dict[str, str]:
-    """Name of the signal of each axis."""
-    signals: dict[str, str] = {}
-    for pair in pairs:
-        axis, equals, name = pair.partition("=")
-        if not (axis and equals and name):
-            raise ValueError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
-        if axis in signals:
-            raise ValueError(f"--signal: found two signals of {axis}, allowed is one")
-        signals[_axis(axis, deployment)] = name
-    return signals
-
-
-def _messages(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
-    """Messages that name the signals."""
-    from canshaper.can.database import Messages, load_dbc
-    from canshaper.config.source import DeploymentError
-
-    if not files and deployment:
-        return deployment.messages
-    loaded, problems = [], []
-    for path in files or [data_directory() / "dbc" / "forwarder.dbc"]:
-        one, faults = load_dbc(path)
-        problems += faults
-        loaded += [one] if one else []
-    if problems:
-        raise DeploymentError(problems)
-    return Messages(loaded)
-
-
-def _logged(
-    logs: Sequence[str],
-    signals: dict[str, str],
-    deployment: "Deployment | None",
-    messages: "Messages",
-    *,
-    axis: str | None,
-    channel: str | None,
-    about_s: float | None,
-) -> list["Finding"]:
-    """What logs tell, by axis and label."""
-    from canshaper.identification.canlog import read_can
-    from canshaper.identification.judge import identify as judged
-    from canshaper.identification.phone import series_of
-    from canshaper.identification.table import is_table, read_table
-
-    if not logs:
-        raise ValueError("found no log and no stopwatch; see canshaper identify --help")
-    series: dict[tuple[str, str], list[Series]] = {}
-    with _progress() as tell:
-        for text in logs:
-            label, path = _labelled(text)
-            report = tell(path.name)
-            if is_table(path):
-                table = read_table(path, report)
-                wanted: dict[str, str | None] = {**signals}
-                wanted = wanted or {_axis(axis, deployment): None}
-                found = {a: series_of(table, label, c, about_s) for a, c in wanted.items()}
-            else:
-                found = read_can(
-                    path,
-                    label,
-                    signals or _simulated(deployment, messages, axis),
-                    messages,
-                    deployment=deployment,
-                    channel=channel,
-                    progress=report,
-                )
-            for name, one in found.items():
-                series.setdefault((name, label), []).append(one)
-        findings = []
-        for (name, label), parts in series.items():
-            tell(f"{name} {label}")(0.5)
-            finding = judged(name, label, parts, about_s)
-            if finding.at is None:
-                finding.at = _number(label)
-            findings.append(finding)
-    return findings
-
-
-def _labelled(text: str) -> tuple[str, Path]:
-    """Label and path of "LABEL=LOG"; a file that is there has its name."""
-    label, equals, rest = text.partition("=")
-    if not equals or Path(text).exists():
-        return "", Path(text)
-    return label, Path(rest)
-
-
-def _number(label: str) -> float | None:
-    try:
-        return float(label)
-    except ValueError:
-        return None
-
-
-def _simulated(
-    deployment: "Deployment | None", messages: "Messages", axis: str | None
-) -> dict[str, str]:
-    """Signals of the simulated crane, where nobody named others."""
-    axes = list(deployment.axes) if deployment else list(SIMULATED)
-    there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
-    if not there or isinstance(messages.find("GrappleSway"), str):
-        raise ValueError(
-            "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL with what shows the swing"
-        )
-    return there
-
-
 def _speed(deployment: "Deployment | None", axis: str) -> float | None:
     """Full speed that the deployment has."""
     sway = deployment.axes[axis].config.sway if deployment else None
     return sway.full_speed_m_s if sway else None
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], Callable[[float], None]]]:
-    """A bar on the terminal, beside the output; gone when done."""
-    console = Console(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def tell(what: str) -> Callable[[float], None]:
-            bar.update(task, completed=0.0, description=what)
-            return lambda done: bar.update(task, completed=done)
-
-        yield tell
 
 
 def _draw(

@@ -1,0 +1,173 @@
+"""What ``canshaper identify`` was given: logs and tables, or a stopwatch, to findings."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn
+
+from canshaper.cli.common import data_directory
+
+if TYPE_CHECKING:
+    from canshaper.can.database import Messages
+    from canshaper.can.deployment import Deployment
+    from canshaper.identification.judge import Finding
+    from canshaper.identification.series import Series
+
+# Swing of each axis as `canshaper sim` tells it.
+SIMULATED = {
+    "slew": "GrappleSway.SwayPerpendicular",
+    "near_far": "GrappleSway.SwayParallel",
+}
+# Name of the axis where neither a deployment nor an option tells one.
+UNNAMED = "swing"
+
+
+def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) -> "Finding":
+    """What a stopwatch tells."""
+    from canshaper.identification.judge import Finding
+    from canshaper.identification.stopwatch import stopwatch
+
+    missing = [name for name, value in timed.items() if value is None]
+    if missing or logs:
+        found = f"without {', '.join(missing)}" if missing else f"with the log {logs[0]}"
+        raise ValueError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
+    period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
+    return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
+
+
+def axis_named(axis: str | None, deployment: "Deployment | None") -> str:
+    """The axis of data that names none."""
+    if deployment is None:
+        return axis or UNNAMED
+    if axis not in deployment.axes:
+        found = repr(axis) if axis else "none"
+        raise ValueError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
+    return axis
+
+
+def signals_named(pairs: Sequence[str], deployment: "Deployment | None") -> dict[str, str]:
+    """Name of the signal of each axis."""
+    signals: dict[str, str] = {}
+    for pair in pairs:
+        axis, equals, name = pair.partition("=")
+        if not (axis and equals and name):
+            raise ValueError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
+        if axis in signals:
+            raise ValueError(f"--signal: found two signals of {axis}, allowed is one")
+        signals[axis_named(axis, deployment)] = name
+    return signals
+
+
+def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
+    """Messages that name the signals."""
+    from canshaper.can.database import Messages, load_dbc
+    from canshaper.config.source import DeploymentError
+
+    if not files and deployment:
+        return deployment.messages
+    loaded, problems = [], []
+    for path in files or [data_directory() / "dbc" / "forwarder.dbc"]:
+        one, faults = load_dbc(path)
+        problems += faults
+        loaded += [one] if one else []
+    if problems:
+        raise DeploymentError(problems)
+    return Messages(loaded)
+
+
+def logged(
+    logs: Sequence[str],
+    signals: dict[str, str],
+    deployment: "Deployment | None",
+    messages: "Messages",
+    *,
+    axis: str | None,
+    channel: str | None,
+    about_s: float | None,
+) -> list["Finding"]:
+    """What logs tell, by axis and label."""
+    from canshaper.identification.canlog import read_can
+    from canshaper.identification.judge import identify as judged
+    from canshaper.identification.phone import series_of
+    from canshaper.identification.table import is_table, read_table
+
+    if not logs:
+        raise ValueError("found no log and no stopwatch; see canshaper identify --help")
+    series: dict[tuple[str, str], list[Series]] = {}
+    with _progress() as tell:
+        for text in logs:
+            label, path = _labelled(text)
+            report = tell(path.name)
+            if is_table(path):
+                table = read_table(path, report)
+                wanted: dict[str, str | None] = {**signals}
+                wanted = wanted or {axis_named(axis, deployment): None}
+                found = {a: series_of(table, label, c, about_s) for a, c in wanted.items()}
+            else:
+                found = read_can(
+                    path,
+                    label,
+                    signals or _simulated(deployment, messages, axis),
+                    messages,
+                    deployment=deployment,
+                    channel=channel,
+                    progress=report,
+                )
+            for name, one in found.items():
+                series.setdefault((name, label), []).append(one)
+        findings = []
+        for (name, label), parts in series.items():
+            tell(f"{name} {label}")(0.5)
+            finding = judged(name, label, parts, about_s)
+            if finding.at is None:
+                finding.at = _number(label)
+            findings.append(finding)
+    return findings
+
+
+def _labelled(text: str) -> tuple[str, Path]:
+    """Label and path of "LABEL=LOG"; a file that is there has its name."""
+    label, equals, rest = text.partition("=")
+    if not equals or Path(text).exists():
+        return "", Path(text)
+    return label, Path(rest)
+
+
+def _number(label: str) -> float | None:
+    try:
+        return float(label)
+    except ValueError:
+        return None
+
+
+def _simulated(
+    deployment: "Deployment | None", messages: "Messages", axis: str | None
+) -> dict[str, str]:
+    """Signals of the simulated crane, where nobody named others."""
+    axes = list(deployment.axes) if deployment else list(SIMULATED)
+    there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
+    if not there or isinstance(messages.find("GrappleSway"), str):
+        raise ValueError(
+            "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL with what shows the swing"
+        )
+    return there
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], Callable[[float], None]]]:
+    """A bar on the terminal, beside the output; gone when done."""
+    console = Console(stderr=True)
+    columns = (TextColumn("{task.description}"), BarColumn())
+    with Progress(
+        *columns, console=console, transient=True, disable=not console.is_terminal
+    ) as bar:
+        task = bar.add_task("", total=1.0)
+
+        def tell(what: str) -> Callable[[float], None]:
+            bar.update(task, completed=0.0, description=what)
+            return lambda done: bar.update(task, completed=done)
+
+        yield tell
