@@ -1,0 +1,42 @@
+"""The benchmarks keep up with what they measure: their options, and the deployments they make."""
+
+import subprocess
+import sys
+from importlib import import_module
+from pathlib import Path
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.config.bus import Bus
+
+ROOT = Path(__file__).parents[2]
+PROGRAMS = sorted(
+    path
+    for path in (ROOT / "benchmarks").glob("*.py")
+    if "ArgumentParser" in path.read_text()  # the others are started by these, or shared
+)
+BUS = Bus(interface="udp_multicast", channel="239.74.163.2")
+
+
+@pytest.fixture(autouse=True)
+def of_benchmarks(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(str(ROOT / "benchmarks"))
+
+
+@pytest.mark.parametrize("program", PROGRAMS, ids=lambda path: path.stem)
+def test_help_tells_what_is_measured(program: Path) -> None:
+    done = subprocess.run(
+        [sys.executable, program, "--help"], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == 0, done.stderr
+    assert done.stdout.startswith("usage: ")
+
+
+def test_the_deployments_they_make_are_valid(tmp_path: Path) -> None:
+    kilohertz, rig, tick = (import_module(name) for name in ("kilohertz", "rig", "tick"))
+    eight = load_deployment(kilohertz.deployment(tmp_path, 8, 1, BUS))
+    assert (len(eight.axes), eight.config.tick_ms) == (8, 1)
+    assert len(tick.four_axes(tmp_path).axes) == 4
+    assert list(load_deployment(rig.slew_only(tmp_path, "vcan0", 1)).axes) == ["slew"]
+    assert load_deployment(rig.on_channel(tmp_path, BUS)).config.buses["crane"] == BUS
