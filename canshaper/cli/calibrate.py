@@ -98,9 +98,11 @@ def calibrate(
         raise fail(error) from None
     except CalibrationError as error:
         raise fail(error, EXIT_NOT_MEASURED) from None
+    if write:  # first: what reads the output may end before its last line
+        _write(deployment, axis, result)
     _told(deployment, axis, result, top_pct)
     if write:
-        _write(deployment, axis, result)
+        typer.echo(f"written: {deployment.path}")
 
 
 def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str, str]:
@@ -161,4 +163,3 @@ def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
         set_values(deployment.path, ("axes", axis, "limits"), values)
     except DeploymentError as error:
         raise fail(error) from None
-    typer.echo(f"written: {deployment.path}")
