@@ -43,7 +43,9 @@ def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
     for name in (*COPIED, "tests/shaping", "tests/service"):
         ignore = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, work / name, ignore=ignore)
-    shutil.copy(ROOT / "tests/conftest.py", work / "tests")
+    for name in ("tests/conftest.py", "tests/can/protected_machine.py"):
+        (work / name).parent.mkdir(exist_ok=True)
+        shutil.copy(ROOT / name, work / name)
     paths = [name.replace(".", "/") for name in mutated]
     only = [f"{path}/*" if (ROOT / path).is_dir() else f"{path}.py" for path in paths]
     (work / "pyproject.toml").write_text(

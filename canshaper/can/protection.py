@@ -85,8 +85,10 @@ class Protector:
         Raises:
             OverflowError: a value is not within the bits of its signal.
         """
-        self.count(raw)
-        return self.seal(self._encode(raw))
+        if self._counts:
+            self.count(raw)
+        data = self._encode(raw)
+        return data if self._check is None else self.seal(data)
 
     def count(self, raw: dict[str, Any]) -> None:
         """Go on to the next frame, and put its counter among the raw values."""

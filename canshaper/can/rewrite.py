@@ -61,7 +61,7 @@ class RewrittenMessage(ValveMessage):
         ours = int.from_bytes(self._layout.encode(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
         sealed = self._protector.seal(word.to_bytes(self._length, "little"))
-        return new_frame(Frame, (self._bus, self._id, self._extended, sealed))
+        return new_frame(Frame, (self.bus, self._id, self._extended, sealed))
 
     def own(self, *, enabled: bool) -> Frame:
         """The next frame without one of the lever: nothing in it is older than the axes."""

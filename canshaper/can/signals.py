@@ -164,12 +164,13 @@ class VelocitySignal:
         full = float(signal.maximum or 0.0)
         return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal))
 
-    def command(self, raw: float) -> float | Reason:
-        """Part of full scale in [-1, 1], or why the raw value is no velocity."""
-        fault = self.special.get(raw)
+    def read(self, raw: dict[str, Any]) -> float | Reason:
+        """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
+        found: float = raw[self.name]
+        fault = self.special.get(found)
         if fault is not None:
             return fault
-        value = (raw * self.scale + self.offset) / self.full
+        value: float = (found * self.scale + self.offset) / self.full
         if -1.0 <= value <= 1.0:
             return value
         if not math.isfinite(value):
@@ -177,10 +178,6 @@ class VelocitySignal:
         if abs(value) > 1.0 + ROUNDING:
             return Reason.STICK_OUT_OF_RANGE
         return math.copysign(1.0, value)
-
-    def read(self, raw: dict[str, Any]) -> float | Reason:
-        """Command of a frame, from the raw values of its signals."""
-        return self.command(raw[self.name])
 
 
 class FieldSet:

@@ -16,19 +16,20 @@ class ValveMessage:
 
     Attributes:
         sender: its place on the bus.
+        bus: name of the bus.
         raw: raw value of every signal, which the axes change.
     """
 
     def __init__(self, sender: Sender) -> None:
         self.sender = sender
         self.raw: dict[str, Any] = dict(sender.fields.start)
-        self._bus, self._id, self._extended = sender.key
+        self.bus, self._id, self._extended = sender.key
         self._protect = sender.protector.protect
 
     def frame(self) -> Frame:
         """The next frame, protected, with what its axes have put in."""
         data = self._protect(self.raw)
-        return new_frame(Frame, (self._bus, self._id, self._extended, data))
+        return new_frame(Frame, (self.bus, self._id, self._extended, data))
 
 
 class Direction(Protocol):
@@ -114,6 +115,7 @@ class ValveCodec:
         self._direction = direction
         self._negative = negative.name if negative else None
         self._also = [(s.name, _zero(s), _steps(s) * (1 if s.scale > 0 else -1)) for s in also]
+        self._plain = not (direction or negative or also)  # nearly every valve
         self.put(0)
 
     def put(self, steps: int) -> None:
@@ -128,6 +130,9 @@ class ValveCodec:
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
         raw, size = self._raw, steps
+        if self._plain:
+            raw[self._signal] = self._zero + self._sign * steps
+            return
         if self._direction is not None:
             self._direction.put(raw, (steps > 0) - (steps < 0))
             size = abs(steps)

@@ -9,6 +9,7 @@ from canshaper.can.canopen import service_of
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
+from canshaper.can.valve import ValveMessage
 from canshaper.service.canopen import canopen_buses
 from canshaper.service.counters import Counters
 from canshaper.service.events import Event, FeedbackEvent, Told
@@ -91,18 +92,17 @@ class Controller:
         used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._sent)}
         self._others = deployment.messages.ids() - used
         # An axis that asks something of another one goes first.
-        self._order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
+        order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
         self._by_message: dict[tuple[str, int, bool], list[AxisRunner]] = {}
-        for _, runner in self._order:
+        for _, runner in order:
             key = runner.bound.valve.message.sender.key
             self._by_message.setdefault(key, []).append(runner)
-        for runners in self._by_message.values():
-            runners[-1].sends = True  # when all axes of the message have moved
         self._lines = {
             key: Line(runners[0].bound.valve.message, levers[_lever(runners[0])], runners)
             for key, runners in self._by_message.items()
             if runners[0].bound.rewrites
         }
+        self._turns = [self._turn(name, runner) for name, runner in order]
         self._in_line = {bus for bus in deployment.config.buses if deployment.in_line(bus)}
         self._canopen = canopen_buses(deployment, self.axes)
         for bus, nodes in self._canopen.items():
@@ -140,6 +140,10 @@ class Controller:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
+        return self._passed_on(frame, now_ns) if self._lines else None
+
+    def _passed_on(self, frame: Frame, now_ns: int) -> Frame | None:
+        """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
         for line in self._lines.values():
             if line.news():
                 return line.pass_on(frame.data, now_ns)
@@ -171,16 +175,21 @@ class Controller:
         self._last = now
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
-        overrun = self._overruns(missed)
+        overrun = bool(missed or self._late) and self._overruns(missed)
         changed = []
         silent = self._network.silent if self._network.nodes else NOWHERE
-        for name, runner in self._order:
-            if passed := _passed(last, now, runner.bound.period_ticks):
+        for name, runner, message, line in self._turns:
+            period = runner.period_ticks
+            if passed := now // period - last // period:
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
-                if runner.sends and (frame := self._command(runner, now_ns, silent)):
-                    yield frame
+                if line is not None:
+                    if (frame := line.own(now_ns)) is not None:
+                        yield frame
+                elif message is not None and message.bus not in silent:
+                    yield message.frame()
+                runner.settle(now_ns)
                 if runner.feedback is not None:
                     self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:
@@ -196,12 +205,15 @@ class Controller:
             yield from nodes.frames(now_ns)
             self.events += nodes.changes()
 
-    def _command(self, runner: AxisRunner, now_ns: int, silent: frozenset[str]) -> Frame | None:
-        """The frame of a valve message whose axes have moved."""
+    def _turn(
+        self, name: str, runner: AxisRunner
+    ) -> tuple[str, AxisRunner, ValveMessage | None, Line | None]:
+        """An axis, and the message that goes out when it has moved: the last one of the message."""
         message = runner.bound.valve.message
-        if (line := self._lines.get(message.sender.key)) is not None:
-            return line.own(now_ns)
-        return None if runner.bound.config.valve.bus in silent else message.frame()
+        if self._by_message[message.sender.key][-1] is not runner:
+            return name, runner, None, None
+        line = self._lines.get(message.sender.key)
+        return name, runner, None if line else message, line
 
     def _choose(self) -> list[tuple[BoundInput, Input]]:
         """Let grapple and operator choose sway data and filter of the axes that have a choice."""

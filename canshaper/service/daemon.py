@@ -77,7 +77,7 @@ class Daemon:
         self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
-                run_at_deadlines(self._tick_ns, self._body, self._wait)
+                run_at_deadlines(self._tick_ns, self._body, self._wait if self._line else None)
                 if self._next and not self._stop:
                     self._apply(self._next)
         finally:
@@ -107,11 +107,9 @@ class Daemon:
         return not (self._stop or (self._next and controller.neutral))
 
     def _wait(self, seconds: float) -> None:
-        """Until the next deadline; in a gateway frames are passed on meanwhile."""
-        if self._line:
-            self._line.wait(seconds, self._controller, self._ports)
-        else:
-            time.sleep(seconds)
+        """In a gateway: pass frames on until the next deadline."""
+        assert self._line is not None  # asked of a gateway only
+        self._line.wait(seconds, self._controller, self._ports)
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""

@@ -60,9 +60,10 @@ class LeverInput(Input):
             trip: a cause for neutral at once, handed through.
             neutral_band: |stick| up to which it counts as neutral and may stand still for ever.
         """
-        lost = self.lost(now_ns)
         released = self._released or self._released_ns > since_ns
-        if lost is not None:
+        received_ns = self._received_ns
+        if received_ns is None or now_ns - received_ns > self._timeout_ns:
+            lost = self.lost(now_ns)
             # Seen released is more than lost: an immediate stop, not the shaped one.
             released = self._released_ns > since_ns or (
                 self._released and lost is Reason.STICK_UNTRUSTED

@@ -42,12 +42,11 @@ class AxisRunner:
 
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
-        period_s: time between two commands to its valve.
+        period_ticks, period_s: time between two commands to its valve.
         trip: a cause for neutral at once, noted since the last tick.
         lost: the input was lost since the last tick, though it may be back: neutral comes first.
         contested_ns: when a frame of another sender with the id of this valve was last seen.
         added: velocity that another axis asks of this one, fraction of full speed.
-        sends: the message of its valve goes out when this axis has moved.
         control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
@@ -62,6 +61,7 @@ class AxisRunner:
         self._ticked_ns = -1
         self._signal = config.stick.signal
         self._neutral_band = config.stick.neutral_pct / 100.0
+        self.period_ticks = bound.period_ticks
         self.period_s = period_s = tick_s * bound.period_ticks
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
         self.axis = Axis(
@@ -84,7 +84,6 @@ class AxisRunner:
         self.lost = False
         self.contested_ns: int | None = None
         self.added = 0.0
-        self.sends = False
         self.gates: list[Gate] = []
         self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
@@ -127,6 +126,8 @@ class AxisRunner:
     ) -> Transition | None:
         """One step of the axis; a trip cause noted since the last one acts now.
 
+        ``settle`` has to follow, before another axis moves.
+
         Args:
             now_ns: monotonic time.
             emergency: the emergency stop, where there is one.
@@ -138,19 +139,33 @@ class AxisRunner:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
         if self.chooser is not None:
             self.chooser.update(now_ns)
-        if self.compensator is None:
-            transition = self.axis.tick(stick, self.added)
-        else:
+        if self.compensator is not None:
             self.compensator.before_slew()
-            transition = self.axis.tick(stick, self.added)
-            self.compensator.after_slew(now_ns)
+        transition = self.axis.act(stick, self.added)
         self.bound.valve.put(self.axis.raw)
         return transition
 
+    def settle(self, now_ns: int) -> None:
+        """What can wait until the valve was told: the model, and what is asked of another axis."""
+        self.axis.advance()
+        if self.compensator is not None:
+            self.compensator.after_slew(now_ns)
+
     def _stick(self, now_ns: int, emergency: EmergencyStopInput | None) -> StickInput:
-        since_ns = self._ticked_ns
-        trip, lost = self.trip, self.lost
+        since_ns, trip, lost, fault = self._ticked_ns, self.trip, self.lost, None
         self.trip, self.lost = None, False
+        if emergency or self.gates or lost or self.contested_ns is not None:
+            trip, fault = self._objections(now_ns, emergency, trip, lost)
+        stick = self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
+        # A release is more than a fault.
+        if fault is None or not (stick.enabled or self.axis.neutral):
+            return stick
+        return StickInput(fault=fault, trip=trip)
+
+    def _objections(
+        self, now_ns: int, emergency: EmergencyStopInput | None, trip: Reason | None, lost: bool
+    ) -> tuple[Reason | None, Reason | None]:
+        """Why the axis has to be neutral at once, and why it has to stop or may not begin."""
         if self.contested_ns is not None:
             if now_ns - self.contested_ns <= CONTESTED_NS:
                 trip = trip or Reason.SECOND_SENDER
@@ -163,7 +178,7 @@ class AxisRunner:
                 trip = trip or found
             else:
                 fault = fault or found
-        if emergency is not None and (stop := emergency.stop(now_ns, since_ns)):
+        if emergency is not None and (stop := emergency.stop(now_ns, self._ticked_ns)):
             if stop is Reason.EMERGENCY_STOP or not neutral:
                 trip = trip or stop
             else:  # not heard of yet: nothing to trip, but nothing may begin
@@ -172,11 +187,8 @@ class AxisRunner:
             fault = fault or Reason.STICK_TIMEOUT
         if fault is not None and self.axis.state is State.TRIPPED:
             # What tripped it is still there, so that a reset which is held is no new press.
-            trip, fault = trip or fault, None
-        stick = self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
-        if fault is None or not (neutral or stick.enabled):  # a release is more than a fault
-            return stick
-        return StickInput(fault=fault, trip=trip)
+            return trip or fault, None
+        return trip, fault
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""

@@ -98,6 +98,12 @@ class Axis:
         return self.state not in MOVING
 
     def tick(self, stick: StickInput, added: float = 0.0) -> Transition | None:
+        """A whole tick: ``act`` and ``advance``."""
+        transition = self.act(stick, added)
+        self.advance()
+        return transition
+
+    def act(self, stick: StickInput, added: float = 0.0) -> Transition | None:
         """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
 
         Args:
@@ -130,9 +136,12 @@ class Axis:
         except (ValueError, ArithmeticError):
             self._output_invalid()
         self.told = self.sent - added if self.state is ACTIVE else self.sent
+        return None if self.state is old else Transition(old, self.state, self.reason)
+
+    def advance(self) -> None:
+        """Let the model swing with what ``act`` found: work that can wait until that is sent."""
         if self.sway is not None:
             self.sway.step(self.told)
-        return None if self.state is old else Transition(old, self.state, self.reason)
 
     def hold(self, ticks: int) -> None:
         """Tell the axis that the last output was held for ``ticks`` missed ticks.

@@ -45,10 +45,10 @@ class Fir:
 
     def inherit(self, old: "Fir", _command: float) -> None:
         """Go on with the commands that another one has seen; of older ones its oldest is taken."""
-        seen = list(old._history)
-        seen += [seen[-1]] * (len(self.taps) - len(seen))
+        count = len(self.taps)
+        seen = [*old._history, *[old._history[-1]] * count]
         self._history.clear()
-        self._history.extend(seen[: len(self.taps)])
+        self._history.extend(seen[:count])
 
 
 def zv_taps(mode: SwayMode, tick_s: float) -> list[float]:

@@ -81,12 +81,14 @@ class RecentCommand:
                 smallest.pop()
             smallest.append((now, command))
         expired = now - self._ticks
-        while largest and largest[0][0] < expired:
-            largest.popleft()
-        while smallest and smallest[0][0] < expired:
-            smallest.popleft()
-        self.high = largest[0][1] if largest else 0.0
-        self.low = smallest[0][1] if smallest else 0.0
+        if largest:  # else high is 0 already
+            while largest and largest[0][0] < expired:
+                largest.popleft()
+            self.high = largest[0][1] if largest else 0.0
+        if smallest:
+            while smallest and smallest[0][0] < expired:
+                smallest.popleft()
+            self.low = smallest[0][1] if smallest else 0.0
 
 
 def allowed_range(

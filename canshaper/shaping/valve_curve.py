@@ -18,14 +18,13 @@ class ValveCurve:
         ValueError: the points are no such curve.
     """
 
-    __slots__ = ("_commands", "_zero", "speeds")
+    __slots__ = ("_commands", "speeds")
 
     def __init__(self, commands: Sequence[float], speeds: Sequence[float]) -> None:
         if fault := next(_faults(commands, speeds), None):
             raise ValueError(fault)
         self._commands = tuple(commands)
         self.speeds = tuple(speeds)
-        self._zero = self.speeds.index(0.0)  # of the negative end of the dead band
 
     def command(self, velocity: float) -> float:
         """Command for a velocity; beyond what the valve gives, full command."""
@@ -41,9 +40,7 @@ class ValveCurve:
 
     def velocity(self, command: float) -> float:
         """Velocity that a command gives; zero within the dead band."""
-        speeds, commands, zero = self.speeds, self._commands, self._zero
-        if commands[zero] <= command <= commands[zero + 1]:
-            return 0.0
+        speeds, commands = self.speeds, self._commands
         if command >= commands[-1]:
             return speeds[-1]
         if command <= commands[0]:

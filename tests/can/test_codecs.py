@@ -126,7 +126,7 @@ def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None
     [(50, Reason.STICK_NOT_AVAILABLE), (51, Reason.STICK_ERROR), (0, 0.0), (49, 0.49), (52, 0.52)],
 )
 def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reason) -> None:
-    assert velocity("Lever", "Plain").command(raw) == command
+    assert velocity("Lever", "Plain").read({"Plain": raw}) == command
 
 
 @pytest.mark.parametrize(
@@ -148,7 +148,7 @@ def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reaso
 def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
-    assert VelocitySignal.of(signal(message, "Plain")).command(50) == reason
+    assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == reason
 
 
 @pytest.mark.parametrize(
@@ -172,7 +172,7 @@ def test_float_sticks(value: float, command: float | Reason) -> None:
 @pytest.mark.parametrize(("raw", "command"), [(3, 1.0), (-3, -1.0)])
 def test_full_stick_is_full_in_spite_of_rounding(raw: int, command: float) -> None:
     """3 steps of 0.1 are a little more than 0.3 in floating point."""
-    assert VelocitySignal("S", 0.1, 0.0, 0.3, {}).command(raw) == command
+    assert VelocitySignal("S", 0.1, 0.0, 0.3, {}).read({"S": raw}) == command
 
 
 @pytest.mark.parametrize("length", [0, 1, 7, 9, 64])

@@ -16,6 +16,9 @@ from canshaper.shaping.valve_curve import ValveCurve
 COMMANDS = (-1.0, -0.5, -0.04, 0.07, 0.4, 1.0)
 SPEEDS = (-0.8, -0.3, 0.0, 0.0, 0.35, 1.0)
 CURVE = ValveCurve(COMMANDS, SPEEDS)
+NO_ENDS = "allowed are commands from -100 to 100 %, with the ends of the dead band between"
+NO_BAND = "allowed are two neighbouring commands with speed 0, the ends of the dead band"
+NOT_FULL = "the faster direction has speed 100 % at full command, and none has more"
 
 
 @pytest.mark.parametrize(("command", "speed"), list(zip(COMMANDS, SPEEDS, strict=True)))
@@ -84,28 +87,44 @@ def test_the_grid_stays_within_its_bounds(
 @pytest.mark.parametrize(
     ("commands", "speeds", "says"),
     [
-        ((-1, 0, 1), (-1, 0, 0, 1), "found 3 commands and 4 speeds"),
-        ((-1, 0, 1), (-1, 0, 1), "from -100 to 100 %"),
-        ((-0.9, -0.1, 0.1, 1), (-1, 0, 0, 1), "from -100 to 100 %"),
-        ((-1, -0.1, 0.1, 0.9), (-1, 0, 0, 1), "from -100 to 100 %"),
+        ((-1, 0, 1), (-1, 0, 0, 1), "found 3 commands and 4 speeds, allowed is one for each"),
+        ((-1, 0, 1), (-1, 0, 1), NO_ENDS),
+        ((-0.9, -0.1, 0.1, 1), (-1, 0, 0, 1), NO_ENDS),
+        ((-1, -0.1, 0.1, 0.9), (-1, 0, 0, 1), NO_ENDS),
         ((-1, 0.1, 0.1, 1), (-1, 0, 0, 1), "commands do not rise"),
-        ((-1, -0.1, 0.1, 1), (-1, -0.1, 0, 1), "two neighbouring commands with speed 0"),
-        ((-1, -0.1, 0, 0.1, 1), (-1, 0, 0, 0, 1), "two neighbouring commands with speed 0"),
-        ((-1, -0.1, 0.1, 1), (0, 0, 0.5, 1), "two neighbouring commands with speed 0"),
-        ((-1, -0.5, 0.1, 1), (-1, -0.5, 0, 0), "two neighbouring commands with speed 0"),
-        ((-1, 0.1, 0.2, 1), (-1, 0, 0, 1), "does not lie around command 0"),
-        ((-1, -0.2, -0.1, 1), (-1, 0, 0, 1), "does not lie around command 0"),
-        ((-1, -0.5, -0.1, 0.1, 1), (-0.5, -0.6, 0, 0, 1), "speeds do not rise"),
-        ((-1, -0.1, 0.1, 0.5, 1), (-1, 0, 0, 0.7, 0.7), "speeds do not rise"),
-        ((-1, -0.1, 0.1, 1), (-0.9, 0, 0, 0.9), "the faster direction has speed 100 %"),
-        ((-1, -0.1, 0.1, 1), (-1.1, 0, 0, 1), "the faster direction has speed 100 %"),
+        ((-1, -0.1, 0.1, 1), (-1, -0.1, 0, 1), NO_BAND),
+        ((-1, -0.1, 0, 0.1, 1), (-1, 0, 0, 0, 1), NO_BAND),
+        ((-1, -0.1, 0.1, 1), (0, 0, 0.5, 1), NO_BAND),
+        ((-1, -0.5, 0.1, 1), (-1, -0.5, 0, 0), NO_BAND),
+        ((-1, 0.1, 0.2, 1), (-1, 0, 0, 1), "the dead band does not lie around command 0"),
+        ((-1, -0.2, -0.1, 1), (-1, 0, 0, 1), "the dead band does not lie around command 0"),
+        ((-1, -0.5, -0.1, 0.1, 1), (-0.5, -0.6, 0, 0, 1), "speeds do not rise with the command"),
+        ((-1, -0.1, 0.1, 0.5, 1), (-1, 0, 0, 0.7, 0.7), "speeds do not rise with the command"),
+        ((-1, -0.1, 0.1, 1), (-0.9, 0, 0, 0.9), NOT_FULL),
+        ((-1, -0.1, 0.1, 1), (-1.1, 0, 0, 1), NOT_FULL),
     ],
 )
 def test_what_is_no_curve_is_refused(
     commands: tuple[float, ...], speeds: tuple[float, ...], says: str
 ) -> None:
-    with pytest.raises(ValueError, match=says):
+    with pytest.raises(ValueError, match=f"^{says}$"):
         ValveCurve(commands, speeds)
+
+
+@pytest.mark.parametrize(
+    ("commands", "speeds"),
+    [
+        ((-1, 0, 0.1, 1), (-1, 0, 0, 0.5)),
+        ((-1, -0.1, 0, 1), (-0.5, 0, 0, 1)),
+        ((-1, -0.5, -0.1, 0.1, 0.5, 1), (-0.8, -0.3, 0, 0, 0.5, 0.999)),
+        ((-1, -0.1, 0.1, 1), (-0.999, 0, 0, 0.999)),
+    ],
+)
+def test_a_band_that_ends_at_zero_and_a_rounded_full_speed_make_a_curve(
+    commands: tuple[float, ...], speeds: tuple[float, ...]
+) -> None:
+    curve = ValveCurve(commands, speeds)
+    assert [curve.velocity(command) for command in commands] == pytest.approx(speeds)
 
 
 def driven(command: float, added: float = 0.0) -> Axis:
