@@ -208,15 +208,15 @@ def _integral(t_s: list[float], values: list[float], window: range) -> float:
     return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
 
 
-def _crossing_s(t_s: list[float], values: list[float], k: int, level: float) -> float:
+def _crossing_s(t_s: list[float], values: Mapping[int, float], k: int, level: float) -> float:
     """Time at which the straight line from sample k to k + 1 passes the level."""
     share = (level - values[k]) / (values[k + 1] - values[k])
     return t_s[k] + share * (t_s[k + 1] - t_s[k])
 
 
 def _time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
-    speed = [stroke.direction * value for value in trace.speed]
     held = range(stroke.press, stroke.plateau[1] + 1)
+    speed = {k: stroke.direction * trace.speed[k] for k in held}
     lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
     start = lost[-1] if lost else stroke.press
     wanted = REACHED * stroke.level
@@ -229,7 +229,7 @@ def _time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float |
 
 
 def _run_on_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    speed = [abs(value) for value in trace.speed]
+    speed = {k: abs(trace.speed[k]) for k in stroke.rest}
     release, last = stroke.rest[0], stroke.rest[-1]
     moving = next((k for k in reversed(stroke.rest) if speed[k] >= STOPPED), None)
     if moving is None:
