@@ -103,7 +103,7 @@ class Axis:
         self.advance()
         return transition
 
-    def act(self, stick: StickInput, added: float = 0.0) -> Transition | None:
+    def act(self, stick: StickInput, added: float) -> Transition | None:
         """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
 
         Args:

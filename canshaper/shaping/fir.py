@@ -43,11 +43,10 @@ class Fir:
         """Begin with a command that has long been there."""
         self._history.extend([command] * len(self.taps))
 
-    def inherit(self, old: "Fir", _command: float) -> None:
+    def inherit(self, old: "Fir") -> None:
         """Go on with the commands that another one has seen; of older ones its oldest is taken."""
         count = len(self.taps)
         seen = [*old._history, *[old._history[-1]] * count]
-        self._history.clear()
         self._history.extend(seen[:count])
 
 

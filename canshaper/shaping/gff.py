@@ -81,7 +81,7 @@ class Gff:
         command = self._command
         return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
 
-    def inherit(self, old: "Gff", _command: float) -> None:
+    def inherit(self, old: "Gff") -> None:
         """Go on from where another one stands; the swing is in the model."""
         self._command = old._command
 

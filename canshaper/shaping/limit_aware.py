@@ -13,6 +13,7 @@ With no limit acting the difference is zero, and the shaper is itself.
 import math
 from typing import Protocol
 
+from canshaper.shaping.fir import Fir
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.sway import SwayModel
 
@@ -40,7 +41,7 @@ def carry_over(old: _Shaper, new: _Shaper, command: float) -> None:
         command: the command now; without a better memory it counts as the one for long.
     """
     if type(old) is type(new) and hasattr(new, "inherit"):
-        new.inherit(old, command)
+        new.inherit(old)
     elif hasattr(new, "begin_at"):
         new.begin_at(command)
 
@@ -50,7 +51,7 @@ class LimitAware:
 
     Args:
         sway: sway model of the axis; its owner steps it with what was sent.
-        shaper: the shaper, such as a ``Fir``.
+        shaper: the shaper.
         rate_per_s: rate of the valve, full speeds per second.
 
     Raises:
@@ -59,7 +60,7 @@ class LimitAware:
 
     __slots__ = ("_asked", "_gff", "_shaper", "_sway", "_twin")
 
-    def __init__(self, sway: SwayModel, shaper: _Shaper, rate_per_s: float = math.inf) -> None:
+    def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
         if omega > fastest:
             raise ValueError(
@@ -73,18 +74,17 @@ class LimitAware:
         self._shaper = shaper
         self._asked = 0.0
 
-    def inherit(self, old: "LimitAware", command: float) -> None:
+    def inherit(self, old: "LimitAware") -> None:
         """Go on from where another one stands."""
         self._twin = old._twin.retuned(self._sway.mode, old._asked)
         self._asked = old._asked
-        carry_over(old._shaper, self._shaper, command)
+        self._shaper.inherit(old._shaper)
 
     def begin_at(self, command: float) -> None:
         """Begin with a command that has long been there, and no swing that limits have made."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
         self._asked = command
-        if hasattr(self._shaper, "begin_at"):
-            self._shaper.begin_at(command)
+        self._shaper.begin_at(command)
 
     def wanted(self, command: float) -> float:
         """Output for this tick's command, before limits."""

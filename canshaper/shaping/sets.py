@@ -3,6 +3,7 @@
 from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import zip_longest
 from typing import Any
 
 from canshaper.shaping.gff import poles_from_denominator
@@ -74,11 +75,6 @@ def _by_poles(parameters: dict[str, Any]) -> dict[str, Any]:
 
 def _between(first: Any, second: Any, share: float) -> Any:
     if isinstance(first, Sequence):
-        length = max(len(first), len(second))
-        pairs = zip(_filled(first, length), _filled(second, length), strict=True)
+        pairs = zip_longest(first, second, fillvalue=0.0)
         return [a + share * (b - a) for a, b in pairs]
     return first + share * (second - first)
-
-
-def _filled(numbers: Sequence[float], length: int) -> list[float]:
-    return [*numbers, *[0.0] * (length - len(numbers))]

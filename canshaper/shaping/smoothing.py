@@ -26,7 +26,7 @@ class FirstOrder:
         """Begin with a command that has long been there."""
         self._value = command
 
-    def inherit(self, old: "FirstOrder", _command: float) -> None:
+    def inherit(self, old: "FirstOrder") -> None:
         """Go on from where another one stands."""
         self._value = old._value
 
@@ -69,6 +69,6 @@ class SCurve:
         """Begin with a command that has long been there."""
         self._value, self._slope = command, 0.0
 
-    def inherit(self, old: "SCurve", _command: float) -> None:
+    def inherit(self, old: "SCurve") -> None:
         """Go on from where another one stands."""
         self._value, self._slope = old._value, old._slope

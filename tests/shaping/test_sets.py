@@ -12,7 +12,7 @@ from canshaper.shaping.fir import Fir, zv_taps
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limit_aware import LimitAware
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper, build_shaper
+from canshaper.shaping.registry import Shaper, build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
 from canshaper.shaping.smoothing import FirstOrder, SCurve
 from canshaper.shaping.states import StickInput
@@ -72,6 +72,31 @@ def test_taps_stay_taps() -> None:
     taps = at_position(sets, STEPS_BETWEEN // 4).parameters["taps"]
     assert taps == pytest.approx([0.4375, 0.4375, 0.125])
     assert math.fsum(taps) == pytest.approx(1.0)
+
+
+def test_among_three_sets_the_two_around_a_value_count() -> None:
+    heavy = ParameterSet(1000.0, SwayMode.from_period(3.4, 0.05), "gff", {"a1": 1.4, "a2": 0.3})
+    sets = (*SETS, heavy)
+    assert position(sets, 800.0) == STEPS_BETWEEN
+    assert position(sets, 900.0) == STEPS_BETWEEN + STEPS_BETWEEN // 2
+    assert position(sets, 1000.0) == position(sets, 1e6) == 2 * STEPS_BETWEEN
+    found = at_position(sets, position(sets, 900.0))
+    assert (found.at, found.kind) == (900.0, "gff")
+    assert found.mode.period_s == pytest.approx(3.1)
+    lower = at_position(sets, position(sets, 400.0))
+    assert (lower.at, lower.mode.period_s) == (400.0, pytest.approx(2.4))
+
+
+def test_poles_go_from_the_faster_one_to_the_faster_one() -> None:
+    sets = (
+        ParameterSet(0.0, EMPTY, "gff", {"a1": 0.5, "a2": 0.06}),  # poles -5 and -3.33
+        ParameterSet(1.0, FULL, "gff", {"poles_rad_s": (-2.0, -4.0)}),
+        ParameterSet(2.0, FULL, "gff", {"poles_rad_s": (-3.0, -1.0), "third_pole_rad_s": -5.0}),
+    )
+    first = at_position(sets, STEPS_BETWEEN // 2).parameters
+    assert first == {"poles_rad_s": pytest.approx([-4.5, -8.0 / 3.0])}
+    second = at_position(sets, 3 * STEPS_BETWEEN // 2).parameters
+    assert second == {"poles_rad_s": pytest.approx([-3.5, -1.5])}
 
 
 # -- in motion -------------------------------------------------------------------------------------
@@ -166,8 +191,16 @@ def test_inherited_history_gives_the_same_output() -> None:
     for n in range(200):
         old.wanted(math.sin(n / 10))
     new = Fir(old.taps)
-    new.inherit(old, 0.0)
+    new.inherit(old)
     assert [new.wanted(0.3) for _ in range(60)] == [old.wanted(0.3) for _ in range(60)]
+
+
+def test_a_limit_aware_shaper_goes_on_with_its_history() -> None:
+    old, new = (LimitAware(SwayModel(EMPTY, TICK_S), Fir([0.1] * 10)) for _ in range(2))
+    for n in range(30):
+        old.wanted(0.02 * n)
+    new.inherit(old)
+    assert [new.wanted(0.6) for _ in range(12)] == [old.wanted(0.6) for _ in range(12)]
 
 
 def test_a_longer_shaper_takes_the_oldest_command_for_older_ones() -> None:
@@ -175,10 +208,10 @@ def test_a_longer_shaper_takes_the_oldest_command_for_older_ones() -> None:
     old.wanted(0.2)
     old.wanted(0.8)
     new = Fir([0.25] * 4)
-    new.inherit(old, 0.0)
+    new.inherit(old)
     assert new.wanted(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
     shorter = Fir([1.0])
-    shorter.inherit(old, 0.0)
+    shorter.inherit(old)
     assert shorter.wanted(0.4) == 0.4
 
 
@@ -192,7 +225,6 @@ def test_every_shaper_begins_at_a_command() -> None:
         Gff(sway, (-3.0, -2.0), -5.0),
         LimitAware(sway, Fir([0.5, 0.5])),
     ]
-    LimitAware(sway, Off()).begin_at(0.7)  # a shaper without memory
     for shaper in shapers:
         shaper.begin_at(0.7)
         assert shaper.wanted(0.7) == pytest.approx(0.7, abs=1e-9)
