@@ -144,6 +144,7 @@ def judge(known: dict[Change, str], patterns: list[str]) -> int:
     """Print the result; 0 when every survivor has its reason, and every reason its survivor."""
     counts: Counter[str] = Counter()
     seen: set[Change] = set()
+    alive: set[Change] = set()
     failures = 0
     for data, name, change in mutants():
         if patterns and not any(fnmatch.fnmatch(name, pattern) for pattern in patterns):
@@ -152,17 +153,18 @@ def judge(known: dict[Change, str], patterns: list[str]) -> int:
         seen.add(change)
         if code in (*KILLED, *TIMED_OUT):
             counts["killed" if code in KILLED else "killed by the time limit"] += 1
-            if change in known:
-                print("\n# killed, though explained", change[0], *change[1], sep="\n")
         elif code == TYPES:
             counts["left to the type checker"] += 1
         elif code == SURVIVED and change in known:
             counts["survived for a reason"] += 1
+            alive.add(change)
         else:
             failures += 1
             what = "survived" if code == SURVIVED else f"came to nothing ({code})"
             counts[what] += 1
             print(f"\n# {what}: {name}", change[0], *change[1], sep="\n")
+    for change in (known.keys() & seen) - alive:  # a function may have the same line twice
+        print("\n# killed, though explained", change[0], *change[1], sep="\n")
     mutated = {function.rpartition(".")[0] for function, _ in seen}
     for function, changed in known:
         module = function.rpartition(".")[0]
