@@ -200,8 +200,8 @@ class Controller:
             yield from self._network.frames(now_ns)
         self.events += self._network.changes()
         for nodes in self._canopen.values():
-            if lost := nodes.lost(now_ns):
-                self.counters.add(FrameFault.HEARTBEAT_LOST, lost)
+            if nodes.lost(now_ns):
+                self.counters.add(FrameFault.HEARTBEAT_LOST)
             yield from nodes.frames(now_ns)
             self.events += nodes.changes()
 
@@ -212,8 +212,7 @@ class Controller:
         message = runner.bound.valve.message
         if self._by_message[message.sender.key][-1] is not runner:
             return name, runner, None, None
-        line = self._lines.get(message.sender.key)
-        return name, runner, None if line else message, line
+        return name, runner, message, self._lines.get(message.sender.key)
 
     def _choose(self) -> list[tuple[BoundInput, Input]]:
         """Let grapple and operator choose sway data and filter of the axes that have a choice."""

@@ -35,7 +35,8 @@ class RadiusInput:
         """
         if self._fixed_m is not None:
             return self._fixed_m
-        radius_m = self._measured.fresh(now_ns) if self._measured else None
+        assert self._measured is not None  # one of both is there
+        radius_m = self._measured.fresh(now_ns)
         return None if radius_m is None else radius_m / tip_share
 
 

@@ -10,6 +10,8 @@ import pytest
 
 from canshaper.can.frame import Frame
 from canshaper.service.adjust import Adjuster
+from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.sway import SwayModel
 from tests.service.conftest import Rig
 
 ROOT = Path(__file__).parents[2]
@@ -108,8 +110,11 @@ def test_in_motion_nothing_jumps_and_the_new_filter_is_in_force(make: Make, at: 
 @pytest.mark.parametrize(
     ("values", "why"),
     [
-        ({}, "found no number"),
-        ({"axes.slew.stick.neutral_pct": 2.0}, "not adjustable; allowed are axes.slew.sway"),
+        ({}, "^found no number to change$"),
+        (
+            {"axes.slew.stick.neutral_pct": 2.0},
+            r"not adjustable; allowed are axes\.slew\.sway\.period_s, axes\.slew\.sway\.full",
+        ),
         ({"axes.slew.sway.period_s": 1.79}, "found 1.79, allowed is 1.8 to 3"),
         ({"axes.slew.sway.period_s": 3.01}, "found 3.01, allowed is 1.8 to 3"),
         ({"axes.slew.sway.period_s": math.nan}, "found nan, allowed is 1.8 to 3"),
@@ -144,6 +149,35 @@ def test_a_filter_that_cannot_run_at_the_period_of_its_valve_is_refused(make: Ma
         Adjuster(rig.controller).change(
             {"axes.slew.filter.a1": 0.0021, "axes.slew.filter.a2": 0.000001}
         )
+
+
+@pytest.mark.parametrize(
+    ("kind", "number"),
+    [
+        ("first_order, time_constant_s: 0.4", "time_constant_s"),
+        (f"robust, tick_ms: 20, taps: {[0.05] * 20}", "taps"),
+    ],
+)
+def test_the_new_filter_is_made_as_the_file_makes_it(
+    make: Make, monkeypatch: pytest.MonkeyPatch, kind: str, number: str
+) -> None:
+    """For the period of its valve, and with the rate of its valve."""
+    made: list[tuple[tuple[object, ...], dict[str, object]]] = []
+
+    def noted(kind: str, tick_s: float, sway: SwayModel | None, **others: object) -> Shaper:
+        made.append(((kind, tick_s), others))
+        return build_shaper(kind, tick_s, sway, **others)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("canshaper.service.runner.build_shaper", noted)
+    rig = make(
+        {
+            f"{SLEW}\n    {FILTER}": f"{SLEW}\n    filter: {{ kind: {kind} }}\n",
+            "    axes.slew.filter.a1: [0.3, 1.0]\n    axes.slew.filter.a2: [0.03, 0.2]\n": "",
+        }
+    )
+    at_first = next(one for one in made if number in one[1])
+    Adjuster(rig.controller).change({"axes.slew.sway.period_s": 2.5})
+    assert made[-1] == at_first
 
 
 def test_limits_change_in_neutral_only(make: Make) -> None:

@@ -190,6 +190,12 @@ def test_another_sender_of_the_lever_behind_us_trips(rig: GatewayRig) -> None:
     assert rig.state("lift")[0] == "READY"
 
 
+def test_a_trip_before_the_first_joystick_frame_sends_nothing(rig: GatewayRig) -> None:
+    rig.receive(Frame("machine", 0x110, False, bytes(8)))
+    assert [rig.tick() for _ in range(10)] == [[]] * 10
+    assert rig.state() == ("TRIPPED", "SECOND_SENDER")
+
+
 def test_a_frame_that_did_not_go_out_trips(rig: GatewayRig) -> None:
     rig.moving()
     passed = rig.receive(rig.lever(Slew=1000))

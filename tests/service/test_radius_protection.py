@@ -63,6 +63,14 @@ def test_a_radius_with_a_flipped_bit_is_none(tip: Tip, bit: int) -> None:
     assert tip.known_m == pytest.approx(4.0)
 
 
+def test_after_a_stall_any_counter_is_the_first_one(tip: Tip) -> None:
+    tip.send(4000)
+    tip.radius.forget()
+    assert tip.known_m is None
+    assert tip.send(5000, step=9) is FrameFault.NONE
+    assert tip.known_m == pytest.approx(5.0)
+
+
 def test_a_radius_for_another_data_id_is_none(tip: Tip) -> None:
     for other in (b"\x76", b"\x77\x01", b""):
         assert tip.give(tip.data(5000, other)) is FrameFault.CHECKSUM

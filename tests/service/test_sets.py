@@ -95,6 +95,26 @@ def test_the_weight_chooses(chosen: Rig, kg: int, period: float, number: int) ->
     assert chosen.controller.axes["slew"].chooser.number == number  # type: ignore[union-attr]
 
 
+def test_the_weight_chooses_where_the_operator_has_no_choice(changed_rig: Make) -> None:
+    alone = {SLEW: SLEW + SETS.partition("    feels:")[0]}
+    rig = changed_rig(yaml={**YAML, **alone}, dbc=DBC)
+    rig.run(3)
+    rig.receive(load(1000))
+    rig.run(10)
+    assert period_s(rig) == pytest.approx(2.9)
+    rig.receive(feel(1))
+    rig.run(10)
+    assert period_s(rig) == pytest.approx(2.9)
+
+
+def test_an_axis_without_a_choice_tells_the_set_0(changed_rig: Make) -> None:
+    rig = changed_rig(dbc=DBC)
+    told = [
+        sent["SlewStatus"]["ActiveSet"] for _ in range(20) if "SlewStatus" in (sent := rig.run())
+    ]
+    assert set(told) == {0}
+
+
 def test_a_weight_that_is_lost_or_not_available_is_none(chosen: Rig) -> None:
     chosen.receive(load(1000))
     chosen.run(10)
