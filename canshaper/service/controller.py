@@ -248,11 +248,14 @@ class Controller:
                 yield frame
 
     def _overruns(self, missed: int) -> bool:
-        """Whether so many ticks came late that the filter no longer does what it was tuned for."""
+        """Whether so many ticks came late that the filter no longer does what it was tuned for.
+
+        Asked while that is not paid back, and when a tick was late.
+        """
         if missed:
             self._late = min(self._late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self._late == LATE_LIMIT
-        elif self._late:
+        else:
             self._late -= 1
             self._overrun &= self._late > 0
         return self._overrun
