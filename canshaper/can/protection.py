@@ -85,17 +85,15 @@ class Protector:
         Raises:
             OverflowError: a value is not within the bits of its signal.
         """
-        if self._counts:
-            self.count(raw)
-        data = self._encode(raw)
-        return data if self._check is None else self.seal(data)
+        return self.seal(self.unsealed(raw))
 
-    def count(self, raw: dict[str, Any]) -> None:
-        """Go on to the next frame, and put its counter among the raw values."""
+    def unsealed(self, raw: dict[str, Any]) -> bytes:
+        """The next frame, as ``protect``, without its check."""
         if self._counts:
             self._count = (self._count + 1) % self._counts
             if self._counter is not None:
                 raw[self._counter] = self._count
+        return self._encode(raw)
 
     def seal(self, data: bytes) -> bytes:
         """The same frame with the check of the count it has come to."""
@@ -143,18 +141,19 @@ class Guard:
         if self._range:
             if self._in_header:
                 count = data[1] & COUNTER
-            last, self._last = self._last, count
-            anew, self._anew = self._anew, False
+            last = self._last
+            self._last = count
             if last is not None:
                 step = (count - last) % self._range
                 if step == 0:
-                    self._anew = anew
                     return FrameFault.COUNTER_REPEATED
-                if step > self._max_step and not anew:
+                if step > self._max_step and not self._anew:
                     self._qualify_anew()
                     return FrameFault.COUNTER_JUMP
-        self._good += 1
-        self.qualified = self._good >= self._qualify
+            self._anew = False
+        if not self.qualified:
+            self._good += 1
+            self.qualified = self._good >= self._qualify
         return GOOD
 
     def _qualify_anew(self) -> None:

@@ -57,8 +57,7 @@ class RewrittenMessage(ValveMessage):
 
     def onto(self, data: bytes) -> Frame:
         """The next frame: this one of the lever with our velocities, protected anew."""
-        self._protector.count(self.raw)
-        ours = int.from_bytes(self._layout.encode(self.raw), "little") & self._mask_of_all
+        ours = int.from_bytes(self._protector.unsealed(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
         sealed = self._protector.seal(word.to_bytes(self._length, "little"))
         return new_frame(Frame, (self.bus, self._id, self._extended, sealed))

@@ -24,12 +24,12 @@ class ValveMessage:
         self.sender = sender
         self.raw: dict[str, Any] = dict(sender.fields.start)
         self.bus, self._id, self._extended = sender.key
-        self._protect = sender.protector.protect
+        protector = sender.protector
+        self._next = protector.protect if sender.protection.check else protector.unsealed
 
     def frame(self) -> Frame:
         """The next frame, protected, with what its axes have put in."""
-        data = self._protect(self.raw)
-        return new_frame(Frame, (self.bus, self._id, self._extended, data))
+        return new_frame(Frame, (self.bus, self._id, self._extended, self._next(self.raw)))
 
 
 class Direction(Protocol):
@@ -129,10 +129,11 @@ class ValveCodec:
         """
         if not -self.steps <= steps <= self.steps:
             raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
-        raw, size = self._raw, steps
+        raw = self._raw
         if self._plain:
             raw[self._signal] = self._zero + self._sign * steps
             return
+        size = steps
         if self._direction is not None:
             self._direction.put(raw, (steps > 0) - (steps < 0))
             size = abs(steps)

@@ -175,7 +175,7 @@ class Controller:
         self._last = now
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
-        overrun = bool(missed or self._late) and self._overruns(missed)
+        overrun = self._overruns(missed) if missed or self._late else False
         changed = []
         silent = self._network.silent if self._network.nodes else NOWHERE
         for name, runner, message, line in self._turns:

@@ -24,7 +24,7 @@ def run_at_deadlines(
     deadline = now = clock()
     while True:
         late = now - deadline
-        missed = max(0, late) // period_ns
+        missed = late // period_ns if late > 0 else 0
         deadline += missed * period_ns
         if not body(now, missed, late):
             return

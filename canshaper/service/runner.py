@@ -152,20 +152,19 @@ class AxisRunner:
             self.compensator.after_slew(now_ns)
 
     def _stick(self, now_ns: int, emergency: EmergencyStopInput | None) -> StickInput:
-        since_ns, trip, lost, fault = self._ticked_ns, self.trip, self.lost, None
-        self.trip, self.lost = None, False
-        if emergency or self.gates or lost or self.contested_ns is not None:
-            trip, fault = self._objections(now_ns, emergency, trip, lost)
-        stick = self._lever.stick(self._signal, now_ns, since_ns, trip, self._neutral_band)
+        fault = None
+        if emergency or self.gates or self.lost or self.contested_ns is not None:
+            fault = self._objections(now_ns, emergency)
+        trip, self.trip = self.trip, None
+        stick = self._lever.stick(self._signal, now_ns, self._ticked_ns, trip, self._neutral_band)
         # A release is more than a fault.
         if fault is None or not (stick.enabled or self.axis.neutral):
             return stick
         return StickInput(fault=fault, trip=trip)
 
-    def _objections(
-        self, now_ns: int, emergency: EmergencyStopInput | None, trip: Reason | None, lost: bool
-    ) -> tuple[Reason | None, Reason | None]:
-        """Why the axis has to be neutral at once, and why it has to stop or may not begin."""
+    def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
+        """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""
+        trip = self.trip
         if self.contested_ns is not None:
             if now_ns - self.contested_ns <= CONTESTED_NS:
                 trip = trip or Reason.SECOND_SENDER
@@ -183,12 +182,14 @@ class AxisRunner:
                 trip = trip or stop
             else:  # not heard of yet: nothing to trip, but nothing may begin
                 fault = fault or stop
-        if lost:
+        if self.lost:
+            self.lost = False
             fault = fault or Reason.STICK_TIMEOUT
         if fault is not None and self.axis.state is State.TRIPPED:
             # What tripped it is still there, so that a reset which is held is no new press.
-            return trip or fault, None
-        return trip, fault
+            trip, fault = trip or fault, None
+        self.trip = trip
+        return fault
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""

@@ -274,9 +274,12 @@ class Axis:
     # -- the output ----------------------------------------------------------------------------
 
     def _deadzone(self, command: float) -> float:
-        if not math.isfinite(command):  # it would stay in the memory of a filter
-            raise ValueError(f"command is {command}")
-        return 0.0 if abs(command) <= self._neutral_band else command
+        size = abs(command)
+        if self._neutral_band < size < math.inf:
+            return command
+        if size <= self._neutral_band:
+            return 0.0
+        raise ValueError(f"command is {command}")  # it would stay in the memory of a filter
 
     def _within_maximum(self, command: float) -> float:
         """A command no faster than the axis may be: a filter that is cut off damps nothing."""
@@ -301,9 +304,9 @@ class Axis:
         return wanted + self._bump
 
     def _drive(self, command: float, wanted: float, added: float) -> None:
-        limits = self._limits
-        self._recent.add(command)
-        low, high = allowed_range(command, self._recent.low, self._recent.high, limits)
+        limits, recent = self._limits, self._recent
+        recent.add(command)
+        low, high = allowed_range(command, recent.low, recent.high, limits)
         target = within(wanted, low, high, limits.minimum)
         if added:
             self._drive_both(target, added)

@@ -126,9 +126,12 @@ def within(velocity: float, low: float, high: float, minimum: float) -> float:
     Raises:
         ValueError: the velocity is not a number; a filter gone wrong must not reach a valve.
     """
-    if not math.isfinite(velocity):
+    if low <= velocity <= high:
+        clipped = velocity
+    elif math.isfinite(velocity):
+        clipped = low if velocity < low else high
+    else:
         raise ValueError(f"filter output is {velocity}")
-    clipped = low if velocity < low else high if velocity > high else velocity
     return clipped if abs(clipped) >= minimum else 0.0
 
 
@@ -152,15 +155,16 @@ def rate_limited(target: float, last: float, rise: float, fall: float) -> float:
 
 def with_deadband(velocity: float, deadband: float) -> float:
     """Command for a velocity: the deadband is jumped over, full speed stays full command."""
-    if velocity == 0.0:
-        return 0.0
-    return math.copysign(deadband + (1.0 - deadband) * abs(velocity), velocity)
+    if velocity > 0.0:
+        return (1.0 - deadband) * velocity + deadband
+    return (1.0 - deadband) * velocity - deadband if velocity < 0.0 else velocity
 
 
 def without_deadband(command: float, deadband: float) -> float:
     """Velocity that a command gives: the inverse of ``with_deadband``, zero inside the deadband."""
-    magnitude = abs(command) - deadband
-    return math.copysign(magnitude / (1.0 - deadband), command) if magnitude > 0.0 else 0.0
+    if command > deadband:
+        return (command - deadband) / (1.0 - deadband)
+    return (command + deadband) / (1.0 - deadband) if command < -deadband else 0.0
 
 
 def on_grid(

@@ -293,10 +293,13 @@ def test_a_filter_without_a_number_trips_and_can_recover(
     drive.moving()
 
 
-def test_a_command_that_is_no_number_never_reaches_the_valve(drive_with: DriveWith) -> None:
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf])
+def test_a_command_that_is_no_number_never_reaches_the_valve(
+    drive_with: DriveWith, bad: float
+) -> None:
     for shaper in (None, Off()):
         drive = drive_with(shaper).moving()
-        drive.tick(StickInput(math.nan))
+        drive.tick(StickInput(bad))
         assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
         assert (drive.axis.raw, drive.axis.command) == (0, 0.0)
         drive.tick(RESET)
