@@ -133,8 +133,15 @@ class AxisRunner:
             emergency: the emergency stop, where there is one.
             overrun: too many deadlines were missed lately.
         """
-        stick = self._stick(now_ns, emergency)
+        fault = None
+        if emergency or self.gates or self.lost or self.contested_ns is not None:
+            fault = self._objections(now_ns, emergency)
+        trip, self.trip = self.trip, None
+        stick = self._lever.stick(self._signal, now_ns, self._ticked_ns, trip, self._neutral_band)
         self._ticked_ns = now_ns
+        # A release is more than a fault.
+        if fault is not None and (stick.enabled or self.axis.neutral):
+            stick = StickInput(fault=fault, trip=trip)
         if overrun and stick.enabled and stick.fault is None:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
         if self.chooser is not None:
@@ -150,17 +157,6 @@ class AxisRunner:
         self.axis.advance()
         if self.compensator is not None:
             self.compensator.after_slew(now_ns)
-
-    def _stick(self, now_ns: int, emergency: EmergencyStopInput | None) -> StickInput:
-        fault = None
-        if emergency or self.gates or self.lost or self.contested_ns is not None:
-            fault = self._objections(now_ns, emergency)
-        trip, self.trip = self.trip, None
-        stick = self._lever.stick(self._signal, now_ns, self._ticked_ns, trip, self._neutral_band)
-        # A release is more than a fault.
-        if fault is None or not (stick.enabled or self.axis.neutral):
-            return stick
-        return StickInput(fault=fault, trip=trip)
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
         """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""

@@ -126,7 +126,12 @@ class Axis:
         command = 0.0
         try:
             if state is ACTIVE or state is BYPASS_ON:
-                command = self._deadzone(stick.command)
+                command = stick.command
+                size = abs(command)
+                if size <= self._neutral_band:
+                    command = 0.0
+                elif not size < math.inf:  # it would stay in the memory of a filter
+                    raise ValueError(f"command is {command}")
             self.command = command
             wanted = self._wanted(command, added)
             if state in MOVING:
@@ -168,7 +173,8 @@ class Axis:
         else:
             sway = self.sway.retuned(mode, self.told)
         shaper = shaper_for(sway)
-        carry_over(self._shaper, shaper, self._within_maximum(self.command))
+        maximum = self._limits.maximum
+        carry_over(self._shaper, shaper, within(self.command, -maximum, maximum, 0.0))
         self._shaper = shaper
         self.sway = sway
         self._rebump = True
@@ -273,24 +279,11 @@ class Axis:
 
     # -- the output ----------------------------------------------------------------------------
 
-    def _deadzone(self, command: float) -> float:
-        size = abs(command)
-        if self._neutral_band < size < math.inf:
-            return command
-        if size <= self._neutral_band:
-            return 0.0
-        raise ValueError(f"command is {command}")  # it would stay in the memory of a filter
-
-    def _within_maximum(self, command: float) -> float:
-        """A command no faster than the axis may be: a filter that is cut off damps nothing."""
-        maximum = self._limits.maximum
-        if command > maximum:
-            return maximum
-        return -maximum if command < -maximum else command
-
     def _wanted(self, command: float, added: float) -> float:
         """What the filter asks for; with ``added``, no step from what was sent before a change."""
-        command = self._within_maximum(command)
+        maximum = self._limits.maximum
+        if abs(command) > maximum:  # a filter that is cut off damps nothing
+            command = math.copysign(maximum, command)
         wanted = self._shaper.wanted(command)
         if self._bypassed:
             wanted = command

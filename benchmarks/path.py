@@ -1,0 +1,107 @@
+"""Where the way from joystick frame to valve frame goes: bytecodes by function.
+
+One axis at 1 ms, in motion, a new stick position in every tick. Counted are the bytecodes that
+Python executes from the begin of the tick's exchange until the valve frame is handed to the kernel;
+frames are the kernel's, on a pair of sockets. The same on every machine that has the same Python.
+
+    python benchmarks/path.py
+    python benchmarks/path.py --least 20       only functions with so many
+"""
+
+import argparse
+import platform
+import socket
+import sys
+import tempfile
+from collections import Counter
+from contextlib import suppress
+from pathlib import Path
+from types import FrameType
+from typing import Any
+
+from rig import Row, print_table, slew_only
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.frame import Frame
+from canshaper.can.raw import CAN_FRAME, RawPort
+from canshaper.service.controller import Controller
+from canshaper.service.exchange import exchange
+from canshaper_sim.hand import Hand, Held
+
+TICKS = 400  # enough for the axis to move and for the input to be trusted
+TICK_NS = 1_000_000
+
+
+class Counted:
+    """Counts bytecodes while it traces."""
+
+    def __init__(self) -> None:
+        self.bytecodes: Counter[str] = Counter()
+        self.calls: Counter[str] = Counter()
+
+    def trace(self, frame: FrameType, event: str, _argument: Any) -> Any:
+        """As ``sys.settrace`` wants it."""
+        frame.f_trace_opcodes, frame.f_trace_lines = True, False
+        code = frame.f_code
+        name = f"{Path(code.co_filename).stem}.{code.co_qualname}"
+        if event == "opcode":
+            self.bytecodes[name] += 1
+        elif event == "call":
+            self.calls[name] += 1
+        return self.trace
+
+
+class Traced(RawPort):
+    """A port that ends the count when a frame is with the kernel."""
+
+    def send(self, frame: Frame) -> bool:
+        sent = super().send(frame)
+        sys.settrace(None)
+        return sent
+
+
+def count() -> Counted:
+    """Drive the axis; count the last tick."""
+    near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
+    with tempfile.TemporaryDirectory() as name:
+        deployment = load_deployment(slew_only(Path(name), "vcan0", 1))
+    controller, hand, counted = Controller(deployment), Hand(deployment), Counted()
+    port = Traced("crane", lambda _ids: [near], None, lambda _fault: None, confirms=False)
+    for tick in range(TICKS):
+        speed = 0.0 if tick < 20 else 0.2 + 0.6 * (tick % 50) / 50  # neutral first
+        for frame in hand.frames(tick, Held({"slew": speed}, enable=True)):
+            far.send(CAN_FRAME.pack(frame.can_id, len(frame.data), frame.data))
+        if tick == TICKS - 1:
+            sys.settrace(counted.trace)
+        exchange(controller, {"crane": port}, tick * TICK_NS, 0, stalled=False)
+        sys.settrace(None)
+        with suppress(BlockingIOError):
+            while True:
+                far.recv(CAN_FRAME.size)
+    assert not controller.axes["slew"].axis.neutral
+    port.close()
+    far.close()
+    return counted
+
+
+def main() -> None:
+    """Count and print."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--least", type=int, default=0, help="fewest bytecodes that are shown")
+    least = parser.parse_args().least
+    counted = count()
+    whole = sum(counted.bytecodes.values())
+    rows = [
+        Row(name, [str(counted.calls[name]), str(n), f"{100 * n / whole:.0f}"])
+        for name, n in counted.bytecodes.most_common()
+        if n >= least
+    ]
+    rows.append(Row("all", [str(sum(counted.calls.values())), str(whole), "100"]))
+    print(f"one tick, {platform.python_implementation()} {platform.python_version()}")
+    print_table(["calls", "bytecodes", "%"], rows)
+
+
+if __name__ == "__main__":
+    main()
