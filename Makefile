@@ -82,6 +82,7 @@ j1939: .venv/test-ready
 
 bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
+	.venv/bin/python benchmarks/path.py
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/replay.py

@@ -44,7 +44,6 @@ SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, Bus
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
 UP = BusState.UP
-SFF_MASK = socket.CAN_SFF_MASK  # by way of the module it takes longer, for every frame
 _EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
 
 
@@ -150,7 +149,7 @@ class RawPort:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
         word, length, payload = CAN_FRAME.unpack(data)
-        if word <= SFF_MASK and length <= 8:  # the most frequent kind first
+        if word <= socket.CAN_SFF_MASK and length <= 8:  # the most frequent kind first
             return new_frame(Frame, (self.name, word, False, payload[:length]))
         if word & socket.CAN_ERR_FLAG:  # first: its id is an error class, and could match
             self._error_frame(word, payload)
