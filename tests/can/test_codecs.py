@@ -282,7 +282,14 @@ def axis_status(*values: Any) -> dict[str, Any]:
 def test_status_carries_what_it_is_told() -> None:
     decoded = axis_status(State.ACTIVE, Reason.STICK_MOVED, 0.5, -0.25, 12.34)
     assert decoded == pytest.approx(
-        {"State": 2, "Reason": 2, "RawCommand": 50, "ShapedCommand": -25, "PredictedSway": 12.34}
+        {
+            "State": 2,
+            "ActiveSet": 0,
+            "Reason": 2,
+            "RawCommand": 50,
+            "ShapedCommand": -25,
+            "PredictedSway": 12.34,
+        }
     )
 
 

@@ -252,7 +252,11 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
             "axes.slew.valve.alive_counter: AliveCounter is a float, allowed is an unsigned",
         ),
         (
-            [("Sway : 48|16@1-", "Sway : 32|32@1-"), ("ShapedCommand : 32|16", "Shaped : 4|4")],
+            [
+                ("Sway : 48|16@1-", "Sway : 32|32@1-"),
+                ("RawCommand : 16|16", "RawCommand : 16|8"),
+                ("ShapedCommand : 32|16", "Shaped : 24|8"),
+            ],
             "768 PredictedSway",
             "PredictedSway is a float; allowed is an integer signal",
         ),

@@ -21,9 +21,6 @@ BO_ 512 SlewCommand""",
         'BA_ "GenMsgCycleTime" BO_ 512 20;\nBA_ "GenMsgCycleTime" BO_ 1296 200;\n'
         'BA_ "GenMsgCycleTime" BO_ 1297 500;\nVAL_ 1296 Weight 65535 "NotAvailable" ;'
     ),
-    ' SG_ State : 0|4@1+ (1,0) [0|15] "" PLANT\n': (
-        ' SG_ State : 0|4@1+ (1,0) [0|15] "" PLANT\n SG_ ActiveSet : 4|4@1+ (1,0) [0|15] "" PLANT\n'
-    ),
 }
 SETS = """
     sets:
