@@ -185,11 +185,11 @@ class Run:
         directory = file.parent
         sleeper = compiled(PEERS / "sleeper.c", directory)
         notes, log, late = directory / "ticks", directory / "log", directory / "late"
+        hands = Hands(file, port)  # before: at our priority it keeps the kernel from its frames
         on_core = ["taskset", "-c", str(core)]
         program = ROOT / "benchmarks" / "observed.py"
         with running([*on_core, sys.executable, program, "ticks", notes, file], log, fifo) as ours:
             wait_for_text(ours, log, "started")
-            hands = Hands(file, port)
             hands.drive(1.0, neutral=True)
             hands.drive(1.0)
             peer = [*on_core, sleeper, str(period_ns), str(count)] if sleeper else ["true"]

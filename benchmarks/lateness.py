@@ -103,14 +103,17 @@ class Bench:
             self.results[loaded].append(ticks)
 
     def _drive(self, duration_ns: int, *, neutral: bool = False) -> tuple[int, int]:
-        """Move the stick for so long; begin and end."""
-        begin = at = time.monotonic_ns()
+        """Move the stick for so long; begin and end.
+
+        What waits is read before: ours is the higher priority than that of a loop without any.
+        """
+        self._wire.forget()
+        begin = at = time.monotonic_ns() + JOYSTICK_NS
         while at < begin + duration_ns:
             at += JOYSTICK_NS
             self._high = not self._high
             moved = HIGH_PCT if self._high else LOW_PCT
             self._wire.send(at, 0.0 if neutral else moved, JOYSTICK_NS // 4)
-        self._wire.forget()
         return begin, at
 
     def _conditions(self) -> list[bool]:

@@ -22,7 +22,7 @@ import yaml
 
 from canshaper.config.schema import Bus
 from canshaper.config.source import Source
-from canshaper.service.realtime import lock_memory
+from canshaper.service.realtime import lock_memory, refuse_huge_pages
 
 ROOT = Path(__file__).resolve().parents[1]
 PEERS = ROOT / "benchmarks" / "peers"
@@ -60,9 +60,10 @@ def machine() -> str:
 def as_client() -> None:
     """Give this process, which sends what gateways answer, its priority, and all of its memory.
 
-    Virtual time runs on while a page is read from the host.
+    Virtual time runs on while a page is read from the host, or joined to a huge one.
     """
     os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(CLIENT_FIFO))
+    refuse_huge_pages()
     lock_memory()
 
 

@@ -24,7 +24,7 @@ LOST = frozenset(("STOPPING", "TRIPPED"))
 UNIT = "canshaper@.service"
 SERVICE = f"the service's unit does: {UNIT}"
 AS_ROOT = f"measure as root, with the priority that {UNIT} has"
-REAL_TIME = "see kernel, governor, idle states and virtual machine below"
+REAL_TIME = "see kernel, huge pages, governor, idle states and virtual machine below"
 
 
 def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Finding]:

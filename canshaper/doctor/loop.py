@@ -18,7 +18,7 @@ from canshaper.service.controller import Controller
 from canshaper.service.events import Event
 from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.loop import run_at_deadlines
-from canshaper.service.realtime import Collector, lock_memory
+from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
 
 
 class WatchedPort(RawPort):
@@ -148,6 +148,7 @@ def main(options: dict[str, Any]) -> None:
     for one in sockets.values():
         one.setblocking(False)
     loop = Loop(deployment, sockets, options["seconds"])
+    refuse_huge_pages()
     policy, memory = real_time(LOOP_PRIORITY), lock_memory()
     loop.run()
     print(json.dumps(loop.record() | {"policy": policy, "memory": memory}))

@@ -37,6 +37,7 @@ def machine_findings(tick_ms: int) -> list[Finding]:
         preemption(root, platform.version()),
         throttling(root),
         swap(root),
+        huge_pages(root),
         governor(root),
         idle_states(root, tick_ms),
         clock_source(root),
@@ -110,6 +111,22 @@ def swap(root: Path) -> Finding:
         f"{used_kib / 1024:.0f} MiB in use: memory is short",
         "more memory or fewer programs; then sudo swapoff -a. The daemon's own memory is locked",
     )
+
+
+def huge_pages(root: Path) -> Finding:
+    """Whose memory the kernel may join to pages of 2 MiB, in steps that nothing interrupts.
+
+    The daemon refuses it for its own memory; that of other programs is joined on any processor.
+    """
+    modes = _read(root / "sys/kernel/mm/transparent_hugepage/enabled") or ""
+    told = re.search(r"\[(\w+)\]", modes)
+    if told is None:
+        return Finding("huge pages", Level.OK, "none")
+    if told[1] != "always":
+        return Finding("huge pages", Level.OK, told[1])
+    found = "always: the kernel may hold up the loop for 1 ms when it makes one for any program"
+    remedy = "boot with transparent_hugepage=madvise"
+    return Finding("huge pages", Level.NOTE, found, remedy)
 
 
 def governor(root: Path) -> Finding:

@@ -19,7 +19,7 @@ from canshaper.service.gateway import InLine
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
 from canshaper.service.reading import Reading
-from canshaper.service.realtime import Collector, lock_memory
+from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
 
 log = logging.getLogger("canshaper")
 
@@ -69,6 +69,7 @@ class Daemon:
         names = ",".join(self._controller.axes)
         if self._controller.deployment.listen_only:
             log.warning("listen-only=yes valves=none: nothing is sent but status")
+        refuse_huge_pages()
         why = lock_memory()
         log.info("memory=%s", f"not-locked ({why})" if why else "locked")
         self._collector.freeze()

@@ -8,8 +8,9 @@ import gc
 import os
 import resource
 
-# sys/mman.h of Linux
+# sys/mman.h and linux/prctl.h
 MCL_CURRENT, MCL_FUTURE = 1, 2
+PR_SET_THP_DISABLE = 41
 
 
 class Collector:
@@ -41,6 +42,16 @@ class Collector:
             self._next_ns = now_ns + self.PERIOD_NS
             gc.collect()
             gc.disable()  # a library may have switched it on
+
+
+def refuse_huge_pages() -> None:
+    """Keep the kernel from joining pages of this process to huge ones.
+
+    Its khugepaged does that behind every process's back, 2 MiB at a time: on the same processor it
+    cannot be interrupted meanwhile, by no priority, and on another one it keeps the process from
+    its memory. A kernel without huge pages has nothing to refuse.
+    """
+    ctypes.CDLL(None).prctl(PR_SET_THP_DISABLE, 1, 0, 0, 0)
 
 
 def lock_memory() -> str | None:

@@ -82,6 +82,7 @@ def test_a_system_that_tells_nothing_is_no_error(tmp_path: Path) -> None:
     for found in (
         machine.throttling(tmp_path),
         machine.swap(tmp_path),
+        machine.huge_pages(tmp_path),
         machine.governor(tmp_path),
         machine.idle_states(tmp_path, 20),
         machine.clock_source(tmp_path),
@@ -105,6 +106,24 @@ def test_swap(tmp_path: Path, lines: str, level: Level, says: str) -> None:
     found = machine.swap(tmp_path)
     assert found.level is level
     assert says in found.found
+
+
+@pytest.mark.parametrize(
+    ("modes", "level", "says"),
+    [
+        ("[always] madvise never", Level.NOTE, "always"),
+        ("always [madvise] never", Level.OK, "madvise"),
+        ("always madvise [never]", Level.OK, "never"),
+    ],
+)
+def test_huge_pages_of_any_program_are_noted(
+    tmp_path: Path, modes: str, level: Level, says: str
+) -> None:
+    write(tmp_path, **{"sys/kernel/mm/transparent_hugepage/enabled": f"{modes}\n"})
+    found = machine.huge_pages(tmp_path)
+    assert found.level is level
+    assert found.found.startswith(says)
+    assert bool(found.remedy) == (level is Level.NOTE)
 
 
 def test_one_slow_processor_is_enough(tmp_path: Path) -> None:
@@ -202,6 +221,7 @@ def test_all_checks_work_on_this_machine() -> None:
         "kernel",
         "real-time share",
         "swap",
+        "huge pages",
         "governor",
         "idle states",
         "clock source",

@@ -2,6 +2,8 @@
 
 import signal
 import subprocess
+import sys
+import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -9,6 +11,7 @@ import can
 import pytest
 
 from tests.hil.machine import (
+    ANSWER_S,
     FILE,
     VALVES,
     Levers,
@@ -21,6 +24,17 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
+
+HUGE_PAGES = Path("/sys/kernel/mm/transparent_hugepage")
+PAUSE = HUGE_PAGES / "khugepaged/scan_sleep_millisecs"
+# A process like the daemon, but for the one call.
+LARGE = """
+from canshaper.service.realtime import lock_memory
+kept = [bytes(100) for _ in range(100_000)]
+assert lock_memory() is None
+print("ready", flush=True)
+input()
+"""
 
 
 @pytest.fixture
@@ -181,3 +195,52 @@ def test_reload_refuses_a_broken_file_and_applies_a_good_one_in_neutral(
         levers.values["Slew"] = 0.0
         held = wait_for(bus, "SlewStatus", state("READY"))
         assert held["ShapedCommand"] == 0.0
+
+
+@pytest.fixture
+def khugepaged() -> Iterator[None]:
+    """Let the kernel join pages, though not before ``PAUSE`` is shorter."""
+    settings = {
+        PAUSE: "1000000",
+        HUGE_PAGES / "enabled": "always",
+        HUGE_PAGES / "khugepaged/pages_to_scan": "100000",
+    }
+    if not HUGE_PAGES.exists():
+        pytest.skip("this kernel has no transparent huge pages")
+    before = {file: file.read_text() for file in settings}
+    before[HUGE_PAGES / "enabled"] = before[HUGE_PAGES / "enabled"].split("[")[1].split("]")[0]
+    for file, value in settings.items():
+        file.write_text(value)
+    yield
+    for file, value in before.items():
+        file.write_text(value)
+
+
+def done(what: str) -> int:
+    """How often khugepaged has done something."""
+    return int((HUGE_PAGES / "khugepaged" / what).read_text())
+
+
+def huge_kb(process: int) -> int:
+    """Memory of a process in huge pages."""
+    lines = Path(f"/proc/{process}/smaps_rollup").read_text().splitlines()
+    return int(next(line.split()[1] for line in lines if line.startswith("AnonHugePages")))
+
+
+@pytest.mark.usefixtures("khugepaged")
+def test_the_kernel_does_not_join_pages_of_the_daemon(tmp_path: Path) -> None:
+    """Joining them held up even a loop with priority for 1.4 ms each, and it came unforeseen."""
+    with service(tmp_path / "daemon.log", "run", str(FILE)) as daemon:
+        daemon.wait_log("started file=")
+        ours, joined = huge_kb(daemon.process.pid), done("pages_collapsed")
+        command = [sys.executable, "-c", LARGE]
+        with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+            assert other.stdout is not None
+            assert other.stdout.readline() == b"ready\n"
+            PAUSE.write_text("100")
+            enough, until = done("full_scans") + 3, time.monotonic() + ANSWER_S
+            while done("pages_collapsed") == joined or done("full_scans") < enough:
+                assert time.monotonic() < until, "the kernel joins no pages at all"
+                time.sleep(0.1)
+            other.communicate(b"\n")
+        assert huge_kb(daemon.process.pid) == ours

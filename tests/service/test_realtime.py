@@ -145,6 +145,18 @@ def test_memory_is_locked_also_what_is_taken_later() -> None:
     assert locked > 0.9 * size  # all but what the kernel itself puts there
 
 
+def test_huge_pages_are_refused_and_by_children_too() -> None:
+    code = (
+        "import subprocess\nfrom canshaper.service.realtime import refuse_huge_pages\n"
+        "show = ['grep', 'THP_enabled', '/proc/self/status']\n"
+        "subprocess.run(show)\nrefuse_huge_pages()\nsubprocess.run(show)\n"
+    )
+    result = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, timeout=ANSWER_S
+    )
+    assert result.stdout.split() == ["THP_enabled:", "1", "THP_enabled:", "0"]
+
+
 def test_below_a_limit_nothing_is_locked() -> None:
     """Memory needed later would be refused, and the daemon would end in the middle of its work."""
     limit = (

@@ -62,6 +62,7 @@ def test_process_is_real_time_locked_and_nobody(forwarder: Unit) -> None:
     assert scheduling.endswith("priority: 40\n")
     fields = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
     assert int(fields["VmLck"].split()[0]) >= int(fields["VmRSS"].split()[0]) // 2 > 0
+    assert fields["THP_enabled"].strip() == "0"  # no huge pages
     assert "0" not in fields["Uid"].split()
     assert (fields["CapEff"].strip("\t0"), fields["CapBnd"].strip("\t0")) == ("", "")
     assert fields["NoNewPrivs"].strip() == "1"
