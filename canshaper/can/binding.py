@@ -1,13 +1,15 @@
 """Deployment file and DBC files brought together: codecs, or every problem at once."""
 
+from collections.abc import Mapping
 from pathlib import Path
 
 from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
 from canshaper.can.deployment import BoundAxis, BoundRadial, Deployment
 from canshaper.can.filters import FilterBinder
+from canshaper.can.inputs import BoundSwitch
 from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.rewrite import RewrittenMessage
-from canshaper.can.signals import status_faults
+from canshaper.can.signals import find_signal, special_name, status_faults
 from canshaper.can.valve import ValveMessage
 from canshaper.config.bus import LAST_SPN, J1939Name
 from canshaper.config.gateway import Gateway
@@ -16,6 +18,7 @@ from canshaper.config.schema import (
     AxisConfig,
     Status,
 )
+from canshaper.config.sets import Feel
 from canshaper.config.source import DeploymentError, Place
 
 
@@ -44,6 +47,11 @@ class _Binder(FilterBinder):
         stop = self.stop(config.emergency_stop) if config.emergency_stop else None
         grapple = self.switch(("grapple",), config.grapple) if config.grapple else None
         feel = self.switch(("feel",), config.feel) if config.feel else None
+        if feel and config.feel:
+            codes = config.feel.codes.items()
+            self._check_values(feel, {("feel", "codes", name): code for name, code in codes})
+        if grapple:
+            self._check_values(grapple, self._values_of_sets())
         service = self._status(("status",), config.status, ServiceStatusCodec)
         if config.gateway:
             self._check_gateway(config.gateway, [a.valve.message for a in axes.values() if a])
@@ -64,6 +72,27 @@ class _Binder(FilterBinder):
             feel,
             self.on_bus,
         )
+
+    def _values_of_sets(self) -> dict[Place, float]:
+        """Values of the grapple that the sets name, by their places."""
+        parts: dict[Place, AxisConfig | Feel] = {}
+        for name, axis in self.config.axes.items():
+            parts["axes", name] = axis
+            parts |= {("axes", name, "feels", feel): part for feel, part in axis.feels.items()}
+        return {
+            (*place, "sets", i, "at"): one.at
+            for place, part in parts.items()
+            for i, one in enumerate(part.sets)
+        }
+
+    def _check_values(self, switch: BoundSwitch, values: Mapping[Place, float]) -> None:
+        """A value that the DBC names as an error is never taken, so it can choose nothing."""
+        signal = find_signal(switch.message, switch.config.signal)
+        assert signal is not None  # bound, so it is there
+        for place, value in values.items():
+            if name := special_name(signal, value):
+                text = f"found {value:g}, which {signal.name} names {name} in the DBC"
+                self.add(place, f"{text}; allowed is a value that is no error")
 
     def _check_node_ids(self) -> None:
         """Ids of nodes are used once."""

@@ -16,9 +16,14 @@ from canshaper.can.canopen import FULL_SET_POINT
 from canshaper.can.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
 
-# Names that the tables of a DBC give to raw values that are no measurement.
-_NOT_AVAILABLE = re.compile(r"not.?avail|unavail|^(na|n/a|sna)$", re.IGNORECASE)
-_ERROR = re.compile(r"err|fault|fail|invalid|reserved|defect|not.?valid", re.IGNORECASE)
+# Names that the tables of a DBC give to raw values that are no measurement, as words in small
+# letters: SensorError is "sensor error". In a name without any gap, such as sensorerror, they are
+# found too, but not in Default, Interrupted, Terrain and Preserved.
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_NOT_AVAILABLE = re.compile(r"not ?avail|unavail|\bsna\b|^n ?a$")
+_ERROR = re.compile(
+    r"\berr(?!and)|err\b|error|(?<!\bde)fault|fail|invalid|not ?valid|(?<!\bp)reserved|defect"
+)
 
 
 def find_signal(message: Message, name: str) -> Signal | None:
@@ -127,11 +132,19 @@ def special_codes(signal: Signal) -> dict[Any, Reason]:
     """Raw values that are no measurement by the table of the DBC."""
     special: dict[Any, Reason] = {}
     for raw, name in (signal.choices or {}).items():
-        if _NOT_AVAILABLE.search(str(name)):
+        words = " ".join(_WORD.findall(str(name))).lower()
+        if _NOT_AVAILABLE.search(words):
             special[raw] = Reason.STICK_NOT_AVAILABLE
-        elif _ERROR.search(str(name)):
+        elif _ERROR.search(words):
             special[raw] = Reason.STICK_ERROR
     return special
+
+
+def special_name(signal: Signal, value: float) -> str | None:
+    """Name in the DBC of a value that is no measurement, or None; ``value`` is in its unit."""
+    special = special_codes(signal)
+    codes = {raw * signal.scale + signal.offset: raw for raw in special}
+    return str((signal.choices or {})[codes[value]]) if value in codes else None
 
 
 def radius_range(signal: Signal) -> str | None:

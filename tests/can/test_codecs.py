@@ -138,8 +138,16 @@ def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reaso
         ("Unavailable", Reason.STICK_NOT_AVAILABLE),
         ("SNA", Reason.STICK_NOT_AVAILABLE),
         ("N/A", Reason.STICK_NOT_AVAILABLE),
+        ("Slew_SNA", Reason.STICK_NOT_AVAILABLE),
         ("Error", Reason.STICK_ERROR),
+        ("Err", Reason.STICK_ERROR),
+        ("ERROR_2", Reason.STICK_ERROR),
+        ("ErrorCode", Reason.STICK_ERROR),
+        ("sensor_error", Reason.STICK_ERROR),
+        ("sensorerr", Reason.STICK_ERROR),
         ("SensorFault", Reason.STICK_ERROR),
+        ("modefault", Reason.STICK_ERROR),
+        ("Faulty", Reason.STICK_ERROR),
         ("invalid", Reason.STICK_ERROR),
         ("Not valid", Reason.STICK_ERROR),
         ("Reserved", Reason.STICK_ERROR),
@@ -149,6 +157,25 @@ def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
     assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == reason
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Default",
+        "DEFAULT",
+        "Factory default",
+        "Interrupted",
+        "Terrain",
+        "Preserved",
+        "Snap",
+        "Fast",
+    ],
+)
+def test_ordinary_words_are_no_errors(name: str) -> None:
+    text = DBC.replace('50 "SNA"', f'50 "{name}"')
+    message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
+    assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == 0.5
 
 
 @pytest.mark.parametrize(

@@ -204,3 +204,36 @@ def test_what_does_not_fit_is_told(changed_rig: Make, old: str, new: str, says: 
     with pytest.raises(DeploymentError) as caught:
         changed_rig(yaml=changed, dbc=DBC)
     assert any(says in str(problem) for problem in caught.value.problems), caught.value.problems
+
+
+def test_a_value_that_the_dbc_names_default_is_a_choice(changed_rig: Make) -> None:
+    names = 'VAL_ 1297 Feel 0 "Calm" 1 "Default" ;'
+    rig = changed_rig(yaml=YAML, dbc=DBC | {"VAL_ 272 Enable": f"{names}\nVAL_ 272 Enable"})
+    rig.run(3)
+    base = poles(rig)
+    rig.receive(feel(1))
+    rig.run(10)
+    assert max(poles(rig)) < max(base)
+
+
+@pytest.mark.parametrize(
+    ("names", "says"),
+    [
+        (
+            'VAL_ 1297 Feel 1 "Error" ;',
+            "feel.codes.fast: found 1, which Feel names Error in the DBC; allowed is a value that",
+        ),
+        (
+            'VAL_ 1296 Weight 1000 "Reserved" ;',
+            "axes.slew.sets.1.at: found 1000, which Weight names Reserved in the DBC; allowed is a",
+        ),
+    ],
+)
+def test_a_value_that_the_dbc_names_an_error_is_no_choice(
+    changed_rig: Make, names: str, says: str
+) -> None:
+    with pytest.raises(DeploymentError) as caught:
+        changed_rig(yaml=YAML, dbc=DBC | {"VAL_ 272 Enable": f"{names}\nVAL_ 272 Enable"})
+    (problem,) = caught.value.problems
+    assert says in str(problem)
+    assert problem.line is not None
