@@ -18,6 +18,8 @@ _WHOLE = re.compile(r"[-+]?(0|[1-9][0-9]{0,17})")
 _HEX = re.compile(r"0x[0-9a-fA-F]{1,8}")
 _DECIMAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
+# Escapes can put them into text. No name has any, and no path with a NUL can be opened.
+_CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
 
 
 @dataclass(frozen=True)
@@ -92,7 +94,11 @@ class Source:
         if isinstance(node, yaml.SequenceNode) and node.tag == _TAG + "seq":
             return [self._build(n, (*path, i)) for i, n in enumerate(node.value)]
         if isinstance(node, yaml.ScalarNode) and node.tag in _SCALARS:
-            return _scalar(node)
+            value = _scalar(node)
+            if isinstance(value, str) and _CONTROL.search(value):
+                text = f"found {value!r}, allowed is text without control characters"
+                self._add(path, node, text)
+            return value
         self._add(path, node, f"found the tag {node.tag.replace(_TAG, '!!')}, which is not allowed")
         return None
 
@@ -101,7 +107,7 @@ class Source:
         for key_node, value_node in node.value:
             plain = isinstance(key_node, yaml.ScalarNode) and key_node.tag in _SCALARS
             key = _scalar(key_node) if plain else None
-            if not isinstance(key, str):
+            if not isinstance(key, str) or _CONTROL.search(key):
                 found = repr(key_node.value) if key_node.id == "scalar" else f"a {key_node.id}"
                 self._add(path, key_node, f"found the key {found}, allowed are words")
                 continue

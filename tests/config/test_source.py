@@ -51,6 +51,31 @@ def test_what_is_no_yaml_is_one_problem(file: Path, text: str | bytes, says: str
     assert fault(file, text).startswith(says)
 
 
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            r"""a: ["b\0c"]""",
+            ":1: a.0: found 'b\\x00c', allowed is text without control characters",
+        ),
+        (
+            "a:\n  b: |\n    c\n",
+            ":2: a.b: found 'c\\n', allowed is text without control characters",
+        ),
+        (r"""a: "\x7f" """, ":1: a: found '\\x7f', allowed is text without control characters"),
+        (r"""a: "\ud800" """, ":1: a: found '\\ud800', allowed is text without control characters"),
+        (r"""a: { "b\0": 1 }""", ":1: a: found the key 'b\\x00', allowed are words"),
+    ],
+)
+def test_control_characters_are_refused(file: Path, text: str, says: str) -> None:
+    assert fault(file, text) == says
+
+
+def test_other_characters_are_text(file: Path) -> None:
+    text = 'a: "größe\u00a0\u3000.dbc"'
+    assert data(file, text) == {"a": "größe\u00a0\u3000.dbc"}
+
+
 def test_anchors_within_anchors_do_not_fill_the_memory(file: Path) -> None:
     rows = ["a0: &a0 [x, x, x, x]"]
     rows += [f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}, *a{i - 1}, *a{i - 1}]" for i in range(1, 30)]
