@@ -5,6 +5,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+# No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
+LATEST_S = 10_000_000_000
+
 
 class TimedFrame(NamedTuple):
     """A classical CAN data frame with the time of its reception.

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from canshaper.capture import binary, text
-from canshaper.capture.frames import CutOffError, LogError, Place, TimedFrame
+from canshaper.capture.frames import LATEST_S, CutOffError, LogError, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
@@ -28,6 +28,7 @@ BINARY = frozenset((".blf", ".mf4"))
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
 LONGEST_GAP_NS = 12 * 3600 * 1_000_000_000
+LATEST_NS = LATEST_S * 1_000_000_000
 TELL_EVERY = 8192
 BUFFER_BYTES = 1 << 17
 
@@ -84,11 +85,11 @@ class LogFile:
             latest_ns = 0
             for frame in READERS[suffix](file, place):
                 time_ns = frame[0]
-                if last_ns is None or last_ns <= time_ns <= latest_ns:
+                if last_ns is not None and last_ns <= time_ns <= latest_ns:
                     last_ns = time_ns
                     yield frame
                 else:
-                    last_ns = self._out_of_order(time_ns, last_ns, place)
+                    last_ns = self._first_or_out_of_order(time_ns, last_ns, place)
                     yield frame._replace(time_ns=last_ns)
                 latest_ns = last_ns + LONGEST_GAP_NS
                 tell -= 1
@@ -101,8 +102,13 @@ class LogFile:
         if self._progress:
             self._progress(1.0)
 
-    def _out_of_order(self, time_ns: int, last_ns: int, place: Place) -> int:
+    def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
         """The time of a frame that does not follow that of the one before."""
+        if abs(time_ns) > LATEST_NS:
+            found = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
+            raise place.error(found, "a date before 2286, or a time from the start of the log")
+        if last_ns is None:
+            return time_ns
         step_ns = time_ns - last_ns
         if -OUT_OF_ORDER_NS <= step_ns < 0:
             self.disordered += 1

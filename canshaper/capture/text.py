@@ -12,7 +12,7 @@ from decimal import Decimal
 from functools import partial
 from typing import BinaryIO
 
-from canshaper.capture.frames import Place, TimedFrame
+from canshaper.capture.frames import LATEST_S, Place, TimedFrame
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
@@ -73,11 +73,11 @@ def candump(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         elif data is None:
             place.left_out["remote" if remote else "CAN FD"] += 1
         else:
-            try:
-                content = unhexlify(data)
+            try:  # int() refuses thousands of digits
+                time_ns, content = int(seconds) * SECOND_NS + ns, unhexlify(data)
             except ValueError:
                 raise place.error(_shown(line), CANDUMP_ALLOWED) from None
-            yield _new(TimedFrame, (int(seconds) * SECOND_NS + ns, *known, content))
+            yield _new(TimedFrame, (time_ns, *known, content))
 
 
 def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:
@@ -101,7 +101,7 @@ _ASC = re.compile(
 )
 _ASC_ERROR = re.compile(r"\s*\d+\.\d+\s+(?:\d+|CANFD\s+\d+\s+\S+)\s+ErrorFrame", re.IGNORECASE)
 _ASC_FD = re.compile(r"\s*(\d+)\.(\d{1,9})\s+CANFD\s+(\d+)\s+(Rx|Tx|TxRq)\s+(\S+)\s+(.*)", re.ASCII)
-ASC_ALLOWED = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02"
+ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with numbers"
 
 
 def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
@@ -111,14 +111,14 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         line = raw.decode("utf-8", "replace").rstrip()
         if found := _ASC.match(line):
             seconds, fraction, channel, number, direction, kind, rest = found.groups()
-            count, *data = rest.split() or ["0"]
+            count, *data = rest.split() or [""]
+        elif _ASC_ERROR.match(line):
+            place.left_out["error"] += 1
+            continue
         elif found := _ASC_FD.match(line):
             seconds, fraction, channel, direction, number, rest = found.groups()
             kind = "d"
             count, *data = _classical(rest.split()) or ["FD"]
-        elif _ASC_ERROR.match(line):
-            place.left_out["error"] += 1
-            continue
         else:
             if header := _BASE.match(line):
                 base = 10 if header[1].lower() == "dec" else 16
@@ -132,21 +132,35 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             continue
         extended = number[-1] in "xX"
         try:
-            can_id = int(number.rstrip("xX"), base)
-            length = min(8, int(count, base))
-            payload = bytes(int(byte, base) for byte in data[:length])
+            time_ns = int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            can_id, length, payload = _numbers(number, count, data, base)
         except ValueError:
-            raise place.error(_shown(raw), f"{ASC_ALLOWED}, with numbers") from None
+            raise place.error(_shown(raw), ASC_NUMBERS) from None
         if len(payload) < length:
             raise place.error(f"{len(payload)} of {length} bytes", "all of them")
         if can_id > (LARGEST_EXTENDED if extended else LARGEST_STANDARD):
             raise place.error(_id(can_id), "an id of 11 bits, or of 29 with an x behind")
-        time_ns = int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
         yield TimedFrame(time_ns, channel, can_id, extended, payload)
+
+
+def _numbers(number: str, count: str, data: list[str], base: int) -> tuple[int, int, bytes]:
+    """Id, length and data of a line.
+
+    Raises:
+        ValueError: something else stands there.
+    """
+    length = min(8, int(count, base))
+    digits = "".join((number, count, *data[:length]))
+    if not (digits.isascii() and digits.isalnum()):  # int() takes signs, _ and foreign digits too
+        raise ValueError
+    payload = bytes([int(byte, base) for byte in data[:length]])
+    return int(number.rstrip("xX"), base), length, payload
 
 
 def _classical(words: list[str]) -> list[str] | None:
     """Length and data of a line of a CAN FD channel; None where the frame is one of CAN FD.
+
+    Where length or flags are no numbers the length is empty, for the caller to tell.
 
     In front are a name, where there is one, two flags and the length code; behind the data are
     its duration, its bits and the flags that tell.
@@ -155,16 +169,21 @@ def _classical(words: list[str]) -> list[str] | None:
         words = words[1:]
     if len(words) < 4 or not words[3].isdigit():
         return None
-    length, data = int(words[3]), words[4:]
-    behind = data[length:]
-    if length > 8 or len(behind) < 3 or int(behind[2], 16) & EDL:
-        return None
+    try:
+        length, data = int(words[3]), words[4:]
+        behind = data[length:]
+        if length > 8 or len(behind) < 3 or int(behind[2], 16) & EDL:
+            return None
+    except ValueError:
+        return [""]
     return [words[3], *data[:length]]
 
 
 # -- CSV ---------------------------------------------------------------------------------------
 
-_CSV = re.compile(r"([0-9.e+-]+),(0x[0-9a-f]+),([01]),([01]),([01]),(\d+),([A-Za-z0-9+/]*=*)\s*")
+_CSV = re.compile(
+    r"([0-9.e+-]+),(0x[0-9a-f]{1,8}),([01]),([01]),([01]),([0-9]{1,2}),([A-Za-z0-9+/]*=*)\s*"
+)
 CSV_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
 
 
@@ -184,7 +203,10 @@ def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             place.left_out["error" if error == "1" else "remote"] += 1
             continue
         try:
-            time_ns, payload = int(Decimal(time).scaleb(9).to_integral_value()), b64decode(data)
+            seconds, payload = Decimal(time), b64decode(data)
+            if abs(seconds) > LATEST_S:  # before it is a number of a million digits
+                raise ValueError
+            time_ns = int(seconds.scaleb(9).to_integral_value())
         except (ArithmeticError, ValueError):
             raise place.error(_shown(raw), f"a row of {CSV_HEADER}") from None
         if len(payload) > 8:

@@ -28,7 +28,7 @@ LINES = [
 
 def log(tmp_path: Path, *lines: str, name: str = "a.log") -> Path:
     path = tmp_path / name
-    path.write_text("".join(lines), encoding="ascii", newline="")
+    path.write_text("".join(lines), encoding="utf-8", newline="")
     return path
 
 
@@ -120,6 +120,7 @@ Begin Triggerblock Sat Nov 21 10:15:30.400 am 2026
    0.200000 1  1CFE3506x       Tx   d 1 FF
    0.200000 1  1CFE3506x       TxRq d 1 FF
    0.250000 1  ErrorFrame
+   0.255000 CANFD   2 Rx ErrorFrame   Not Acknowledge error, dominant error flag   fffe c7 31ca Rx
    0.260000 2  7FF             Rx   r 3
    0.300000 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.00%
    0.300000 CANFD   2 Rx        111                       Lever 0 0 8  3 01 02 03   0    0   0 0 0 0
@@ -139,7 +140,7 @@ def test_asc_of_vectors_tools(tmp_path: Path) -> None:
         TimedFrame(300_000_000, "2", 0x111, False, b"\x01\x02\x03"),
         TimedFrame(310_000_000, "2", 0x112, False, b"\x01\x02"),
     ]
-    assert file.left_out == {"error": 1, "remote": 1, "CAN FD": 2}
+    assert file.left_out == {"error": 2, "remote": 1, "CAN FD": 2}
 
 
 def test_asc_with_decimal_numbers(tmp_path: Path) -> None:
@@ -239,6 +240,12 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         ("a.asc", "1.0 1 110 Rx d 3 01 02\n", "found 2 of 3 bytes"),
         ("a.asc", "1.0 1 110 Rx d 1 1FF\n", "with numbers"),
         ("a.asc", "1.0 1 900 Rx d 1 1F\n", "found id 0x900"),
+        ("a.asc", "1.0 1 110 Rx d -1 01 02\n", "a.asc:1: found '1.0 1 110 Rx d -1 01 02'"),
+        ("a.asc", "1.0 1 110 Rx d\n", "a.asc:1: found '1.0 1 110 Rx d', allowed is a line of"),
+        ("a.asc", "1.0 1 110 Rx d 2 0_1 02\n", "a.asc:1: found '1.0 1 110 Rx d 2 0_1 02'"),
+        ("a.asc", "1.0 1 110 Rx d \u0661 01\n", "a.asc:1: found '1.0 1 110 Rx d \u0661 01'"),
+        ("a.asc", "1.0 CANFD 1 Rx 110 1 0 2 ² 01 02 0 0 0\n", "a.asc:1: found '1.0 CANFD 1"),
+        ("a.asc", "1.0 CANFD 1 Rx 110 1 0 2 2 01 02 0 0 zz\n", "a.asc:1: found '1.0 CANFD 1"),
         ("a.csv", "time;id;data\n", "found 'time;id;data', allowed is the header of python-can"),
         ("a.blf", "LOGG", "found error"),
         ("a.blf", "x" * 200, "found BLFParseError Unexpected file format"),
@@ -265,6 +272,9 @@ HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
         ("1.0,0x800,0,0,0,2,AQI=", "found id 0x800"),
         ("1.0.0,0x110,0,0,0,2,AQI=", "a row of timestamp,"),
         ("1.0,272,0,0,0,2,AQI=", "a row of timestamp,"),
+        ("1e999,0x110,0,0,0,2,AQI=", "a.csv:2: found '1e999,0x110"),
+        (f"1.0,0x110,0,0,0,{'1' * 5000},AQI=", "a.csv:2: found '1.0,0x110"),
+        (f"1.0,0x{'f' * 5000},0,0,0,2,AQI=", "a.csv:2: found '1.0,0xfff"),
     ],
 )
 def test_a_wrong_row_of_a_table(tmp_path: Path, row: str, text: str) -> None:
@@ -278,6 +288,40 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 
 # -- clocks ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("digits", [11, 400, 5000])
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("a.log", "({}.000000) can0 110#0102\n"),
+        ("a.log", "({}.0) can0 110#0102\n"),
+        ("a.asc", "{}.0 1 110 Rx d 1 01\n"),
+        ("a.csv", "{}.0,0x110,0,0,0,2,AQI=\n"),
+    ],
+)
+def test_a_time_that_no_clock_can_have(
+    tmp_path: Path, name: str, line: str, before: bool, digits: int
+) -> None:
+    start = HEADER if name == "a.csv" else "base hex timestamps absolute\n" * (name == "a.asc")
+    start += line.format(1) * before
+    path = log(tmp_path, start, line.format("9" * digits), line.format(2), name=name)
+    found, error = prefix(path)
+    assert len(found) == before
+    assert f"{path}:{len(start.splitlines()) + 1}: found " in str(error)
+    assert "mixed clocks" not in str(error)
+
+
+def test_a_binary_log_with_a_time_that_no_clock_can_have(tmp_path: Path) -> None:
+    path = tmp_path / "a.blf"
+    with can.BLFWriter(path, compression_level=0) as writer:
+        writer.on_message_received(messages(FRAMES)[0])
+    content = bytearray(path.read_bytes())
+    at = content.rindex(b"LOBJ") + 24  # its time, 8 bytes, ns since the log began
+    content[at : at + 8] = b"\xff" * 8
+    path.write_bytes(content)
+    assert f"{path}: frame 1: found a time further than 10000000000 s" in error_of(path)
 
 
 def test_a_clock_that_was_set_is_told_with_its_place(tmp_path: Path) -> None:
