@@ -6,16 +6,12 @@ sender. The stick has to stay in neutral; moving it ends the measurement.
 
 import statistics
 from collections.abc import Iterator
-from typing import Any
 
 from canshaper.calibration.fit import Calibration, CalibrationError, Sample, fit
 from canshaper.calibration.ramp import Ramp
+from canshaper.calibration.speed import SpeedFeedback
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.can.j1939 import group_of
-from canshaper.can.layout import Layout, is_j1939
-from canshaper.can.signals import find_signal, special_codes
-from canshaper.config.source import DeploymentError, Problem
 from canshaper.service.controller import Controller
 from canshaper.service.lever import LeverInput
 from canshaper.shaping.axis import Axis
@@ -27,25 +23,31 @@ from canshaper.shaping.states import MOVING, Reason, State, StickInput
 NEUTRAL_BAND = 1e-4
 # Fall of the command when the measurement ends early, full commands per second.
 FALL_PER_S = 5.0
-# Feedback older than that says nothing of the axis, which must not go on unseen.
-SILENT_NS = 500_000_000
 
 
 class _RampLever:
-    """A lever that is held in neutral with its enable on; the ramp stands for its stick."""
+    """A lever that is held in neutral with its enable on; the ramp stands for its stick.
+
+    Attributes:
+        command: of the ramp; that of an axis which is not measured stays 0.
+        moved: whether the stick itself is not in neutral.
+    """
 
     def __init__(self, lever: LeverInput) -> None:
         self._lever = lever
         self.command = 0.0
+        self.moved = False
 
     def stick(
         self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
         """What the axis may use now."""
         found = self._lever.stick(signal, now_ns, since_ns, trip, neutral_band)
-        if found.fault is not None or not found.enabled:
+        usable = found.fault is None and found.enabled
+        self.moved = usable and abs(found.command) > neutral_band
+        if not usable:
             return found
-        if abs(found.command) > neutral_band:
+        if self.moved:
             return StickInput(fault=Reason.STICK_NOT_NEUTRAL, trip=found.trip)
         return found._replace(command=self.command, bypass=False)
 
@@ -70,11 +72,11 @@ class CalibrationDrive:
     def __init__(
         self, deployment: Deployment, axis: str, speed: tuple[str, str], ramp: Ramp
     ) -> None:
-        self._hear(deployment, *speed)
+        self._speed = SpeedFeedback(deployment, axis, *speed)
         self._controller = Controller(deployment)
         self._runner = runner = self._controller.axes[axis]
         period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
-        runner.compensator = runner.chooser = None
+        runner.chooser = None
         runner.axis = Axis(
             period_s,
             OutputLimits(maximum=1.0, rise_per_s=FALL_PER_S, fall_per_s=FALL_PER_S, tail_s=0.0),
@@ -84,29 +86,19 @@ class CalibrationDrive:
             stop_s=1.0,
             grid_steps=runner.bound.valve.steps,
         )
-        self._lever = _RampLever(self._controller.levers[runner.bound.config.stick.lever])
-        runner.replace_lever(self._lever)
+        # Nothing moves but this axis: no other one gets its stick, nor moves for another one.
+        self._levers: dict[str, _RampLever] = {}
+        for name, one in self._controller.axes.items():
+            lever = _RampLever(self._controller.levers[one.bound.config.stick.lever])
+            one.compensator = None
+            one.replace_lever(lever)
+            self._levers[name] = lever
+        self._lever = self._levers.pop(axis)
         self._ramp = ramp
         self._begun_ns: int | None = None
-        self._latest: float | None = None
-        self._heard_ns = 0
         self._samples: dict[str, list[Sample]] = {}
         self.ended = ""
         self.progress = 0.0
-
-    def _hear(self, deployment: Deployment, message: str, signal: str) -> None:
-        found = deployment.messages.find(message)
-        if isinstance(found, str):
-            raise DeploymentError([Problem("command line", None, "--speed", found)])
-        definition = find_signal(found[1], signal)
-        if definition is None:
-            names = [s.name for s in found[1].signals]
-            raise _problem(deployment, "--speed", signal, f"signals of {message}", names)
-        self._message = found[1]
-        self._any = is_j1939(self._message)
-        self._signal = definition
-        self._layout = Layout(self._message)
-        self._special = special_codes(definition)
 
     @property
     def waiting_for(self) -> str:
@@ -114,30 +106,26 @@ class CalibrationDrive:
         if self._begun_ns is not None:
             return ""
         axis = self._runner.axis
-        return "feedback" if axis.state is State.READY else axis.reason.name
+        if axis.state is not State.READY:
+            return axis.reason.name
+        return f"the stick of {moved}" if (moved := self._moved) else "feedback"
+
+    @property
+    def _moved(self) -> str:
+        """Axes that are not measured and whose stick is not in neutral."""
+        return " and ".join(name for name, lever in self._levers.items() if lever.moved)
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
-        passed = self._controller.receive(frame, now_ns)
-        known = self._message.frame_id
-        mine = group_of(frame.can_id) == group_of(known) if self._any else frame.can_id == known
-        if (
-            mine
-            and frame.extended == self._message.is_extended_frame
-            and len(frame.data) == self._message.length
-        ):
-            raw: Any = self._layout.decode(frame.data)[self._signal.name]
-            if raw not in self._special:
-                self._latest = raw * self._signal.scale + self._signal.offset
-                self._heard_ns = now_ns
-        return passed
+        self._speed.receive(frame, now_ns)
+        return self._controller.receive(frame, now_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send."""
         axis = self._runner.axis
         state = axis.state
-        heard = self._latest is not None and now_ns - self._heard_ns <= SILENT_NS
-        if self._begun_ns is None and state is State.READY and heard:
+        heard = self._speed.heard(now_ns)
+        if self._begun_ns is None and state is State.READY and heard and not self._moved:
             self._begun_ns = now_ns
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
@@ -148,6 +136,8 @@ class CalibrationDrive:
                 self.ended = "done"
             elif state not in MOVING and state is not State.READY:
                 self.ended = f"stopped: {axis.reason.name}"
+            elif self._moved:
+                self.ended = f"stopped: the stick of {self._moved} was moved"
             elif not heard:
                 self.ended = "stopped: the feedback fell silent, or tells an error"
             if self.ended:
@@ -164,11 +154,9 @@ class CalibrationDrive:
         self._controller.stalled()
 
     def _sample(self, time_s: float) -> None:
-        if self._latest is None:
-            return
         sent = self._runner.axis.raw / self._runner.bound.valve.steps
         part = self._ramp.part(time_s)
-        self._samples.setdefault(part, []).append(Sample(sent, self._latest))
+        self._samples.setdefault(part, []).append(Sample(sent, self._speed.value))
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve."""
@@ -202,10 +190,3 @@ class CalibrationDrive:
         if found[0][0] != found[1][0]:
             raise CalibrationError("both directions moved the same way; is the feedback signed?")
         return Calibration(found[0][1], found[1][1])
-
-
-def _problem(
-    deployment: Deployment, option: str, found: str, what: str, names: Any
-) -> DeploymentError:
-    text = f"found {found!r}, {what} are {', '.join(names)}"
-    return DeploymentError([Problem(str(deployment.path), None, option, text)])

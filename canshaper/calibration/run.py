@@ -3,6 +3,7 @@
 import signal
 import time
 from collections.abc import Callable
+from contextlib import ExitStack
 from types import FrameType
 
 from canshaper.calibration.drive import CalibrationDrive
@@ -14,6 +15,8 @@ from canshaper.service.loop import run_at_deadlines
 
 # How often the end is told to every valve: a frame may be lost.
 LAST_FRAMES = 3
+# All that can end or hold a program from its terminal: a valve must not stay open behind it.
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
 
 
 def run_live(
@@ -32,16 +35,16 @@ def run_live(
         BusError: a bus cannot be opened.
     """
     ports: dict[str, Port] = {}
-    stopped = False
+    stopped = ""
 
     def ignore(_fault: FrameFault) -> None:
         pass
 
-    def stop(_number: int, _frame: FrameType | None) -> None:
+    def stop(number: int, _frame: FrameType | None) -> None:
         nonlocal stopped
-        stopped = True
+        stopped = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
 
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOPS:
         signal.signal(number, stop)
     told_ns = 0
     tick_ns, longest_ns = deployment.config.tick_ms * 1_000_000, stall_ns(deployment)
@@ -54,18 +57,18 @@ def run_live(
             told_ns = now_ns + 200_000_000
             tell(drive)
         if stopped and not drive.ended:
-            drive.ended = "stopped: Ctrl-C"
+            drive.ended = f"stopped: {stopped}"
         return not drive.ended
 
-    try:
+    with ExitStack() as open_ports:
         for name, bus in deployment.config.buses.items():
             ports[name] = open_port(name, bus, ignore)
-        run_at_deadlines(tick_ns, body)
-    finally:
-        for _ in range(LAST_FRAMES if ports else 0):
-            for frame in drive.neutral_frames():
-                ports[frame.bus].send(frame)
-            time.sleep(deployment.config.tick_ms / 1000.0)
-        for port in ports.values():
-            port.close()
+            open_ports.callback(ports[name].close)
+        try:
+            run_at_deadlines(tick_ns, body)
+        finally:
+            for _ in range(LAST_FRAMES):
+                for frame in drive.neutral_frames():
+                    ports[frame.bus].send(frame)
+                time.sleep(deployment.config.tick_ms / 1000.0)
     tell(drive)

@@ -91,7 +91,7 @@ class Deployment:
         """Messages that matter on a bus."""
         radii = [a.radial.radius for a in self.axes.values() if a.radial and a.radial.radius]
         inputs = [i for i in (*self.inputs(), *radii) if i.key[0] == bus]
-        taken = [i.key for i in inputs if not i.by_group]
+        taken = [key for i in inputs if not i.by_group for key in i.keys]
         valves = [a.valve.message.sender.key for a in self.axes.values()]
         if self.listen_only:  # they are those of another
             valves = []

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 from canshaper.can.cangw import Rule, changed_bytes
 from canshaper.can.deployment import Deployment
 from canshaper.can.inputs import BoundLever
-from canshaper.can.j1939 import NULL, group_mask, group_of
+from canshaper.can.j1939 import NULL, WITHOUT_PRIORITY, group_mask, group_of
 from canshaper.can.kernel_check import kernel_check
 from canshaper.can.layout import is_j1939
 from canshaper.can.passing import EFF, Pattern, all_but, exactly
@@ -22,7 +22,11 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
     assert gateway is not None  # only such deployments are asked
     found = {_of(lever) for lever in deployment.levers.values() if lever.key[0] in gateway.between}
     for bus in gateway.between:
-        found |= {exactly(*key) for key in deployment.ids(bus).sent}
+        j1939 = deployment.is_j1939(bus)
+        found |= {
+            _whatever_priority(can_id) if j1939 and extended else exactly(can_id, extended)
+            for can_id, extended in deployment.ids(bus).sent
+        }
     for name in gateway.blocked:
         message = deployment.messages.find(name)
         assert not isinstance(message, str)  # checked with the deployment
@@ -73,9 +77,14 @@ def _passed(deployment: Deployment) -> Iterator[tuple[BoundLever, RewrittenMessa
 def _of(lever: BoundLever) -> Pattern:
     """Frames of a lever, of J1939 whatever their priority."""
     _, can_id, extended = lever.key
-    if not lever.by_group:
-        return exactly(can_id, extended)
-    return _group(can_id, None if lever.any_source else can_id & 0xFF)
+    if lever.by_group:
+        return _group(can_id, None if lever.any_source else can_id & 0xFF)
+    return _whatever_priority(can_id) if is_j1939(lever.message) else exactly(can_id, extended)
+
+
+def _whatever_priority(can_id: int) -> Pattern:
+    """A message of J1939 from one node, to one where it has a destination."""
+    return Pattern(can_id & WITHOUT_PRIORITY | EFF, WITHOUT_PRIORITY | EFF)
 
 
 def _group(can_id: int, source: int | None) -> Pattern:

@@ -7,7 +7,7 @@ from cantools.database.can import Message
 from canshaper.can.codecs import LeverCodec
 from canshaper.can.database import DbcFile
 from canshaper.can.flags import FlaggedVelocity, RockerVelocity
-from canshaper.can.j1939 import NULL, has_destination, with_source
+from canshaper.can.j1939 import NULL, at_every_priority, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Guard, Protection
 from canshaper.can.protections import ProtectionBinder
@@ -43,6 +43,14 @@ class BoundInput:
         if source is not None:
             can_id = with_source(can_id, source)
         return self.config.bus, can_id, self.message.is_extended_frame
+
+    @property
+    def keys(self) -> list[tuple[str, int, bool]]:
+        """Everything its frames may come as, where that is not ``by_group``."""
+        bus, can_id, extended = self.key
+        if not is_j1939(self.message) or self.by_group:
+            return [self.key]
+        return [(bus, one, extended) for one in at_every_priority(can_id)]
 
     @property
     def any_source(self) -> bool:

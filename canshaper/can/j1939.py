@@ -19,6 +19,7 @@ TRANSPORT = 0xEC00  # PGN 60416, connection management
 TRANSPORT_DATA = 0xEB00  # PGN 60160
 DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
 
+WITHOUT_PRIORITY = 0x03FFFFFF
 _PAGES_AND_FORMAT = 0x03FF0000
 _GROUP_OF_PDU2 = 0x03FFFF00
 
@@ -61,6 +62,11 @@ def pgn_of(can_id: int) -> int:
 def with_source(can_id: int, source: int) -> int:
     """The same message from another address."""
     return can_id & ~0xFF | source
+
+
+def at_every_priority(can_id: int) -> list[int]:
+    """The identifiers that a message may come with: its priority says nothing of what it is."""
+    return [priority << 26 | can_id & WITHOUT_PRIORITY for priority in range(8)]
 
 
 def claims_of(address: int) -> list[int]:

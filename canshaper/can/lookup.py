@@ -8,7 +8,7 @@ from cantools.database.can import Message, Signal
 from canshaper.can.canopen import STATE_BITS, service_of
 from canshaper.can.codecs import Sender
 from canshaper.can.database import DbcFile, Messages, load_dbc
-from canshaper.can.j1939 import NULL, has_destination, with_source
+from canshaper.can.j1939 import NULL, WITHOUT_PRIORITY, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Protection
 from canshaper.can.signals import find_signal, symmetrical_range
@@ -86,7 +86,8 @@ class Lookup:
         self._check_j1939(place, bus, message, takes=takes, source=source)
         self._check_pdo(place, bus, message)
         can_id, _ = self.address(bus, message, takes=takes, source=source)
-        key = (bus, can_id, message.is_extended_frame)
+        whole = can_id & WITHOUT_PRIORITY if is_j1939(message) else can_id
+        key = (bus, whole, message.is_extended_frame)
         if key in self._used:
             self.add(
                 (*place, "message"),

@@ -236,7 +236,7 @@ class Replay:
         return [
             f"{lever.message.name}, id {lever.key[1]:#x} on {lever.key[0]}"
             for lever in self.stepper.deployment.levers.values()
-            if lever.key not in self.heard
+            if self.heard.keys().isdisjoint(lever.keys)
             and not (lever.by_group and (lever.key[0], group_of(lever.key[1])) in heard)
         ]
 

@@ -291,4 +291,4 @@ NOTHING = Result([], {}, [])
 
 def _inputs(stepper: Stepper) -> dict[Key, BoundInput]:
     deployment = stepper.deployment
-    return {bound.key: bound for bound in deployment.inputs()}
+    return {key: bound for bound in deployment.inputs() for key in bound.keys}

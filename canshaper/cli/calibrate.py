@@ -6,7 +6,15 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import (
+    CHANNEL,
+    EXIT_NO_BUS,
+    FILE,
+    INTERFACE,
+    fail,
+    loader,
+    refuse_shipped,
+)
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
@@ -68,6 +76,8 @@ def calibrate(
 
     try:
         deployment = loader(file, interface, channel)()
+        if write:
+            refuse_shipped(file)
         ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
         drive = CalibrationDrive(deployment, axis, _speed(deployment, axis, speed), ramp)
         if live and not yes:

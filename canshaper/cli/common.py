@@ -43,6 +43,17 @@ def deployment_path(name: str) -> Path:
     return shipped if shipped.exists() and path.parent in (Path(), Path("config")) else path
 
 
+def refuse_shipped(file: str) -> None:
+    """Refuse to write into a deployment that is only found among the shipped ones.
+
+    Raises:
+        DeploymentError: it is one of them.
+    """
+    if deployment_path(file) != Path(file):
+        text = "shipped with the package; copy it, then write to the copy"
+        raise DeploymentError([Problem(file, None, "--write", text)])
+
+
 def loader(
     file: str, interface: str | None = None, channels: list[str] | None = None
 ) -> Callable[[], Deployment]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import typer
 from rich.console import Console
 
-from canshaper.cli.common import INSTALL_TOOLS, fail, loader
+from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -88,8 +88,8 @@ def identify(
         deployment = loader(file)() if file else None
         if write and (deployment is None or file is None):
             raise ValueError("--write: allowed with --file, the deployment to write to")
-        if write and file and not Path(file).exists():
-            raise ValueError(f"{file}: shipped with the package; copy it, then write to the copy")
+        if write and file:
+            refuse_shipped(file)
         timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
         if any(v is not None for v in timed.values()):
             findings = [timed_by_hand(timed, logs or [], axis_named(axis, deployment))]

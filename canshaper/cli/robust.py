@@ -7,7 +7,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.cli.common import FILE, fail, loader
+from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.tuning.evaluate import Evaluation
@@ -50,6 +50,8 @@ def robust(
     console = Console()
     try:
         deployment = loader(file)()
+        if write:
+            refuse_shipped(file)
         bound = deployment.axes.get(axis)
         if bound is None or bound.config.sway is None:
             having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway)

@@ -8,7 +8,7 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
-from canshaper.cli.common import FILE, fail, loader
+from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -51,6 +51,8 @@ def set_(
 
     try:
         deployment = loader(file)()
+        if write:
+            refuse_shipped(file)
         path = control or _socket(deployment)
         values = dict(_parsed(change) for change in changes or [])
         before = client.table(path)

@@ -10,7 +10,7 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader
+from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import BoundAxis, Deployment
@@ -88,8 +88,8 @@ def tune(
     try:
         deployment = loader(file)()
         bound = _axis(deployment, axis)
-        if write and not Path(file).exists():
-            raise ValueError(f"{file}: shipped with the package; copy it, then write to the copy")
+        if write:
+            refuse_shipped(file)
         asked: dict[str, Any] = {
             "max_jump": max_jump,
             "max_rate_per_s": max_rate,

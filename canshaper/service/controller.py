@@ -75,7 +75,7 @@ class Controller:
             if runner.bound.status_word and runner.control
         ]
         self._inputs: dict[tuple[str, int, bool], Taken] = {
-            bound.key: one for bound, one in taken if not bound.any_source
+            key: one for bound, one in taken if not bound.any_source for key in bound.keys
         }
         self._sent = {
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
@@ -85,7 +85,7 @@ class Controller:
                 radius = RadiusInput(runner.bound.radial)
                 if (measured := runner.bound.radial.radius) is not None:
                     taken.append((measured, radius))
-                    self._inputs[measured.key] = radius
+                    self._inputs |= dict.fromkeys(measured.keys, radius)
                 target = self.axes[runner.bound.radial.config.axis]
                 runner.compensator = Compensator(runner, target, radius)
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.

@@ -4,11 +4,9 @@ import math
 from collections import deque
 from enum import Enum
 
-from cantools.database.can import Signal
-
 from canshaper.can.inputs import BoundFeedback
 from canshaper.can.signals import find_signal
-from canshaper.service.value import ValueInput
+from canshaper.service.value import ValueInput, measurable
 
 
 class Following(Enum):
@@ -37,7 +35,7 @@ class Feedback(ValueInput):
         config = bound.config
         signal = find_signal(bound.message, config.signal)
         assert signal is not None  # checked with the deployment
-        super().__init__(bound, signal.name, *_range(signal))
+        super().__init__(bound, signal.name, *measurable(signal))
         self._full = config.full if config.full is not None else float(signal.maximum or 0.0)
         self._tolerance = config.tolerance_pct / 100.0
         self._commands = deque([0.0], maxlen=1 + math.ceil(config.settle_ms / 1000.0 / period_s))
@@ -74,11 +72,3 @@ class Feedback(ValueInput):
         """Nothing received so far counts any more."""
         super().forget()
         self._waited_for_ns = None
-
-
-def _range(signal: Signal) -> tuple[float, float]:
-    """What of a signal can be a measurement; a millionth more, for the rounding of decimals."""
-    low, high = signal.minimum, signal.maximum
-    if low is None or high is None or high <= low:
-        return -math.inf, math.inf
-    return low - 1e-6 * (high - low), high + 1e-6 * (high - low)

@@ -66,10 +66,7 @@ class Line:
 
     def last(self) -> list[Frame]:
         """What is sent before we go: neutral, where the last frame was not."""
-        if not self._moved:
-            return []
-        self._moved = False
-        return [self._message.own(enabled=False)]
+        return [self._message.own(enabled=False)] if self._moved else []
 
     def _moves(self) -> bool:
         return any(runner.axis.raw and runner.trip is None for runner in self._runners)

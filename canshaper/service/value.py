@@ -3,6 +3,8 @@
 import sys
 from typing import Any
 
+from cantools.database.can import Signal
+
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundInput
 from canshaper.can.signals import find_signal, special_codes
@@ -60,3 +62,11 @@ class ValueInput(Input):
         """Nothing received so far counts any more."""
         super().forget()
         self.measured_ns = None
+
+
+def measurable(signal: Signal) -> tuple[float, float]:
+    """What of a signal can be a measurement; a millionth more, for the rounding of decimals."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        return -LARGEST, LARGEST
+    return low - 1e-6 * (high - low), high + 1e-6 * (high - low)

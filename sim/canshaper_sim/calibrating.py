@@ -31,7 +31,8 @@ def run_simulated(
     while not drive.ended:
         now_ns = time_ms * 1_000_000
         for frame in levers.frames_of_tick(time_ms, tick_ms):
-            drive.receive(frame, now_ns)
+            if (passed := drive.receive(frame, now_ns)) is not None:
+                plant.receive(passed)
         for frame in drive.tick(now_ns):
             plant.receive(frame)
         plant.advance(tick_ms / 1000.0)

@@ -189,5 +189,30 @@ axes:
     assert values[axis.stick.signal] == pytest.approx(100.0, abs=0.5)
 
 
+def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path: Path) -> None:
+    """A lever and a valve of J1939 with a destination: what is theirs at one priority is at all."""
+    dbc = (ROOT / "dbc" / "j1939-bjm-avc.dbc").read_text("cp1252")
+    lever, valve = 0x0CEF2733, 0x0CEF3000
+    dbc = dbc.replace("2365445886", str(lever | EFF)).replace("2365468926", str(valve | 0xFE | EFF))
+    (tmp_path / "machine.dbc").write_text(dbc, "cp1252")
+    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
+    text = text.replace("../dbc/j1939-bjm-avc.dbc", "machine.dbc").replace(
+        "\ndbc:", "  far: { interface: socketcan, channel: can1 }\n"
+        "gateway: { between: [crane, far], fallback: stop }\ndbc:", 1
+    )  # fmt: skip
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    deployment = load_deployment(file)
+    own = deployment.config.buses["crane"].j1939
+    assert own is not None
+    rules = passing_rules(deployment)
+    for priority in range(8):
+        for can_id in (lever, valve | own.address):
+            word = can_id & 0x03FFFFFF | priority << 26 | EFF
+            assert not [rule for rule in rules if rule.pattern.fits(word)], hex(word)
+        other = 0x00EF2744 | priority << 26 | EFF
+        assert len([rule for rule in rules if rule.pattern.fits(other)]) == 2
+
+
 def sent_steps(deployment: Deployment) -> int:
     return deployment.axes["slew"].valve.steps

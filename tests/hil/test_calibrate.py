@@ -65,7 +65,7 @@ def test_a_valve_on_the_bus_is_measured(file: Path, tmp_path: Path) -> None:
     assert last_of_each(log) == [0, 0, 0]
 
 
-@pytest.mark.parametrize("end", ["enable", "silence", "stick", "ctrl-c"])
+@pytest.mark.parametrize("end", ["enable", "silence", "stick", "ctrl-c", "hang-up"])
 def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end: str) -> None:
     log = tmp_path / "bus.log"
     slow = [*QUICK[:2], "--rate", "1", *QUICK[4:], "--write"]
@@ -93,7 +93,8 @@ def make(levers: Levers, end: str, running: object) -> None:
     elif end == "stick":
         levers.values["Slew"] = 30.0
     else:
-        running.process.send_signal(signal.SIGINT)  # type: ignore[attr-defined]
+        number = signal.SIGINT if end == "ctrl-c" else signal.SIGHUP
+        running.process.send_signal(number)  # type: ignore[attr-defined]
 
 
 def test_it_asks_before_anything_moves(file: Path, tmp_path: Path) -> None:

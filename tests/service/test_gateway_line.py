@@ -217,7 +217,8 @@ def test_the_last_frame_is_neutral_where_the_one_before_was_not(rig: GatewayRig)
     rig.moving()
     (frame,) = rig.controller.neutral_frames()
     assert (rig.decoded(frame)["Slew"], rig.decoded(frame)["Enable"]) == (0, 0)
-    assert rig.controller.neutral_frames() == []
+    (again,) = rig.controller.neutral_frames()  # the one before may be lost
+    assert again.data[:2] == frame.data[:2]
 
 
 CHECKSUM = (

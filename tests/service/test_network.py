@@ -159,6 +159,25 @@ def test_valves_at_a_destination_are_contested_at_that_one_only(tmp_path: Path) 
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")
 
 
+@pytest.mark.parametrize("priority", [0, 3, 6, 7])
+def test_a_joystick_with_a_destination_is_known_whatever_its_priority(
+    tmp_path: Path, priority: int
+) -> None:
+    """Proprietary A from 0x33 to 0x27; the same group to another node is not for us."""
+    dbc = (ROOT / "dbc" / "j1939-bjm-avc.dbc").read_text(encoding="cp1252")
+    changed = dbc.replace("2365445886", str(0x8CEF2733))
+    (tmp_path / "machine.dbc").write_text(changed, encoding="cp1252")
+    rig = variant(tmp_path, (str(ROOT / "dbc" / "j1939-bjm-avc.dbc"), "machine.dbc"))
+    data = bjm("BJM1").data
+    for destination, state in ((0x28, State.NEUTRAL_WAIT), (0x27, State.READY)):
+        can_id = priority << 26 | 0xEF0033 | destination << 8
+        for _ in range(30):
+            rig.tick(Frame("crane", can_id, True, data), bjm("BJM2"))
+        assert rig.state() is state
+    taken = rig.deployment.ids("crane").taken
+    assert (can_id, True) in taken  # or the kernel would keep it from us
+
+
 def test_other_traffic_of_29_bits_is_no_fault_and_of_11_bits_it_is(rig: Rig) -> None:
     rig.claimed()
     before = rig.fault

@@ -1,0 +1,100 @@
+"""The speed of an axis as its machine tells it: from one bus and one sender, or it is silence."""
+
+from cantools.database.can import Message, Signal
+
+from canshaper.can.codecs import LeverCodec
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundInput
+from canshaper.can.j1939 import NULL, group_of
+from canshaper.can.protection import UNPROTECTED
+from canshaper.can.signals import find_signal
+from canshaper.config.input import Input
+from canshaper.config.source import DeploymentError, Problem
+from canshaper.service.value import ValueInput, measurable
+
+# Feedback older than that says nothing of the axis, which must not go on unseen.
+SILENT_MS = 500
+MOST_BYTES = 8
+
+
+class SpeedFeedback:
+    """Feedback of the speed of one axis.
+
+    Where it is the ``feedback`` of the axis in the deployment, all that stands there holds: bus,
+    source, counter, checksum. Any other message has to come on the bus of the valve.
+
+    Args:
+        deployment: the machine.
+        axis: name of the axis.
+        message: name of the message.
+        signal: its signal.
+
+    Raises:
+        DeploymentError: no such message or signal, or one that cannot be measured with.
+    """
+
+    def __init__(self, deployment: Deployment, axis: str, message: str, signal: str) -> None:
+        found = _find(deployment, message, signal)
+        self._bound = bound = _bound(deployment, axis, message, found[0], signal)
+        self._input = ValueInput(bound, found[1].name, *measurable(found[1]))
+        self._keys = frozenset(bound.keys)
+        _, can_id, _ = bound.key
+        self._source = None if can_id & 0xFF == NULL else can_id & 0xFF
+
+    @property
+    def value(self) -> float:
+        """The last speed that counted, in the unit of the DBC."""
+        return self._input.value
+
+    def heard(self, now_ns: int) -> bool:
+        """Whether it tells the speed now: neither silence nor an error nor what is no number."""
+        measured_ns = self._input.measured_ns
+        return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
+
+    def receive(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame, where it is one of this message."""
+        if self._mine(frame):
+            self._input.receive(frame.data, now_ns)
+
+    def _mine(self, frame: Frame) -> bool:
+        if not self._bound.by_group:
+            return frame[:3] in self._keys
+        bus, can_id, _ = self._bound.key
+        if frame.bus != bus or not frame.extended or group_of(frame.can_id) != group_of(can_id):
+            return False
+        source = frame.can_id & 0xFF
+        if self._source is None:
+            self._source = source  # the first that is heard, and nobody else any more
+        return source == self._source
+
+
+def _find(deployment: Deployment, message: str, signal: str) -> tuple[Message, Signal]:
+    found = deployment.messages.find(message)
+    if isinstance(found, str):
+        raise DeploymentError([Problem("command line", None, "--speed", found)])
+    definition = find_signal(found[1], signal)
+    if definition is None:
+        names = ", ".join(s.name for s in found[1].signals)
+        raise _problem(deployment, f"found {signal!r}, signals of {message} are {names}")
+    if found[1].is_multiplexed():
+        raise _problem(deployment, f"{message} is multiplexed; nothing can be taken from it")
+    if found[1].length > MOST_BYTES:
+        text = f"{message} has {found[1].length} bytes, allowed are {MOST_BYTES}"
+        raise _problem(deployment, text)
+    return found[1], definition
+
+
+def _bound(
+    deployment: Deployment, axis: str, name: str, message: Message, signal: str
+) -> BoundInput:
+    of_axis = deployment.axes[axis].feedback
+    if of_axis and (of_axis.config.message, of_axis.config.signal) == (name, signal):
+        return of_axis
+    bus = deployment.axes[axis].config.valve.bus
+    config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
+    return BoundInput(config, message, LeverCodec(message, []), UNPROTECTED)
+
+
+def _problem(deployment: Deployment, text: str) -> DeploymentError:
+    return DeploymentError([Problem(str(deployment.path), None, "--speed", text)])
