@@ -73,18 +73,26 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
         (log, deployment file).
 
     Raises:
-        LogError: it is no bundle.
+        LogError: it is no bundle, or a damaged one; tells the member.
     """
+    where = f"{path}"
     try:
         with zipfile.ZipFile(path) as bundle:
-            about = json.loads(bundle.read(ABOUT))
-            bundle.extractall(folder)
-        log, file = folder / about["log"], folder / about["deployment"]
-    except (zipfile.BadZipFile, KeyError, ValueError, TypeError, OSError) as error:
+            for member in (ABOUT, *bundle.namelist()):
+                where = f"{path}: {member}"
+                bundle.extract(member, folder)
+        where = f"{path}: {ABOUT}"
+        about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+        log, file = ((folder / about[key]).resolve() for key in ("log", "deployment"))
+    except Exception as error:  # of many kinds, where the file is damaged
         text = f"found {type(error).__name__} {error}, allowed is one of canshaper record"
-        raise LogError(f"{path}: not a bundle: {text}") from None
-    if folder not in log.resolve().parents or folder not in file.resolve().parents:
-        raise LogError(f"{path}: not a bundle: a path leads out of it")
+        raise LogError(f"{where}: not a bundle: {text}") from None
+    for one in (log, file):
+        if folder.resolve() not in one.parents:
+            raise LogError(f"{path}: not a bundle: a path leads out of it")
+        if not one.is_file():
+            text = f"found no {one.relative_to(folder.resolve())}, allowed is one that has it"
+            raise LogError(f"{path}: not a bundle: {text}")
     return log, file
 
 

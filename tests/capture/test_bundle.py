@@ -1,6 +1,7 @@
 """A bundle has all that a replay needs, wherever it is unpacked."""
 
 import json
+import random
 import shutil
 import zipfile
 from pathlib import Path
@@ -90,6 +91,60 @@ def test_what_is_no_bundle_is_told(tmp_path: Path) -> None:
         unpack(path, tmp_path / "there")
     with pytest.raises(LogError, match="not a bundle: found FileNotFoundError"):
         unpack(tmp_path / "none.zip", tmp_path / "there")
+
+
+def damaged(bundle: Path, signature: bytes, at: int, value: bytes) -> Path:
+    """The bundle with other bytes in the last header of that kind: those of history.txt."""
+    content = bytearray(bundle.read_bytes())
+    start = content.rindex(signature) + at
+    content[start : start + len(value)] = value
+    bundle.write_bytes(content)
+    return bundle
+
+
+@pytest.mark.parametrize(
+    ("signature", "at", "value", "found"),
+    [
+        (b"PK\x01\x02", 8, b"\x01", "RuntimeError .* is encrypted"),
+        (b"PK\x01\x02", 10, b"\x63", "NotImplementedError"),
+        (b"PK\x03\x04", 30 + len("history.txt"), b"\xff" * 4, "error Error -3 while"),
+    ],
+    ids=["encrypted", "compressed in an unknown way", "damaged"],
+)
+def test_a_member_that_cannot_be_read_is_told(
+    machine: Path, tmp_path: Path, signature: bytes, at: int, value: bytes, found: str
+) -> None:
+    bundle = damaged(packed(machine, tmp_path), signature, at, value)
+    with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: found {found}"):
+        unpack(bundle, tmp_path / "there")
+
+
+def test_a_bundle_damaged_anywhere_is_told(machine: Path, tmp_path: Path) -> None:
+    bundle = packed(machine, tmp_path)
+    content, dice = bundle.read_bytes(), random.Random(1)
+    for _ in range(300):
+        one = bytearray(content)
+        # Twice of three times in the directory at its end, where nearly every byte counts.
+        where = dice.randrange(dice.choice([0, len(one) - 500, len(one) - 500]), len(one))
+        one[where] = dice.randrange(256)
+        bundle.write_bytes(one)
+        try:
+            log, file = unpack(bundle, tmp_path / "there")
+        except LogError as error:
+            assert str(bundle) in str(error)
+        else:
+            assert log.is_file()
+            assert file.is_file()
+        shutil.rmtree(tmp_path / "there", ignore_errors=True)
+
+
+def test_a_bundle_without_its_log_is_told(tmp_path: Path) -> None:
+    path = tmp_path / "x.zip"
+    with zipfile.ZipFile(path, "w") as bundle:
+        bundle.writestr("about.json", json.dumps({"log": "a.log", "deployment": "a.yaml"}))
+        bundle.writestr("a.yaml", "")
+    with pytest.raises(LogError, match=r"x\.zip: not a bundle: found no a\.log"):
+        unpack(path, tmp_path / "there")
 
 
 def test_a_bundle_cannot_point_out_of_itself(tmp_path: Path) -> None:
