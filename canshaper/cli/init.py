@@ -1,14 +1,14 @@
 """``canshaper init``: a first deployment, by a few questions."""
 
-import json
 import os
 import re
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import typer
 
+from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
 from canshaper.cli.common import data_directory, fail
 
 if TYPE_CHECKING:
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
     from canshaper.config.first import FirstAxis, FirstLever, FirstMachine, Stopwatch
 
-_T = TypeVar("_T")
-NONE = "-"
 MOST_OFFERED = 6
 # Axes that make nothing swing, by their names.
 CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
@@ -35,8 +33,9 @@ def init(
 
     Looks through the DBC files for levers, valves and switches and offers what it finds; Enter
     takes what stands in brackets, "-" leaves a thing out. Written with reduced speed and with a
-    filter to begin with. Ctrl-C writes nothing. Machines of J1939 and CANopen begin with a copy of
-    the shipped j1939-forwarder.yaml or canopen-forwarder.yaml.
+    filter to begin with. Ctrl-C writes nothing; should the check of the whole file find something
+    after all, the answers stay in a draft beside it. Machines of J1939 and CANopen begin with a
+    copy of the shipped j1939-forwarder.yaml or canopen-forwarder.yaml.
 
     Examples:
 
@@ -47,13 +46,14 @@ def init(
     from canshaper.config.first import first_deployment
     from canshaper.config.source import DeploymentError
 
-    if file.exists() and not force:
-        raise fail(ValueError(f"{file}: is there already; --force replaces it"))
+    draft = file.with_name(f"{file.stem}.draft.yaml")
+    for path in (file, draft):
+        if path.exists() and not force:
+            raise fail(ValueError(f"{path}: is there already; --force replaces it"))
     try:
         messages = _messages(files := dbc or [data_directory() / "dbc" / "forwarder.dbc"])
         machine = _machine(messages, files, file.resolve().parent)
-        text = first_deployment(machine)
-        _write(file, text)
+        _write(file, draft, first_deployment(machine))
     except DeploymentError as error:
         raise fail(error) from None
     except OSError as error:
@@ -84,7 +84,9 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
 
 def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> "FirstMachine":
     from canshaper.can import suggest
+    from canshaper.config.bus import Bus
     from canshaper.config.first import FirstMachine
+    from canshaper.config.load import limits
 
     typer.echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
     possible = suggest.levers(messages)
@@ -96,24 +98,22 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
                 " j1939-forwarder.yaml for joysticks with direction flags"
             )
         )
-    channel = typer.prompt("CAN interface", default="can0")
-    bitrate = _asked("Bit rate, bit/s", _whole(10_000, 1_000_000), "250000")
+    interface = asked("CAN interface", channel, "can0")
+    bitrate = asked("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
     names = [message.name for message in possible]
     text = f"Messages of the levers, of {', '.join(names)}"
     likely = [m.name for m in possible if suggest.named(suggest.switches(m), suggest.ENABLE)]
-    chosen = _asked(text, _several(names), " ".join(likely or names[:1]))
+    chosen = asked(text, several(names), " ".join(likely or names[:1]))
     levers = [_lever(message) for message in possible if message.name in chosen]
     others = [message for message in messages if message.name not in chosen]
-    axes = [
-        axis
-        for lever, message in zip(levers, (m for m in possible if m.name in chosen), strict=True)
-        for axis in _axes(lever, message, others)
-    ]
+    axes: list[FirstAxis] = []
+    for lever, message in zip(levers, (m for m in possible if m.name in chosen), strict=True):
+        axes += _axes(lever, message, others, [axis.name for axis in axes])
     if not axes:
         raise fail(ValueError("no axis was named; nothing is written"))
     status = suggest.service_status(messages)
     return FirstMachine(
-        channel,
+        interface,
         bitrate,
         [_relative(path, folder) for path in files],
         levers,
@@ -125,60 +125,81 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
 def _lever(message: "Message") -> "FirstLever":
     from canshaper.can import suggest
     from canshaper.config.first import FirstLever
+    from canshaper.config.load import limits
+    from canshaper.config.schema import Lever
 
-    switches = [signal.name for signal in suggest.switches(message)]
+    left = suggest.switches(message)  # a switch has one meaning
 
-    def switch(text: str, found: str | None, *, needed: bool = False) -> str | None:
-        allowed = switches if needed else [*switches, NONE]
-        default = found or (switches[0] if needed else NONE)
-        answer = _asked(f"{message.name}: {text}, of {', '.join(allowed)}", _one(allowed), default)
+    def switch(text: str, looks: re.Pattern[str], *, needed: bool = False) -> str | None:
+        allowed = [signal.name for signal in left] + ([] if needed else [NONE])
+        default = suggest.named(left, looks) or (allowed[0] if needed else NONE)
+        answer = asked(f"{message.name}: {text}, of {', '.join(allowed)}", one(allowed), default)
+        left[:] = [signal for signal in left if signal.name != answer]
         return None if answer == NONE else answer
 
-    of = suggest.switches(message)
-    enable = switch("enable switch", suggest.named(of, suggest.ENABLE), needed=True)
+    enable = switch("enable switch", suggest.ENABLE, needed=True)
     assert enable is not None
+    least, most = limits(Lever, "timeout_ms")
+    reset = switch("switch that resets a trip", suggest.RESET)
+    off = switch("switch for anti-sway off", suggest.ANTI_SWAY_OFF)
+    counter = suggest.counter(message)
     return FirstLever(
         suggest.axis_name(message.name),
         message.name,
-        FEWEST_CYCLES * (message.cycle_time or 0),
+        int(min(max(FEWEST_CYCLES * (message.cycle_time or 0), least), most)),
         enable,
-        switch("switch that resets a trip", suggest.named(of, suggest.RESET)),
-        switch("switch for anti-sway off", suggest.named(of, suggest.ANTI_SWAY_OFF)),
-        suggest.counter(message),
+        reset,
+        off,
+        None if counter in (enable, reset, off) else counter,
     )
 
 
-def _axes(lever: "FirstLever", message: "Message", others: "list[Message]") -> "list[FirstAxis]":
+def _axes(
+    lever: "FirstLever", message: "Message", others: "list[Message]", taken: list[str]
+) -> "list[FirstAxis]":
+    """Axes of a lever; ``others`` are messages that are left, ``taken`` names that are not."""
     from canshaper.can import suggest
+    from canshaper.can.valves import FRAMES_PER_TIMEOUT
     from canshaper.config.first import FirstAxis
+    from canshaper.config.load import limits
+    from canshaper.config.schema import Valve
 
-    found = []
+    least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
+    found: list[FirstAxis] = []
     for stick in suggest.sticks(message):
         where = f"{message.name}.{stick.name}"
-        name = _asked(f"Axis of {where}, - for none", _word, suggest.axis_name(stick.name))
-        if name == NONE:
+        names = [*taken, *(axis.name for axis in found)]
+        likely = suggest.axis_name(stick.name)
+        default = f"{lever.name}_{likely}" if likely in names else likely
+        axis = asked(f"Axis of {where}, - for none", name(names), default)
+        if axis == NONE:
             continue
-        possible = suggest.valves(others, stick.name)
+        possible = [
+            m
+            for m in suggest.valves(others, stick.name)
+            if FRAMES_PER_TIMEOUT * (m.cycle_time or 0) <= most
+        ]
         commands = [f"{m.name}.{s.name}" for m in possible for s in suggest.commands(m)]
         if not commands:
             typer.echo("  no message is left that can command its valve; axis left out")
             continue
         offered = ", ".join(commands[:MOST_OFFERED])
-        likely = suggest.likeness(possible[0].name, stick.name) >= suggest.LIKELY
-        text = f"  {name}: valve command, such as {offered}, - for none"
-        valve = _asked(text, _one([*commands, NONE]), commands[0] if likely else NONE)
+        alike = suggest.likeness(possible[0].name, stick.name) >= suggest.LIKELY
+        text = f"  {axis}: valve command, such as {offered}, - for none"
+        valve = asked(text, one([*commands, NONE]), commands[0] if alike else NONE)
         if valve == NONE:
             continue
         command, _, signal = valve.partition(".")
         sender = next(m for m in possible if m.name == command)
         others.remove(sender)
         cycle = sender.cycle_time or 0
-        text = f"  {name}: silence after which the valve closes by itself, ms (its manual)"
-        timeout = _asked(text, _whole(max(10, 3 * cycle), 5000), str(max(200, 3 * cycle)))
-        status = suggest.status_of(others, name)
+        shortest = max(least, FRAMES_PER_TIMEOUT * cycle)
+        text = f"  {axis}: silence after which the valve closes by itself, ms (its manual)"
+        timeout = asked(text, whole(shortest, most), str(max(200, shortest)))
+        status = suggest.status_of(others, axis)
         found.append(
             FirstAxis(
-                name,
+                axis,
                 lever.name,
                 stick.name,
                 command,
@@ -186,98 +207,57 @@ def _axes(lever: "FirstLever", message: "Message", others: "list[Message]") -> "
                 timeout,
                 suggest.counter(sender),
                 status.name if status else None,
-                _swing(name),
+                _swing(axis, cycle / 1000.0),
             )
         )
     return found
 
 
-def _swing(name: str) -> "Stopwatch | None":
+def _swing(axis: str, period_s: float) -> "Stopwatch | None":
+    """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
     from canshaper.config.first import Stopwatch
+    from canshaper.config.load import limits
+    from canshaper.config.sway import Sway
 
-    if not typer.confirm(
-        f"  {name}: does it make the grapple swing", default=not CALM.search(name)
-    ):
+    question = f"  {axis}: does it make the grapple swing"
+    if not typer.confirm(question, default=not CALM.search(axis)):
         return None
-    seconds = _asked("    time of ten full swings, s", _number(1.5, 120.0), "23.6")
-    first = _asked("    how far the first of them goes (any unit)", _number(1e-3, 1e6), "20")
-    last = _asked(
-        "    and the one after the tenth", _number(1e-3 * first, first), f"{first / 3:.3g}"
-    )
-    speed = _asked("    speed of the tip at full stick, m/s", _number(0.05, 20.0), "1")
+    seconds = asked("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
+    first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
+    last = asked("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
+    allowed = number(*limits(Sway, "full_speed_m_s"))
+    speed = asked("    speed of the tip at full stick, m/s", allowed, "1")
     return Stopwatch(seconds, first, last, speed)
 
 
-def _write(file: Path, text: str) -> None:
-    """Write it when it is a good deployment: read like every other first."""
-    from canshaper.can.binding import load_deployment
+def _ten_swings_s(period_s: float) -> tuple[float, float]:
+    """Shortest and longest time of ten swings with which the filter can run at a valve's period."""
+    from canshaper.can.filters import filter_fault
+    from canshaper.config.first import Stopwatch, ten_swings_s
+    from canshaper.config.schema import Limits
 
-    draft = file.with_name(f".{file.name}.draft")
+    low, high = ten_swings_s()
+    rate = Limits().slowest_per_s
+    for tenth in range(round(10.0 * low), round(10.0 * high)):
+        watch = Stopwatch(tenth / 10.0, 1.0, 1.0, 1.0)
+        if filter_fault(watch.filter, watch.sway, period_s, rate) is None:
+            return watch.ten_swings_s, high
+    return low, high  # with none at all: the check of the whole file tells why
+
+
+def _write(file: Path, draft: Path, text: str) -> None:
+    """Write it when it is a good deployment: read like every other first. Else it stays a draft."""
+    from canshaper.can.binding import load_deployment
+    from canshaper.config.source import DeploymentError
+
     draft.write_text(text, encoding="utf-8")
     try:
         load_deployment(draft)
-        draft.replace(file)
-    finally:
-        draft.unlink(missing_ok=True)
+    except DeploymentError as error:
+        kept = f"{draft}: kept with all answers; mend it there and rename it to {file}"
+        raise fail(ValueError(f"{error}\n{kept}")) from None
+    draft.replace(file)
 
 
 def _relative(path: Path, folder: Path) -> str:
-    name = os.path.relpath(path.resolve(), folder)
-    return name if re.fullmatch(r"[\w./-]+", name) else json.dumps(name)  # JSON is YAML too
-
-
-def _asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
-    """Ask until the answer is one."""
-    while True:
-        try:
-            return parse(str(typer.prompt(text, default=default)).strip())
-        except ValueError as error:
-            typer.echo(f"  {error}", err=True)
-
-
-def _word(text: str) -> str:
-    if text != NONE and not text.isidentifier():
-        raise ValueError(f"found {text!r}, allowed is a word of letters, digits and _")
-    return text
-
-
-def _one(allowed: Sequence[str]) -> Callable[[str], str]:
-    def parse(text: str) -> str:
-        if text not in allowed:
-            raise ValueError(f"found {text!r}, allowed is one of {', '.join(allowed)}")
-        return text
-
-    return parse
-
-
-def _several(allowed: Sequence[str]) -> Callable[[str], list[str]]:
-    def parse(text: str) -> list[str]:
-        names = text.replace(",", " ").split()
-        if not names or not {*names} <= {*allowed}:
-            raise ValueError(f"found {text!r}, allowed are some of {', '.join(allowed)}")
-        return names
-
-    return parse
-
-
-def _number(low: float, high: float) -> Callable[[str], float]:
-    def parse(text: str) -> float:
-        fault = f"found {text!r}, allowed is a number, {low:g} to {high:g}"
-        try:
-            value = float(text)
-        except ValueError:
-            raise ValueError(fault) from None
-        if not low <= value <= high:
-            raise ValueError(fault)
-        return value
-
-    return parse
-
-
-def _whole(low: int, high: int) -> Callable[[str], int]:
-    def parse(text: str) -> int:
-        if not text.isdecimal() or not low <= int(text) <= high:
-            raise ValueError(f"found {text!r}, allowed is a whole number, {low} to {high}")
-        return int(text)
-
-    return parse
+    return os.path.relpath(path.resolve(), folder)

@@ -1,8 +1,14 @@
 """The text of a first deployment file, from what a person knows of a new machine."""
 
+import json
 import math
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+
+from canshaper.config.filters import GffFilter
+from canshaper.config.load import limits
+from canshaper.config.sway import Sway
 
 # Of full speed, for the first motion; raised step by step while it works.
 FIRST_MAX_PCT = 40
@@ -10,6 +16,8 @@ FIRST_MAX_PCT = 40
 POLES_TO_OMEGA = (0.9, 1.1)
 # Room for a wrong stopwatch in what may be changed while it works.
 PERIOD_RANGE = (0.7, 1.4)
+# What YAML takes as the text that it is.
+_PLAIN = re.compile(r"(?!(?:true|false|null)$)(?:\.*/)*[^\W\d][\w./-]*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
@@ -44,6 +52,20 @@ class Stopwatch:
         """Part of the amplitude that is lost over a full swing."""
         return 1.0 - math.pow(self.last / self.first, 0.1)
 
+    @property
+    def filter(self) -> GffFilter:
+        """A filter to begin with."""
+        omega = 2.0 * math.pi / self.period_s
+        poles = [float(_rounded(-share * omega)) for share in POLES_TO_OMEGA]
+        return GffFilter(kind="gff", poles_rad_s=poles)
+
+    @property
+    def sway(self) -> Sway:
+        """The same as sway data of an axis."""
+        period, decay = (float(_rounded(v)) for v in (self.period_s, self.decay_per_swing))
+        speed = self.full_speed_m_s
+        return Sway(period_s=period, decay_per_swing=decay, full_speed_m_s=speed)
+
 
 @dataclass(frozen=True)
 class FirstAxis:
@@ -72,6 +94,19 @@ class FirstMachine:
     status: str | None = None
 
 
+def ten_swings_s() -> tuple[float, float]:
+    """Shortest and longest time of ten swings whose period may be changed as far as is written."""
+    least, most = limits(Sway, "period_s")
+    low, high = 10.0 * least / PERIOD_RANGE[0], 10.0 * most / PERIOD_RANGE[1]
+    # In tenths and inwards, so that both are allowed as they are told.
+    return math.ceil(10.0 * low) / 10.0, math.floor(10.0 * high) / 10.0
+
+
+def plain(text: str) -> str:
+    """A text as it stands in YAML: in quotes where it could be read as something else."""
+    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
+
+
 def first_deployment(machine: FirstMachine) -> str:
     """The deployment file, with a filter to begin with and reduced speed."""
     return "\n".join(_lines(machine)) + "\n"
@@ -83,10 +118,11 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     yield "tick_ms: 20 # period of the control loop"
     yield ""
     yield "buses:"
-    bus = f"interface: socketcan, channel: {machine.channel}, bitrate: {machine.bitrate}"
+    channel = plain(machine.channel)
+    bus = f"interface: socketcan, channel: {channel}, bitrate: {machine.bitrate}"
     yield f"  crane: {{ {bus} }}"
     yield ""
-    yield f"dbc: [{', '.join(machine.dbc)}] # relative to this file"
+    yield f"dbc: [{', '.join(plain(path) for path in machine.dbc)}] # relative to this file"
     yield ""
     yield "levers:"
     for lever in machine.levers:
@@ -131,11 +167,10 @@ def _axis(axis: FirstAxis) -> Iterator[str]:
         return
     swing = axis.swing
     yield f"    # Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
-    period, decay = _rounded(swing.period_s), _rounded(swing.decay_per_swing)
-    speed = f"full_speed_m_s: {swing.full_speed_m_s:g}"
-    yield f"    sway: {{ period_s: {period}, decay_per_swing: {decay}, {speed} }}"
-    omega = 2.0 * math.pi / swing.period_s
-    poles = ", ".join(_rounded(-share * omega) for share in POLES_TO_OMEGA)
+    sway = swing.sway
+    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
+    yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
+    poles = ", ".join(f"{pole:g}" for pole in swing.filter.poles_rad_s or ())
     yield "    # To begin with; better is `canshaper robust FILE --axis NAME --write`."
     yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
     yield "    # First motion at reduced speed: raise max_pct when all is well."

@@ -46,6 +46,13 @@ def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:
         raise DeploymentError(_unique(problems)) from None
 
 
+def limits(schema: type[Section], key: str) -> tuple[float, float]:
+    """Least and most of a number of a section, in its own unit."""
+    found = _Place.of((key,), schema).limits
+    assert found is not None, key
+    return found
+
+
 def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Problem:
     kind, found, context = error["type"], error["input"], error.get("ctx", {})
     place = _Place.of(error["loc"], schema)
@@ -124,14 +131,24 @@ class _Place:
         return ", ".join(repr(k) for section in get_args(self._type) for k in _kinds(section))
 
     @property
+    def _fields(self) -> list[FieldInfo]:
+        return [m for m in self._metadata if isinstance(m, FieldInfo)]
+
+    @property
+    def limits(self) -> tuple[float, float] | None:
+        """Least and most of the number that may stand here; None where it is none."""
+        marks: list[Any] = [mark for field in self._fields for mark in field.metadata]
+        low: Any = next((m.ge for m in marks if isinstance(m, annotated_types.Ge)), None)
+        high: Any = next((m.le for m in marks if isinstance(m, annotated_types.Le)), None)
+        return None if low is None or high is None else (low, high)
+
+    @property
     def allowed(self) -> str:
         """What may stand here, in words."""
-        fields = [m for m in self._metadata if isinstance(m, FieldInfo)]
-        limits = [limit for f in fields for limit in f.metadata]
-        low = next((m.ge for m in limits if isinstance(m, annotated_types.Ge)), None)
-        high = next((m.le for m in limits if isinstance(m, annotated_types.Le)), None)
-        if low is not None and high is not None:
-            units = [f.json_schema_extra for f in fields if isinstance(f.json_schema_extra, dict)]
+        if limits := self.limits:
+            low, high = limits
+            extras = [field.json_schema_extra for field in self._fields]
+            units = [extra for extra in extras if isinstance(extra, dict)]
             whole = "a whole number, " if self._type is int else ""
             return f"{whole}{low:g} to {high:g} {units[0]['unit'] if units else ''}".rstrip()
         if isinstance(self._type, type) and issubclass(self._type, Section):

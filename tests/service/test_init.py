@@ -95,14 +95,17 @@ def test_the_stopwatch_becomes_sway_data_and_a_filter(tmp_path: Path) -> None:
 def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     given = {
+        "CAN interface": "can 0\ncan0",
         "Bit rate": "fast\n500000",
         "Messages of the levers": "Left\nLeverLeft LeverRight",
         "LeverLeft: e": "Slew\nEnable",
-        "Axis of LeverLeft.Slew": "big slew\nturn",
+        "LeverLeft: r": "Enable\nReset",
+        "Axis of LeverLeft.Slew": "big slew\nnull\nturn",
+        "Axis of LeverLeft.NearFar": "turn\nnear_far",
         "slew valve": "Valve\nSlewCommand.Velocity",
         "slew timeout": "50\n300",
         "slew swings": "y",
-        "slew ten": "0\n20",
+        "slew ten": "0\n2.1\n86\n20",
         "slew last": "21\n10",
     }
     result = init(file, given)
@@ -111,16 +114,71 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
         "found 'fast', allowed is a whole number, 10000 to 1000000",
         "found 'Left', allowed are some of LeverLeft, LeverRight",
         "found 'Slew', allowed is one of Enable, AntiSwayOff, Reset",
+        "found 'can 0', allowed is a name without spaces",
+        "found 'Enable', allowed is one of AntiSwayOff, Reset, -",
         "found 'big slew', allowed is a word",
+        "found 'null', allowed is a word",
+        "found 'turn', allowed is another one than turn",
+        "found '2.1', allowed is a number, 2.2 to 85.7",
+        "found '86', allowed is a number, 2.2 to 85.7",
         "found 'Valve', allowed is one of SlewCommand.Velocity",
         "found '50', allowed is a whole number, 60 to 5000",
-        "found '0', allowed is a number, 1.5 to 120",
+        "found '0', allowed is a number, 2.2 to 85.7",
         "found '21', allowed is a number, 0.02 to 20",
     ):
         assert told in result.output
     config = load_deployment(file).config
     assert config.buses["crane"].bitrate == 500_000
     assert config.axes["turn"].valve.timeout_ms == 300
+
+
+@pytest.mark.parametrize("seconds", ["2.2", "85.7"])
+@pytest.mark.parametrize("channel", ["5", "true", "x'y", "a:b", "1e3", "größe"])
+def test_every_answer_that_is_taken_makes_a_good_file(
+    tmp_path: Path, channel: str, seconds: str
+) -> None:
+    file = tmp_path / "machine.yaml"
+    given = {"CAN interface": channel, "slew ten": seconds, "near_far ten": seconds}
+    result = init(file, given | {"near_far last": "20", "slew last": "0.02"})
+    assert result.exit_code == 0, result.output
+    assert load_deployment(file).config.buses["crane"].channel == channel
+    assert axis(file, "slew").sway.period_s == pytest.approx(float(seconds) / 10)
+
+
+def changed_dbc(tmp_path: Path, cycle_ms: int) -> Path:
+    """The machine's DBC with another cycle of the slew valve."""
+    old, new = (f'BA_ "GenMsgCycleTime" BO_ 512 {ms};' for ms in (20, cycle_ms))
+    text = DBC.read_text(encoding="utf-8")
+    assert old in text
+    dbc = tmp_path / "1.dbc"
+    dbc.write_text(text.replace(old, new), encoding="utf-8")
+    return dbc
+
+
+def test_a_slow_valve_takes_slow_swings_only(tmp_path: Path) -> None:
+    file, dbc = tmp_path / "machine.yaml", changed_dbc(tmp_path, 200)
+    given = answers({"slew ten": "13.8\n13.9", "slew timeout": "600"})
+    result = CliRunner().invoke(app, ["init", str(file), "--dbc", str(dbc)], input=given)
+    assert "found '13.8', allowed is a number, 13.9 to 85.7" in result.output
+    assert result.exit_code == 0, result.output
+    assert axis(file, "slew").sway.period_s == 1.39
+
+
+def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path) -> None:
+    file, dbc = tmp_path / "machine.yaml", changed_dbc(tmp_path, 50)
+    draft = tmp_path / "machine.draft.yaml"
+    arguments = ["init", str(file), "--dbc", str(dbc)]
+    given = answers({"CAN interface": "can7"})
+    result = CliRunner().invoke(app, arguments, input=given)
+    assert result.exit_code == 2
+    told = [line for line in result.output.splitlines() if str(tmp_path) in line][1:]
+    assert "has GenMsgCycleTime 50 ms, allowed is a multiple of tick_ms, 20 ms" in told[0]
+    assert told[1:] == [f"{draft}: kept with all answers; mend it there and rename it to {file}"]
+    assert not file.exists()
+    again = CliRunner().invoke(app, arguments, input=given)
+    assert (again.exit_code, f"{draft}: is there already" in again.output) == (2, True)
+    draft.write_text(draft.read_text(encoding="utf-8").replace("tick_ms: 20", "tick_ms: 10"))
+    assert load_deployment(draft).config.buses["crane"].channel == "can7"
 
 
 def test_axes_and_switches_can_be_left_out(tmp_path: Path) -> None:
