@@ -53,10 +53,7 @@ def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
         return sets[low]
     first, second = sets[low], sets[low + 1]
     share = part / STEPS_BETWEEN
-    mode = SwayMode.from_period(
-        _between(first.mode.period_s, second.mode.period_s, share),
-        _between(first.mode.damping_ratio, second.mode.damping_ratio, share),
-    )
+    mode = first.mode.towards(second.mode, share)
     one, two = _by_poles(first.parameters), _by_poles(second.parameters)
     parameters = {name: _between(one[name], two[name], share) for name in one.keys() & two.keys()}
     at = _between(first.at, second.at, share)

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from typing import Self
 
 GRAVITY_M_S2 = 9.81
+SLOWEST_RAD_S, FASTEST_RAD_S = 0.5, 50.0
 
 
 def _require(name: str, value: float, low: float, high: float, unit: str) -> float:
@@ -22,6 +23,11 @@ def _require(name: str, value: float, low: float, high: float, unit: str) -> flo
         found, allowed = f"{value:g} {unit}".strip(), f"{low:g} to {high:g} {unit}".strip()
         raise ValueError(f"{name} is {found}, allowed is {allowed}")
     return value
+
+
+def _omega_rad_s(period_s: float, damping_ratio: float) -> float:
+    """Undamped natural frequency of a swing with this damped period."""
+    return 2.0 * math.pi / (period_s * math.sqrt(1.0 - damping_ratio**2))
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,7 +46,7 @@ class SwayMode:
     damping_ratio: float
 
     def __post_init__(self) -> None:
-        _require("natural frequency", self.omega_rad_s, 0.5, 50.0, "rad/s")
+        _require("natural frequency", self.omega_rad_s, SLOWEST_RAD_S, FASTEST_RAD_S, "rad/s")
         _require("damping ratio", self.damping_ratio, 0.0, 0.95, "")
 
     @classmethod
@@ -57,7 +63,7 @@ class SwayMode:
         """Mode from the period seen on a stopwatch (that of the damped swing) and damping ratio."""
         _require("period", period_s, 0.15, 12.0, "s")
         _require("damping ratio", damping_ratio, 0.0, 0.95, "")
-        return cls(2.0 * math.pi / (period_s * math.sqrt(1.0 - damping_ratio**2)), damping_ratio)
+        return cls(_omega_rad_s(period_s, damping_ratio), damping_ratio)
 
     @classmethod
     def from_decay(cls, period_s: float, decay_per_swing: float) -> Self:
@@ -69,6 +75,23 @@ class SwayMode:
         _require("decay per swing", decay_per_swing, 0.0, 0.99, "")
         decrement = -math.log1p(-decay_per_swing)
         return cls.from_period(period_s, decrement / math.hypot(2.0 * math.pi, decrement))
+
+    def towards(self, other: "SwayMode", share: float) -> "SwayMode":
+        """Mode between this one and another, whatever both are: never an error.
+
+        Period and damping ratio run in straight lines. Where the damping of both differs much, the
+        swing between them may be slower than a mode can be; it then is the slowest one.
+
+        Args:
+            other: the other mode.
+            share: part of the way to it, 0 to 1.
+        """
+        period_s = self.period_s + share * (other.period_s - self.period_s)
+        ratio = self.damping_ratio + share * (other.damping_ratio - self.damping_ratio)
+        # Not from_period: its range is of what a stopwatch shows. A mode of length and mass may
+        # have a longer period, and 12 s may have become a little more by rounding.
+        omega = _omega_rad_s(period_s, ratio)
+        return SwayMode(min(max(omega, SLOWEST_RAD_S), FASTEST_RAD_S), ratio)
 
     @property
     def pole(self) -> complex:

@@ -64,6 +64,47 @@ def test_a_measured_period_is_met_exactly() -> None:
     assert found.mode.period_s == pytest.approx(2.25)
 
 
+@pytest.mark.parametrize(
+    ("first", "second"),
+    [
+        # 12.000000000000002 s by rounding
+        (SwayMode.from_period(12.0, 0.449), SwayMode.from_period(12.0, 0.449)),
+        # 22.6 s, which no stopwatch is asked for
+        (SwayMode.from_grapple(30.0, 270000.0, 300.0), SwayMode.from_period(2.0, 0.03)),
+        (SwayMode(0.5, 0.0), SwayMode(0.5, 0.95)),
+        (SwayMode(50.0, 0.95), SwayMode(50.0, 0.0)),
+    ],
+)
+def test_between_two_valid_modes_there_is_always_one(first: SwayMode, second: SwayMode) -> None:
+    sets = [ParameterSet(0.0, first, "zv", {}), ParameterSet(1.0, second, "zv", {})]
+    for steps in range(1, STEPS_BETWEEN):
+        mode = at_position(sets, steps).mode
+        ratio = first.damping_ratio + steps / STEPS_BETWEEN * (
+            second.damping_ratio - first.damping_ratio
+        )
+        assert mode.damping_ratio == ratio
+        period_s = first.period_s + steps / STEPS_BETWEEN * (second.period_s - first.period_s)
+        assert mode.period_s == pytest.approx(period_s) or mode.omega_rad_s == 0.5
+
+
+MODES = st.builds(SwayMode, st.floats(0.5, 50.0), st.floats(0.0, 0.95))
+
+
+@given(MODES, MODES, st.integers(1, STEPS_BETWEEN - 1))
+def test_a_mode_between_is_never_an_error_nor_quicker_than_both(
+    first: SwayMode, second: SwayMode, steps: int
+) -> None:
+    """Quicker than both it could be too quick for a tick that both suit."""
+    mode = first.towards(second, steps / STEPS_BETWEEN)
+    assert mode.omega_rad_s <= max(first.omega_rad_s, second.omega_rad_s) * (1.0 + 1e-12)
+
+
+def test_the_mode_between_is_that_of_its_period_to_the_last_bit() -> None:
+    found = EMPTY.towards(FULL, 0.375)
+    period_s = EMPTY.period_s + 0.375 * (FULL.period_s - EMPTY.period_s)
+    assert found == SwayMode.from_period(period_s, 0.03 + 0.375 * (0.05 - 0.03))
+
+
 def test_taps_stay_taps() -> None:
     sets = [
         ParameterSet(0.0, EMPTY, "robust", {"taps": [0.5, 0.5]}),
