@@ -35,7 +35,7 @@ def stopwatch(
             f"--first, --last: found {first_deg:g} and {last_deg:g} degrees, allowed are up to 60,"
             " the last one above 0 and not larger than the first"
         )
-    decrement = math.log(first_deg / last_deg) / swings
+    decrement = (math.log(first_deg) - math.log(last_deg)) / swings
     ratio = decrement / math.hypot(2.0 * math.pi, decrement)
     # Mean of (1 + A^2/16) over the counted swings: the amplitude falls exponentially.
     square = math.radians(first_deg) ** 2

@@ -5,14 +5,16 @@ Understood are comma, semicolon and tab, decimal point and comma, a header with 
 """
 
 import csv
+import math
 import re
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TextIO
 
 import numpy as np
+from numpy.typing import NDArray
 
 from canshaper.identification.series import Array, IdentificationError, Unit, unit_of
 
@@ -25,7 +27,13 @@ _ACCELERATION = re.compile(r"acc|beschl", re.IGNORECASE)
 _SAMPLING_S = (5e-4, 0.5)
 # A table with more wrong lines than one in so many is no table.
 _WRONG_LINES = 50
+# No sensor tells more, in whatever unit, and nanoseconds since 1970 are fewer; squares stay finite.
+_LARGEST = 1e30
+# The year 2286; no clock is there.
+_LATEST_S = 1e10
 _TELL_EVERY = 20_000
+
+Lines = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -112,10 +120,12 @@ def read_table(path: Path, progress: Callable[[float], None] | None = None) -> T
     with path.open(encoding="utf-8-sig", errors="replace", newline="") as file:
         number, names, delimiter = _header(path, file)
         values = [array("d") for _ in names]
+        lines = array("q")
         wrong: list[int] = []
         size = max(path.stat().st_size, 1)
         read = 0
-        for line, row in enumerate(_rows(file, delimiter), number + 1):
+        for line, text in enumerate(file, number + 1):
+            row = _row(path, line, text, delimiter)
             read += sum(len(f) for f in row) + len(row) + 1
             if progress and line % _TELL_EVERY == 0:
                 progress(min(1.0, read / size))
@@ -125,9 +135,10 @@ def read_table(path: Path, progress: Callable[[float], None] | None = None) -> T
             if numbers is None or len(numbers) != len(names):
                 wrong.append(line)
                 continue
+            lines.append(line)
             for column, value in zip(values, numbers, strict=True):
                 column.append(value)
-    return _table(path, names, [np.array(v) for v in values], wrong, line_of_first=number + 1)
+    return _table(path, names, [np.array(v) for v in values], np.array(lines), wrong)
 
 
 def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
@@ -139,7 +150,7 @@ def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
         if "\0" in text or "\ufffd" in text:
             break
         delimiter = max("\t;,", key=_outside_quotes(text).count)
-        names = [n.strip() for n in next(csv.reader([text], delimiter=delimiter))]
+        names = [n.strip() for n in _row(path, number, text, delimiter)]
         if len(names) < 2:
             raise IdentificationError(
                 f"{path}:{number}: found {text[:60]!r}, allowed is a header with the names of at"
@@ -158,8 +169,13 @@ def _outside_quotes(text: str) -> str:
     return re.sub(r'"[^"]*"', "", text)
 
 
-def _rows(file: TextIO, delimiter: str) -> Iterator[list[str]]:
-    return csv.reader((line.replace("\0", "") for line in file), delimiter=delimiter)
+def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
+    """Fields of a line; of one alone, so that a quote left open swallows no others."""
+    try:
+        return next(csv.reader([line.replace("\0", "")], delimiter=delimiter), [])
+    except csv.Error as error:  # a field longer than the reader takes
+        text = f"found {error}, allowed is a table of numbers"
+        raise IdentificationError(f"{path}:{number}: {text}") from None
 
 
 def _numbers(row: list[str], delimiter: str) -> list[float] | None:
@@ -167,15 +183,16 @@ def _numbers(row: list[str], delimiter: str) -> list[float] | None:
     if delimiter != ",":
         row = [f.replace(",", ".") for f in row]
     try:
-        return [float(f) if f.strip() else float("nan") for f in row]
+        numbers = [float(f) if f.strip() else math.nan for f in row]
     except ValueError:
         return None
+    return None if any(_LARGEST < abs(n) < math.inf for n in numbers) else numbers
 
 
 def _table(
-    path: Path, names: list[str], values: list[Array], wrong: list[int], line_of_first: int
+    path: Path, names: list[str], values: list[Array], lines: Lines, wrong: list[int]
 ) -> Table:
-    count = len(values[0])
+    count = len(lines)
     notes = []
     if wrong:
         if len(wrong) * _WRONG_LINES > count + _WRONG_LINES:
@@ -183,18 +200,28 @@ def _table(
                 f"{path}:{wrong[0]}: {len(wrong)} of {count + len(wrong)} lines are not"
                 f" {len(names)} numbers; allowed is a table of numbers"
             )
-        ending = wrong == [line_of_first + count]
+        ending = len(wrong) == 1 and (not count or wrong[0] > lines[-1])
         what = "the last line is cut off and" if ending else f"{len(wrong)} lines are wrong and"
         notes.append(f"{path}:{wrong[0]}: {what} left out")
     if count < 2:
         raise IdentificationError(f"{path}: found {count} lines of numbers, allowed are more")
     columns = dict(zip(names, values, strict=True))
     time_name, factor = _time(path, columns)
-    time = (columns.pop(time_name) - values[names.index(time_name)][0]) * factor
+    time = columns.pop(time_name)
     others = {n: c for n, c in columns.items() if not _TIME.search(n)}
     if not others:
         raise IdentificationError(f"{path}: found no column but times: {', '.join(names)}")
-    return Table(path, time, others, {n: _named(n)[1] for n in others}, notes)
+    good = np.abs(time) * factor <= _LATEST_S  # which NaN is not
+    if not good.all():
+        found = f"{path}:{lines[~good][0]}: {np.count_nonzero(~good)} lines"
+        if np.count_nonzero(good) < 2:
+            text = f"of {count} have no number in column {time_name} that is a time"
+            raise IdentificationError(f"{found} {text}; allowed is a time in each line")
+        notes.append(f"{found} are without a time and left out")
+    time = time[good]
+    others = {n: c[good] for n, c in others.items()}
+    units = {n: _named(n)[1] for n in others}
+    return Table(path, (time - time[0]) * factor, others, units, notes)
 
 
 def _named(header: str) -> tuple[str, str]:

@@ -234,6 +234,10 @@ def test_stopwatch() -> None:
     assert 0.02 < period.half < 0.06
 
 
+def test_a_stopwatch_with_next_to_no_amplitude_left() -> None:
+    assert 0.9 < stopwatch(10, 23.6, 20.0, 1e-320)[1].value < 1.0
+
+
 @pytest.mark.parametrize(
     ("swings", "seconds", "first", "last", "text"),
     [

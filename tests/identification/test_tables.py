@@ -98,10 +98,46 @@ def test_some_wrong_lines_are_left_out_and_told(tmp_path: Path) -> None:
     lines = file.read_text().splitlines()
     lines[100] = "battery low"
     lines[300] = "1.0,,,"
+    lines[400] = '"' + lines[400]
     file.write_text("\n".join(lines))
+    table = read_table(file)
+    assert table.notes == [f"{file}:101: 2 lines are wrong and left out"]
+    assert len(table.time_s) == len(SWUNG) - 2
+    assert identify("slew", "", [series_of(table, "", None)]).usable
+
+
+@pytest.mark.parametrize("number", ["", "nan", "inf", "1e12"])
+@pytest.mark.parametrize("at", [2, 700, 1501])
+def test_a_line_without_a_time_is_left_out_and_told(tmp_path: Path, at: int, number: str) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[at - 1] = number + "," + lines[at - 1].partition(",")[2]
+    file.write_text("\n".join([*lines, ""]))
+    table = read_table(file)
+    assert table.notes == [f"{file}:{at}: 1 lines are without a time and left out"]
+    assert table.time_s[0] == 0.0
+    finding = identify("slew", "", [series_of(table, "", None)])
+    assert finding.usable, finding.poor
+
+
+def test_a_value_that_none_can_be_makes_a_line_wrong(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[100] = lines[100].rpartition(",")[0] + ",1e308"
+    file.write_text("\n".join([*lines, ""]))
     table = read_table(file)
     assert table.notes == [f"{file}:101: 1 lines are wrong and left out"]
     assert identify("slew", "", [series_of(table, "", None)]).usable
+
+
+def test_a_gyroscope_with_an_empty_column(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    header, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([header, *(row.rpartition(",")[0] + "," for row in rows), ""]))
+    assert identify("slew", "", [series_of(read_table(file), "", None)]).usable
+    file.write_text("\n".join([header, *(row.partition(",")[0] + ",,," for row in rows), ""]))
+    with pytest.raises(IdentificationError, match=r"a\.csv: found no number in Gyroscope x"):
+        series_of(read_table(file), "", None)
 
 
 def test_a_clock_that_goes_back(tmp_path: Path) -> None:
@@ -128,6 +164,15 @@ WRONG = {
         "are not 2 numbers",
     ),
     "bytes": ("\0\1\2,\0", "found no text"),
+    "an endless field": (
+        "time (s),x\n0.0,1.0\n0.1," + "2" * 140_000,
+        ":3: found field larger than field limit (131072), allowed is a table of numbers",
+    ),
+    "an endless header": ("a," + "b" * 140_000, ":1: found field larger than field limit"),
+    "times of no clock": (
+        "time (s),x\n" + "1e12,1.0\n" * 50,
+        ":2: 50 lines of 50 have no number in column time (s) that is a time",
+    ),
     "no unit of time": ("time,x\n0.0,1.0\n1e12,2.0\n", "which are no sampling in s, ms"),
 }
 
