@@ -103,18 +103,18 @@ def damaged(bundle: Path, signature: bytes, at: int, value: bytes) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("signature", "at", "value", "found"),
+    ("damage", "found"),
     [
-        (b"PK\x01\x02", 8, b"\x01", "RuntimeError .* is encrypted"),
-        (b"PK\x01\x02", 10, b"\x63", "NotImplementedError"),
-        (b"PK\x03\x04", 30 + len("history.txt"), b"\xff" * 4, "error Error -3 while"),
+        ((b"PK\x01\x02", 8, b"\x01"), "RuntimeError .* is encrypted"),
+        ((b"PK\x01\x02", 10, b"\x63"), "NotImplementedError"),
+        ((b"PK\x03\x04", 30 + len("history.txt"), b"\xff" * 4), "error Error -3 while"),
     ],
     ids=["encrypted", "compressed in an unknown way", "damaged"],
 )
 def test_a_member_that_cannot_be_read_is_told(
-    machine: Path, tmp_path: Path, signature: bytes, at: int, value: bytes, found: str
+    machine: Path, tmp_path: Path, damage: tuple[bytes, int, bytes], found: str
 ) -> None:
-    bundle = damaged(packed(machine, tmp_path), signature, at, value)
+    bundle = damaged(packed(machine, tmp_path), *damage)
     with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: found {found}"):
         unpack(bundle, tmp_path / "there")
 
