@@ -25,11 +25,16 @@ class Reckons(Protocol):
 
 
 def stall_ns(deployment: Deployment) -> int:
-    """Time after which what waits in the sockets must not look fresh: the shortest age limit."""
-    inputs = [lever.config.timeout_ms for lever in deployment.levers.values()]
+    """Longest standstill of the loop, in ns, after which an axis in motion may go on.
+
+    After the shortest age limit of an input, what waits in the sockets must not look fresh; after
+    the shortest timeout of a valve, that valve has closed, and would get full speed in one step.
+    """
+    limits = [lever.config.timeout_ms for lever in deployment.levers.values()]
+    limits += [axis.config.valve.timeout_ms for axis in deployment.axes.values()]
     if deployment.emergency_stop:
-        inputs.append(deployment.emergency_stop.config.timeout_ms)
-    return min(inputs) * 1_000_000
+        limits.append(deployment.emergency_stop.config.timeout_ms)
+    return min(limits) * 1_000_000
 
 
 def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int) -> int:
