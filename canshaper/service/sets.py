@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from canshaper.can.deployment import BoundAxis
+from canshaper.can.filters import parameter_sets
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel
 from canshaper.service.value import ValueInput
@@ -87,9 +88,5 @@ def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[Para
     parts: dict[str, AxisConfig | Feel] = {"": config, **config.feels}
     for name, part in parts.items():
         base = ParameterSet(0.0, mode, part.filter.kind, part.filter.parameters())
-        sets = [
-            ParameterSet(one.at, one.sway.mode(), one.filter.kind, one.filter.parameters())
-            for one in part.sets
-        ]
-        found[name] = (base, sets)
+        found[name] = (base, parameter_sets(part.sets))
     return found

@@ -163,6 +163,44 @@ def test_the_status_tells_it_where_there_is_a_signal(chosen: Rig) -> None:
     assert sent["SlewStatus"]["ActiveSet"] == 2
 
 
+@pytest.mark.parametrize(
+    "sway",
+    [
+        "length_m: 30, mass_kg: 300, damping_nms: 270000",  # period 22.6 s
+        "period_s: 12, damping_ratio: 0.449",  # 12.000000000000002 s
+    ],
+)
+def test_between_two_sets_of_a_very_slow_swing_the_loop_goes_on(
+    changed_rig: Make, sway: str
+) -> None:
+    sets = SETS.replace("period_s: 2.3, damping_ratio: 0.04", sway)
+    sets = sets.replace("period_s: 2.9, damping_ratio: 0.05", sway)
+    rig = changed_rig(yaml={**YAML, SLEW: SLEW + sets}, dbc=DBC)
+    rig.run(3)
+    rig.receive(load(1000))
+    rig.run(20, Slew=900)
+    slow, full = period_s(rig), poles(rig)
+    rig.receive(load(500))
+    rig.run(10, Slew=900)
+    assert period_s(rig) == pytest.approx(slow)
+    assert max(poles(rig)) < max(full)
+    assert rig.controller.axes["slew"].axis.sent > 0.0
+
+
+def test_what_cannot_run_between_two_sets_is_told(changed_rig: Make) -> None:
+    """Taps may miss the sum 1 by a thousandth; between two such, rounding can make it more."""
+    one = "kind: robust, tick_ms: 20, taps: [0.056, 0.87, 0.075]"
+    two = "kind: robust, tick_ms: 20, taps: [0.57, 0.2, 0.231]"
+    slew = SLEW.replace("kind: gff, a1: 0.708, a2: 0.12", one)
+    sets = SETS.partition("    feels:")[0].replace("kind: gff, a1: 0.7, a2: 0.12", one)
+    changed = {**YAML, SLEW: slew + sets.replace("kind: gff, a1: 0.9, a2: 0.2", two)}
+    with pytest.raises(DeploymentError) as caught:
+        changed_rig(yaml=changed, dbc=DBC)
+    (problem,) = caught.value.problems
+    text = "axes.slew.sets: at 31.25, between two sets: sum of the taps is 1.001, allowed is 1"
+    assert text in str(problem)
+
+
 def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
     chosen.receive(load(0))
     chosen.run(200, Slew=900)
