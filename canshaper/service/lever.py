@@ -23,6 +23,7 @@ class LeverInput(Input):
         self._changed_ns: dict[str, int] = {}
         self._released_ns = -1
         self._released = False
+        self._doubted_ns = -1  # when it was seen released in a frame that does not count
 
     def heard(
         self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
@@ -35,6 +36,8 @@ class LeverInput(Input):
         if enable == 0:
             self._released_ns = now_ns
             self._released = True
+            if not counts:
+                self._doubted_ns = now_ns
         elif counts:
             self._released = False
         if not counts:
@@ -68,20 +71,22 @@ class LeverInput(Input):
             released = self._released_ns > since_ns or (
                 self._released and lost is Reason.STICK_UNTRUSTED
             )
-            return StickInput(fault=None if released else lost, enabled=not released, trip=trip)
+            # What the switches did meanwhile is not known; one that is held was not pressed.
+            return StickInput(fault=lost, enabled=not released, reset=True, trip=trip)
         raw = self.raw
         command = self.commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
-        enable = 0 if released else raw[self._enable]
-        if type(command) is Reason:
-            fault: Reason | None = command
+        enable = raw[self._enable]
+        if released and enable != 0 and (self._released or self._doubted_ns > since_ns):
+            fault: Reason | None = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
+        elif type(command) is Reason:
+            fault = command
         elif enable not in (0, 1):
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.STICK_FROZEN
         else:
-            return _new(StickInput, (command, None, enable == 1, bypass, reset, trip))
-        if enable == 0:
-            return StickInput(enabled=False, bypass=bypass, trip=trip)
-        return StickInput(fault=fault, bypass=bypass, trip=trip)
+            enabled = enable == 1 and not released
+            return _new(StickInput, (command, None, enabled, bypass, reset, trip))
+        return StickInput(0.0, fault, enable != 0 and not released, bypass, reset, trip)

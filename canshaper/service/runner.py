@@ -141,9 +141,9 @@ class AxisRunner:
         self._ticked_ns = now_ns
         # A release is more than a fault.
         if fault is not None and (stick.enabled or self.axis.neutral):
-            stick = StickInput(fault=fault, trip=trip)
+            stick = StickInput(fault=fault, reset=stick.reset, trip=trip)
         if overrun and stick.enabled and stick.fault is None:
-            stick = StickInput(fault=Reason.LOOP_OVERRUN, trip=stick.trip)
+            stick = StickInput(fault=Reason.LOOP_OVERRUN, reset=stick.reset, trip=stick.trip)
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self.compensator is not None:

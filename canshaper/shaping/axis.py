@@ -29,6 +29,8 @@ MOST_OWED = 0.1
 
 # A member by way of its class takes ten times as long as a name, and a tick looks at many.
 NEUTRAL_WAIT, READY, ACTIVE, BYPASS_ON, STOPPING, TRIPPED = State
+# Faults with which the switches are not known either: enable counts as held.
+NOTHING_KNOWN = (Reason.STICK_TIMEOUT, Reason.STICK_UNTRUSTED)
 
 
 class Axis:
@@ -202,8 +204,9 @@ class Axis:
             centred = abs(command) <= self._neutral_band
             pressed = (reset and not self._was_reset) or (enabled and not self._was_enabled)
             self._was_reset, self._was_enabled = reset, enabled
-        elif reset:  # a switch that is held while its frames fail is no new press
-            self._was_reset = True
+        else:  # a switch that is held while its frames fail is no new press
+            self._was_reset = self._was_reset or reset
+            self._was_enabled = enabled or fault in NOTHING_KNOWN
 
         if trip is not None:
             if state is not TRIPPED:
@@ -221,7 +224,7 @@ class Axis:
 
     def _wait(self, stick: StickInput, centred: bool) -> None:
         if stick.fault is not None:
-            self.reason = stick.fault
+            self.reason = stick.fault if stick.enabled else Reason.ENABLE_OFF
         elif not centred:
             self.reason = Reason.STICK_NOT_NEUTRAL
         elif not stick.enabled:
@@ -230,10 +233,10 @@ class Axis:
             self._go(READY, Reason.STICK_NEUTRAL)
 
     def _ready(self, stick: StickInput, centred: bool, added: float) -> None:
-        if stick.fault is not None:
-            self._go(NEUTRAL_WAIT, stick.fault)
-        elif not stick.enabled:
+        if not stick.enabled:
             self._go(NEUTRAL_WAIT, Reason.ENABLE_OFF)
+        elif stick.fault is not None:
+            self._go(NEUTRAL_WAIT, stick.fault)
         elif not centred:
             if stick.bypass:
                 self._go(BYPASS_ON, Reason.BYPASS_REQUESTED)
@@ -243,11 +246,11 @@ class Axis:
             self._go(ACTIVE, Reason.COMPENSATING)
 
     def _moving(self, stick: StickInput, centred: bool, added: float) -> None:
-        if stick.fault is not None:
+        if not stick.enabled:
+            self._go(TRIPPED, Reason.ENABLE_LOST)
+        elif stick.fault is not None:
             self._stopping = 0
             self._go(STOPPING, stick.fault)
-        elif not stick.enabled:
-            self._go(TRIPPED, Reason.ENABLE_LOST)
         elif centred and not added and self._at_rest():
             self._go(READY, Reason.AT_REST)
         elif stick.bypass:
@@ -257,7 +260,7 @@ class Axis:
             self._go(ACTIVE, Reason.BYPASS_RELEASED)
 
     def _stop(self, stick: StickInput) -> None:
-        if stick.fault is None and not stick.enabled:
+        if not stick.enabled:
             self._go(TRIPPED, Reason.ENABLE_LOST)
             return
         self._stopping += 1

@@ -76,10 +76,10 @@ class StickInput(NamedTuple):
     Attributes:
         command: stick in [-1, 1]; not looked at while ``fault`` is set.
         fault: why the stick (or a switch it needs) cannot be used; None when fresh and valid.
-        enabled: enable switch; not looked at while ``fault`` is set, so that a lost frame gives
-            a shaped stop and a released switch an immediate one.
+        enabled: False where the enable switch was seen released, be the stick as it may: a lost
+            frame gives a shaped stop, and a released switch an immediate one.
         bypass: the operator asks for the unshaped stick.
-        reset: reset switch (its rising edge counts).
+        reset: reset switch (its rising edge counts); True while it is not known.
         trip: a cause for neutral at once that is there now.
     """
 

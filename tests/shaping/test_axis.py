@@ -147,11 +147,11 @@ def test_a_stick_that_comes_back_in_a_stop_has_to_be_seen_neutral(drive: Drive) 
     drive.to_ready()
 
 
-def test_enable_is_not_looked_at_in_a_lost_frame(drive: Drive) -> None:
+def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:
     drive.moving()
-    drive.tick(StickInput(fault=Reason.STICK_TIMEOUT, enabled=False))
+    drive.tick(StickInput(fault=Reason.STICK_TIMEOUT))
     assert drive.state is State.STOPPING
-    drive.tick(StickInput(enabled=False))
+    drive.tick(StickInput(fault=Reason.STICK_TIMEOUT, enabled=False))
     assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.ENABLE_LOST)
     assert drive.axis.raw == 0
 
@@ -225,6 +225,10 @@ RESET = StickInput(reset=True)
         [StickInput(fault=Reason.STICK_TIMEOUT, reset=True), RESET, RESET],  # pressed then
         [StickInput(0.8, enabled=False), StickInput(0.8), CENTRED],
         [StickInput(fault=Reason.STICK_TIMEOUT, enabled=False), CENTRED],  # enable unknown
+        [StickInput(fault=Reason.STICK_UNTRUSTED, enabled=False), CENTRED],
+        [StickInput(enabled=False), StickInput(fault=Reason.STICK_TIMEOUT), CENTRED],
+        [StickInput(enabled=False), StickInput(fault=Reason.STICK_ERROR), CENTRED],  # held since
+        [StickInput(fault=Reason.SWITCH_INVALID, reset=True), RESET],
     ],
 )
 def test_no_way_out_of_a_trip(drive: Drive, inputs: list[StickInput]) -> None:
@@ -240,6 +244,8 @@ def test_no_way_out_of_a_trip(drive: Drive, inputs: list[StickInput]) -> None:
         [RESET],
         [StickInput(reset=True, enabled=False)],
         [StickInput(enabled=False), CENTRED],
+        # off in a frame that tells it, though its stick is not available
+        [StickInput(fault=Reason.STICK_NOT_AVAILABLE, enabled=False), CENTRED],
         [StickInput(0.8, reset=True), CENTRED, RESET],  # a second edge
         [StickInput(fault=Reason.STICK_TIMEOUT), CENTRED, RESET],  # off before, seen off after
         [CENTRED, StickInput(fault=Reason.STICK_TIMEOUT), RESET],

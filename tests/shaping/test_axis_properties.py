@@ -241,8 +241,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
             assert reset or (stick.enabled and not self.enabled_before)
         held = self.reset_before and stick.fault is not None
         self.reset_before = stick.reset or held
-        if stick.fault is None:
-            self.enabled_before = stick.enabled
+        unknown = stick.fault in (Reason.STICK_TIMEOUT, Reason.STICK_UNTRUSTED)
+        self.enabled_before = stick.enabled or unknown
         self.stop_from = self.stop_from if old is State.STOPPING else self.now
         ended = self.now - self.stop_from >= self.stop
         assert not ended or axis.state is not State.STOPPING

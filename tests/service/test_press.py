@@ -1,0 +1,59 @@
+"""What is no press of reset or enable: nobody touched a switch, and a trip must stay."""
+
+from canshaper.can.frame import Frame
+from canshaper.shaping.states import State
+from tests.service.conftest import Rig
+
+
+def tripped(rig: Rig, **switches: int) -> Rig:
+    """Latched by a frame that was not sent, with the stick back in neutral."""
+    rig.run(3, **switches)
+    rig.run(10, Slew=1000, **switches)
+    rig.controller.send_failed(Frame("crane", 0x200, False, bytes(2)))
+    rig.run(1, Slew=1000, **switches)
+    rig.run(5, **switches)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
+    return rig
+
+
+def test_a_reset_that_was_pressed_while_another_switch_is_broken(rig: Rig) -> None:
+    tripped(rig).run(10, Enable=2, Reset=1)
+    rig.run(5, Reset=1)
+    assert rig.state() is State.TRIPPED
+    rig.run(1)
+    rig.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def test_a_reset_that_was_pressed_in_silence(rig: Rig) -> None:
+    tripped(rig)
+    for _ in range(20):
+        rig.tick()
+    rig.run(5, Reset=1)
+    assert rig.state() is State.TRIPPED
+
+
+def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
+    """A glitch, or somebody else with the lever's id."""
+    tripped(rig)
+    count = rig.counts["LeverLeft"]
+    rig.counts["LeverLeft"] = (count + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    rig.counts["LeverLeft"] = count
+    rig.tick()
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
+def test_a_reset_that_is_stuck_and_an_enable_off_beside_a_broken_stick(rig: Rig) -> None:
+    tripped(rig, Reset=1).run(1, Slew=32766, Enable=0, Reset=1)
+    rig.run(2, Enable=0, Reset=1)
+    assert rig.state() is State.TRIPPED
+
+
+def test_an_enable_that_comes_back_with_the_measurement_of_its_stick_is_one(rig: Rig) -> None:
+    """A joystick that has no measurement while it is not enabled."""
+    tripped(rig).run(5, Slew=32767, Enable=0)
+    assert rig.state() is State.TRIPPED
+    rig.run(1)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
