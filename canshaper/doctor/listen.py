@@ -8,11 +8,13 @@ from collections.abc import Callable
 from itertools import pairwise
 
 from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput
 from canshaper.can.raw import CAN_FRAME
 from canshaper.can.socketcan import open_sockets
 from canshaper.doctor.figures import summary
 from canshaper.doctor.finding import Finding, Level
+from canshaper.service.finder import InputFinder
 
 # asm/socket.h: the time of reception by the kernel, so that our own lateness does not count.
 SO_TIMESTAMPNS = 35
@@ -36,7 +38,9 @@ def listen(
     Raises:
         OSError: an interface cannot be opened.
     """
-    names = {bound.key: name for name, bound in inputs_of(deployment).items()}
+    inputs = inputs_of(deployment)
+    names = {bound.key: name for name, bound in inputs.items()}
+    finder = InputFinder(deployment.config.buses, inputs.values())
     heard: dict[str, list[int]] = {}
     sockets: dict[socket.socket, str] = {}
     try:
@@ -52,30 +56,29 @@ def listen(
             tell(passed)
             ready, _, _ = select.select(list(sockets), [], [], min(LOOK_S, seconds - passed))
             for one in ready:
-                _take(one, sockets[one], names, heard)
+                if taken := _next(one, sockets[one]):
+                    frame, time_ns = taken
+                    if bound := finder.find(frame, time_ns):
+                        heard[names[bound.key]].append(time_ns)
     finally:
         for one in sockets:
             one.close()
     return heard
 
 
-def _take(
-    one: socket.socket,
-    bus: str,
-    names: dict[tuple[str, int, bool], str],
-    heard: dict[str, list[int]],
-) -> None:
-    """The next frame of a socket."""
-    data, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, 128)
-    word = CAN_FRAME.unpack(data)[0]
-    key = bus, word & socket.CAN_EFF_MASK, bool(word & socket.CAN_EFF_FLAG)
-    name = names.get(key)
-    if name is None or word & (socket.CAN_ERR_FLAG | socket.CAN_RTR_FLAG):
-        return
+def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
+    """The next data frame of a socket and when the kernel received it, ns; None for another one."""
+    packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, 128)
+    word, length, data = CAN_FRAME.unpack(packet)
+    if word & (socket.CAN_ERR_FLAG | socket.CAN_RTR_FLAG):
+        return None
+    extended = bool(word & socket.CAN_EFF_FLAG)
+    frame = Frame(bus, word & socket.CAN_EFF_MASK, extended, data[:length])
     for level, kind, value in ancillary:
         if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
             seconds, ns = _STAMP.unpack(value[: _STAMP.size])
-            heard[name].append(seconds * 1_000_000_000 + ns)
+            return frame, seconds * 1_000_000_000 + ns
+    return None
 
 
 def heard_findings(deployment: Deployment, heard: dict[str, list[int]]) -> list[Finding]:

@@ -8,9 +8,12 @@ import numpy as np
 
 from canshaper.can.codecs import WrongLengthError
 from canshaper.can.deployment import BoundAxis, Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundLever
 from canshaper.can.layout import Layout
 from canshaper.identification.driven import STANDS
 from canshaper.identification.series import Array, Command
+from canshaper.service.finder import InputFinder
 
 # Silence of a command's message after which nothing is known of the command, s.
 _SILENT_S = 2.0
@@ -38,7 +41,6 @@ class Commands:
 
     def __init__(self, deployment: Deployment | None) -> None:
         self._axes = dict(deployment.axes) if deployment else {}
-        self._levers = dict(deployment.levers) if deployment else {}
         self._valves: dict[str, Samples] = {n: Samples() for n in self._axes}
         self._sticks: dict[str, Samples] = {n: Samples() for n in self._axes}
         self._by_valve: dict[tuple[int, bool], list[BoundAxis]] = {}
@@ -48,7 +50,9 @@ class Commands:
             self._by_valve.setdefault(key, []).append(bound)
             self._layouts[key] = Layout(bound.valve_message), bound.valve_message.length
         self._curves = {n: a.config.limits.curve() for n, a in self._axes.items()}
-        self._by_lever = {lever.key[1:]: lever for lever in self._levers.values()}
+        levers = list(deployment.levers.values()) if deployment else []
+        self._lever_buses = {lever.key[0] for lever in levers}
+        self._finder = InputFinder(deployment.config.buses if deployment else {}, levers)
 
     def take(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
         """Take a frame."""
@@ -62,18 +66,21 @@ class Commands:
                         part = steps / bound.valve.steps
                         speed = self._speed(bound, part)
                         self._valves[bound.name].add(time_s, speed)
-        lever = self._by_lever.get(key)
-        if lever:
-            try:
-                _, sticks = lever.codec.decode(data)
-            except WrongLengthError:
-                return
-            for name, bound in self._axes.items():
-                stick = bound.config.stick
-                value = sticks.get(stick.signal) if stick.lever == lever.name else None
-                if type(value) is float:
-                    moved = abs(value) > stick.neutral_pct / 100.0
-                    self._sticks[name].add(time_s, value if moved else 0.0)
+        for bus in self._lever_buses:  # which one a channel of the log is, nobody has said
+            if lever := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
+                self._take_lever(lever, time_s, data)
+
+    def _take_lever(self, lever: BoundLever, time_s: float, data: bytes) -> None:
+        try:
+            _, sticks = lever.codec.decode(data)
+        except WrongLengthError:
+            return
+        for name, bound in self._axes.items():
+            stick = bound.config.stick
+            value = sticks.get(stick.signal) if stick.lever == lever.name else None
+            if type(value) is float:
+                moved = abs(value) > stick.neutral_pct / 100.0
+                self._sticks[name].add(time_s, value if moved else 0.0)
 
     def _speed(self, bound: BoundAxis, command: float) -> float:
         """Speed that the valve gives by the limits of its axis, part of full."""

@@ -4,10 +4,11 @@ from collections import Counter, deque
 from dataclasses import dataclass, field
 
 from canshaper.can.deployment import Deployment
-from canshaper.can.j1939 import group_of
+from canshaper.can.frame import Frame
 from canshaper.capture.history import History, Told
 from canshaper.capture.listen import Heard
 from canshaper.capture.sorting import Key
+from canshaper.service.finder import InputFinder
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000
@@ -78,14 +79,11 @@ class Monitor:
         self.events: deque[Told] = deque(maxlen=MOST_EVENTS)
         self.others: Counter[str] = Counter()
         self.messages: dict[Key, MessageRate] = {}
-        self._groups: dict[tuple[str, int], MessageRate] = {}
+        self._finder = InputFinder(deployment.config.buses, deployment.inputs())
         self._buses = {name: MessageRate(name, None) for name in deployment.config.buses}
         self._seen = 0
         for bound in deployment.inputs():
-            rate = MessageRate(bound.message.name, bound.message.cycle_time)
-            self.messages[bound.key] = rate
-            if bound.any_source:
-                self._groups[bound.key[0], group_of(bound.key[1])] = rate
+            self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
         for axis in deployment.axes.values():
             message = axis.valve_message
             key = axis.valve.message.sender.key
@@ -106,9 +104,8 @@ class Monitor:
             self.others[frame.kind] += 1
             return
         key = (frame.bus, frame.can_id, frame.extended)
-        rate = self.messages.get(key)
-        if rate is None and frame.extended:
-            rate = self._groups.get((frame.bus, group_of(frame.can_id)))
+        bound = self._finder.find(Frame(*key, frame.data), frame.time_ns)
+        rate = self.messages.get(bound.key if bound else key)
         if rate is not None:
             rate.take(frame.time_ns)
         self.history.take(frame)

@@ -1,15 +1,23 @@
 """What was heard of the levers, against their cycle and their timeout."""
 
+import os
+import socket
+import struct
 from collections.abc import Iterable
 from itertools import accumulate
 from pathlib import Path
+from typing import Any
 
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.frame import Frame
+from canshaper.can.raw import CAN_FRAME
+from canshaper.doctor import listen as listening
 from canshaper.doctor.finding import Finding, Level
-from canshaper.doctor.listen import heard_findings
-from tests.doctor.conftest import SHIPPED
+from canshaper.doctor.listen import SO_TIMESTAMPNS, heard_findings
+from tests.doctor.conftest import ROOT, SHIPPED
+from tests.service.j1939_rig import bjm
 
 MS = 1_000_000
 DEPLOYMENT = load_deployment(SHIPPED)  # cycle 20 ms, timeout 100 ms
@@ -60,3 +68,49 @@ def test_other_buses_are_not_listened_to(two_buses: Path) -> None:
         ("lever right", Level.NOTE),
         ("emergency stop", Level.NOTE),
     ]
+
+
+class Packets:
+    """A socket with frames of every 20 ms, and something to read as long as there is one."""
+
+    def __init__(self, frames: list[tuple[Frame, int]]) -> None:
+        self._frames = frames
+        self._end, other = os.pipe()
+        os.close(other)
+
+    def fileno(self) -> int:
+        return self._end
+
+    def setsockopt(self, *_options: int) -> None:
+        """It always tells the time."""
+
+    def recvmsg(self, *_sizes: int) -> tuple[bytes, list[tuple[int, int, bytes]], int, None]:
+        if not self._frames:
+            return CAN_FRAME.pack(socket.CAN_ERR_FLAG, 8, bytes(8)), [], 0, None
+        frame, flags = self._frames.pop(0)
+        flags |= socket.CAN_EFF_FLAG if frame.extended else 0
+        packet = CAN_FRAME.pack(frame.can_id | flags, len(frame.data), frame.data)
+        stamp = struct.pack("=qq", 0, 1_000_000_000 - 5 * MS * len(self._frames))
+        return packet, [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], 0, None
+
+    def close(self) -> None:
+        os.close(self._end)
+
+
+def test_levers_of_j1939_are_heard_from_whatever_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = []
+    for _ in range(20):
+        frames += [(bjm("BJM1", 0x33, 6), 0), (bjm("BJM2", 0x34), 0)]
+        frames += [(bjm("BJM1", 0x35), 0), (bjm("BJM1", 0x33), socket.CAN_RTR_FLAG)]
+
+    def sockets(*_names: Any) -> list[Packets]:
+        return [Packets(frames)]
+
+    monkeypatch.setattr(listening, "open_sockets", sockets)
+    deployment = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+    heard = listening.listen(deployment, 0.1, lambda _passed: None)
+    assert {name: len(times) for name, times in heard.items()} == {
+        "lever left": 20,
+        "lever right": 20,
+    }
+    assert {f.level for f in heard_findings(deployment, heard)} == {Level.OK}

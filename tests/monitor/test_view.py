@@ -2,6 +2,7 @@
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from rich.console import Console
@@ -13,6 +14,7 @@ from canshaper.cli.common import loader
 from canshaper.monitor.state import Monitor
 from canshaper.monitor.view import bar, screen, status_line
 from canshaper.shaping.states import Reason, State
+from tests.service.j1939_rig import bjm
 
 NOW = 1_763_750_000_000_000_000
 MS = 1_000_000
@@ -51,6 +53,27 @@ def told(
     ]
     assert deployment.status
     return [*frames, heard(deployment.status.frame(COUNTERS), time_ns)]
+
+
+def j1939(source: str, folder: Path) -> Deployment:
+    """The machine of J1939, its left joystick with another line."""
+    file = loader("j1939-forwarder.yaml")().path
+    lines = file.read_text(encoding="utf-8").replace("../dbc/", f"{file.parents[1]}/dbc/")
+    (folder / "machine.yaml").write_text(
+        lines.replace("    message: BJM1\n", f"    message: BJM1\n{source}"), encoding="utf-8"
+    )
+    return loader(str(folder / "machine.yaml"))()
+
+
+@pytest.mark.parametrize("source", ["", "    source: 0x33\n"])
+def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: str) -> None:
+    deployment = j1939(source, tmp_path)
+    monitor = Monitor(deployment)
+    for n, priority in enumerate((3, 6, 0)):
+        monitor.take(heard(bjm("BJM1", 0x33, priority), NOW + n * MS))
+    monitor.take(heard(bjm("BJM1", 0x35), NOW + 9 * MS))
+    rate = monitor.messages[deployment.levers["left"].key]
+    assert (len(rate.times), rate.last_ns) == (3, NOW + 2 * MS)
 
 
 def text(monitor: Monitor, now_ns: int, width: int = 80, height: int = 24) -> list[str]:
