@@ -1,6 +1,7 @@
 """``canshaper record``: a log of the buses, and a bundle to attach to a report."""
 
 import signal
+import tempfile
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -36,8 +37,9 @@ def record(
     what the status messages told. `canshaper replay BUNDLE` replays it. Begin before what is to be
     seen, best before the daemon starts: what an axis did before is not in the log.
 
-    Ctrl-C or SIGTERM end it. Exit code 0, 1 when the bundle or the log cannot be written, 2 when
-    the deployment is wrong, 3 when a bus cannot be opened or read.
+    Ctrl-C or SIGTERM end it. Exit code 0, also when nothing was heard, which is told; 1 when the
+    bundle or the log cannot be written, 2 when the deployment is wrong, 3 when a bus cannot be
+    opened or read.
 
     Examples:
 
@@ -54,7 +56,6 @@ def record(
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", ".log"):
         raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
-    log = out if out.suffix == ".log" else out.with_suffix(".log")
     try:
         deployment = loader(file, interface, channel)()
     except DeploymentError as error:
@@ -64,26 +65,43 @@ def record(
     failure: Exception | None = None
     code = EXIT_NO_BUS
     stop = _Stop()
+    log = out
     try:
+        log = out if out.suffix == ".log" else _beside(out)
         with Live(console=console, refresh_per_second=4) as live:
 
             def tell(so_far: "Recording") -> bool:
-                live.update(_line(so_far, log))
+                live.update(_line(so_far, out))
                 return not stop.asked
 
             recording.run(log, seconds, tell)
-            live.update(_line(recording, log))
+            live.update(_line(recording, out))
     except BusError as error:
         failure = error
     except OSError as error:
         failure, code = ValueError(f"{log}: {error.strerror or error}"), EXIT_NOT_WRITTEN
-    if recording.frames and out != log:  # what there is is worth having, whatever came then
-        _bundle(deployment, recording, log, out, failure)
+    if out != log:
+        if recording.frames or failure is None:  # what there is is worth having, whatever came then
+            _bundle(deployment, recording, log, out, failure)
+        log.unlink()
     if failure is not None:
         raise fail(failure, code)
     if not recording.frames:
-        typer.echo("nothing was heard: is the bus up, and the machine on?", err=True)
+        text = f"nothing was heard, {out} is without frames: is the bus up, and the machine on?"
+        typer.echo(text, err=True)
     typer.echo(f"{out}: {_text(recording)}")
+
+
+def _beside(out: Path) -> Path:
+    """A new log beside a bundle, such as drive.x2k9.log: drive.log may be another recording.
+
+    Raises:
+        OSError: it cannot be made.
+    """
+    with tempfile.NamedTemporaryFile(
+        dir=out.parent, prefix=f"{out.stem}.", suffix=".log", delete=False
+    ) as log:
+        return Path(log.name)
 
 
 def _bundle(
@@ -93,7 +111,7 @@ def _bundle(
     out: Path,
     failure: Exception | None,
 ) -> None:
-    """Put everything into one file; the log goes once it is in there."""
+    """Put everything into one file."""
     from canshaper.capture.bundle import pack
 
     facts = {
@@ -107,7 +125,6 @@ def _bundle(
     except OSError as error:
         text = f"{error.filename or out}: {error.strerror or error}; the log is {log}"
         raise fail(ValueError(text), EXIT_NOT_WRITTEN) from None
-    log.unlink()
 
 
 class _Stop:
@@ -123,8 +140,8 @@ class _Stop:
         signal.signal(number, signal.SIG_DFL)
 
 
-def _line(recording: "Recording", log: Path) -> str:
-    return f"recording to {log}: {_text(recording)} (Ctrl-C ends it)"
+def _line(recording: "Recording", out: Path) -> str:
+    return f"recording to {out}: {_text(recording)} (Ctrl-C ends it)"
 
 
 def _text(recording: "Recording") -> str:

@@ -16,6 +16,7 @@ import can
 import pytest
 from typer.testing import CliRunner
 
+from canshaper.capture.bundle import unpack
 from canshaper.capture.listen import Listener
 from canshaper.capture.record import Recording
 from canshaper.cli.app import app
@@ -72,17 +73,22 @@ def test_what_a_daemon_does_is_recorded_and_replayed_to_the_last_bit(tmp_path: P
 
 def test_the_command_makes_a_bundle_and_ends_with_ctrl_c(tmp_path: Path) -> None:
     out = tmp_path / "bundle.zip"
+    mine = tmp_path / "bundle.log"
+    mine.write_text("another recording\n")
     with (
         running("operator", log=tmp_path / "operator"),
         running("record", "--out", str(out), log=tmp_path / "record") as record,
     ):
-        log, until = out.with_suffix(".log"), time.monotonic() + ANSWER_S
-        while not log.exists() or log.stat().st_size < 10_000:  # 170 lines
+        until = time.monotonic() + ANSWER_S
+        while (
+            sum(log.stat().st_size for log in tmp_path.glob("bundle.*.log")) < 10_000
+        ):  # 170 lines
             assert time.monotonic() < until, (tmp_path / "record").read_text()
             time.sleep(0.05)
         record.send_signal(signal.SIGINT)
         assert record.wait(ANSWER_S) == 0, (tmp_path / "record").read_text()
-    assert not log.exists()
+    assert sorted(tmp_path.glob("bundle*")) == [mine, out]
+    assert mine.read_text() == "another recording\n"
     with zipfile.ZipFile(out) as bundle:
         about = json.loads(bundle.read("about.json"))
         rows = bundle.read("recording.log").decode().splitlines()
@@ -97,6 +103,24 @@ def test_a_bus_that_cannot_be_opened_ends_with_3(tmp_path: Path) -> None:
     result = CliRunner().invoke(app, [*arguments, "--out", str(tmp_path / "x.zip")])
     assert result.exit_code == 3
     assert "bus crane: cannot open nothing channel x" in result.output
+    assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize("name", ["none.zip", "none.log"])
+def test_a_silent_bus_gives_a_file_without_frames(tmp_path: Path, name: str) -> None:
+    out = tmp_path / name
+    result = CliRunner().invoke(
+        app, ["record", "forwarder.yaml", *BUS, "--seconds", "0.2", "--out", str(out)]
+    )
+    assert result.exit_code == 0, result.output
+    assert f"nothing was heard, {out} is without frames: is the bus up" in result.output
+    assert ", 0 frames" in result.output
+    assert list(tmp_path.iterdir()) == [out]
+    log = out
+    if out.suffix == ".zip":
+        log, _ = unpack(out, tmp_path / "there")
+        assert json.loads((tmp_path / "there" / "about.json").read_text())["frames"] == {}
+    assert log.read_text() == ""
 
 
 def test_a_log_that_cannot_be_written_ends_with_1(tmp_path: Path) -> None:
