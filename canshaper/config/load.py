@@ -15,6 +15,8 @@ from canshaper.config.source import DeploymentError, Place, Problem, Source
 
 _S = TypeVar("_S", bound=Section)
 
+_UNIONS = (Union, types.UnionType)
+
 _WORDS = {
     str: "text (in quotes where it looks like a number)",
     bool: "true or false",
@@ -104,7 +106,7 @@ class _Place:
             field = self._type.model_fields.get(str(part))
             self.description = field.description or "" if field else ""
             self._is(field.annotation if field else None, field)
-        elif sections and get_origin(self._type) is not dict:  # filters, told apart by their kind
+        elif sections and get_origin(self._type) in _UNIONS:  # filters, told apart by their kind
             self._is(next(s for s in sections if part in _kinds(s)))
         elif arguments and part != "[key]":
             self.path += (part,)
@@ -119,7 +121,7 @@ class _Place:
             if get_origin(annotation) is Annotated:
                 self._metadata += arguments[1:]
                 annotation = arguments[0]
-            elif get_origin(annotation) in (Union, types.UnionType) and len(some) == 1:
+            elif get_origin(annotation) in _UNIONS and len(some) == 1:
                 annotation = some[0]
             else:
                 break
@@ -153,7 +155,7 @@ class _Place:
             return f"{whole}{low:g} to {high:g} {units[0]['unit'] if units else ''}".rstrip()
         if isinstance(self._type, type) and issubclass(self._type, Section):
             return f"a section with the keys {', '.join(self._type.model_fields)}"
-        if get_origin(self._type) in (Union, types.UnionType):
+        if get_origin(self._type) in _UNIONS:
             return f"a section of the kind {self.kinds}"
         return _WORDS.get(get_origin(self._type) or self._type, "")
 
