@@ -24,6 +24,9 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 # Time constant with which the difference at a change of filter fades: quick against a swing of
 # one to three seconds, slow against a valve of a tenth of a second.
 BLEND_S = 0.3
+# Missed ticks that are gone through one by one: after more of them nothing moves any more, and the
+# first neutral frame waits.
+MOST_HELD = 2000
 # Most that may be owed of an added velocity, full speed times ticks: a few steps of a coarse grid.
 MOST_OWED = 0.1
 
@@ -153,13 +156,19 @@ class Axis:
     def hold(self, ticks: int) -> None:
         """Tell the axis that the last output was held for ``ticks`` missed ticks.
 
-        They count as time: late ticks lengthen neither the run-on nor a stop.
+        They count as time: late ticks lengthen neither the run-on nor a stop, and the filter saw
+        the last command in each of them. Only the rates do not catch up.
         """
         self._recent.age(ticks)
         self._stopping += ticks
-        if self.sway is not None:
-            for _ in range(ticks):
-                self.sway.step(self.told)
+        maximum = self._limits.maximum
+        command = within(self.command, -maximum, maximum, 0.0)
+        try:
+            for _ in range(min(ticks, MOST_HELD)):
+                self._shaper.wanted(command)
+                self.advance()
+        except (ValueError, ArithmeticError):
+            self._output_invalid()
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:
         """Change sway data and filter, also in motion, without a jump of the output.
@@ -321,14 +330,16 @@ class Axis:
         """Send the operator's part and the added one.
 
         The added part is a path to be run, slow and with few steps of the grid: what rounding and
-        rates leave out is owed and paid while the axis moves anyway, never by a twitch.
+        rates leave out is owed and paid while the axis moves anyway, never by a twitch: by one step
+        of the grid in a tick.
         """
         if not abs(added) <= 1.0:
             raise ValueError(f"added velocity is {added}")
         limits = self._limits
         least = max(limits.minimum, 0.5 / self._grid_steps)
         wish = within(target + added, -limits.maximum, limits.maximum, least)
-        paid = self._owed if wish else 0.0
+        step = 1.0 / self._grid_steps
+        paid = within(self._owed, -step, step, 0.0) if wish else 0.0
         aim = within(wish + paid, -limits.maximum, limits.maximum, least)
         self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
         self.raw, self.sent = on_grid(

@@ -11,7 +11,7 @@ import pytest
 from canshaper.shaping.axis import BLEND_S, Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.registry import Off, build_shaper
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
@@ -309,3 +309,56 @@ def test_limits_change_in_neutral_and_hold_from_then_on() -> None:
     steps = [b - a for a, b in itertools.pairwise([0.0, *sent])]
     assert max(steps) == pytest.approx(1.0 * 0.02, abs=2e-4)
     assert min(steps) == pytest.approx(-2.0 * 0.02, abs=2e-4)
+
+
+@pytest.mark.parametrize("kind", ["gff", "robust"])
+def test_late_ticks_leave_no_more_swing(kind: str) -> None:
+    """One tick in seven comes four late: filter and model have seen the time in between."""
+    model = SwayModel(SwayMode.from_period(2.36, 0.05), 0.02)
+    options = {"gff": {"a1": 0.708, "a2": 0.12}, "robust": {"taps": [1 / 118] * 118}}
+
+    def left(missed: int) -> float:
+        truth, sway = model.retuned(model.mode, 0.0), model.retuned(model.mode, 0.0)
+        shaper = build_shaper(kind, 0.02, sway, valve_rate_per_s=5.0, **options[kind])
+        axis = Axis(0.02, OutputLimits(), sway=sway, shaper=shaper)
+        axis.tick(StickInput())
+        largest, now = 0.0, 0
+        while now < 600:
+            if now % 7 == 0 and missed:
+                axis.hold(missed)
+                for _ in range(missed):
+                    truth.step(axis.sent)
+                now += missed
+            axis.tick(StickInput(1.0 if now < 200 else 0.0))
+            truth.step(axis.sent)
+            now += 1
+            if now > 450:
+                largest = max(largest, abs(truth.angle))
+        return largest
+
+    assert left(4) <= 1.2 * left(0) + 0.002
+
+
+def test_a_filter_that_breaks_in_a_missed_tick_trips(drive: Drive) -> None:
+    class Broken:
+        def wanted(self, command: float) -> float:
+            raise ArithmeticError
+
+    drive.moving()
+    drive.axis._shaper = Broken()
+    drive.axis.hold(2)
+    assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
+    assert drive.axis.raw == 0
+
+
+def test_of_a_long_standstill_not_every_tick_is_gone_through(drive: Drive) -> None:
+    class Counted:
+        times = 0
+
+        def wanted(self, command: float) -> float:
+            self.times += 1
+            return 0.0
+
+    drive.axis._shaper = counted = Counted()
+    drive.axis.hold(50 * 86_400)
+    assert counted.times <= 2000
