@@ -141,7 +141,11 @@ class InLine:
             self._bridge = Bridge(channels, excluded(deployment), on_fault)
 
     def wait(self, seconds: float, reckons: Reckons, ports: Mapping[str, Port]) -> None:
-        """Until a deadline pass on what comes; frames of the levers first."""
+        """Until a deadline pass on what comes; frames of the levers first.
+
+        What comes later is left to the tick, which knows whether the loop stood still: it must not
+        leave with the velocities from before.
+        """
         clock = time.monotonic_ns
         until_ns = clock() + round(seconds * 1e9)
         empty = 0
@@ -153,7 +157,7 @@ class InLine:
             if self._bridge:
                 waiting += [one.fileno() for one in self._bridge.sockets]
             ready, _, _ = select.select(waiting, [], [], left_ns / 1e9)
-            if not ready:
+            if not ready or clock() >= until_ns:
                 return
             empty += not (take(reckons, ports, clock()) + self.pass_others())
 

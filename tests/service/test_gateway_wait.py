@@ -4,6 +4,7 @@ import logging
 import socket
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -60,6 +61,28 @@ def test_a_joystick_frame_does_not_wait_for_the_tick(rig: GatewayRig, ends: Ends
         assert data[4:] == frame.data[4:]  # the counters of both begin with 1
     with pytest.raises(BlockingIOError):
         others["levers"].recv(CAN_FRAME.size)
+
+
+def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
+    rig: GatewayRig, ends: Ends, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Whoever sleeps through the deadline leaves it to the tick to find out for how long."""
+    ports, others, _ = ends
+    frame = rig.lever()
+    others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
+    now_ns = [0]
+    select = gateway.select.select
+
+    def stopped(*arguments: Any) -> Any:
+        now_ns[0] += 5_000_000_000
+        return select(*arguments)
+
+    monkeypatch.setattr(gateway.select, "select", stopped)
+    monkeypatch.setattr(gateway.time, "monotonic_ns", lambda: now_ns[0])
+    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
+    with pytest.raises(BlockingIOError):
+        others["machine"].recv(CAN_FRAME.size)
+    assert [one.can_id for one in ports["levers"].frames()] == [frame.can_id]
 
 
 def test_what_is_of_no_use_does_not_keep_the_loop_busy(
