@@ -184,11 +184,12 @@ class Stepper:
         number = tick.number - (choice.earlier if choice else 0)
         missed = number - self.number - 1
         self.number = number
-        if missed * self._tick_ns > self._stall_ns:
+        stalled = missed * self._tick_ns > self._stall_ns
+        if stalled:
             controller.stalled()
-        else:
-            for _, frame in taken:
-                controller.receive(frame, now_ns)
+        for _, frame in taken:
+            controller.receive(frame, now_ns)
+            if not stalled:
                 self.heard[frame[:3]] = now_ns
         sent += controller.tick(now_ns, missed)
         for frame in tick.others:

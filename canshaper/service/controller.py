@@ -112,6 +112,7 @@ class Controller:
         self._last = -1  # number of the last deadline
         self._late = 0
         self._overrun = False
+        self._stood_still = False
 
     @property
     def neutral(self) -> bool:
@@ -124,6 +125,10 @@ class Controller:
         Returns:
             What it leaves as on the other bus of a gateway, to be sent at once.
         """
+        if self._stood_still:
+            if self._stop is not None:
+                self._stop.waited(frame, now_ns)
+            return None
         key = frame[:3]
         entry = self._inputs.get(key)
         if entry is not None:
@@ -173,6 +178,7 @@ class Controller:
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
+        self._stood_still = False
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
         overrun = self._overruns(missed) if missed or self._late else False
@@ -261,7 +267,12 @@ class Controller:
         return self._overrun
 
     def stalled(self) -> None:
-        """The loop stood still for longer than any input may be old: nothing known still holds."""
+        """The loop stood still for longer than any input may be old: nothing known still holds.
+
+        Nor does what comes before the next tick, which has waited in the sockets; of that only an
+        emergency stop counts.
+        """
+        self._stood_still = True
         for entry in self._inputs.values():
             entry.forget()
         self._network.stalled()

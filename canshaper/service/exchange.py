@@ -7,6 +7,10 @@ from canshaper.can.bus import Port
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 
+# After a standstill ports are asked so often until none has anything more: a port hands out 2000
+# frames at a time, a queue holds more, and 100 000 is more than any.
+MOST_ROUNDS = 50
+
 
 class Reckons(Protocol):
     """Frames in, frames out: a ``Controller``, or what stands around one."""
@@ -15,7 +19,7 @@ class Reckons(Protocol):
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
-        """The loop stood still for longer than any input may be old."""
+        """The loop stood still for too long: what comes before the next tick has waited."""
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send now."""
@@ -66,11 +70,10 @@ def exchange(
         stalled: that was longer than ``stall_ns``.
     """
     if stalled:
-        for port in ports.values():
-            for _ in port.frames():
-                pass
         reckons.stalled()
-    take(reckons, ports, now_ns)
+    for _ in range(MOST_ROUNDS if stalled else 1):
+        if not take(reckons, ports, now_ns):
+            break
     for frame in reckons.tick(now_ns, missed):
         if not ports[frame.bus].send(frame):
             reckons.send_failed(frame)

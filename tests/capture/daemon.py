@@ -88,7 +88,6 @@ def log_of(
         missed = max(0, late) // tick_ns
         deadline += missed * tick_ns
         if missed * tick_ns > stall_ns(deployment):
-            waiting = [f for f in waiting if f[0] > now]
             controller.stalled()
         while waiting and waiting[0][0] <= now:
             controller.receive(waiting.pop(0)[1], now)

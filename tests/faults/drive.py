@@ -138,16 +138,14 @@ class Drive:
     def _body(self) -> None:
         while self.tick_number < self.ticks:
             active = [f for f in self.faults if f.active(self.tick_number)]
-            passed, missed, drained = self._loop(active)
+            passed, missed, stalled = self._loop(active)
             for _ in range(passed):
                 self.tick_number += 1
                 last = self.tick_number - 1
                 sticks = {n: p[min(last, self.ticks - 1)] for n, p in self.paths.items()}
                 switches = {n: self._switches(v, last) for n, v in self.machine.levers.items()}
                 self._take(sticks, switches, active)
-            if drained:
-                # What waits in the sockets is thrown away; something may come in right after.
-                self._waiting = self._waiting[-2:] if drained > 1 else []
+            if stalled:
                 self._tell("stood still")
                 self.judge.stalled()
                 self.controller.stalled()
@@ -160,39 +158,39 @@ class Drive:
             raw[lever.off.name] = 1
         return raw
 
-    def _loop(self, active: list[Fault]) -> tuple[int, int, int]:
-        """How the loop does: ticks of the clock that pass, missed ones told, and how it stalled.
+    def _loop(self, active: list[Fault]) -> tuple[int, int, bool]:
+        """How the loop does.
 
         Returns:
-            (ticks that pass before the next call, ticks told as missed, how it stalled: 0 not,
-            1 and nothing came in since, 2 and something did).
+            (ticks that pass before the next call, ticks told as missed, whether it stood still for
+            too long).
         """
         if self._untold:
             missed, self._untold = self._untold, 0
-            return 0, missed, 0
+            return 0, missed, False
         limit = self.machine.shortest_timeout_ns // self.machine.tick_ns
         for fault in active:
             once = fault.start == self.tick_number or "done" not in fault.memory
             if fault.kind == "loop: late often":
                 missed = fault.rng.choice((0, 1, 1, 2))
-                return 1 + missed, missed, 0
+                return 1 + missed, missed, False
             if not once:
                 continue
             if fault.kind == "loop: late once":
                 fault.memory["done"] = True
                 missed = fault.rng.randint(1, limit)
-                return 1 + missed, missed, 0
+                return 1 + missed, missed, False
             if fault.kind == "loop: late, told later":
                 # A loop that was held up in its sleep hears of it after the next body.
                 fault.memory["done"] = True
                 late = fault.rng.randint(2, limit)
                 self._untold = late - 1
-                return late, 0, 0
+                return late, 0, False
             if fault.kind == "loop: stands still":
                 fault.memory["done"] = True
                 missed = limit + fault.rng.randint(1, 40)
-                return 1 + missed, missed, fault.rng.choice((1, 2))
-        return 1, 0, 0
+                return 1 + missed, missed, True
+        return 1, 0, False
 
     def _take(
         self,

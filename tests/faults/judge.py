@@ -276,6 +276,7 @@ class Judge:
         if self.stop:
             self._inputs[self.stop.source.key] = self.stop
         self._presses = 0
+        self._stood_still = False
         self.axes = {n: AxisJudge(a, self.heard[a.lever.name]) for n, a in machine.axes.items()}
         self._by_valve = {a.axis.valve_key: a for a in self.axes.values()}
         self._by_status = {a.axis.status_key: a for a in self.axes.values() if a.axis.status_key}
@@ -297,6 +298,11 @@ class Judge:
         """A frame is on a bus."""
         key = frame[:3]
         machine = self.machine
+        if self._stood_still:  # it has waited: only a press of the emergency stop still counts
+            if self.stop and key == self.stop.source.key:
+                self.stop.hear(frame.data, now_ns)
+                self.stop.forget()
+            return
         if entry := self._inputs.get(key):
             fault = entry.hear(frame.data, now_ns)
         elif machine.radius and key == machine.radius[0]:
@@ -319,6 +325,7 @@ class Judge:
 
     def stalled(self) -> None:
         """The loop tells that it stood still."""
+        self._stood_still = True
         for entry in self._inputs.values():
             entry.forget()
         for axis in self.axes.values():
@@ -341,6 +348,7 @@ class Judge:
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
+        self._stood_still = False
         self.counts["MissedDeadlines"] += missed
         self.counts["SendFailures"] += len(failed)
         if missed:

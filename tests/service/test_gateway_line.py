@@ -161,14 +161,14 @@ def test_enable_off_leaves_with_its_frame_and_neutral_with_the_next(rig: Gateway
 
 
 def test_a_trip_that_is_noted_makes_the_next_frame_neutral(rig: GatewayRig) -> None:
-    """The loop stood still: the velocity of its last tick is old."""
+    """The last frame did not reach the ECU: the velocity of the last tick goes no further."""
     rig.moving()
-    rig.controller.stalled()
+    rig.controller.send_failed(rig.left[-2])
     passed = rig.receive(rig.lever(Slew=1000))
     assert passed is not None
     assert rig.decoded(passed)["Slew"] == 0
     assert rig.tick() == []
-    assert rig.state() == ("TRIPPED", "LOOP_STALLED")
+    assert rig.state() == ("TRIPPED", "SEND_FAILED")
 
 
 def test_neutral_after_a_trip_does_not_wait_for_a_joystick_that_is_late(rig: GatewayRig) -> None:
