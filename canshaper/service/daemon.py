@@ -49,6 +49,7 @@ class Daemon:
         self._reading: Reading | None = None
         self._next: Deployment | None = None  # read, and good
         self._waiting_told = False
+        self._stood_still = False  # for a reload, before the first tick of its loop
         self._manager = ServiceManager()
         self._collector = Collector()
         self._logged_fault = FrameFault.NONE
@@ -79,8 +80,6 @@ class Daemon:
         try:
             while not self._stop:
                 run_at_deadlines(self._tick_ns, self._body, self._wait if self._line else None)
-                if self._next and not self._stop:
-                    self._apply(self._next)
         finally:
             self._manager.stopping()
             self._send_neutral()
@@ -97,15 +96,22 @@ class Daemon:
     # -- one tick ------------------------------------------------------------------------------
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        """Take all waiting frames, tick the axes, send, then housekeeping."""
+        """Take all waiting frames, tick the axes, send, then housekeeping.
+
+        A reload that is refused has taken its time as all else has: its deadlines were missed.
+        """
         controller = self._controller
-        stalled = missed * self._tick_ns > self._stall_ns
+        stalled = self._stood_still or missed * self._tick_ns > self._stall_ns
+        self._stood_still = False
         exchange(controller, self._ports, now_ns, missed, stalled=stalled)
         if self._line:
             self._line.pass_others()
         self._latest_ns = max(self._latest_ns, late_ns)
         self._housekeeping(now_ns)
-        return not (self._stop or (self._next and controller.neutral))
+        applied = False
+        if self._next and controller.neutral and not self._stop:
+            applied = self._apply(self._next)
+        return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
         """In a gateway: pass frames on until the next deadline."""
@@ -235,11 +241,15 @@ class Daemon:
             log.info("reload=waiting until every axis is neutral")
         self._waiting_told = waiting
 
-    def _apply(self, deployment: Deployment) -> None:
+    def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment, if its buses can be opened; else go on as before.
 
-        Called with every axis neutral and no tick running, so a bus may take its time.
+        Called with every axis neutral and behind a tick, so a bus may take its time.
+
+        Returns:
+            Whether it was replaced; a loop with its tick has to begin.
         """
+        began_ns = time.monotonic_ns()
         self._manager.reloading()
         self._next = None
         config = self._controller.deployment.config
@@ -252,23 +262,25 @@ class Daemon:
             self._close(port for port in ports.values() if port not in opened.values())
             self._manager.ready("as before")
             self._refuse(str(error))
-        else:
-            self._send_neutral()
-            self._close(port for port in opened.values() if port not in ports.values())
-            for name, port in ports.items():
-                port.watch(name, deployment.ids(name))
-            self._ports = ports
-            if self._line:
-                self._line.close()
-            self._line = line
-            if self._control:
-                self._control.close()
-            self._use(deployment)
-            self._control = self._open_control(deployment)
-            log.info("reload=applied file=%s", deployment.path)
-            self._manager.ready("reload applied")
-            self._told_ns = time.monotonic_ns() + SECOND_NS
+            return False
+        self._send_neutral()
+        self._close(port for port in opened.values() if port not in ports.values())
+        for name, port in ports.items():
+            port.watch(name, deployment.ids(name))
+        self._ports = ports
+        if self._line:
+            self._line.close()
+        self._line = line
+        if self._control:
+            self._control.close()
+        self._use(deployment)
+        self._control = self._open_control(deployment)
+        log.info("reload=applied file=%s", deployment.path)
+        self._manager.ready("reload applied")
+        self._told_ns = time.monotonic_ns() + SECOND_NS
         self._collector.freeze()
+        self._stood_still = time.monotonic_ns() - began_ns > self._stall_ns
+        return True
 
     def _refuse(self, why: str) -> None:
         """Tell why a reload changes nothing."""

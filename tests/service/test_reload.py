@@ -1,0 +1,245 @@
+"""What a reload must not do: set anything going, forget a trip, or take ourselves for another."""
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.bus import BusError, Port
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.can.socketcan import Ids
+from canshaper.config.bus import Bus
+from canshaper.service import daemon as module
+from canshaper.service import loop
+from canshaper.service.daemon import Daemon
+from tests.service.conftest import ROOT, TICK_NS, Rig
+
+BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
+SECOND = f"{BUS}\n  two: {{ interface: socketcan, channel: vcan1 }}"
+# From sending to the other sockets of the bus: a few frames have to go first.
+UNDER_WAY_NS = 4_000_000
+FOREIGN = Frame("crane", 0x200, False, b"\0\0")
+
+
+class FakePort:
+    """A port that hears what comes to its channel, other ports of ours included, after a while."""
+
+    state = BusState.UP
+
+    def __init__(self, name: str, channel: str, bench: "Bench") -> None:
+        self.name = name
+        self.channel = channel
+        self.waiting: list[tuple[int, Frame]] = []
+        self.closed = False
+        self._bench = bench
+
+    def frames(self) -> Iterator[Frame]:
+        yield from self._heard(lambda can_id: can_id < 0x200)
+
+    def others(self) -> Iterator[Frame]:
+        yield from self._heard(lambda can_id: can_id >= 0x200)
+
+    def _heard(self, wanted: Callable[[int], bool]) -> list[Frame]:
+        assert not self.closed
+        now_ns = self._bench.now_ns
+        found = [f for at, f in self.waiting if at <= now_ns and wanted(f.can_id)]
+        self.waiting = [(t, f) for t, f in self.waiting if t > now_ns or not wanted(f.can_id)]
+        return [frame._replace(bus=self.name) for frame in found]
+
+    def send(self, frame: Frame) -> bool:
+        assert not self.closed
+        self._bench.sent.append(frame)
+        for port in self._bench.ports:
+            if port is not self and port.channel == self.channel:
+                port.waiting.append((self._bench.now_ns + UNDER_WAY_NS, frame))
+        return True
+
+    def watch(self, name: str, ids: Ids) -> None:
+        self.name = name
+
+    def fileno(self) -> int:
+        return -1
+
+    def close(self) -> None:
+        self.closed = True
+
+
+class Bench:
+    """A daemon on buses and a clock of the test's; it runs in no time.
+
+    Attributes:
+        script: called before every tick with its number, from 0.
+        opening: called when a bus is opened, with its channel.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_ns = 10**12
+        self.ports: list[FakePort] = []
+        self.sent: list[Frame] = []
+        self.script: Callable[[int], None] = lambda number: None
+        self.opening: Callable[[str], None] = lambda channel: None
+        self.file = folder / "machine.yaml"
+        text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+        self.text = text.replace("../dbc", str(ROOT / "dbc"))
+        self.file.write_text(self.text, encoding="utf-8")
+        self.rig = Rig(self.file)  # for its levers
+        self._tick = 0
+        self._handlers: dict[int, Any] = {}
+        for one in (module, loop):
+            monkeypatch.setattr(one, "time", self)
+        monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
+        monkeypatch.setattr(module, "open_port", self._open)
+        monkeypatch.setattr(module, "Reading", Read)
+        monkeypatch.setattr(module, "Collector", Uncollected)
+        for name in ("lock_memory", "refuse_huge_pages"):
+            monkeypatch.setattr(module, name, lambda: None)
+        run_at_deadlines = module.run_at_deadlines
+        monkeypatch.setattr(
+            module,
+            "run_at_deadlines",
+            lambda period_ns, body, wait: run_at_deadlines(period_ns, self._before(body), wait),
+        )
+
+    def monotonic_ns(self) -> int:
+        return self.now_ns
+
+    def monotonic(self) -> float:
+        return self.now_ns / 1e9
+
+    def sleep(self, seconds: float) -> None:
+        self.now_ns += round(seconds * 1e9)
+
+    def _before(self, body: Callable[..., bool]) -> Callable[..., bool]:
+        def scripted(*arguments: int) -> bool:
+            self.script(self._tick)
+            self._tick += 1
+            return body(*arguments)
+
+        return scripted
+
+    def _open(self, name: str, bus: Bus, _fault: Callable[[FrameFault], None], _ids: Ids) -> Port:
+        self.opening(bus.channel)
+        self.ports.append(FakePort(name, bus.channel, self))
+        return self.ports[-1]
+
+    def run(self, script: Callable[[int], None]) -> None:
+        self.script = script
+        Daemon(lambda: load_deployment(self.file)).run()
+
+    def reload(self, old: str = "", new: str = "") -> None:
+        """Tell the daemon to read the file again, with a piece of it replaced."""
+        assert old in self.text
+        self.file.write_text(self.text.replace(old, new, 1) if old else self.text, encoding="utf-8")
+        self._handlers[module.signal.SIGHUP](module.signal.SIGHUP, None)
+
+    def stop(self) -> None:
+        self._handlers[module.signal.SIGTERM](module.signal.SIGTERM, None)
+
+    def put(self, *frames: Frame) -> None:
+        """Frames of others come to the first bus."""
+        for port in self.ports:
+            if port.channel == "vcan0" and not port.closed:
+                port.waiting += [(self.now_ns, frame) for frame in frames]
+
+    def levers(self, **raw: int) -> None:
+        self.put(self.rig.lever("LeverLeft", **raw), self.rig.lever("LeverRight"))
+
+    def told(self) -> tuple[str, str]:
+        """What the last status of the slew axis tells: state and reason."""
+        message = self.rig.messages["SlewStatus"]
+        frame = next(f for f in reversed(self.sent) if f.can_id == message.frame_id)
+        values = message.decode(frame.data)
+        return str(values["State"]), str(values["Reason"])
+
+    def moved(self) -> bool:
+        """Whether any valve was ever told to move."""
+        return any(f.data[0] for f in self.sent if 0x200 <= f.can_id <= 0x202)
+
+
+class Read:
+    """A deployment that has been read at once."""
+
+    def __init__(self, load: Callable[[], Deployment]) -> None:
+        self._load = load
+
+    def result(self) -> Deployment:
+        return self._load()
+
+    def end(self) -> None: ...
+
+
+class Uncollected:
+    """This process is not the daemon's: its garbage is its own."""
+
+    def freeze(self) -> None: ...
+
+    def pause(self, now_ns: int) -> None: ...
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(tmp_path, monkeypatch)
+
+
+# -- a bus that takes its time ---------------------------------------------------------------------
+
+
+def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    """The stick went out meanwhile, and its joystick died."""
+
+    def opening(channel: str) -> None:
+        if channel == "vcan1":
+            for stick in [0] * 50 + [1000] * 50:
+                bench.levers(Slew=stick)
+                bench.now_ns += TICK_NS
+            bench.now_ns += 10**9
+            raise BusError("bus two: cannot open: no such adapter")
+
+    def script(tick: int) -> None:
+        if tick < 10:
+            bench.levers()
+        if tick == 9:
+            assert bench.told() == ("READY", "STICK_NEUTRAL")
+            bench.reload(BUS, SECOND)
+        if tick == 100:
+            bench.stop()
+
+    bench.opening = opening
+    bench.run(script)
+    assert "reload=refused bus two: cannot open: no such adapter" in caplog.messages
+    assert not bench.moved()
+    assert bench.told() == ("NEUTRAL_WAIT", "STICK_TIMEOUT")
+
+
+def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
+    """On a bus that stays open: what it says is old, and the next frame has the stick out."""
+    since: list[int] = []
+
+    def opening(channel: str) -> None:
+        if channel == "vcan1":
+            for _ in range(50):
+                bench.levers()
+                bench.now_ns += TICK_NS
+
+    def script(tick: int) -> None:
+        if len(bench.ports) < 2:
+            bench.levers()
+        elif since:
+            bench.levers(Slew=1000)
+        else:
+            since.append(tick)
+        if tick == 9:
+            bench.reload(BUS, SECOND)
+        if tick == 100:
+            bench.stop()
+
+    bench.opening = opening
+    bench.run(script)
+    assert [port.channel for port in bench.ports] == ["vcan0", "vcan1"]
+    assert not bench.moved()
+    assert bench.told() == ("NEUTRAL_WAIT", "STICK_NOT_NEUTRAL")
