@@ -17,7 +17,15 @@ from canshaper.can.inputs import (
     BoundStop,
     BoundSwitch,
 )
-from canshaper.can.j1939 import CLAIMED, REQUEST, claims_of, group_of, sent_by
+from canshaper.can.j1939 import (
+    CLAIMED,
+    NULL,
+    REQUEST,
+    claims_of,
+    group_of,
+    identifier,
+    sent_by,
+)
 from canshaper.can.layout import is_j1939
 from canshaper.can.load import BusLoad, bus_load
 from canshaper.can.rewrite import RewrittenMessage
@@ -104,8 +112,13 @@ class Deployment:
                 sent.append((bus, HEARTBEAT + canopen.node, False))
                 sent += [(bus, NMT, False)] if canopen.master else []
         own = self.config.buses[bus].j1939
+        claims: list[int] = []
         if own:
-            sent += [(bus, can_id, True) for can_id in sent_by(own.address)]
+            claims = claims_of(own.address)
+            if self.listen_only:
+                claims.append(identifier(REQUEST, NULL))
+            else:
+                sent += [(bus, can_id, True) for can_id in sent_by(own.address)]
         groups = {group_of(i.key[1]) for i in inputs if i.by_group}
         return Ids(
             frozenset(key[1:] for key in taken if key[0] == bus),
@@ -114,7 +127,7 @@ class Deployment:
             frozenset(self.messages.ids()),
             frozenset(groups | ({CLAIMED << 8, REQUEST << 8} if own else set())),
             frozenset(self.sent_groups(bus)),
-            frozenset((can_id, True) for can_id in (claims_of(own.address) if own else ())),
+            frozenset((can_id, True) for can_id in claims),
             self.is_j1939(bus),
             canopen is not None,
             self.in_line(bus),
@@ -153,7 +166,8 @@ class Deployment:
         """The same machine for one who only listens, and tells what it would do.
 
         What valves say of themselves answers another controller's commands, so it is not compared
-        with ours. A node of ours on J1939 stays where a status message needs its address.
+        with ours. A node of ours on J1939 stays where a status message needs its address, which it
+        gives up to whoever has it.
         """
         told = {s.sender.key[0] for s in (self.status, *self._axis_status()) if s}
         buses = {

@@ -17,7 +17,7 @@ class J1939Name(Section):
     identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of this PC")]
     manufacturer_code: Annotated[int, number(0, 2047, "", "code that SAE gave to the maker")]
     function: Annotated[int, number(0, 255, "", "function code")] = 129
-    """129 in industry group 2: auxiliary valve control."""
+    """129 in industry group 2, vehicle system 0: operator controls, machine specific."""
     ecu_instance: Annotated[int, number(0, 7, "", "instance of the ECU")] = 0
     function_instance: Annotated[int, number(0, 31, "", "instance of the function")] = 0
     vehicle_system: Annotated[int, number(0, 127, "", "vehicle system, or device class")] = 0

@@ -46,6 +46,8 @@ class AddressClaim:
         config: address and NAME.
         answered: groups (PGN) that are sent on request by others of us.
         cyclic: groups that are sent anyhow; a request for one is answered by the next of them.
+        guest: the address may be another's: we ask first, claim it only when nobody answers, give
+            it up to whoever claims it, whatever the NAME, and refuse nothing.
 
     Attributes:
         state: of our address; nothing but claims may be sent in any other than CLAIMED.
@@ -58,6 +60,8 @@ class AddressClaim:
         config: J1939,
         answered: frozenset[int] = frozenset(),
         cyclic: frozenset[int] = frozenset(),
+        *,
+        guest: bool = False,
     ) -> None:
         self.state = ClaimState.WAITING
         self.requested: set[int] = set()
@@ -67,6 +71,9 @@ class AddressClaim:
         self._number = int.from_bytes(self._name, "little")
         self._answered = answered
         self._cyclic = cyclic
+        self._guest = guest
+        self._asking = False  # whether anybody has it; nothing is claimed meanwhile
+        self._ask = guest
         self._delay_ns = config.name.identity_number % 256 * STEP_NS
         self._due_ns: int | None = 0  # when to send a claim, or that there is none
         self._until_ns: int | None = None
@@ -81,20 +88,21 @@ class AddressClaim:
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a claim or a request of another node; never one of ours, seen back."""
         destination, source = frame.can_id >> 8 & 0xFF, frame.can_id & 0xFF
-        group = group_of(frame.can_id)
+        group, lost = group_of(frame.can_id), self.state is ClaimState.LOST
         if group == CLAIMED << 8 and len(frame.data) == 8:
-            if source == self._address and self.state is not ClaimState.LOST:
+            if source == self._address and not lost:
                 self._contended(int.from_bytes(frame.data, "little"), now_ns)
         elif (
             group == REQUEST << 8
             and len(frame.data) == 3
-            and destination in (GLOBAL, self._address)
+            # One that is lost is the address of whoever has it now.
+            and (destination == GLOBAL or (destination == self._address and not lost))
         ):
             pgn = int.from_bytes(frame.data, "little")
             self._asked(pgn, source, now_ns, by_name=destination != GLOBAL)
 
     def _contended(self, other: int, now_ns: int) -> None:
-        if other > self._number:
+        if other > self._number and not self._guest:
             self._claim_at(now_ns)
             return
         # The same NAME too: two nodes that were set up alike cannot agree which of them it is.
@@ -111,6 +119,7 @@ class AddressClaim:
         elif (
             by_name
             and self.sends
+            and not self._guest
             and pgn not in self._cyclic
             and source < NULL
             and len(self._refused) < MOST_REFUSED
@@ -119,6 +128,8 @@ class AddressClaim:
 
     def _claim_at(self, time_ns: int) -> None:
         """A claim is due; one that is due already is not put off by who asks again."""
+        if self._asking:
+            return
         time_ns = max(time_ns, self._again_ns)
         self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
 
@@ -126,7 +137,12 @@ class AddressClaim:
         """What is due now: claims, and answers to requests for what we do not have."""
         if self._due_ns is not None and now_ns >= self._due_ns:
             lost = self.state is ClaimState.LOST
-            self._due_ns = None
+            if self._ask and not lost:
+                self._ask, self._asking, self._due_ns = False, True, now_ns + WAIT_NS
+                data = CLAIMED.to_bytes(3, "little")
+                yield Frame(self._bus, identifier(REQUEST, NULL), True, data)
+                return
+            self._asking, self._due_ns = False, None
             self._again_ns = now_ns + LEAST_BETWEEN_NS
             if self._until_ns is None:
                 self._until_ns = now_ns + WAIT_NS
@@ -160,4 +176,5 @@ class AddressClaim:
             self.state = ClaimState.WAITING
             self._until_ns = None
             self._refused.clear()
+            self._ask, self._asking = self._guest, False
             self._claim_at(self._again_ns)

@@ -58,7 +58,9 @@ class Network:
         self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
         self._axes = axes
         self.nodes = {
-            name: Node(name, config, frozenset(_cyclic(deployment, name)))
+            name: Node(
+                name, config, frozenset(_cyclic(deployment, name)), guest=deployment.listen_only
+            )
             for name, config in self._configs.items()
         }
         self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
@@ -70,7 +72,8 @@ class Network:
                 r for r in axes.values() if r.bound.config.valve.bus == bus and not r.bound.rewrites
             ]
             for runner in there:
-                runner.gates.append(node.gate)
+                if not deployment.listen_only:  # it reckons, whoever has the address
+                    runner.gates.append(node.gate)
             for group in deployment.sent_groups(bus):
                 runners = [
                     r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group

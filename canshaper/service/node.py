@@ -20,13 +20,23 @@ class Node:
         bus: name of the bus.
         config: address and NAME.
         cyclic: groups (PGN) that are sent anyhow, so that nobody has to ask for them.
+        guest: whether the address may be another's, and no fault is told.
 
     Attributes:
         state: of our address.
     """
 
-    def __init__(self, bus: str, config: J1939, cyclic: frozenset[int] = frozenset()) -> None:
-        self._claim = AddressClaim(bus, config, frozenset((DM1,)), cyclic)
+    def __init__(
+        self,
+        bus: str,
+        config: J1939,
+        cyclic: frozenset[int] = frozenset(),
+        *,
+        guest: bool = False,
+    ) -> None:
+        answered = frozenset(() if guest else (DM1,))
+        self._claim = AddressClaim(bus, config, answered, cyclic, guest=guest)
+        self._guest = guest
         self._faults = ActiveFaults(bus, config.address)
 
     @property
@@ -52,6 +62,8 @@ class Node:
     def frames(self, active: Sequence[tuple[int, int]], now_ns: int) -> Iterator[Frame]:
         """What is due now; ``active`` are (SPN, FMI) of the faults that are there."""
         yield from self._claim.frames(now_ns)
+        if self._guest:
+            return
         if self._claim.sends:
             requested = DM1 in self._claim.requested
             self._claim.requested.clear()

@@ -83,3 +83,57 @@ def test_valves_of_canopen_need_not_follow(axis: str) -> None:
     deployment = load_deployment(ROOT / "config" / "canopen-forwarder.yaml").listening()
     runner = Controller(deployment).axes[axis]
     assert (runner.control, runner.feedback) == (None, None)
+
+
+def guest() -> j1939_rig.Rig:
+    rig = j1939_rig.Rig()
+    rig.deployment = rig.deployment.listening()
+    rig.controller = Controller(rig.deployment)
+    return rig
+
+
+def sent_ids(rig: j1939_rig.Rig, ticks: int, **left: float) -> list[int]:
+    return [i for sent in rig.run(ticks, **left) for i in j1939_rig.ids(sent)]
+
+
+WHO_HAS_IT = 0x18EAFFFE
+
+
+def test_the_address_is_asked_for_before_it_is_claimed() -> None:
+    rig = guest()
+    assert sent_ids(rig, 1) == [WHO_HAS_IT]
+    rig.receive(j1939_rig.request(0xEE00))  # somebody else asks too
+    assert sent_ids(rig, 12) == []
+    assert sent_ids(rig, 1) == [j1939_rig.CLAIM]
+    assert sent_ids(rig, 12) == []
+    found = set(sent_ids(rig, 100, X=100.0))
+    assert found & {i for i, _ in rig.deployment.ids("crane").sent}  # status
+    assert j1939_rig.DM1 not in found
+
+
+@pytest.mark.parametrize("difference", [-1, 1])
+@pytest.mark.parametrize("when", [1, 20, 100])
+def test_whoever_has_the_address_keeps_it(difference: int, when: int) -> None:
+    rig = guest()
+    rig.run(when)
+    rig.receive(rig.claim(difference))
+    assert set(sent_ids(rig, 50)) <= {j1939_rig.NO_CLAIM}
+    assert sent_ids(rig, 50, X=100.0) == []
+    assert rig.state() is State.ACTIVE  # it reckons all the same, for the log
+
+
+def test_after_an_outage_it_is_asked_for_again() -> None:
+    rig = guest()
+    rig.run(100)
+    rig.controller.unheard("crane")
+    assert sent_ids(rig, 3)[0] == WHO_HAS_IT
+    rig.receive(rig.claim(1))
+    assert set(sent_ids(rig, 50)) <= {j1939_rig.NO_CLAIM}
+
+
+def test_no_fault_is_told_and_no_request_refused() -> None:
+    rig = guest()
+    rig.run(100)
+    rig.receive(j1939_rig.request(0xFECA), j1939_rig.request(0xFEDA, to=j1939_rig.OWN))
+    found = {i for _ in range(100) for i in j1939_rig.ids(rig.tick())}  # the levers are silent
+    assert not found & {j1939_rig.DM1, j1939_rig.BROADCAST, j1939_rig.NACK, 0x18E8FF9C}
