@@ -12,6 +12,7 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundLever
 from canshaper.can.j1939 import NULL, with_source
+from canshaper.service.finder import InputFinder
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import MOVING, Reason, State
 from canshaper.studio.words import fault_words, reason_words, state_words
@@ -71,13 +72,12 @@ class CraneView:
         modes = [axis.config.sway.mode() for axis in deployment.axes.values() if axis.config.sway]
         periods = [2.0 * math.pi / mode.omega_rad_s for mode in modes]
         self._swing_s = max([LEAST_SWING_S, *periods])
+        self._levers = InputFinder(deployment.config.buses, deployment.levers.values())
         self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
         self._find_messages()
 
     def _find_messages(self) -> None:
         deployment = self._deployment
-        for lever in deployment.levers.values():
-            self._on(lever.key, self._stick, lever)
         for name, axis in deployment.axes.items():
             self._on(axis.valve.message.sender.key, self._valve, name)
             if axis.status and axis.config.status:
@@ -107,6 +107,8 @@ class CraneView:
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame, one that the page's levers sent too; what is none of ours is passed."""
         entries = self._handlers.get(frame[:3])
+        if lever := self._levers.find(frame, round(now_s * 1e9)):
+            entries = [*(entries or ()), (self._stick, lever)]
         if entries is None and frame.extended:  # of J1939, from any address
             entries = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         for handler, what in entries or ():

@@ -16,6 +16,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
+from tests.service.j1939_rig import bjm
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
@@ -194,3 +195,10 @@ def test_every_state_reason_and_fault_has_words() -> None:
     assert state_words(15) == "state 15"
     assert reason_words(99) == "reason 99"
     assert fault_words(99) == "fault 99" and fault_words(0) == ""
+
+
+@pytest.mark.parametrize("priority", [3, 6])
+def test_a_joystick_of_j1939_is_seen_at_every_priority_and_one_at_a_time(priority: int) -> None:
+    watched = Watched("j1939-forwarder")
+    watched.take([bjm("BJM1", s, priority, X=x) for s, x in ((0x33, 100.0), (0x34, -100.0))])
+    assert watched.view.axes["slew"].stick == pytest.approx(1.0)
