@@ -25,6 +25,8 @@ log = logging.getLogger("canshaper")
 
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
+# Until what was sent last has left a queue of some frames, also on a bus with other traffic.
+ON_THE_BUS_S = 0.1
 SECOND_NS = 1_000_000_000
 # Nobody hears us there, or we nobody.
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE))
@@ -265,6 +267,8 @@ class Daemon:
             return False
         self._send_neutral()
         self._close(port for port in opened.values() if port not in ports.values())
+        if new := [port for port in ports.values() if port not in opened.values()]:
+            self._pass_over(new)
         for name, port in ports.items():
             port.watch(name, deployment.ids(name))
         self._ports = ports
@@ -281,6 +285,16 @@ class Daemon:
         self._collector.freeze()
         self._stood_still = time.monotonic_ns() - began_ns > self._stall_ns
         return True
+
+    def _pass_over(self, new: Iterable[Port]) -> None:
+        """Throw away what new ports hear at first: what we have sent last from the old ones.
+
+        They cannot know it for ours, and it would look like a second sender of every valve's id.
+        """
+        time.sleep(ON_THE_BUS_S)
+        for port in new:
+            for _ in (*port.frames(), *port.others()):
+                pass
 
     def _refuse(self, why: str) -> None:
         """Tell why a reload changes nothing."""

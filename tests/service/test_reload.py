@@ -243,3 +243,32 @@ def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
     assert [port.channel for port in bench.ports] == ["vcan0", "vcan1"]
     assert not bench.moved()
     assert bench.told() == ("NEUTRAL_WAIT", "STICK_NOT_NEUTRAL")
+
+
+def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -> None:
+    """What was sent from the old port comes to the new one, some of it after it was opened."""
+
+    def script(tick: int) -> None:
+        bench.levers()
+        if tick == 9:
+            bench.reload("bitrate: 250000", "bitrate: 500000")
+        if tick == 100:
+            bench.stop()
+
+    bench.run(script)
+    assert [(port.channel, port.closed) for port in bench.ports] == [("vcan0", True)] * 2
+    assert bench.told() == ("READY", "STICK_NEUTRAL")
+
+
+def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
+    def script(tick: int) -> None:
+        bench.levers()
+        bench.put(FOREIGN)
+        if tick == 9:
+            bench.reload("bitrate: 250000", "bitrate: 500000")
+        if tick == 30:
+            bench.stop()
+
+    bench.run(script)
+    assert len(bench.ports) == 2
+    assert bench.told() == ("TRIPPED", "SECOND_SENDER")
