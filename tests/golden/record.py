@@ -26,7 +26,7 @@ SCRIPT = Script(
         Stroke(SLEW, 5.6, 3.6, -0.77),
         Stroke(NEAR_FAR, 6.2, 1.3, -0.9),
         Stroke(LIFT, 10.0, 2.0, -0.58),
-        Stroke(SLEW, 10.9, 2.2, 0.64),
+        Stroke(SLEW, 10.9, 2.2, 0.63),
         Stroke(NEAR_FAR, 11.6, 1.2, 0.53),
         Stroke(SLEW, 13.1, 1.6, -0.41),
         Stroke(LIFT, 15.0, 0.8, 0.93),
