@@ -23,7 +23,7 @@ from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
 from canshaper.service.sets import SetChooser
 from canshaper.service.value import ValueInput
-from canshaper.shaping.states import Reason
+from canshaper.shaping.states import Reason, State
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
 # than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
@@ -113,6 +113,16 @@ class Controller:
         self._late = 0
         self._overrun = False
         self._stood_still = False
+
+    def follow(self, before: "Controller") -> None:
+        """Keep latched what was latched in the controller that ran before: a reload is no reset.
+
+        Of a lost address it is the way back.
+        """
+        for name in self.axes.keys() & before.axes.keys():
+            old, axis = before.axes[name].axis, self.axes[name].axis
+            if old.state is State.TRIPPED and old.reason is not Reason.ADDRESS_LOST:
+                axis.state, axis.reason = old.state, old.reason
 
     @property
     def neutral(self) -> bool:

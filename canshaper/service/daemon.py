@@ -180,8 +180,10 @@ class Daemon:
 
     # -- deployments ---------------------------------------------------------------------------
 
-    def _use(self, deployment: Deployment) -> None:
+    def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
         self._controller = Controller(deployment)
+        if before:
+            self._controller.follow(before)
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -277,7 +279,7 @@ class Daemon:
         self._line = line
         if self._control:
             self._control.close()
-        self._use(deployment)
+        self._use(deployment, before=self._controller)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
         self._manager.ready("reload applied")

@@ -14,7 +14,9 @@ from canshaper.can.socketcan import Ids
 from canshaper.config.bus import Bus
 from canshaper.service import daemon as module
 from canshaper.service import loop
+from canshaper.service.controller import Controller
 from canshaper.service.daemon import Daemon
+from canshaper.shaping.states import Reason, State
 from tests.service.conftest import ROOT, TICK_NS, Rig
 
 BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
@@ -272,3 +274,56 @@ def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
     bench.run(script)
     assert len(bench.ports) == 2
     assert bench.told() == ("TRIPPED", "SECOND_SENDER")
+
+
+# -- what was latched ------------------------------------------------------------------------------
+
+
+def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench) -> None:
+    told: list[tuple[str, str]] = []
+
+    def script(tick: int) -> None:
+        bench.levers(Reset=int(tick in (200, 201)))
+        if tick == 5:
+            bench.put(FOREIGN)
+        if tick in (9, 199, 205):
+            told.append(bench.told())
+        if tick == 9:
+            bench.reload()
+        if tick == 205:
+            bench.stop()
+
+    bench.run(script)
+    assert told == [("TRIPPED", "SECOND_SENDER")] * 2 + [("READY", "STICK_NEUTRAL")]
+
+
+def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:
+    axes = rig.controller.axes
+    axes["slew"].trip, axes["near_far"].trip = Reason.EMERGENCY_STOP, Reason.ADDRESS_LOST
+    rig.run(3)
+    assert [rig.state(axis) for axis in axes] == [State.TRIPPED, State.TRIPPED, State.READY]
+    before, rig.controller = rig.controller, Controller(rig.deployment)
+    rig.controller.follow(before)
+    assert rig.state("near_far") is State.NEUTRAL_WAIT
+    rig.run(3)
+    assert (rig.state("slew"), rig.reason("slew")) == (State.TRIPPED, "EMERGENCY_STOP")
+    assert [rig.state(axis) for axis in ("near_far", "lift")] == [State.READY] * 2
+    rig.run(1, Reset=1)
+    rig.run(1)
+    assert rig.state("slew") is State.READY
+
+
+def test_a_reset_that_is_held_through_a_reload_is_no_press(rig: Rig) -> None:
+    rig.controller.axes["slew"].trip = Reason.EMERGENCY_STOP
+    rig.run(3, Reset=1)
+    before, rig.controller = rig.controller, Controller(rig.deployment)
+    rig.controller.follow(before)
+    rig.run(10, Reset=1)
+    assert rig.state("slew") is State.TRIPPED
+
+
+def test_an_axis_that_is_new_begins_as_ever(changed_rig: Callable[..., Rig], rig: Rig) -> None:
+    other = changed_rig({"  lift:\n": "  boom:\n"})
+    other.controller.follow(rig.controller)
+    other.run(3)
+    assert other.state("boom") is State.READY
