@@ -9,6 +9,7 @@ import os
 import socket
 from collections import deque
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from functools import partial
 from typing import Any, Protocol
 
@@ -21,6 +22,9 @@ from canshaper.config.bus import Bus
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
+# Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
+# behind it must not grow old; a bus that is gone fails at every call.
+MOST_FAILURES = 20
 # linux/in.h, linux/in6.h; Python has no names for these.
 IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 
@@ -155,14 +159,17 @@ class PythonCanPort:
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
-        receive = self._bus.recv
+        receive, failures = self._bus.recv, 0
         for _ in range(MOST_FRAMES):
             try:
                 message = receive(0)
-            except (can.CanError, OSError):
+            except Exception:  # each interface raises its own kinds
                 self.state = BusState.FAILED
                 self._on_fault(FrameFault.BUS_ERROR)
-                return
+                failures += 1
+                if failures == MOST_FAILURES:
+                    return
+                continue
             if message is None:
                 return
             self.state = BusState.UP
@@ -190,7 +197,7 @@ class PythonCanPort:
         )
         try:
             self._bus.send(message)
-        except (can.CanError, OSError):
+        except Exception:  # as above
             self.state = BusState.FAILED
             return False
         if self._echoes is not None:
@@ -203,14 +210,15 @@ class PythonCanPort:
 
     def fileno(self) -> int:
         """File descriptor to wait on; -1 where the interface has none."""
-        return int(self._bus.fileno())
+        try:
+            return int(self._bus.fileno())
+        except Exception:  # most have none and say so in their own way
+            return -1
 
     def close(self) -> None:
         """Close the bus; errors of a bus that is gone do not matter any more."""
-        try:
+        with suppress(Exception):
             self._bus.shutdown()
-        except (can.CanError, OSError):
-            return
 
 
 def hear_one_group(fileno: int) -> None:

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.can.bus import open_port
 from canshaper.can.cangw import GatewayError, Rule
 from canshaper.can.frame import FrameFault
 from canshaper.can.raw import CAN_FRAME, RawPort
@@ -109,6 +110,16 @@ def test_a_port_that_is_gone_is_waited_for(rig: GatewayRig, ends: Ends) -> None:
     others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
     InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
     assert rig.controller.counters.last_fault is FrameFault.SEND_FAILED
+
+
+def test_ports_without_a_file_descriptor_are_read_with_the_tick(rig: GatewayRig) -> None:
+    """As those of python-can's virtual interface, and of some adapters."""
+    buses = rig.deployment.config.buses
+    ports = {name: open_port(name, bus, ignore) for name, bus in buses.items()}
+    assert [port.fileno() for port in ports.values()] == [-1, -1]
+    InLine(rig.deployment, ignore).wait(0.001, rig.controller, ports)
+    for port in ports.values():
+        port.close()
 
 
 def test_without_socketcan_it_says_that_others_do_not_pass(
