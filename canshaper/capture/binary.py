@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 import can
 
-from canshaper.capture.frames import Place, TimedFrame
+from canshaper.capture.frames import LARGEST_EXTENDED, LARGEST_STANDARD, Place, TimedFrame
 
 # A float of that many seconds still holds nanoseconds; a date holds microseconds.
 FINE_S = 4e6
@@ -14,12 +14,25 @@ FINE_S = 4e6
 _OBJECT = struct.Struct("<4sHHLL")
 
 
+class _Reader(can.BLFReader):
+    """python-can's, which never ends where an object of a damaged file has no length."""
+
+    def _parse_data(self, data: bytes) -> Iterator[can.Message]:
+        at = data.find(b"LOBJ", 0, 8)
+        while 0 <= at <= len(data) - _OBJECT.size:
+            length = _OBJECT.unpack_from(data, at)[3]
+            if length < _OBJECT.size:
+                raise ValueError(f"an object of {length} bytes")
+            at = data.find(b"LOBJ", at + length, at + length + 8)
+        return super()._parse_data(data)
+
+
 def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
     """Vector's BLF; times to the nanosecond or ten microseconds, as the logger had them."""
     wrong = _cut_off(file)  # which python-can passes over in silence
     file.seek(0)
     try:
-        reader = can.BLFReader(file)
+        reader = _Reader(file)
         # It adds the start to every time, and rounds the sum to what a float holds.
         start_ns = round(reader.start_timestamp * 1000) * 1_000_000
         reader.start_timestamp = 0.0
@@ -68,21 +81,26 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 def _frames(
     reader: can.io.generic.MessageReader, place: Place, start_ns: int, first: int
 ) -> Iterator[TimedFrame]:
-    """Its data frames; ``first`` is the number of the first channel for people."""
+    """Its data frames; ``first`` is the number of the first channel for people.
+
+    Raises:
+        ValueError: a frame that none can be; python-can takes it as it stands.
+    """
     for message in reader:
         place.number += 1
         if message.is_error_frame or message.is_remote_frame or message.is_fd:
             kind = "error" if message.is_error_frame else "remote"
             place.left_out["CAN FD" if message.is_fd else kind] += 1
             continue
+        can_id, data = message.arbitration_id, bytes(message.data)
+        if can_id > (LARGEST_EXTENDED if message.is_extended_id else LARGEST_STANDARD):
+            raise ValueError(f"id {can_id:#x}")
+        if len(data) > 8:
+            raise ValueError(f"{len(data)} bytes in a classical frame")
         channel = message.channel
         name = str(channel + first) if isinstance(channel, int) else str(channel or "")
         yield TimedFrame(
-            start_ns + _ns(message.timestamp),
-            name,
-            message.arbitration_id,
-            message.is_extended_id,
-            bytes(message.data),
+            start_ns + _ns(message.timestamp), name, can_id, message.is_extended_id, data
         )
 
 

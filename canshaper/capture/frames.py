@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 # No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
 LATEST_S = 10_000_000_000
+LARGEST_STANDARD, LARGEST_EXTENDED = 0x7FF, 0x1FFFFFFF
 
 
 class TimedFrame(NamedTuple):

@@ -12,13 +12,18 @@ from decimal import Decimal
 from functools import partial
 from typing import BinaryIO
 
-from canshaper.capture.frames import LATEST_S, Place, TimedFrame
+from canshaper.capture.frames import (
+    LARGEST_EXTENDED,
+    LARGEST_STANDARD,
+    LATEST_S,
+    Place,
+    TimedFrame,
+)
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
 LONGEST_LINE = 65_536
 SHOWN = 60
-LARGEST_STANDARD, LARGEST_EXTENDED = 0x7FF, 0x1FFFFFFF
 ERROR_FLAG = 0x20000000  # linux/can.h, CAN_ERR_FLAG
 EDL = 0x1000  # a frame of CAN FD, in the flags of an ASC line
 

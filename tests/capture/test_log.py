@@ -2,6 +2,7 @@
 
 import gzip
 import tracemalloc
+from itertools import islice
 from pathlib import Path
 
 import can
@@ -313,15 +314,30 @@ def test_a_time_that_no_clock_can_have(
     assert "mixed clocks" not in str(error)
 
 
-def test_a_binary_log_with_a_time_that_no_clock_can_have(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("at", "value", "text"),
+    [
+        (8, bytes(4), "frame 0: found ValueError an object of 0 bytes"),  # its length
+        (24, b"\xff" * 8, "frame 1: found a time further than 10000000000 s"),  # ns
+        (36, b"\x00\x08\x00\x00", "frame 1: found ValueError id 0x800"),
+        (45, b"\x00", "frame 1: found ValueError 12 bytes in a classical frame"),  # flags of FD
+    ],
+)
+def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: str) -> None:
     path = tmp_path / "a.blf"
+    fd = at == 45
+    message = can.Message(
+        timestamp=1.0, arbitration_id=1, is_extended_id=False, is_fd=fd, data=bytes(12 if fd else 8)
+    )
     with can.BLFWriter(path, compression_level=0) as writer:
-        writer.on_message_received(messages(FRAMES)[0])
+        writer.on_message_received(message)
     content = bytearray(path.read_bytes())
-    at = content.rindex(b"LOBJ") + 24  # its time, 8 bytes, ns since the log began
-    content[at : at + 8] = b"\xff" * 8
+    at += content.rindex(b"LOBJ")
+    content[at : at + len(value)] = value
     path.write_bytes(content)
-    assert f"{path}: frame 1: found a time further than 10000000000 s" in error_of(path)
+    with pytest.raises(LogError) as error:
+        list(islice(read_log(path), 5))  # without end where an object has no length
+    assert f"{path}: {text}" in str(error.value)
 
 
 def test_a_clock_that_was_set_is_told_with_its_place(tmp_path: Path) -> None:
