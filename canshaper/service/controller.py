@@ -81,13 +81,13 @@ class Controller:
             (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
         }
         for runner in self.axes.values():
-            if runner.bound.radial is not None:
-                radius = RadiusInput(runner.bound.radial)
-                if (measured := runner.bound.radial.radius) is not None:
+            if (radial := runner.bound.radial) is not None:
+                radius = RadiusInput(radial)
+                if (measured := radial.radius) is not None:
                     taken.append((measured, radius))
                     self._inputs |= dict.fromkeys(measured.keys, radius)
-                target = self.axes[runner.bound.radial.config.axis]
-                runner.compensator = Compensator(runner, target, radius)
+                target = self.axes[radial.config.axis]
+                runner.compensator = Compensator(runner.axis, radial.config, target, radius)
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
         used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._sent)}
         self._others = deployment.messages.ids() - used

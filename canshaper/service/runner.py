@@ -7,7 +7,7 @@ from typing import Protocol
 
 from canshaper.can.deployment import BoundAxis
 from canshaper.can.frame import Frame
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisConfig, RadialConfig
 from canshaper.service.cia408 import ValveControl
 from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
@@ -147,7 +147,7 @@ class AxisRunner:
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self.compensator is not None:
-            self.compensator.before_slew()
+            self.added = self.compensator.before_slew()
         transition = self.axis.act(stick, self.added)
         self.bound.valve.put(self.axis.raw)
         return transition
@@ -203,14 +203,20 @@ class AxisRunner:
 class Compensator:
     """Radial compensation from a slew axis to its near-far axis.
 
+    It does not know the runner that has it: a cycle would outlive a reload, see ``Collector``.
+
     Args:
         slew: the axis that slews.
+        radial: its compensation.
         near_far: the axis that moves the tip in and out.
         radius: where the radius of the tip comes from.
     """
 
-    def __init__(self, slew: AxisRunner, near_far: AxisRunner, radius: RadiusInput) -> None:
+    def __init__(
+        self, slew: Axis, radial: RadialConfig, near_far: AxisRunner, radius: RadiusInput
+    ) -> None:
         self._slew = slew
+        self._config = radial
         self._near_far = near_far
         self._radius = radius
         self._share = 1.0
@@ -218,28 +224,27 @@ class Compensator:
 
     def adjust(self) -> None:
         """Take the sway data of the near-far axis as it is now."""
-        radial, sway = self._slew.bound.radial, self._near_far.bound.config.sway
-        assert radial is not None  # only such axes have one
+        radial, sway = self._config, self._near_far.bound.config.sway
         assert sway is not None  # checked with the deployment
         self._radial = RadialCompensation(
             sway.mode(),
-            radial.config.full_speed_rad_s,
+            radial.full_speed_rad_s,
             sway.full_speed_m_s,
-            radial.config.max_pct / 100.0,
+            radial.max_pct / 100.0,
         )
 
-    def before_slew(self) -> None:
-        """Tell the slew axis what to add in this tick."""
-        sway, told = self._sway(), self._slew.axis.told
+    def before_slew(self) -> float:
+        """What the slew axis is to add in this tick."""
+        sway, told = self._sway(), self._slew.told
         self._share = self._radial.tip_share(sway, told)
-        self._slew.added = self._radial.slew(sway, told) if self._moving() else 0.0
+        return self._radial.slew(sway, told) if self._moving() else 0.0
 
     def after_slew(self, now_ns: int) -> None:
         """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
         self._near_far.added = 0.0
         if self._moving():
             sway = self._sway()
-            share = self._radial.tip_share(sway, self._slew.axis.told)
+            share = self._radial.tip_share(sway, self._slew.told)
             circle_m = self._radius.circle_m(now_ns, share)
             if circle_m is not None:
                 added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
@@ -247,11 +252,11 @@ class Compensator:
 
     def _sway(self) -> SwayModel:
         """Sway model of the slew axis now; a change of its sway data makes another one."""
-        sway = self._slew.axis.sway
+        sway = self._slew.sway
         assert sway is not None  # checked with the deployment
         return sway
 
     def _moving(self) -> bool:
         """Not for ever after a swing that nobody damps: nothing may move without an operator."""
-        axis = self._slew.axis
+        axis = self._slew
         return axis.asked and axis.state in (State.ACTIVE, State.STOPPING)

@@ -1,5 +1,7 @@
 """What a reload must not do: set anything going, forget a trip, or take ourselves for another."""
 
+import gc
+import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from canshaper.can.socketcan import Ids
 from canshaper.config.bus import Bus
 from canshaper.service import daemon as module
 from canshaper.service import loop
+from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
 from canshaper.service.daemon import Daemon
 from canshaper.shaping.states import Reason, State
@@ -327,3 +330,22 @@ def test_an_axis_that_is_new_begins_as_ever(changed_rig: Callable[..., Rig], rig
     other.controller.follow(rig.controller)
     other.run(3)
     assert other.state("boom") is State.READY
+
+
+# -- what was before -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["forwarder-robust", "j1939-forwarder", "canopen-forwarder"])
+def test_nothing_is_left_of_the_controller_before(kind: str) -> None:
+    """Without the collector, which never looks through what was there at the start again."""
+    deployment = load_deployment(ROOT / "config" / f"{kind}.yaml")
+    controller = Controller(deployment)
+    adjuster = Adjuster(controller)
+    parts = [controller, deployment, *controller.axes.values()]
+    gone = [weakref.ref(part) for part in parts]
+    gc.disable()
+    try:
+        del controller, adjuster, deployment, parts
+        assert [one() for one in gone] == [None] * len(gone)
+    finally:
+        gc.enable()
