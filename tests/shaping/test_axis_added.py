@@ -14,6 +14,7 @@ from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 from canshaper.shaping.axis import MOST_OWED, Axis
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
@@ -277,6 +278,26 @@ def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:
         assert axis.raw == 0
     axis.tick(StickInput(), 0.2)
     assert axis.sent == pytest.approx(0.2 + 1 / 125, abs=0.005)  # a step of what is owed
+
+
+def test_an_addition_of_less_than_half_a_step_is_not_sent() -> None:
+    """What is owed of it waits for a motion: it is no reason to twitch."""
+    axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
+    for _ in range(50):
+        axis.tick(StickInput(), 0.003)
+        assert axis.raw == 0
+
+
+@pytest.mark.parametrize(("stick", "added"), [(1 / 3, 0.03), (-0.41, 0.0271), (0.25, -0.05)])
+def test_in_the_long_run_stick_and_addition_are_sent_in_full(stick: float, added: float) -> None:
+    limits = OutputLimits(rise_per_s=100.0, fall_per_s=100.0)
+    axis = Axis(TICK_S, limits, sway=None, shaper=Off())
+    axis.tick(StickInput())
+    sent = 0.0
+    for _ in range(200):
+        axis.tick(StickInput(stick), added)
+        sent += axis.sent
+    assert sent == pytest.approx(200 * (stick + added), abs=0.02)
 
 
 def test_what_was_owed_is_forgotten_at_rest() -> None:

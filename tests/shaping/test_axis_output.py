@@ -329,7 +329,7 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
                 for _ in range(missed):
                     truth.step(axis.sent)
                 now += missed
-            axis.tick(StickInput(1.0 if now < 200 else 0.0))
+            axis.tick(StickInput(0.7 if now < 200 else 0.0))
             truth.step(axis.sent)
             now += 1
             if now > 450:
@@ -362,3 +362,20 @@ def test_of_a_long_standstill_not_every_tick_is_gone_through(drive: Drive) -> No
     drive.axis._shaper = counted = Counted()
     drive.axis.hold(50 * 86_400)
     assert counted.times <= 2000
+
+
+def test_in_missed_ticks_the_filter_sees_the_last_command(drive_with: DriveWith) -> None:
+    commands = []
+
+    class Seen:
+        def wanted(self, command: float) -> float:
+            commands.append(command)
+            return command
+
+    drive = drive_with(limits=OutputLimits(maximum=0.5))
+    drive.moving()
+    drive.axis._shaper = Seen()
+    for stick in (0.3, -0.8):
+        drive.tick(StickInput(stick))
+        drive.axis.hold(2)
+    assert commands == [0.3] * 3 + [-0.5] * 3

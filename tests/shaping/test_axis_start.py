@@ -146,3 +146,16 @@ def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: f
     assert drive.axis.command == 0.021 * sign
     (ready,) = drive.run(StickInput(0.02 * sign), 3.0)
     assert (ready.new, ready.reason) == (State.READY, Reason.AT_REST)
+
+
+def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(drive: Drive) -> None:
+    drive.axis.state, drive.axis.reason = State.TRIPPED, Reason.EMERGENCY_STOP
+    drive.run(StickInput(), 0.2)
+    assert drive.state is State.TRIPPED
+
+
+def test_with_the_enable_off_a_stick_that_tells_nothing_is_no_news(drive: Drive) -> None:
+    drive.tick(StickInput(fault=Reason.STICK_NOT_AVAILABLE, enabled=False))
+    assert drive.axis.reason is Reason.ENABLE_OFF
+    drive.tick(StickInput(fault=Reason.STICK_NOT_AVAILABLE))
+    assert drive.axis.reason is Reason.STICK_NOT_AVAILABLE
