@@ -219,7 +219,8 @@ def _table(
             raise IdentificationError(f"{found} {text}; allowed is a time in each line")
         notes.append(f"{found} are without a time and left out")
     time = time[good]
-    others = {n: c[good] for n, c in others.items()}
+    # Infinite is no number either; two of them would make a warning of a sum.
+    others = {n: np.where(np.isfinite(c), c, np.nan)[good] for n, c in others.items()}
     units = {n: _named(n)[1] for n in others}
     return Table(path, (time - time[0]) * factor, others, units, notes)
 

@@ -130,6 +130,16 @@ def test_a_value_that_none_can_be_makes_a_line_wrong(tmp_path: Path) -> None:
     assert identify("slew", "", [series_of(table, "", None)]).usable
 
 
+def test_an_infinite_value_is_as_good_as_none(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[100] = lines[100].partition(",")[0] + ",inf,-inf,inf"
+    file.write_text("\n".join([*lines, ""]))
+    series = series_of(read_table(file), "", None)
+    assert len(series.time_s) == len(SWUNG) - 1
+    assert identify("slew", "", [series]).usable
+
+
 def test_a_gyroscope_with_an_empty_column(tmp_path: Path) -> None:
     file = phone(tmp_path / "a.csv", SWUNG)
     header, *rows = file.read_text().splitlines()
