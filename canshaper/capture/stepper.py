@@ -112,6 +112,7 @@ class Stepper:
         self.carried: list[Timed] = []
         self.heard: dict[Key, int] = {}
         self.number = -1
+        self._now_ns = 0
         self.fresh = True
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._stall_ns = stall_ns(deployment)
@@ -124,12 +125,18 @@ class Stepper:
     def begin(self, tick: Tick) -> None:
         """Prepare for a tick that does not follow the one before.
 
-        A controller as fresh as that of a daemon that starts; for one that ran before, what the
+        A controller as fresh as that of a daemon that starts; one that has read its files again
+        knows what was latched, and whether it stood still meanwhile; for one that ran before, what the
         log says of it is put in: states, counters, alive counters. What it knew of the swing is
         not in the log; the model begins at rest.
         """
         if not self.fresh:
+            before, stood_ns = self.controller, tick.now_ns - self._now_ns
             self._begin(self._load())
+            if tick.reloaded:
+                self.controller.follow(before)
+                if stood_ns > self._stall_ns:
+                    self.controller.stalled()
         self.fresh = False
         if tick.starts:
             return
@@ -183,7 +190,7 @@ class Stepper:
             sent += controller.neutral_frames()
         number = tick.number - (choice.earlier if choice else 0)
         missed = number - self.number - 1
-        self.number = number
+        self.number, self._now_ns = number, tick.now_ns
         stalled = missed * self._tick_ns > self._stall_ns
         if stalled:
             controller.stalled()

@@ -18,6 +18,8 @@ Sorted = tuple[int, Frame, Kind]
 DRIFT = 5e-4
 # Neutral frames so long after the last frames are those of another daemon.
 RESTART_NS = 1_000_000_000
+# So soon after neutral frames no daemon starts: it is the same one, with its files read again.
+RELOAD_NS = 250_000_000
 # What waits before a start has been read by then; older frames were for nobody.
 WAITED_NS = 2_000_000_000
 # Ticks by which the grid is found.
@@ -184,8 +186,12 @@ class Recovery:
         """Whether these are the neutral frames of a daemon that starts."""
         if self._marker_data(burst) != self._neutral:
             return False
-        ended = self._extra is not None
-        return before is None or ended or burst.now_ns - before.now_ns > RESTART_NS
+        if before is None:
+            return True
+        passed_ns = burst.now_ns - before.now_ns
+        reloaded = self._count is not None and passed_ns < RELOAD_NS
+        ended = self._extra is not None and not reloaded
+        return ended or passed_ns > RESTART_NS
 
     def _begins_to_count(self, burst: Tick) -> bool:
         if self._count is None:

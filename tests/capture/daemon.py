@@ -4,6 +4,7 @@ Everything that makes it hard to read a log: frames that come while the daemon t
 are late or missing, clocks that drift apart.
 """
 
+import math
 import random
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -30,6 +31,8 @@ class Hardness:
         drift: of the lever's clock against the daemon's.
         before_s: seconds that the levers run before the daemon starts.
         silent: from when to when after its start the levers send nothing, s.
+        stands_s: when the loop stands still for a fifth of a second.
+        reload: when its files are read again, and how long a bus takes to open then, s.
     """
 
     think_ns: int = 200_000
@@ -39,6 +42,8 @@ class Hardness:
     drift: float = 0.0
     before_s: float = 1.0
     silent: tuple[float, float] = (0.0, 0.0)
+    stands_s: float = math.inf
+    reload: tuple[float, float] = (math.inf, 0.0)
 
 
 def log_of(
@@ -54,8 +59,6 @@ def log_of(
     deployment = load()
     controller = Controller(deployment)
     tick_ns = deployment.config.tick_ms * 1_000_000
-    axes = list(deployment.axes)
-    levers = LeverNode(load(), script_named(script or f"random-{seed}", axes))
     lines: list[tuple[int, int, str]] = []
     order = iter(range(10**9))
 
@@ -65,22 +68,16 @@ def log_of(
         can_id = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
         lines.append((time_ns // 1000, next(order), f"{text}{can_id}#{frame.data.hex().upper()}\n"))
 
-    frames: list[tuple[int, Frame]] = []
+    frames = _levers(load(), seed, chance, hardness, seconds=seconds, script=script)
     begin_ns = round(hardness.before_s * 1e9)
-    for number in range(round((seconds + hardness.before_s) * 1000 / levers.cycle_ms)):
-        at_ns = round(number * levers.cycle_ms * 1e6 * (1 + hardness.drift))
-        at_ns += hardness.lever_phase_ns + chance.randrange(50_000)
-        quiet = hardness.silent[0] <= at_ns / 1e9 - hardness.before_s < hardness.silent[1]
-        for frame in levers.frames(number * levers.cycle_ms):
-            at_ns += 60_000
-            if not quiet:
-                frames.append((at_ns, frame))
     for at_ns, frame in frames:
         logged(at_ns, frame)
     opened_ns = begin_ns - 15_000_000
     waiting = [f for f in frames if f[0] >= opened_ns]
     for number, frame in enumerate(controller.neutral_frames()):
         logged(begin_ns - 4_000_000 + 50_000 * number, frame)
+    stands_s, (reload_s, opens_s) = hardness.stands_s, hardness.reload
+    opens_ns = round(opens_s * 1e9)
     deadline = now = begin_ns
     end_ns = begin_ns + round(seconds * 1e9)
     while now < end_ns:
@@ -99,8 +96,42 @@ def log_of(
         now = deadline + chance.randrange(5_000, 5_001 + hardness.late_ns)
         if chance.random() < hardness.miss:
             now += chance.randrange(tick_ns * 3)
+        if (now - begin_ns) / 1e9 > stands_s:
+            stands_s = math.inf
+            now += 200_000_000
         now = max(now, at_ns)
-    for frame in controller.neutral_frames():
-        logged(at_ns, frame)
-        at_ns += 50_000
+        if (now - begin_ns) / 1e9 > reload_s and controller.neutral:
+            reload_s = math.inf
+            for number, frame in enumerate(controller.neutral_frames()):
+                logged(at_ns + 50_000 * number, frame)
+            before, controller = controller, Controller(load())
+            controller.follow(before)
+            now = deadline = at_ns + 500_000 + opens_ns
+            if opens_ns > stall_ns(deployment):
+                controller.stalled()
+    for number, frame in enumerate(controller.neutral_frames()):
+        logged(at_ns + 50_000 * number, frame)
     return [line for _, _, line in sorted(lines)]
+
+
+def _levers(
+    deployment: Deployment,
+    seed: int,
+    chance: random.Random,
+    hardness: Hardness,
+    *,
+    seconds: float,
+    script: str | None,
+) -> list[tuple[int, Frame]]:
+    """What the joysticks send, and when."""
+    levers = LeverNode(deployment, script_named(script or f"random-{seed}", list(deployment.axes)))
+    frames: list[tuple[int, Frame]] = []
+    for number in range(round((seconds + hardness.before_s) * 1000 / levers.cycle_ms)):
+        at_ns = round(number * levers.cycle_ms * 1e6 * (1 + hardness.drift))
+        at_ns += hardness.lever_phase_ns + chance.randrange(50_000)
+        quiet = hardness.silent[0] <= at_ns / 1e9 - hardness.before_s < hardness.silent[1]
+        for frame in levers.frames(number * levers.cycle_ms):
+            at_ns += 60_000
+            if not quiet:
+                frames.append((at_ns, frame))
+    return frames

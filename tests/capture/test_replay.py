@@ -1,5 +1,6 @@
 """A daemon's own log, replayed, gives every frame to the last bit, however hard it is to read."""
 
+import math
 import re
 from collections.abc import Callable
 from dataclasses import replace
@@ -136,6 +137,18 @@ def test_a_daemon_that_is_killed_and_starts_again(tmp_path: Path) -> None:
         row.replace("(176375000", "(176375002") for row in log_of(load, 2, Hardness(), seconds=4.0)
     ]
     replay = same(load, written(tmp_path, killed + later))
+    assert replay.verdict.starts == 2
+
+
+@pytest.mark.parametrize("opens_s", [0.003, 0.15])
+@pytest.mark.parametrize(("seed", "stands_s", "reload_s"), [(4, math.inf, 2.0), (1, 5.0, 5.3)])
+def test_a_daemon_that_reads_its_files_again(
+    tmp_path: Path, seed: int, stands_s: float, reload_s: float, opens_s: float
+) -> None:
+    """At rest, and tripped by a standstill; quickly, and so slowly that what waited is too old."""
+    load = loader("forwarder.yaml")
+    hard = Hardness(stands_s=stands_s, reload=(reload_s, opens_s))
+    replay = same(load, written(tmp_path, log_of(load, seed, hard, seconds=9.0)))
     assert replay.verdict.starts == 2
 
 
