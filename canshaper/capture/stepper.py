@@ -125,10 +125,10 @@ class Stepper:
     def begin(self, tick: Tick) -> None:
         """Prepare for a tick that does not follow the one before.
 
-        A controller as fresh as that of a daemon that starts; one that has read its files again
-        knows what was latched, and whether it stood still meanwhile; for one that ran before, what the
-        log says of it is put in: states, counters, alive counters. What it knew of the swing is
-        not in the log; the model begins at rest.
+        A controller as fresh as that of a daemon that starts. One that has read its files again
+        knows what was latched, and whether it stood still meanwhile. For one that ran before, what
+        the log says of it is put in: states, counters, alive counters. What it knew of the swing
+        is not in the log; the model begins at rest.
         """
         if not self.fresh:
             before, stood_ns = self.controller, tick.now_ns - self._now_ns
