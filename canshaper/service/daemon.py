@@ -3,14 +3,13 @@
 import logging
 import signal
 import time
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from types import FrameType
 from typing import Any
 
-from canshaper.can.bus import BusError, ListeningPort, Port, open_port
+from canshaper.can.bus import BusError, Port
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.config.bus import Bus
 from canshaper.control.server import ControlServer
 from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
@@ -18,6 +17,7 @@ from canshaper.service.exchange import exchange, stall_ns
 from canshaper.service.gateway import InLine
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
+from canshaper.service.ports import close_ports, new_ports, open_ports, pass_over
 from canshaper.service.reading import Reading
 from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
 
@@ -25,8 +25,6 @@ log = logging.getLogger("canshaper")
 
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
-# Until what was sent last has left a queue of some frames, also on a bus with other traffic.
-ON_THE_BUS_S = 0.1
 SECOND_NS = 1_000_000_000
 # Nobody hears us there, or we nobody.
 OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE))
@@ -59,7 +57,7 @@ class Daemon:
         self._told_ns = 0
         self._latest_ns = 0
         deployment = load()
-        self._ports = self._open(deployment, {})
+        self._ports = open_ports(deployment, {}, self._on_fault)
         self._line = self._in_line(deployment)
         self._use(deployment)
         self._control = self._open_control(deployment)
@@ -85,7 +83,7 @@ class Daemon:
         finally:
             self._manager.stopping()
             self._send_neutral()
-            self._close(self._ports.values())
+            close_ports(self._ports.values())
             if self._line:
                 self._line.close()
             if self._reading:
@@ -189,20 +187,6 @@ class Daemon:
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self._stall_ns = stall_ns(deployment)
 
-    def _open(self, deployment: Deployment, opened: dict[Bus, Port]) -> dict[str, Port]:
-        """Ports of a deployment by name, those among them that are open already included."""
-        ports: dict[str, Port] = {}
-        try:
-            for name, bus in deployment.config.buses.items():
-                ids = deployment.ids(name)
-                port = opened.get(bus) or open_port(name, bus, self._on_fault, ids)
-                listens = deployment.listen_only and bus not in opened
-                ports[name] = ListeningPort(port, ids) if listens else port
-        except BusError:
-            self._close(port for port in ports.values() if port not in opened.values())
-            raise
-        return ports
-
     def _in_line(self, deployment: Deployment) -> InLine | None:
         """What passes frames on, where we stand in a line."""
         in_line = deployment.config.gateway and not deployment.listen_only
@@ -260,17 +244,17 @@ class Daemon:
         opened = {bus: self._ports[name] for name, bus in config.buses.items()}
         ports: dict[str, Port] = {}
         try:
-            ports = self._open(deployment, opened)
+            ports = open_ports(deployment, opened, self._on_fault)
             line = self._in_line(deployment)
         except BusError as error:
-            self._close(port for port in ports.values() if port not in opened.values())
+            close_ports(new_ports(ports, opened))
             self._manager.ready("as before")
             self._refuse(str(error))
             return False
         self._send_neutral()
-        self._close(port for port in opened.values() if port not in ports.values())
-        if new := [port for port in ports.values() if port not in opened.values()]:
-            self._pass_over(new)
+        close_ports(port for port in opened.values() if port not in ports.values())
+        if new := new_ports(ports, opened):
+            pass_over(new)
         for name, port in ports.items():
             port.watch(name, deployment.ids(name))
         self._ports = ports
@@ -287,16 +271,6 @@ class Daemon:
         self._collector.freeze()
         self._stood_still = time.monotonic_ns() - began_ns > self._stall_ns
         return True
-
-    def _pass_over(self, new: Iterable[Port]) -> None:
-        """Throw away what new ports hear at first: what we have sent last from the old ones.
-
-        They cannot know it for ours, and it would look like a second sender of every valve's id.
-        """
-        time.sleep(ON_THE_BUS_S)
-        for port in new:
-            for _ in (*port.frames(), *port.others()):
-                pass
 
     def _refuse(self, why: str) -> None:
         """Tell why a reload changes nothing."""
@@ -320,10 +294,6 @@ class Daemon:
                 time.sleep(0.005)
         for frame in waiting:
             log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
-
-    def _close(self, ports: Iterable[Port]) -> None:
-        for port in ports:
-            port.close()
 
     def _on_fault(self, fault: FrameFault) -> None:
         self._controller.counters.add(fault)

@@ -8,6 +8,7 @@ import pytest
 from canshaper.can.binding import load_deployment
 from canshaper.can.frame import Frame
 from canshaper.service.daemon import Daemon
+from canshaper.service.ports import close_ports
 from tests.service.canopen_rig import (
     NODES,
     OPERATIONAL,
@@ -268,4 +269,4 @@ def test_the_daemon_opens_a_bus_of_canopen(tmp_path: Path) -> None:
     )
     daemon = Daemon(lambda: load_deployment(file))
     assert set(daemon._ports) == {"crane"}
-    daemon._close(daemon._ports.values())
+    close_ports(daemon._ports.values())

@@ -16,6 +16,7 @@ from canshaper.can.socketcan import Ids
 from canshaper.config.bus import Bus
 from canshaper.service import daemon as module
 from canshaper.service import loop
+from canshaper.service import ports as service_ports
 from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
 from canshaper.service.daemon import Daemon
@@ -93,10 +94,10 @@ class Bench:
         self.rig = Rig(self.file)  # for its levers
         self._tick = 0
         self._handlers: dict[int, Any] = {}
-        for one in (module, loop):
+        for one in (module, loop, service_ports):
             monkeypatch.setattr(one, "time", self)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
-        monkeypatch.setattr(module, "open_port", self._open)
+        monkeypatch.setattr(service_ports, "open_port", self._open)
         monkeypatch.setattr(module, "Reading", Read)
         monkeypatch.setattr(module, "Collector", Uncollected)
         for name in ("lock_memory", "refuse_huge_pages"):

@@ -1,0 +1,60 @@
+"""The open buses of a daemon, from one deployment to the next."""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+from canshaper.can.bus import BusError, ListeningPort, Port, open_port
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import FrameFault
+from canshaper.config.bus import Bus
+
+# Until what was sent last has left a queue of some frames, also on a bus with other traffic.
+ON_THE_BUS_S = 0.1
+
+
+def open_ports(
+    deployment: Deployment, opened: Mapping[Bus, Port], on_fault: Callable[[FrameFault], None]
+) -> dict[str, Port]:
+    """Ports of a deployment by name, those among them that are open already included.
+
+    Args:
+        deployment: one that only listens gets ports that send no valve frame.
+        opened: what is open.
+        on_fault: called with every fault of a bus.
+
+    Raises:
+        BusError: a bus cannot be opened; what is open stays as it is.
+    """
+    ports: dict[str, Port] = {}
+    try:
+        for name, bus in deployment.config.buses.items():
+            ids = deployment.ids(name)
+            port = opened.get(bus) or open_port(name, bus, on_fault, ids)
+            listens = deployment.listen_only and bus not in opened
+            ports[name] = ListeningPort(port, ids) if listens else port
+    except BusError:
+        close_ports(new_ports(ports, opened))
+        raise
+    return ports
+
+
+def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Port]:
+    """Those among ports that were not open before."""
+    return [port for port in ports.values() if port not in opened.values()]
+
+
+def pass_over(new: Iterable[Port]) -> None:
+    """Throw away what new ports hear at first: what we have sent last from those before them.
+
+    They cannot know it for ours, and it would look like a second sender of every valve's id.
+    """
+    time.sleep(ON_THE_BUS_S)
+    for port in new:
+        for _ in (*port.frames(), *port.others()):
+            pass
+
+
+def close_ports(ports: Iterable[Port]) -> None:
+    """Close them."""
+    for port in ports:
+        port.close()
