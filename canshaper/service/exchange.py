@@ -71,9 +71,11 @@ def exchange(
     """
     if stalled:
         reckons.stalled()
-    for _ in range(MOST_ROUNDS if stalled else 1):
-        if not take(reckons, ports, now_ns):
-            break
+        for _ in range(MOST_ROUNDS):
+            if not take(reckons, ports, now_ns):
+                break
+    else:
+        take(reckons, ports, now_ns)
     for frame in reckons.tick(now_ns, missed):
         if not ports[frame.bus].send(frame):
             reckons.send_failed(frame)

@@ -78,15 +78,18 @@ class LeverInput(Input):
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
         enable = raw[self._enable]
-        if released and enable != 0 and (self._released or self._doubted_ns > since_ns):
-            fault: Reason | None = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
-        elif type(command) is Reason:
-            fault = command
+        if type(command) is Reason:
+            fault: Reason | None = command
+        elif released:
+            fault = None
         elif enable not in (0, 1):
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.STICK_FROZEN
         else:
-            enabled = enable == 1 and not released
-            return _new(StickInput, (command, None, enabled, bypass, reset, trip))
+            return _new(StickInput, (command, None, enable == 1, bypass, reset, trip))
+        if released and enable != 0 and (self._released or self._doubted_ns > since_ns):
+            fault = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
+        elif fault is None:
+            return StickInput(command, None, False, bypass, reset, trip)
         return StickInput(0.0, fault, enable != 0 and not released, bypass, reset, trip)
