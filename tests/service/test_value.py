@@ -1,0 +1,29 @@
+"""One number out of a message: what of its signal can be a measurement."""
+
+import sys
+
+import pytest
+from cantools.database.can import Signal
+from cantools.database.conversion import BaseConversion
+
+from canshaper.service.value import measurable
+
+LARGEST = sys.float_info.max
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "found"),
+    [
+        (-100.0, 100.0, (-100.0, 100.0)),
+        (0.0, 50.0, (0.0, 50.0)),
+        (0.0, 0.0, (-LARGEST, LARGEST)),  # [0|0] says nothing in a DBC
+        (None, None, (-LARGEST, LARGEST)),
+        (5.0, 5.0, (-LARGEST, LARGEST)),
+    ],
+)
+def test_the_range_of_the_dbc_where_it_says_one_and_never_infinity(
+    low: float | None, high: float | None, found: tuple[float, float]
+) -> None:
+    conversion = BaseConversion.factory(1, 0)
+    signal = Signal("Flow", 0, 16, conversion=conversion, minimum=low, maximum=high)
+    assert measurable(signal) == pytest.approx(found, rel=1e-5, abs=1e-3)
