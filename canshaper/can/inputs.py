@@ -46,9 +46,9 @@ class BoundInput:
 
     @property
     def keys(self) -> list[tuple[str, int, bool]]:
-        """Everything its frames may come as, where that is not ``by_group``."""
+        """Everything its frames may come as, where their source is known."""
         bus, can_id, extended = self.key
-        if not is_j1939(self.message) or self.by_group:
+        if not is_j1939(self.message) or self.any_source:
             return [self.key]
         return [(bus, one, extended) for one in at_every_priority(can_id)]
 

@@ -6,8 +6,6 @@ from typing import Any
 from canshaper.can.codecs import WrongLengthError
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
-from canshaper.can.j1939 import WITHOUT_PRIORITY
-from canshaper.can.layout import is_j1939
 from canshaper.shaping.states import Reason
 
 # A member by way of its class takes ten times as long as a name, for every frame.
@@ -90,9 +88,7 @@ class EmergencyStopInput(Input):
     def __init__(self, bound: BoundInput, signal: str) -> None:
         super().__init__(bound)
         self._signal = signal
-        bus, can_id, extended = bound.key
-        self._mask = WITHOUT_PRIORITY if is_j1939(bound.message) else ~0
-        self._key = bus, can_id & self._mask, extended
+        self._keys = frozenset(bound.keys)
         self._pressed_ns = -1
         self._pressed = False
 
@@ -112,9 +108,8 @@ class EmergencyStopInput(Input):
 
         Only a press counts of it, for that one has to be reset though it may be over by now.
         """
-        bus, can_id, extended, data = frame
-        if (bus, can_id & self._mask, extended) == self._key:
-            self.receive(data, now_ns)
+        if frame[:3] in self._keys:
+            self.receive(frame.data, now_ns)
             self.forget()
 
     def stop(self, now_ns: int, since_ns: int) -> Reason | None:

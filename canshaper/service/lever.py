@@ -82,14 +82,14 @@ class LeverInput(Input):
             fault: Reason | None = command
         elif released:
             fault = None
-        elif enable not in (0, 1):
+        elif enable != 1:  # nor 0, which is released
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
             fault = Reason.STICK_FROZEN
         else:
-            return _new(StickInput, (command, None, enable == 1, bypass, reset, trip))
+            return _new(StickInput, (command, None, True, bypass, reset, trip))
         if released and enable != 0 and (self._released or self._doubted_ns > since_ns):
             fault = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
         elif fault is None:
-            return StickInput(command, None, False, bypass, reset, trip)
-        return StickInput(0.0, fault, enable != 0 and not released, bypass, reset, trip)
+            return StickInput(command, enabled=False, reset=reset, trip=trip)
+        return StickInput(fault=fault, enabled=not released, reset=reset, trip=trip)

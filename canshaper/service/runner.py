@@ -181,9 +181,6 @@ class AxisRunner:
         if self.lost:
             self.lost = False
             fault = fault or Reason.STICK_TIMEOUT
-        if fault is not None and self.axis.state is State.TRIPPED:
-            # What tripped it is still there, so that a reset which is held is no new press.
-            trip, fault = trip or fault, None
         self.trip = trip
         return fault
 

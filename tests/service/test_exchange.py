@@ -171,3 +171,15 @@ def test_an_emergency_stop_that_was_free_in_a_standstill_is_not_known(changed_ri
     port.queue = [machine.stop(0), *levers(rig)]
     tick(rig, port)
     assert machine.states() == READY
+
+
+def test_an_axis_with_a_slow_valve_has_seen_the_standstill_too(
+    changed_rig: Callable[..., Rig],
+) -> None:
+    """A valve of 200 ms: the stick is out, and fresh again, before its turn comes."""
+    rig = changed_rig(dbc={"BO_ 512 20;": "BO_ 512 200;"})
+    rig.run(31)
+    assert rig.state() is State.READY
+    rig.controller.stalled()
+    rig.run(40, Slew=1000)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")

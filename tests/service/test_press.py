@@ -1,8 +1,11 @@
 """What is no press of reset or enable: nobody touched a switch, and a trip must stay."""
 
+from collections.abc import Callable
+
 from canshaper.can.frame import Frame
 from canshaper.shaping.states import State
 from tests.service.conftest import Rig
+from tests.service.emergency import Machine
 
 
 def tripped(rig: Rig, **switches: int) -> Rig:
@@ -57,3 +60,59 @@ def test_an_enable_that_comes_back_with_the_measurement_of_its_stick_is_one(rig:
     assert rig.state() is State.TRIPPED
     rig.run(1)
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
+
+
+def test_an_enable_that_was_off_out_of_sequence_and_on_again_in_one_tick(rig: Rig) -> None:
+    tripped(rig)
+    count = rig.counts["LeverLeft"]
+    rig.counts["LeverLeft"] = (count + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    rig.counts["LeverLeft"] = count
+    rig.run(1)  # the good frame of this tick has it on
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
+def test_a_reset_that_is_held_while_the_loop_is_late(rig: Rig) -> None:
+    tripped(rig)
+    for _ in range(12):
+        rig.receive(rig.lever("LeverLeft"), rig.lever("LeverRight"))
+        rig.tick(1)
+    rig.run(80, Reset=1)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
+    rig.run(1)
+    rig.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
+    changed_rig: Callable[..., Rig],
+) -> None:
+    machine = Machine(changed_rig)
+    machine.run(3)
+    rig = tripped_by(machine)
+    for _ in range(10):
+        rig.run(1)  # without the emergency stop
+    rig.run(5, Reset=1)
+    for _ in range(5):
+        machine.run(1, Reset=1)
+    assert rig.state() is State.TRIPPED
+    machine.run(1)
+    machine.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def tripped_by(machine: Machine) -> Rig:
+    machine.run(10, Slew=1000)
+    machine.rig.controller.send_failed(Frame("crane", 0x200, False, bytes(2)))
+    machine.run(1, Slew=1000)
+    machine.run(5)
+    assert machine.rig.state() is State.TRIPPED
+    return machine.rig
+
+
+def test_what_trips_is_told_before_a_released_enable(rig: Rig) -> None:
+    rig.run(3)
+    rig.receive(Frame("crane", 0x200, False, bytes(2)))
+    rig.run(1, Enable=0)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")

@@ -14,10 +14,12 @@ LARGEST = sys.float_info.max
 @pytest.mark.parametrize(
     ("low", "high", "found"),
     [
-        (-100.0, 100.0, (-100.0, 100.0)),
-        (0.0, 50.0, (0.0, 50.0)),
+        (-100.0, 100.0, (-100.0002, 100.0002)),  # decimals are rounded
+        (0.0, 50.0, (-0.00005, 50.00005)),
         (0.0, 0.0, (-LARGEST, LARGEST)),  # [0|0] says nothing in a DBC
         (None, None, (-LARGEST, LARGEST)),
+        (None, 5.0, (-LARGEST, LARGEST)),
+        (5.0, None, (-LARGEST, LARGEST)),
         (5.0, 5.0, (-LARGEST, LARGEST)),
     ],
 )
@@ -26,4 +28,4 @@ def test_the_range_of_the_dbc_where_it_says_one_and_never_infinity(
 ) -> None:
     conversion = BaseConversion.factory(1, 0)
     signal = Signal("Flow", 0, 16, conversion=conversion, minimum=low, maximum=high)
-    assert measurable(signal) == pytest.approx(found, rel=1e-5, abs=1e-3)
+    assert measurable(signal) == pytest.approx(found, rel=1e-12)
