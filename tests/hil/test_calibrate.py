@@ -11,12 +11,12 @@ from tests.hil.machine import (
     DBC,
     FILE,
     Levers,
+    Service,
     candump,
     levers_on,
     logged,
     open_bus,
     service,
-    wait_for,
 )
 
 VALVES = {DBC.get_message_by_name(f"{a}Command").frame_id for a in ("Slew", "NearFar", "Lift")}
@@ -40,8 +40,13 @@ def last_of_each(log: Path) -> list[int]:
     return [found[valve] for valve in sorted(VALVES)]
 
 
-def wait_for_motion(bus: can.BusABC) -> None:
-    wait_for(bus, "SlewCommand", lambda s: s["Velocity"] != 0.0)
+def moves(bus: can.BusABC, running: Service) -> bool:
+    """Wait for motion; False where the measurement ends before."""
+    while running.process.poll() is None:
+        message = bus.recv(0.2)
+        if message is not None and moving(message):
+            return True
+    return False
 
 
 def test_a_valve_on_the_bus_is_measured(file: Path, tmp_path: Path) -> None:
@@ -75,17 +80,21 @@ def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end:
         levers_on("vcan0") as levers,
         open_bus("vcan0") as bus,
         candump(log, "vcan0"),
-        service(tmp_path / "calibrate.log", "calibrate", str(file), *slow) as running,
     ):
-        wait_for_motion(bus)
-        make(levers, end, running)
-        assert running.process.wait() == 1, running.text()
+        for _ in range(3):  # once more where an emulated machine stood still before
+            arguments = ("calibrate", str(file), *slow)
+            with service(tmp_path / "calibrate.log", *arguments) as running:
+                if not moves(bus, running):
+                    continue
+                make(levers, end, running)
+                assert running.process.wait() == 1, running.text()
+                break
     assert "the measurement was not taken to its end: stopped" in running.text()
     assert last_of_each(log) == [0, 0, 0]
     assert file.read_text() == before
 
 
-def make(levers: Levers, end: str, running: object) -> None:
+def make(levers: Levers, end: str, running: Service) -> None:
     if end == "enable":
         levers.switches["Enable"] = 0
     elif end == "silence":
@@ -94,7 +103,7 @@ def make(levers: Levers, end: str, running: object) -> None:
         levers.values["Slew"] = 30.0
     else:
         number = signal.SIGINT if end == "ctrl-c" else signal.SIGHUP
-        running.process.send_signal(number)  # type: ignore[attr-defined]
+        running.process.send_signal(number)
 
 
 def test_it_asks_before_anything_moves(file: Path, tmp_path: Path) -> None:
