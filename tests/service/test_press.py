@@ -73,6 +73,20 @@ def test_an_enable_that_was_off_out_of_sequence_and_on_again_in_one_tick(rig: Ri
     assert rig.state() is State.TRIPPED
 
 
+def test_an_enable_that_was_off_in_a_frame_after_which_the_counter_goes_on_in_its_tick(
+    rig: Rig,
+) -> None:
+    """Frames of a sender that starts anew: the first is out of sequence, the next ones are not."""
+    tripped(rig)
+    rig.counts["LeverLeft"] = (rig.counts["LeverLeft"] + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    for _ in range(5):
+        rig.receive(rig.lever("LeverLeft"))
+    rig.run(1)
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
 def test_a_reset_that_is_held_while_the_loop_is_late(rig: Rig) -> None:
     tripped(rig)
     for _ in range(12):
