@@ -6,7 +6,7 @@ from typing import BinaryIO
 
 import can
 
-from canshaper.capture.frames import LARGEST_EXTENDED, LARGEST_STANDARD, Place, TimedFrame
+from canshaper.capture.frames import Place, TimedFrame, fits
 
 # A float of that many seconds still holds nanoseconds; a date holds microseconds.
 FINE_S = 4e6
@@ -93,7 +93,7 @@ def _frames(
             place.left_out["CAN FD" if message.is_fd else kind] += 1
             continue
         can_id, data = message.arbitration_id, bytes(message.data)
-        if can_id > (LARGEST_EXTENDED if message.is_extended_id else LARGEST_STANDARD):
+        if not fits(can_id, extended=message.is_extended_id):
             raise ValueError(f"id {can_id:#x}")
         if len(data) > 8:
             raise ValueError(f"{len(data)} bytes in a classical frame")

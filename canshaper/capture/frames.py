@@ -7,7 +7,6 @@ from typing import NamedTuple
 
 # No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
 LATEST_S = 10_000_000_000
-LARGEST_STANDARD, LARGEST_EXTENDED = 0x7FF, 0x1FFFFFFF
 
 
 class TimedFrame(NamedTuple):
@@ -26,6 +25,11 @@ class TimedFrame(NamedTuple):
     can_id: int
     extended: bool
     data: bytes
+
+
+def fits(can_id: int, *, extended: bool) -> bool:
+    """Whether an id has room in its 11 or 29 bits."""
+    return can_id < 1 << (29 if extended else 11)
 
 
 class LogError(ValueError):

@@ -12,13 +12,7 @@ from decimal import Decimal
 from functools import partial
 from typing import BinaryIO
 
-from canshaper.capture.frames import (
-    LARGEST_EXTENDED,
-    LARGEST_STANDARD,
-    LATEST_S,
-    Place,
-    TimedFrame,
-)
+from canshaper.capture.frames import LATEST_S, Place, TimedFrame, fits
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
@@ -93,7 +87,7 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
         raise place.error(_shown(line), CANDUMP_ALLOWED)
     if extended and can_id & ERROR_FLAG:
         return None
-    if can_id > (LARGEST_EXTENDED if extended else LARGEST_STANDARD):
+    if not fits(can_id, extended=extended):
         raise place.error(_id(can_id), "an id of 11 bits in 3 digits, or of 29 in 8")
     return channel.decode("ascii", "replace"), can_id, extended
 
@@ -143,7 +137,7 @@ def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
             raise place.error(_shown(raw), ASC_NUMBERS) from None
         if len(payload) < length:
             raise place.error(f"{len(payload)} of {length} bytes", "all of them")
-        if can_id > (LARGEST_EXTENDED if extended else LARGEST_STANDARD):
+        if not fits(can_id, extended=extended):
             raise place.error(_id(can_id), "an id of 11 bits, or of 29 with an x behind")
         yield TimedFrame(time_ns, channel, can_id, extended, payload)
 
@@ -220,7 +214,7 @@ def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         if len(payload) != int(length):
             raise place.error(f"{len(payload)} of {length} bytes", "all of them")
         can_id = int(number, 16)
-        if can_id > (LARGEST_EXTENDED if extended == "1" else LARGEST_STANDARD):
+        if not fits(can_id, extended=extended == "1"):
             raise place.error(_id(can_id), "an id of 11 bits, or of 29 with extended 1")
         yield TimedFrame(time_ns, "", can_id, extended == "1", payload)
 

@@ -255,5 +255,4 @@ class Compensator:
 
     def _moving(self) -> bool:
         """Not for ever after a swing that nobody damps: nothing may move without an operator."""
-        axis = self._slew
-        return axis.asked and axis.state in (State.ACTIVE, State.STOPPING)
+        return self._slew.asked and self._slew.state in (State.ACTIVE, State.STOPPING)

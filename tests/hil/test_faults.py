@@ -151,20 +151,23 @@ def mark(bus: can.BusABC) -> None:
 
 def moving_after_mark(log: Path, axis: str) -> int:
     """Valve frames that moved after the mark, which stands where the first frame cannot tell."""
-    valve = DBC.get_message_by_name(f"{axis}Command").frame_id
     messages = logged(log)
     (at,) = [i for i, m in enumerate(messages) if m.arbitration_id == MARK.frame_id]
-    return sum(m.arbitration_id == valve and m.data[0] != 0 for m in messages[at:])
+    return moving(messages[at:], axis)
 
 
 def moving_after_change(log: Path, axis: str) -> int:
     """Valve frames that moved after the last one of the left stick with another deflection."""
-    valve = DBC.get_message_by_name(f"{axis}Command").frame_id
     messages = logged(log)
     sticks = [(i, bytes(m.data[:2])) for i, m in enumerate(messages) if m.arbitration_id == LEFT]
     changes = [i for (_, before), (i, now) in pairwise(sticks) if now != before]
-    at = max(changes, default=sticks[0][0])
-    return sum(m.arbitration_id == valve and m.data[0] != 0 for m in messages[at:])
+    return moving(messages[max(changes, default=sticks[0][0]) :], axis)
+
+
+def moving(messages: list[can.Message], axis: str) -> int:
+    """Valve frames among these that moved."""
+    valve = DBC.get_message_by_name(f"{axis}Command").frame_id
+    return sum(m.arbitration_id == valve and m.data[0] != 0 for m in messages)
 
 
 def test_frozen_stick_with_a_running_counter(

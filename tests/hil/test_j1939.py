@@ -16,13 +16,12 @@ import pytest
 
 from tests.hil.j1939_drive import FILE, as_wireshark_sees, drive, not_decoded
 from tests.hil.machine import ANSWER_S, Service, candump, logged, open_bus, service
-from tests.service.j1939_rig import CLAIM, NO_CLAIM, OWN, bjm
+from tests.service.j1939_rig import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
 from tests.service.test_dm1 import codes
 
 # Industry group 2, function 129, manufacturer 2047, serial number 1: as the file has it.
 NAME = 0x20008100FFE00001
 AVC0 = 0x0CFE3000 | OWN
-WHO_HAS_IT = 0x18EAFFFE
 FIRST_SPN = 520192
 
 

@@ -18,6 +18,8 @@ TICK_NS = 20_000_000
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
 STICKS = {"LeverLeft": ("Slew", "NearFar"), "LeverRight": ("Lift", "Rotate")}
 
+# For the DBC: the slew axis has its turn in every tenth tick.
+SLOW_VALVE = {"BO_ 512 20;": "BO_ 512 200;"}
 NAMES = (*STICKS, "SlewCommand", "NearFarCommand", "LiftCommand", "ShaperStatus")
 NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus")
 

@@ -3,6 +3,7 @@
 import pytest
 
 from canshaper.shaping.states import State
+from tests.service.conftest import SLOW_VALVE
 from tests.service.emergency import (
     CYCLE,
     DBC,
@@ -150,7 +151,7 @@ def test_a_free_stop_out_of_sequence_frees_nothing(machine: Machine) -> None:
         assert machine.states() == PRESSED
 
 
-@pytest.mark.parametrize("slow", [{}, {"BO_ 512 20;": "BO_ 512 200;"}])
+@pytest.mark.parametrize("slow", [{}, SLOW_VALVE])
 def test_a_short_press_is_one_for_every_axis(changed_rig: Make, slow: dict[str, str]) -> None:
     """Pressed and free again before the next tick, or before the next frame of a slow valve."""
     machine = Machine(changed_rig, dbc=slow)

@@ -9,7 +9,7 @@ from canshaper.can.binding import load_deployment
 from canshaper.can.frame import BusState, Frame
 from canshaper.service.exchange import exchange, stall_ns
 from canshaper.shaping.states import State
-from tests.service.conftest import ROOT, TICK_NS, Rig
+from tests.service.conftest import ROOT, SLOW_VALVE, TICK_NS, Rig
 from tests.service.emergency import DBC, LAST, PRESSED, READY, STOP, Machine
 from tests.service.gateway_rig import GatewayRig
 from tests.service.j1939_rig import Rig as J1939Rig
@@ -177,7 +177,7 @@ def test_an_axis_with_a_slow_valve_has_seen_the_standstill_too(
     changed_rig: Callable[..., Rig],
 ) -> None:
     """A valve of 200 ms: the stick is out, and fresh again, before its turn comes."""
-    rig = changed_rig(dbc={"BO_ 512 20;": "BO_ 512 200;"})
+    rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(31)
     assert rig.state() is State.READY
     rig.controller.stalled()

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.service.conftest import Rig
+from tests.service.conftest import SLOW_VALVE, Rig
 
 # timeout_ms of the shipped levers, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
@@ -204,7 +204,7 @@ def test_a_released_enable_needs_no_qualification(changed_rig: Make, qualify: in
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
-@pytest.mark.parametrize("slow", [{}, {"BO_ 512 20;": "BO_ 512 200;"}])
+@pytest.mark.parametrize("slow", [{}, SLOW_VALVE])
 @pytest.mark.parametrize("silent", [False, True])
 def test_a_short_release_is_a_release(
     changed_rig: Make, slow: dict[str, str], silent: bool

@@ -96,12 +96,9 @@ def sent_ids(rig: j1939_rig.Rig, ticks: int, **left: float) -> list[int]:
     return [i for sent in rig.run(ticks, **left) for i in j1939_rig.ids(sent)]
 
 
-WHO_HAS_IT = 0x18EAFFFE
-
-
 def test_the_address_is_asked_for_before_it_is_claimed() -> None:
     rig = guest()
-    assert sent_ids(rig, 1) == [WHO_HAS_IT]
+    assert sent_ids(rig, 1) == [j1939_rig.WHO_HAS_IT]
     rig.receive(j1939_rig.request(0xEE00))  # somebody else asks too
     assert sent_ids(rig, 12) == []
     assert sent_ids(rig, 1) == [j1939_rig.CLAIM]
@@ -126,7 +123,7 @@ def test_after_an_outage_it_is_asked_for_again() -> None:
     rig = guest()
     rig.run(100)
     rig.controller.unheard("crane")
-    assert sent_ids(rig, 3)[0] == WHO_HAS_IT
+    assert sent_ids(rig, 3)[0] == j1939_rig.WHO_HAS_IT
     rig.receive(rig.claim(1))
     assert set(sent_ids(rig, 50)) <= {j1939_rig.NO_CLAIM}
 

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.can.frame import Frame
 from canshaper.shaping.states import State
-from tests.service.conftest import Rig
+from tests.service.conftest import SLOW_VALVE, Rig
 
 STOP_TICKS = 100  # stop_s of the shipped slew axis
 # Late ticks in a row that are an overrun, and punctual ones that end it.
@@ -196,7 +196,7 @@ def test_bypass_stops_through_the_limits(rig: Rig) -> None:
 
 
 def test_a_slow_valve_stops_with_its_next_frame(changed_rig: Make) -> None:
-    rig = changed_rig(dbc={"BO_ 512 20;": "BO_ 512 200;"})
+    rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(30)
     rig.run(60, Slew=1000)
     assert rig.state() is State.ACTIVE

@@ -8,13 +8,14 @@ from tests.service.conftest import Rig
 from tests.service.emergency import Machine
 
 
-def tripped(rig: Rig, **switches: int) -> Rig:
+def tripped(machine: Rig | Machine, **switches: int) -> Rig:
     """Latched by a frame that was not sent, with the stick back in neutral."""
-    rig.run(3, **switches)
-    rig.run(10, Slew=1000, **switches)
+    rig = machine.rig if isinstance(machine, Machine) else machine
+    machine.run(3, **switches)
+    machine.run(10, Slew=1000, **switches)
     rig.controller.send_failed(Frame("crane", 0x200, False, bytes(2)))
-    rig.run(1, Slew=1000, **switches)
-    rig.run(5, **switches)
+    machine.run(1, Slew=1000, **switches)
+    machine.run(5, **switches)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
     return rig
 
@@ -103,8 +104,7 @@ def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
     changed_rig: Callable[..., Rig],
 ) -> None:
     machine = Machine(changed_rig)
-    machine.run(3)
-    rig = tripped_by(machine)
+    rig = tripped(machine)
     for _ in range(10):
         rig.run(1)  # without the emergency stop
     rig.run(5, Reset=1)
@@ -114,15 +114,6 @@ def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
     machine.run(1)
     machine.run(1, Reset=1)
     assert rig.state() is State.NEUTRAL_WAIT
-
-
-def tripped_by(machine: Machine) -> Rig:
-    machine.run(10, Slew=1000)
-    machine.rig.controller.send_failed(Frame("crane", 0x200, False, bytes(2)))
-    machine.run(1, Slew=1000)
-    machine.run(5)
-    assert machine.rig.state() is State.TRIPPED
-    return machine.rig
 
 
 def test_what_trips_is_told_before_a_released_enable(rig: Rig) -> None:

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.service.conftest import Rig
+from tests.service.conftest import SLOW_VALVE, Rig
 
 
 def test_a_released_enable_is_no_fault_of_the_frame(rig: Rig) -> None:
@@ -31,7 +31,7 @@ def test_of_a_lever_that_is_silent_since_then_silence_is_told(
     changed_rig: Callable[..., Rig],
 ) -> None:
     """A valve of 200 ms on a lever that is old after 100 ms."""
-    rig = changed_rig(dbc={"BO_ 512 20;": "BO_ 512 200;"})
+    rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(30)
     assert rig.state() is State.READY
     rig.run(1, Enable=0)

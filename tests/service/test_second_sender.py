@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.service.conftest import Rig
+from tests.service.conftest import SLOW_VALVE, Rig
 
 # How long the other one must be silent before a reset counts: 1 s, in ticks.
 SILENT_TICKS = 50
@@ -125,7 +125,7 @@ def test_only_the_message_of_a_valve_stops_a_valve(
 
 
 def test_a_slow_valve_is_tripped_by_a_frame_between_its_own(changed_rig: Make) -> None:
-    rig = changed_rig(dbc={"BO_ 512 20;": "BO_ 512 200;"})
+    rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(30)
     rig.run(50, Slew=1000)
     rig.receive(FOREIGN)
