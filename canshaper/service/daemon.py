@@ -135,8 +135,9 @@ class Daemon:
         fault = controller.counters.last_fault
         if fault is not self._logged_fault and now_ns >= self._log_again_ns:
             self._logged_fault = fault
-            self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
-            log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
+            if fault is not FrameFault.NONE:  # the counters of a reload begin without a fault
+                self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
+                log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
         if self._reload or self._reading or self._next:
             self._prepare_reload()
         if self._line:

@@ -142,6 +142,8 @@ class AxisRunner:
         # A release is more than a fault.
         if fault is not None and (stick.enabled or self.axis.neutral):
             stick = StickInput(fault=fault, reset=stick.reset, trip=trip)
+        # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
+        overrun = overrun and self.axis.state is not State.BYPASS_ON
         if overrun and stick.enabled and stick.fault is None:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, reset=stick.reset, trip=stick.trip)
         if self.chooser is not None:

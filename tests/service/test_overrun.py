@@ -187,12 +187,32 @@ def test_a_reset_that_is_held_through_an_overrun_is_no_press(rig: Rig) -> None:
     assert rig.state() is State.READY
 
 
-def test_bypass_stops_through_the_limits(rig: Rig) -> None:
+def test_bypass_goes_on_and_the_filter_does_not(rig: Rig) -> None:
+    """Late ticks spoil a filter; where there is none, the axis stays in the driver's hand."""
     rig.run(3, AntiSwayOff=1)
     rig.run(50, Slew=1000, AntiSwayOff=1)
     assert rig.state() is State.BYPASS_ON
-    overrun(rig, Slew=1000, AntiSwayOff=1)
+    for _ in range(3):
+        assert overrun(rig, Slew=1000, AntiSwayOff=1)["SlewCommand"]["Velocity"] == 100
+        assert rig.state() is State.BYPASS_ON
+    late(rig, Slew=1000)  # anti-sway on again
+    late(rig, Slew=1000)
     assert (rig.state(), rig.reason()) == (State.STOPPING, "LOOP_OVERRUN")
+
+
+def test_bypass_stops_with_its_stick_in_an_overrun_too(rig: Rig) -> None:
+    rig.run(3, AntiSwayOff=1)
+    rig.run(50, Slew=1000, AntiSwayOff=1)
+    overrun(rig, Slew=1000, AntiSwayOff=1)
+    late(rig, Slew=32766, AntiSwayOff=1)
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_ERROR")
+
+
+def test_bypass_does_not_begin_in_an_overrun(rig: Rig) -> None:
+    rig.run(3, AntiSwayOff=1)
+    overrun(rig, AntiSwayOff=1)
+    assert late(rig, Slew=1000, AntiSwayOff=1)["SlewCommand"]["Velocity"] == 0
+    assert rig.state() is State.NEUTRAL_WAIT
 
 
 def test_a_slow_valve_stops_with_its_next_frame(changed_rig: Make) -> None:

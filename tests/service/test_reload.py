@@ -350,3 +350,21 @@ def test_nothing_is_left_of_the_controller_before(kind: str) -> None:
         assert [one() for one in gone] == [None] * len(gone)
     finally:
         gc.enable()
+
+
+def test_a_reload_after_a_fault_warns_of_no_fault(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    """Its counters begin again without one; a fault that comes then is one to warn of."""
+
+    def script(number: int) -> None:
+        if number in (5, 200):
+            bench.put(Frame("crane", 0x110, False, b""))
+        if number == 100:
+            bench.reload()
+        if number == 300:
+            bench.stop()
+
+    bench.run(script)
+    warned = [text.split()[0] for text in caplog.messages if text.startswith("fault=")]
+    assert warned == ["fault=WRONG_LENGTH", "fault=WRONG_LENGTH"]
