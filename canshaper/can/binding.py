@@ -3,9 +3,10 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from canshaper.can.codecs import AxisStatusCodec, Sender, ServiceStatusCodec
+from canshaper.can.codecs import AxisStatusCodec, IdentityCodec, Sender, ServiceStatusCodec
 from canshaper.can.deployment import BoundAxis, BoundRadial, Deployment
 from canshaper.can.filters import FilterBinder
+from canshaper.can.identity import Identity
 from canshaper.can.inputs import BoundSwitch
 from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.rewrite import RewrittenMessage
@@ -53,6 +54,7 @@ class _Binder(FilterBinder):
         if grapple:
             self._check_values(grapple, self._values_of_sets())
         service = self._status(("status",), config.status, ServiceStatusCodec)
+        identity = self._status(("identity",), config.identity, IdentityCodec)
         if config.gateway:
             self._check_gateway(config.gateway, [a.valve.message for a in axes.values() if a])
         if config.control:
@@ -68,6 +70,11 @@ class _Binder(FilterBinder):
             stop,
             ServiceStatusCodec(service[0]) if service else None,
             service[1] if service else 0,
+            Identity(
+                self.source.sha256,
+                {n: f.sha256 for n, f in zip(config.dbc, messages.files, strict=True)},
+            ),
+            IdentityCodec(identity[0]) if identity else None,
             grapple,
             feel,
             self.on_bus,
@@ -222,7 +229,7 @@ class _Binder(FilterBinder):
         self,
         place: Place,
         status: Status | None,
-        codec: type[AxisStatusCodec] | type[ServiceStatusCodec],
+        codec: type[AxisStatusCodec] | type[IdentityCodec] | type[ServiceStatusCodec],
     ) -> tuple[Sender, int] | None:
         if status is None:
             return None

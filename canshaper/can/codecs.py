@@ -8,6 +8,7 @@ from cantools.database.can import Message
 
 from canshaper.can.flags import FlaggedVelocity, RockerVelocity
 from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.identity import DIGEST_BITS
 from canshaper.can.j1939 import with_source
 from canshaper.can.layout import Layout, is_j1939
 from canshaper.can.protection import UNPROTECTED, Protection, Protector
@@ -122,6 +123,24 @@ class AxisStatusCodec:
         if ACTIVE_SET in fields.start:
             raw[ACTIVE_SET] = fields.raw(ACTIVE_SET, active_set)
         return self.sender.frame(raw)
+
+
+@dataclass(frozen=True, slots=True)
+class IdentityCodec:
+    """Message with the digest of what runs."""
+
+    sender: Sender
+    SIGNALS = ("Digest",)
+    CODES: ClassVar[dict[str, int]] = {"Digest": (1 << DIGEST_BITS) - 1}
+
+    def frame(self, digest: int) -> Frame:
+        """The frame with this digest."""
+        return self.sender.frame({"Digest": digest})
+
+    def digest(self, data: bytes) -> int | None:
+        """The digest in a frame; None where its length is wrong."""
+        layout = self.sender.fields.layout
+        return int(layout.decode(data)["Digest"]) if len(data) == layout.length else None
 
 
 @dataclass(frozen=True, slots=True)

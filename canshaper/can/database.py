@@ -3,6 +3,7 @@
 import logging
 import re
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 
 import cantools
@@ -21,10 +22,15 @@ WIDE_ID = "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 mor
 
 @dataclass(frozen=True)
 class DbcFile:
-    """A loaded DBC file."""
+    """A loaded DBC file.
+
+    Attributes:
+        sha256: of its bytes, in hexadecimal digits.
+    """
 
     path: Path
     database: Database
+    sha256: str
 
     def problem(self, message: Message, text: str) -> Problem:
         """A problem of this file at the line where the message is defined."""
@@ -46,7 +52,9 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
     Raises:
         OSError: the file cannot be read.
     """
-    text = path.read_text(encoding="cp1252", errors="replace")
+    data = path.read_bytes()
+    # Line ends as open() reads them: they stand in comments too.
+    text = data.decode("cp1252", errors="replace").replace("\r\n", "\n").replace("\r", "\n")
     if large := _TOO_LARGE.search(text):
         line: int | None = text.count("\n", 0, large.end()) + 1
         text = f"found {large[1] or large[2]} bytes or bits, allowed are 99999 at most"
@@ -54,9 +62,7 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
     # cantools only logs that of two messages with one id the first is lost; found below.
     logging.getLogger("cantools").setLevel(logging.ERROR)
     try:
-        database = cantools.database.load_file(str(path), database_format="dbc")
-    except OSError:
-        raise
+        database = cantools.database.load_string(text, database_format="dbc")
     except Exception as error:  # whatever a broken file makes the parser raise
         cause = getattr(error, "e_dbc", None) or error  # without the names of other formats
         text = " ".join(str(cause).split()) or type(cause).__name__
@@ -70,7 +76,7 @@ def load_dbc(path: Path) -> tuple[DbcFile | None, list[Problem]]:
             line = None
         return None, [Problem(str(path), line, "", f"not a DBC file that can be used: {text}")]
     assert isinstance(database, Database)
-    loaded = DbcFile(path, database)
+    loaded = DbcFile(path, database, sha256(data).hexdigest())
     problems = []
     seen: dict[tuple[int, bool], str] = {}
     for message in database.messages:
@@ -92,9 +98,14 @@ def _id_fault(message: Message) -> str | None:
 
 
 class Messages:
-    """Messages of several DBC files by name."""
+    """Messages of several DBC files by name.
+
+    Attributes:
+        files: the DBC files in the order of the deployment.
+    """
 
     def __init__(self, files: list[DbcFile]) -> None:
+        self.files = files
         self._by_name: dict[str, list[tuple[DbcFile, Message]]] = {}
         for file in files:
             for message in file.database.messages:

@@ -6,8 +6,9 @@ from pathlib import Path
 from cantools.database.can import Message
 
 from canshaper.can.canopen import EMERGENCY, HEARTBEAT, NMT
-from canshaper.can.codecs import AxisStatusCodec, ServiceStatusCodec
+from canshaper.can.codecs import AxisStatusCodec, IdentityCodec, ServiceStatusCodec
 from canshaper.can.database import Messages
+from canshaper.can.identity import Identity
 from canshaper.can.inputs import (
     BoundFeedback,
     BoundInput,
@@ -84,6 +85,8 @@ class Deployment:
     emergency_stop: BoundStop | None
     status: ServiceStatusCodec | None
     status_ticks: int
+    identity: Identity
+    identity_status: IdentityCodec | None
     grapple: BoundSwitch | None
     feel: BoundSwitch | None
     on_bus: dict[str, list[Message]]
@@ -103,7 +106,7 @@ class Deployment:
         valves = [a.valve.message.sender.key for a in self.axes.values()]
         if self.listen_only:  # they are those of another
             valves = []
-        sent = valves + [s.sender.key for s in (self.status, *self._axis_status()) if s]
+        sent = valves + [s.sender.key for s in self._statuses()]
         canopen = self.config.buses[bus].canopen
         if canopen:
             nodes = [n.id for n in canopen.nodes.values()]
@@ -169,7 +172,7 @@ class Deployment:
         with ours. A node of ours on J1939 stays where a status message needs its address, which it
         gives up to whoever has it.
         """
-        told = {s.sender.key[0] for s in (self.status, *self._axis_status()) if s}
+        told = {s.sender.key[0] for s in self._statuses()}
         buses = {
             name: bus if name in told else bus.model_copy(update={"j1939": None})
             for name, bus in self.config.buses.items()
@@ -178,5 +181,7 @@ class Deployment:
         config = self.config.model_copy(update={"buses": buses})
         return replace(self, config=config, axes=axes, listen_only=True)
 
-    def _axis_status(self) -> list[AxisStatusCodec | None]:
-        return [axis.status for axis in self.axes.values()]
+    def _statuses(self) -> list[AxisStatusCodec | IdentityCodec | ServiceStatusCodec]:
+        """Every status message that is sent."""
+        of_axes = [axis.status for axis in self.axes.values()]
+        return [s for s in (self.status, self.identity_status, *of_axes) if s]

@@ -57,7 +57,7 @@ class Layout:
         self._intel = _compiled(intel, bits)
         self._motorola = _compiled(motorola, bits) if motorola else None
         self._unused = _ones(bits) & ~used if is_j1939(message) else 0
-        self._length = message.length
+        self.length = message.length
 
     def decode(self, data: bytes) -> dict[str, Any]:
         """Raw value of every signal, by name.
@@ -84,7 +84,7 @@ class Layout:
         if self._motorola is not None:
             data = bytes(a | b for a, b in zip(data, self._motorola.pack(raw), strict=True))
         if self._unused:
-            data = (int.from_bytes(data, "little") | self._unused).to_bytes(self._length, "little")
+            data = (int.from_bytes(data, "little") | self._unused).to_bytes(self.length, "little")
         return data
 
 

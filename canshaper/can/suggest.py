@@ -6,7 +6,7 @@ from difflib import SequenceMatcher
 
 from cantools.database.can import Message, Signal
 
-from canshaper.can.codecs import AxisStatusCodec, ServiceStatusCodec
+from canshaper.can.codecs import AxisStatusCodec, IdentityCodec, ServiceStatusCodec
 from canshaper.can.signals import command_fault, raw_limits, symmetrical_range
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
@@ -72,8 +72,17 @@ def status_of(messages: Sequence[Message], axis: str) -> Message | None:
 
 def service_status(messages: Sequence[Message]) -> Message | None:
     """The message with the counters of the service."""
-    names = set(ServiceStatusCodec.SIGNALS)
-    return next((m for m in messages if {s.name for s in m.signals} >= names), None)
+    return _with(ServiceStatusCodec.SIGNALS, messages)
+
+
+def identity(messages: Sequence[Message]) -> Message | None:
+    """The message with the digest of what runs."""
+    return _with(IdentityCodec.SIGNALS, messages)
+
+
+def _with(signals: Sequence[str], messages: Sequence[Message]) -> Message | None:
+    """The first message that has all these signals."""
+    return next((m for m in messages if {s.name for s in m.signals} >= set(signals)), None)
 
 
 def axis_name(signal: str) -> str:

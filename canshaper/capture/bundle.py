@@ -47,6 +47,7 @@ def pack(
         "made": datetime.now(UTC).isoformat(timespec="seconds"),
         "buses": {n: f"{b.interface} {b.channel}" for n, b in deployment.config.buses.items()},
         "versions": versions(),
+        "identity": deployment.identity.lines(),
         **facts,
     }
     part = path.with_name(path.name + ".part")

@@ -63,7 +63,9 @@ class Sorter:
         self._ids = {bus: deployment.ids(bus) for bus in deployment.config.buses}
         # Other interfaces hand out all there is before the valves are told.
         self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
-        self._kinds: dict[Key, Kind] = {}
+        # It carries the digest of the program that ran, which need not be this one.
+        identity = deployment.identity_status
+        self._kinds = {identity.sender.key: Kind.IGNORED} if identity else {}
 
     def kind(self, key: Key) -> Kind:
         """What a frame is, by bus, id and whether that is extended."""

@@ -48,6 +48,10 @@ def check(file: str = FILE) -> None:
             f"  axis {name}: {config.levers[stick.lever].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
+    identity = deployment.identity
+    typer.echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
+    for line in identity.lines()[1:]:
+        typer.echo(f"    {line}")
 
 
 def _load(deployment: Deployment, bus: str) -> str:

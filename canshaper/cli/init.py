@@ -111,7 +111,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
         axes += _axes(lever, message, others, [axis.name for axis in axes])
     if not axes:
         raise fail(ValueError("no axis was named; nothing is written"))
-    status = suggest.service_status(messages)
+    status, identity = suggest.service_status(messages), suggest.identity(messages)
     return FirstMachine(
         interface,
         bitrate,
@@ -119,6 +119,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
         levers,
         axes,
         status.name if status else None,
+        identity.name if identity else None,
     )
 
 

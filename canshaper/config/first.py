@@ -92,6 +92,7 @@ class FirstMachine:
     levers: Sequence[FirstLever]
     axes: Sequence[FirstAxis]
     status: str | None = None
+    identity: str | None = None
 
 
 def ten_swings_s() -> tuple[float, float]:
@@ -139,9 +140,10 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     for axis in machine.axes:
         yield from _axis(axis)
         yield ""
-    if machine.status:
-        yield f"status: {{ bus: crane, message: {machine.status} }}"
-        yield ""
+    for key in ("status", "identity"):
+        if (message := getattr(machine, key)) is not None:
+            yield f"{key}: {{ bus: crane, message: {message} }}"
+            yield ""
     yield "# What `canshaper set` may change while the machine works."
     yield "control:"
     yield "  adjustable:"

@@ -267,4 +267,7 @@ class DeploymentConfig(Section):
     grapple: Grapple | None = None
     feel: FeelSwitch | None = None
     status: Status | None = None
+    identity: Status | None = Field(
+        None, description="message, once a second, with the digest of what runs"
+    )
     control: Control | None = None

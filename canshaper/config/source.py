@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,9 @@ class DeploymentError(Exception):
 class Source:
     """A YAML file as data, with the line of every key.
 
+    Attributes:
+        sha256: of its bytes, in hexadecimal digits.
+
     Raises:
         DeploymentError: the file cannot be read or is not YAML, or a key stands twice.
     """
@@ -58,7 +62,9 @@ class Source:
         self._count = 0
         content = ""
         try:
-            content = path.read_text(encoding="utf-8")
+            data = path.read_bytes()
+            self.sha256 = sha256(data).hexdigest()
+            content = data.decode("utf-8")
             node = yaml.compose(content, Loader=yaml.SafeLoader)
             self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:

@@ -69,6 +69,7 @@ class Monitor:
     Attributes:
         history: of the status messages.
         messages: rate of each message of the deployment, by bus, id and whether that is extended.
+        digest: what the daemon says that it runs; None before it says it.
         events: what changed lately, oldest first.
         others: frames that are no classical data frames, by kind.
     """
@@ -82,6 +83,7 @@ class Monitor:
         self._finder = InputFinder(deployment.config.buses, deployment.inputs())
         self._buses = {name: MessageRate(name, None) for name in deployment.config.buses}
         self._seen = 0
+        self.digest: int | None = None
         for bound in deployment.inputs():
             self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
         for axis in deployment.axes.values():
@@ -92,6 +94,8 @@ class Monitor:
                 self._status(axis.status.sender.key, axis.status.sender.fields.message)
         if deployment.status:
             self._status(deployment.status.sender.key, deployment.status.sender.fields.message)
+        if identity := deployment.identity_status:
+            self._status(identity.sender.key, identity.sender.fields.message)
 
     def _status(self, key: Key, message: object) -> None:
         name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
@@ -109,9 +113,20 @@ class Monitor:
         if rate is not None:
             rate.take(frame.time_ns)
         self.history.take(frame)
+        identity = self.deployment.identity_status
+        if identity and key == identity.sender.key:
+            self._compare_identity(identity.digest(frame.data), frame.time_ns)
         changes = self.history.changes
         self.events.extend(changes)
         changes.clear()  # for a day there are many
+
+    def _compare_identity(self, digest: int | None, time_ns: int) -> None:
+        """Whether the daemon runs the files and the program that we have here."""
+        if digest is None or digest == self.digest:
+            return
+        self.digest, ours = digest, self.deployment.identity.digest
+        differs = "" if digest == ours else f", not {ours:#06x} of the files and program here"
+        self.note(time_ns, f"daemon runs digest {digest:#06x}{differs}")
 
     def note(self, time_ns: int, text: str) -> None:
         """Note something that did not come with a frame."""

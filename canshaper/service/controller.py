@@ -129,6 +129,11 @@ class Controller:
         """Whether no axis can move without the operator."""
         return all(runner.axis.neutral for runner in self.axes.values())
 
+    @property
+    def silent_buses(self) -> frozenset[str]:
+        """Buses on which we have no address yet, or no longer."""
+        return self._network.silent if self._network.nodes else NOWHERE
+
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception.
 
@@ -193,7 +198,7 @@ class Controller:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
         overrun = self._overruns(missed) if missed or self._late else False
         changed = []
-        silent = self._network.silent if self._network.nodes else NOWHERE
+        silent = self.silent_buses
         for name, runner, message, line in self._turns:
             period = runner.period_ticks
             if passed := now // period - last // period:

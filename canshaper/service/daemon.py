@@ -76,6 +76,7 @@ class Daemon:
         self._collector.freeze()
         self._send_neutral()  # most valves want to see it before they listen to anything else
         log.info("started file=%s axes=%s", self._controller.deployment.path, names)
+        self._log_identity()
         self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
@@ -147,6 +148,7 @@ class Daemon:
         if now_ns >= self._told_ns:
             self._told_ns = now_ns + SECOND_NS
             self._manager.status(self._summary())
+            self._send_identity()
             self._latest_ns = 0
             for handler in logging.getLogger().handlers:
                 handler.flush()  # a reader that was slow may be back
@@ -267,6 +269,7 @@ class Daemon:
         self._use(deployment, before=self._controller)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
+        self._log_identity()
         self._manager.ready("reload applied")
         self._told_ns = time.monotonic_ns() + SECOND_NS
         self._collector.freeze()
@@ -295,6 +298,20 @@ class Daemon:
                 time.sleep(0.005)
         for frame in waiting:
             log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
+
+    def _log_identity(self) -> None:
+        """What runs, by its hashes: a machine that was signed off is compared with these."""
+        for line in self._controller.deployment.identity.lines():
+            log.info("identity %s", line)
+
+    def _send_identity(self) -> None:
+        """The digest of what runs, where a message carries it and its bus may be used."""
+        deployment = self._controller.deployment
+        status = deployment.identity_status
+        if status and status.sender.key[0] not in self._controller.silent_buses:
+            frame = status.frame(deployment.identity.digest)
+            if not self._ports[frame.bus].send(frame):
+                self._controller.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:
         self._controller.counters.add(fault)

@@ -36,13 +36,13 @@ def test_every_message_of_the_deployment_counts_and_no_other(machine: Machine) -
     deployment = machine.load()
     load = deployment.load("crane")
     assert load is not None
-    used = ("Lever", "Command", "Status")
+    used = ("Lever", "Command", "Status", "Identity")
     cycles = [
         (m.length, m.cycle_time)
         for m in deployment.messages.all()
         if m.cycle_time and any(word in m.name for word in used)
     ]
-    assert load.messages == len(cycles) == 9
+    assert load.messages == len(cycles) == 10
     bits = sum(longest_frame_bits(False, n) * 1000 / ms for n, ms in cycles)
     assert load.share == pytest.approx(bits / 250_000)
 

@@ -13,7 +13,10 @@ from canshaper.config.source import DeploymentError
 Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
-TOP = "tick_ms, buses, dbc, levers, axes, gateway, emergency_stop, grapple, feel, status, control"
+TOP = (
+    "tick_ms, buses, dbc, levers, axes, gateway, emergency_stop, grapple, feel, status, identity,"
+    " control"
+)
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (
     "allowed are length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"

@@ -12,6 +12,7 @@ import typer
 from typer.testing import CliRunner
 
 from canshaper import __version__
+from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.config.source import DeploymentError
@@ -63,14 +64,17 @@ def opened(monkeypatch: pytest.MonkeyPatch) -> list[dict[str, Any]]:
 
 def test_check_of_a_good_file_shows_what_it_does() -> None:
     result = invoke("check", str(SHIPPED))
+    identity = load_deployment(SHIPPED).identity
     assert result.exit_code == 0
     assert result.stderr == ""
     assert result.stdout.splitlines() == [
         f"{SHIPPED}: good",
-        "  bus crane: socketcan vcan0, its 9 messages load 12% of 250 kbit/s",
+        "  bus crane: socketcan vcan0, its 10 messages load 12% of 250 kbit/s",
         "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
         "  axis near_far: LeverLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
         "  axis lift: LeverRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
+        f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
+        *(f"    {line}" for line in identity.lines()[1:]),
     ]
 
 

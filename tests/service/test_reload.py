@@ -368,3 +368,30 @@ def test_a_reload_after_a_fault_warns_of_no_fault(
     bench.run(script)
     warned = [text.split()[0] for text in caplog.messages if text.startswith("fault=")]
     assert warned == ["fault=WRONG_LENGTH", "fault=WRONG_LENGTH"]
+
+
+# -- what runs is known ----------------------------------------------------------------------------
+
+
+def test_the_digest_of_what_runs_is_sent_once_a_second_and_logged_at_every_change(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    digests: list[int] = []
+
+    def script(number: int) -> None:
+        if number == 110:
+            digests.append(load_deployment(bench.file).identity.digest)
+            bench.reload("tail_s: 0.5", "tail_s: 0.4")
+        elif number == 220:
+            digests.append(load_deployment(bench.file).identity.digest)
+            bench.stop()
+
+    with caplog.at_level("INFO", "canshaper"):
+        bench.run(script)
+    status = load_deployment(bench.file).identity_status
+    assert status is not None
+    sent = [status.digest(f.data) for f in bench.sent if f[:3] == status.sender.key]
+    assert sent == [digests[0]] * 3 + [digests[1]] * 2
+    assert digests[0] != digests[1]
+    logged = [r.getMessage() for r in caplog.records if "identity digest=" in r.getMessage()]
+    assert logged == [f"identity digest={digest:#06x}" for digest in digests]

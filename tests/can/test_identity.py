@@ -1,0 +1,114 @@
+"""The digest of what runs: equal for equal content, another for any other byte."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.can import identity as module
+from canshaper.can.binding import load_deployment
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.capture.listen import Heard
+from canshaper.cli.app import app
+from canshaper.monitor.state import Monitor
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = [
+    path.name
+    for path in sorted((ROOT / "config").glob("*.yaml"))
+    if "axes:" in path.read_text(encoding="utf-8")
+]
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    shutil.copytree(ROOT / "config", tmp_path / "config")
+    shutil.copytree(ROOT / "dbc", tmp_path / "dbc")
+    return tmp_path / "config" / "two-cranes.yaml"
+
+
+def digest(path: Path) -> int:
+    return load_deployment(path).identity.digest
+
+
+def test_a_copy_elsewhere_is_the_same(machine: Path) -> None:
+    assert digest(machine) == digest(ROOT / "config" / "two-cranes.yaml")
+
+
+@pytest.mark.parametrize("file", ["config/two-cranes.yaml", "dbc/forwarder.dbc", "dbc/rotator.dbc"])
+def test_a_space_more_in_any_file_is_another(machine: Path, file: str) -> None:
+    before = load_deployment(machine).identity
+    with (machine.parents[1] / file).open("a", encoding="utf-8") as changed:
+        changed.write(" \n")
+    after = load_deployment(machine).identity
+    assert after.digest != before.digest
+    assert sum(a != b for a, b in zip(before.lines(), after.lines(), strict=True)) == 2
+
+
+def test_a_file_that_is_not_used_changes_nothing(machine: Path) -> None:
+    before = digest(machine)
+    (machine.parent / "forwarder.yaml").write_text("", encoding="utf-8")
+    assert digest(machine) == before
+
+
+def test_another_program_is_another(machine: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    before = digest(machine)
+    monkeypatch.setattr(module, "program_sha256", lambda: "0" * 64)
+    assert digest(machine) != before
+
+
+def test_the_program_is_what_lies_in_its_modules(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "part").mkdir()
+    (tmp_path / "part" / "a.py").write_text("x = 1\n", encoding="utf-8")
+    (tmp_path / "b.py").write_text("", encoding="utf-8")
+    monkeypatch.setattr(module.canshaper, "__file__", str(tmp_path / "__init__.py"))
+    hashed = module.program_sha256.__wrapped__
+    first = hashed()
+    (tmp_path / "notes.txt").write_text("no module", encoding="utf-8")
+    assert hashed() == first
+    (tmp_path / "part" / "a.py").write_text("x = 2\n", encoding="utf-8")
+    second = hashed()
+    (tmp_path / "part" / "a.py").rename(tmp_path / "part" / "c.py")
+    assert len({first, second, hashed()}) == 3
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_every_shipped_deployment_sends_it(name: str) -> None:
+    deployment = load_deployment(ROOT / "config" / name)
+    status = deployment.identity_status
+    assert status is not None
+    frame = status.frame(deployment.identity.digest)
+    assert status.digest(frame.data) == deployment.identity.digest
+    assert frame[1:3] in deployment.ids(frame.bus).sent
+    assert status.digest(frame.data[:1]) is None
+
+
+def test_check_prints_it() -> None:
+    done = CliRunner().invoke(app, ["check", str(ROOT / "config" / "forwarder.yaml")])
+    identity = load_deployment(ROOT / "config" / "forwarder.yaml").identity
+    assert f"digest {identity.digest:#06x}" in done.output
+    assert identity.deployment in done.output
+
+
+def said(deployment: Deployment, *digests: int) -> list[str]:
+    """What a monitor notes of these digests on the bus."""
+    status = deployment.identity_status
+    assert status is not None
+    monitor = Monitor(deployment)
+    for i, value in enumerate(digests):
+        frame: Frame = status.frame(value)
+        monitor.take(Heard(i, frame.bus, "can0", *frame[1:], ""))
+    return [event.text for event in monitor.events]
+
+
+def test_a_monitor_compares_it_with_its_own_files() -> None:
+    deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
+    ours = deployment.identity.digest
+    other = ours ^ 1
+    first, second = said(deployment, ours, ours, other, other)
+    assert first == f"daemon runs digest {ours:#06x}"
+    assert f"daemon runs digest {other:#06x}, not {ours:#06x}" in second
