@@ -159,7 +159,7 @@ def test_rules_are_looked_at_while_nothing_moves_and_told_once(
     monkeypatch.setattr(gateway, "rules", refuse)
     line.check(4 * CHECK_NS, neutral=True)
     assert [r.message for r in caplog.records] == [
-        "gateway=rules-missing 42 of 42",
+        "gateway=rules-missing 40 of 40",
         "gateway=rules-right",
         f"gateway=rules-too-many {found[0]}",
         "gateway=rules-not-known no",
