@@ -12,7 +12,7 @@ from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.rewrite import RewrittenMessage
 from canshaper.can.signals import find_signal, special_name, status_faults
 from canshaper.can.valve import ValveMessage
-from canshaper.config.bus import LAST_SPN, J1939Name
+from canshaper.config.bus import LAST_SPN, Bus, J1939Name
 from canshaper.config.gateway import Gateway
 from canshaper.config.load import load_config
 from canshaper.config.schema import (
@@ -78,6 +78,7 @@ class _Binder(FilterBinder):
             grapple,
             feel,
             self.on_bus,
+            source=self.source,
         )
 
     def _values_of_sets(self) -> dict[Place, float]:
@@ -145,6 +146,7 @@ class _Binder(FilterBinder):
             if key in seen:
                 self.add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
             seen[key] = name
+            self._check_match(name, bus)
             if bus.j1939 is None:
                 continue
             # Behind a gateway both may meet, and nobody would know which is meant.
@@ -155,6 +157,24 @@ class _Binder(FilterBinder):
             if last > LAST_SPN:
                 text = f"found {bus.j1939.first_spn}, which makes the last one {last};"
                 self.add(("buses", name, "j1939", "first_spn"), f"{text} allowed is {LAST_SPN}")
+
+    def _check_match(self, name: str, bus: Bus) -> None:
+        """What can be known of a device without it."""
+        if bus.match is None:
+            return
+        if bus.interface != "socketcan":
+            text = f"found it with the interface {bus.interface}, allowed is socketcan"
+            self.add(("buses", name, "match"), text)
+        rate = bus.match.bitrate
+        if rate and bus.bitrate and rate != bus.bitrate:
+            text = f"found {rate}, the bitrate of the bus is {bus.bitrate}; allowed is the same"
+            self.add(("buses", name, "match", "bitrate"), text)
+        for other, config in self.config.buses.items():
+            if other == name:
+                break
+            if config.match and bus.match.may_be(config.match):
+                text = f"may be the device of bus {other} too; allowed is another serial, path"
+                self.add(("buses", name, "match"), f"{text} or port")
 
     def _axis(self, name: str, axis: AxisConfig) -> BoundAxis | None:
         place: Place = ("axes", name)

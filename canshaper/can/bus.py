@@ -15,6 +15,7 @@ from typing import Any, Protocol
 
 import can
 
+from canshaper.can.device import WrongDeviceError, whereabouts
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.can.raw import MOST_FRAMES, RawPort
 from canshaper.can.socketcan import Ids, open_sockets
@@ -31,6 +32,19 @@ IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 
 class BusError(Exception):
     """A bus could not be opened."""
+
+
+class WrongBusError(BusError):
+    """A bus is another device than the deployment names.
+
+    Attributes:
+        bus: its name in the deployment file.
+        why: what differs, and which interface is the device.
+    """
+
+    def __init__(self, bus: str, why: str) -> None:
+        super().__init__(f"bus {bus}: {why}")
+        self.bus, self.why = bus, why
 
 
 class Port(Protocol):
@@ -73,22 +87,28 @@ def open_port(
         ids: the messages that matter; None takes all frames.
 
     Raises:
-        BusError: the bus cannot be opened; the message says which and why.
+        BusError: the bus cannot be opened, or is another device; the message says which and why.
     """
     try:
         if config.interface != "socketcan":
             return PythonCanPort(name, config, on_fault)
         return RawPort(
-            name, partial(open_sockets, config.channel), ids, on_fault, confirms=ids is not None
+            name,
+            partial(open_sockets, config),
+            ids,
+            on_fault,
+            confirms=ids is not None,
+            matched=config.match is not None,
         )
+    except WrongDeviceError as error:
+        raise WrongBusError(name, f"{error}{whereabouts(config)}") from error
     except Exception as error:  # each interface raises its own kinds
         text = (error.strerror if isinstance(error, OSError) else None) or str(error)
         if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
             text = "this kernel has no CAN, or its module can_raw is not loaded"
         where = f"{config.interface} channel {config.channel}"
-        raise BusError(
-            f"bus {name}: cannot open {where}: {text or type(error).__name__}"
-        ) from error
+        text = f"{text or type(error).__name__}{whereabouts(config)}"
+        raise BusError(f"bus {name}: cannot open {where}: {text}") from error
 
 
 class ListeningPort:

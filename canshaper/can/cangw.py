@@ -7,29 +7,25 @@ right, to change CAP_NET_ADMIN.
 """
 
 import errno
-import os
 import socket
 import struct
 import subprocess
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
+from canshaper.can.netlink import ACKNOWLEDGE, DUMP, ask, attribute, attributes
 from canshaper.can.passing import Pattern
 
-# linux/can/gw.h, linux/rtnetlink.h, linux/netlink.h; Python has no names for most of these.
+# linux/can/gw.h, linux/rtnetlink.h; Python has no names for most of these.
 NEW, DELETE, GET = 24, 25, 26  # RTM_NEWROUTE, RTM_DELROUTE, RTM_GETROUTE
 AND, OR, XOR, SET, CS_XOR, CS_CRC8 = range(1, 7)
 SOURCE, DESTINATION, FILTER, LIMIT_HOPS, UID = 9, 10, 11, 13, 14
 FD_MODIFICATIONS = range(15, 19)
 CAN_TO_CAN, ECHO, ON_DATA = 1, 1, 4
-REQUEST, ACKNOWLEDGE, DUMP, ERROR, DONE = 0x1, 0x4, 0x300, 2, 3
-_HEADER = struct.Struct("=IHHII")  # nlmsghdr
 _RULE = struct.Struct("=BBH")  # rtcanmsg
-_ATTRIBUTE = struct.Struct("=HH")  # rtattr
 _MODIFICATION = struct.Struct("=IB3x8sB")  # cgw_frame_mod
 _WORDS = struct.Struct("=II")
-ROOM = 1 << 16
 MODIFYING = frozenset((AND, OR, XOR, SET, CS_XOR, CS_CRC8, UID, *FD_MODIFICATIONS))
 
 
@@ -96,8 +92,8 @@ def rules() -> list[Rule]:
     """
     names: dict[int, str] = {}
     try:
-        bodies = list(_talk(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
-        found = [_read(body, names) for body in bodies]
+        bodies = list(ask(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
+        found = [_read(body, names) for body in bodies if body[0] == socket.AF_CAN]
     except OSError as error:
         raise GatewayError(f"rules of can-gw cannot be listed: {error.strerror}") from error
     return found
@@ -124,7 +120,7 @@ def remove(rule: Rule) -> None:
 def _change(kind: int, rule: Rule) -> None:
     try:
         ends = [socket.if_nametoindex(n) for n in (rule.source, rule.destination)]
-        for _ in _talk(kind, ACKNOWLEDGE, _message(rule, *ends)):
+        for _ in ask(kind, ACKNOWLEDGE, _message(rule, *ends)):
             pass
     except OSError as error:
         why = error.strerror or str(error)
@@ -138,64 +134,31 @@ def _change(kind: int, rule: Rule) -> None:
 
 def _message(rule: Rule, source: int, destination: int) -> bytes:
     parts = [_RULE.pack(socket.AF_CAN, CAN_TO_CAN, rule.flags)]
-    attributes = [*rule.changes]
+    fields = [*rule.changes]
     if rule.hops:
-        attributes.append((LIMIT_HOPS, bytes((rule.hops,))))
-    attributes += [
+        fields.append((LIMIT_HOPS, bytes((rule.hops,))))
+    fields += [
         (FILTER, _WORDS.pack(rule.pattern.value, rule.pattern.mask)),
         (SOURCE, struct.pack("=I", source)),
         (DESTINATION, struct.pack("=I", destination)),
     ]
-    for kind, payload in attributes:
-        part = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(payload), kind) + payload
-        parts.append(part + bytes(-len(part) % 4))
+    parts += [attribute(kind, payload) for kind, payload in fields]
     return b"".join(parts)
 
 
 def _read(body: bytes, names: dict[int, str]) -> Rule:
     flags = _RULE.unpack_from(body)[2]
-    attributes = dict(_attributes(body[_RULE.size :]))
+    fields = dict(attributes(body[_RULE.size :]))
     ends = []
     for kind in (SOURCE, DESTINATION):
-        (index,) = struct.unpack("=I", attributes[kind])
+        (index,) = struct.unpack("=I", fields[kind])
         if index not in names:
             names[index] = socket.if_indextoname(index)
         ends.append(names[index])
-    value, mask = _WORDS.unpack(attributes.get(FILTER, bytes(8)))
-    changes = tuple((kind, attributes[kind]) for kind in sorted(MODIFYING & attributes.keys()))
-    hops = attributes.get(LIMIT_HOPS, b"\0")[0]
+    value, mask = _WORDS.unpack(fields.get(FILTER, bytes(8)))
+    changes = tuple((kind, fields[kind]) for kind in sorted(MODIFYING & fields.keys()))
+    hops = fields.get(LIMIT_HOPS, b"\0")[0]
     return Rule(ends[0], ends[1], Pattern(value, mask), changes, flags, hops)
-
-
-def _attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
-    at = 0
-    while at + _ATTRIBUTE.size <= len(data):
-        length, kind = _ATTRIBUTE.unpack_from(data, at)
-        if length < _ATTRIBUTE.size:
-            return
-        yield kind, data[at + _ATTRIBUTE.size : at + length]
-        at += -(-length // 4) * 4
-
-
-def _talk(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
-    """Ask the kernel; the bodies of its answers."""
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as asked:
-        header = _HEADER.pack(_HEADER.size + len(body), kind, REQUEST | flags, 1, 0)
-        asked.send(header + body)
-        while True:
-            data = asked.recv(ROOM)
-            at = 0
-            while at < len(data):
-                length, answer, _flags, _number, _port = _HEADER.unpack_from(data, at)
-                content = data[at + _HEADER.size : at + length]
-                if answer in (ERROR, DONE):
-                    code = -struct.unpack_from("=i", content)[0] if len(content) >= 4 else 0
-                    if code:
-                        raise OSError(code, os.strerror(code))
-                    return
-                if content[0] == socket.AF_CAN:
-                    yield content
-                at += -(-length // 4) * 4
 
 
 def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:

@@ -1,6 +1,6 @@
 """A deployment, checked: what its files say, with the codecs of its messages."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from cantools.database.can import Message
@@ -37,6 +37,7 @@ from canshaper.config.schema import (
     DeploymentConfig,
     RadialConfig,
 )
+from canshaper.config.source import Source
 
 
 @dataclass(frozen=True)
@@ -90,6 +91,8 @@ class Deployment:
     grapple: BoundSwitch | None
     feel: BoundSwitch | None
     on_bus: dict[str, list[Message]]
+    source: Source = field(compare=False)
+    """The file, for the lines of what is wrong with it on this machine."""
     listen_only: bool = False
     """Nothing is sent but status: another controller drives the machine, or nobody does."""
 

@@ -43,6 +43,7 @@ class FrameFault(IntEnum):
     FEEDBACK_LOST = 20
     HEARTBEAT_LOST = 21
     NODE_EMERGENCY = 22
+    BUS_WRONG_DEVICE = 23
 
 
 class BusState(Enum):
@@ -59,5 +60,7 @@ class BusState(Enum):
     """The interface is set down."""
     GONE = "gone"
     """The interface is removed."""
+    WRONG_DEVICE = "wrong-device"
+    """The interface of that name is not the device of the deployment."""
     FAILED = "failed"
     """Reading or sending failed in another way."""

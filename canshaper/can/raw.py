@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.can.socketcan import Ids, dropped_frames, set_filters
 
@@ -43,6 +44,8 @@ SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, Bus
 # The device is no more; the socket would have to be bound to a new one.
 GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
 LOST = frozenset((BusState.DOWN, BusState.FAILED))
+# States in which the sockets are closed, to be opened again.
+AWAY = frozenset((BusState.GONE, BusState.DOWN, BusState.WRONG_DEVICE))
 UP = BusState.UP
 _EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
 
@@ -58,12 +61,15 @@ class RawPort:
         ids: the messages that matter, handed to it.
         on_fault: called with every fault of the bus.
         confirms: whether our own frames come back when they were sent, with MSG_CONFIRM.
+        matched: whether ``open_sockets`` looks at the device: then an interface that was down is
+            opened again too, because name and bit rate may be others when it is back.
 
     Attributes:
         state: of the bus, as far as seen.
 
     Raises:
         OSError: the sockets cannot be opened.
+        WrongDeviceError: the interface is another device.
     """
 
     def __init__(
@@ -74,12 +80,14 @@ class RawPort:
         on_fault: Callable[[FrameFault], None],
         *,
         confirms: bool,
+        matched: bool = False,
     ) -> None:
         self.name = name
         self.state = UP
         self._open = open_sockets
         self._on_fault = on_fault
         self._confirms = confirms
+        self._matched = matched
         self._sockets: list[socket.socket] = []
         self._unconfirmed: dict[int, int] = {}
         self._since_ns: dict[int, int] = {}
@@ -254,11 +262,11 @@ class RawPort:
 
     def _failed(self, error: OSError) -> None:
         if error.errno in GONE:
-            self.close()
-            self.state = BusState.GONE
-            self._not_before_ns = time.monotonic_ns() + REOPEN_NS
-            self._on_fault(FrameFault.BUS_GONE)
+            self._away(BusState.GONE, FrameFault.BUS_GONE)
         elif error.errno == errno.ENETDOWN:
+            if self._matched:
+                self._away(BusState.DOWN, FrameFault.BUS_DOWN)
+                return
             if self.state is not BusState.DOWN:
                 self._on_fault(FrameFault.BUS_DOWN)
             self.state = BusState.DOWN
@@ -268,6 +276,14 @@ class RawPort:
             self.state = BusState.FAILED
             self._on_fault(FrameFault.BUS_ERROR)
 
+    def _away(self, state: BusState, fault: FrameFault) -> None:
+        """Take and send nothing until the interface is opened again; a fault is told once."""
+        self.close()
+        self._not_before_ns = time.monotonic_ns() + REOPEN_NS
+        if self.state is not state:
+            self.state = state
+            self._on_fault(fault)
+
     def _use(self, sockets: list[socket.socket]) -> None:
         self._sockets = sockets
         self._waiting = [_poll(one) for one in sockets]
@@ -276,18 +292,24 @@ class RawPort:
         self._forget()
         self._claimed.clear()
         self._dropped = 0
-        self._up()
+        self._not_before_ns = 0
 
     def _reopened(self) -> bool:
-        """Look for an interface that has gone."""
-        now_ns = time.monotonic_ns()
-        if self.state is not BusState.GONE or now_ns < self._not_before_ns:
+        """Look for an interface that has gone, was down, or was another device."""
+        if self.state not in AWAY or time.monotonic_ns() < self._not_before_ns:
             return False
         try:
             self._use(self._open(self._ids))
-        except OSError:
-            self._not_before_ns = now_ns + REOPEN_NS
+        except WrongDeviceError:
+            self._away(BusState.WRONG_DEVICE, FrameFault.BUS_WRONG_DEVICE)
             return False
+        except OSError as error:
+            if error.errno in GONE:
+                self._away(BusState.GONE, FrameFault.BUS_GONE)
+            self._not_before_ns = time.monotonic_ns() + REOPEN_NS
+            return False
+        if self.state is not BusState.DOWN:  # which is over with the first frame
+            self.state = UP
         return True
 
     def watch(self, name: str, ids: Ids) -> None:

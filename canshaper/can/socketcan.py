@@ -10,7 +10,9 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 from canshaper.can.canopen import SERVICES
+from canshaper.can.device import WrongDeviceError, check_device
 from canshaper.can.j1939 import group_mask
+from canshaper.config.bus import Bus
 
 # linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.
 CAN_RAW_ERR_FILTER = 2
@@ -56,8 +58,8 @@ class Ids:
     in_line: bool = False
 
 
-def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
-    """Open the sockets of one interface.
+def open_sockets(bus: Bus, ids: Ids | None) -> list[socket.socket]:
+    """Open the sockets of one interface, and look at its device where the deployment names one.
 
     With ``ids`` there are three: for the messages that are taken; for those that we send, which
     hears our own frames back, other senders and the error frames; for ids that nobody knows. So
@@ -66,6 +68,7 @@ def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
 
     Raises:
         OSError: the kernel has no CAN, or there is no such interface.
+        WrongDeviceError: the interface is another device; nothing was sent or taken.
     """
     opened: list[socket.socket] = []
     try:
@@ -83,8 +86,9 @@ def open_sockets(channel: str, ids: Ids | None) -> list[socket.socket]:
             opened[2].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)  # all, not one
             set_filters(opened, ids)
         for one in opened:
-            one.bind((channel,))
-    except OSError:
+            one.bind((bus.channel,))
+        check_device(opened, bus)
+    except (OSError, WrongDeviceError):
         for one in opened:
             one.close()
         raise

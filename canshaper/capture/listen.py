@@ -87,7 +87,7 @@ class Listener:
 
     def _open(self, name: str, bus: Bus) -> None:
         if bus.interface == "socketcan":
-            (one,) = open_sockets(bus.channel, None)
+            (one,) = open_sockets(bus, None)
             one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
             self._sockets[one] = name, bus.channel
             self._files.append(one)

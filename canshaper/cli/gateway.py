@@ -1,10 +1,13 @@
 """``canshaper gateway``: the kernel's rules of a gateway in the line."""
 
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+
+if TYPE_CHECKING:
+    from canshaper.can.deployment import Deployment
 
 EXIT_OTHER_RULES = 1
 
@@ -33,6 +36,7 @@ def gateway(
 
       sudo canshaper gateway config/gateway-forwarder.yaml running
     """
+    from canshaper.can.bus import BusError
     from canshaper.can.cangw import GatewayError, between, load_module, make, rules
     from canshaper.can.gateway import channels, fallback_rules, passing_rules
     from canshaper.config.source import DeploymentError
@@ -59,10 +63,31 @@ def gateway(
                 raise typer.Exit(EXIT_OTHER_RULES)
             return
         if wanted[state]:
+            _look_at_devices(deployment)
             load_module()
         removed, added = make(ends, wanted[state])
-    except GatewayError as error:
+    except (GatewayError, BusError) as error:
         raise fail(error, EXIT_NO_BUS) from None
     typer.echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
     for rule in (rule for rule in removed if rule not in passing + fallback):
         typer.echo(f"  removed {rule}")
+
+
+def _look_at_devices(deployment: "Deployment") -> None:
+    """A rule is for the device that has the name now.
+
+    Raises:
+        BusError: it is another one than the deployment names, or cannot be looked at.
+    """
+    from canshaper.can.bus import BusError
+    from canshaper.can.device import match_fault
+
+    assert deployment.config.gateway is not None  # only such deployments have rules
+    for name in deployment.config.gateway.between:
+        bus = deployment.config.buses[name]
+        try:
+            why = match_fault(bus) if bus.match else None
+        except OSError as error:
+            why = f"{bus.channel} cannot be looked at: {error.strerror}"
+        if why:
+            raise BusError(str(deployment.source.problem(("buses", name, "match"), why)))

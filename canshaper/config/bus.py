@@ -1,8 +1,8 @@
 """Schema of the buses of a deployment, and of our node on them."""
 
-from typing import Annotated
+from typing import Annotated, Self
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from canshaper.config.section import Section, number
 
@@ -56,6 +56,35 @@ class Canopen(Section):
         return hash((self.node, self.heartbeat_ms, self.master, *self.nodes.values()))
 
 
+class Match(Section):
+    """The device that a bus of SocketCAN is; all that stands here has to be so."""
+
+    serial: str | None = Field(None, min_length=1, description="serial number of the USB adapter")
+    path: str | None = Field(
+        None, min_length=1, description="where the device is plugged in, as ID_PATH of udev"
+    )
+    port: Annotated[int, number(0, 63, "", "channel of an adapter with several")] | None = None
+    """As the kernel counts, from 0: dev_port of the interface, in older drivers dev_id."""
+    driver: str | None = Field(
+        None, min_length=1, description="driver of the kernel, such as peak_usb; vcan"
+    )
+    bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
+
+    @model_validator(mode="after")
+    def _says_something(self) -> Self:
+        if not self.model_dump(exclude_none=True):
+            raise ValueError(f"found nothing, allowed are {', '.join(type(self).model_fields)}")
+        return self
+
+    def may_be(self, other: "Match") -> bool:
+        """Whether both name an adapter, and nothing in them tells two of its channels apart."""
+        keys = ("serial", "path", "port")
+        both = [(getattr(self, key), getattr(other, key)) for key in keys]
+        return any(one is not None and one == two for one, two in both[:2]) and all(
+            None in (one, two) or one == two for one, two in both
+        )
+
+
 class Bus(Section):
     """A CAN bus, in the words of python-can."""
 
@@ -63,5 +92,8 @@ class Bus(Section):
     channel: str = Field(description="channel of the interface, such as can0")
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
     """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
+    match: Match | None = Field(
+        None, description="the device behind the channel; without it the name alone counts"
+    )
     j1939: J1939 | None = None
     canopen: Canopen | None = None

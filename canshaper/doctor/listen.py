@@ -47,7 +47,7 @@ def listen(
         for bus, config in deployment.config.buses.items():
             wanted = [name for key, name in names.items() if key[0] == bus]
             if wanted and config.interface == "socketcan":
-                (one,) = open_sockets(config.channel, None)
+                (one,) = open_sockets(config, None)
                 sockets[one] = bus
                 one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
                 heard |= {name: [] for name in wanted}

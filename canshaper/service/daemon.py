@@ -27,7 +27,15 @@ log = logging.getLogger("canshaper")
 NEUTRAL_TRIES_S = 0.1
 SECOND_NS = 1_000_000_000
 # Nobody hears us there, or we nobody.
-OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE))
+OFF_BUS = frozenset(
+    (
+        BusState.BUS_OFF,
+        BusState.NOT_CONFIRMED,
+        BusState.DOWN,
+        BusState.GONE,
+        BusState.WRONG_DEVICE,
+    )
+)
 
 
 class Daemon:

@@ -1,5 +1,6 @@
 """The daemon in the line: it waits for frames, not only for its deadline, and passes them on."""
 
+import errno
 import logging
 import select
 import socket
@@ -10,11 +11,13 @@ from contextlib import suppress
 from canshaper.can.bus import BusError, Port
 from canshaper.can.cangw import GatewayError, Rule, between, difference, rules
 from canshaper.can.deployment import Deployment
+from canshaper.can.device import WrongDeviceError, check_device
 from canshaper.can.frame import FrameFault
 from canshaper.can.gateway import excluded, passing_rules
 from canshaper.can.passing import Pattern
 from canshaper.can.raw import GONE, REOPEN_NS, SIZE
 from canshaper.can.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
+from canshaper.config.bus import Bus
 from canshaper.service.exchange import Reckons, take
 
 log = logging.getLogger("canshaper")
@@ -30,7 +33,7 @@ class Bridge:
     """Passes the frames of others on, in both directions and in their order.
 
     Args:
-        channels: both SocketCAN interfaces.
+        buses: both, of SocketCAN.
         excluded: the frames that do not pass.
         on_fault: called with every frame that could not be passed on.
 
@@ -40,11 +43,12 @@ class Bridge:
 
     def __init__(
         self,
-        channels: tuple[str, str],
+        buses: tuple[Bus, Bus],
         excluded: Iterable[Pattern],
         on_fault: Callable[[FrameFault], None],
     ) -> None:
-        self._channels = channels
+        self._buses = buses
+        self._matched = any(bus.match for bus in buses)
         words = [(pattern.value | CAN_INV_FILTER, pattern.mask) for pattern in excluded]
         self._filters = filter_words(words)
         self._on_fault = on_fault
@@ -52,21 +56,23 @@ class Bridge:
         self.sockets: list[socket.socket] = []
         try:
             self._open()
-        except OSError as error:
-            names = " and ".join(channels)
-            raise BusError(f"gateway: cannot open {names}: {error.strerror}") from error
+        except (OSError, WrongDeviceError) as error:
+            names = " and ".join(bus.channel for bus in buses)
+            why = error.strerror if isinstance(error, OSError) else error
+            raise BusError(f"gateway: cannot open {names}: {why}") from error
 
     def _open(self) -> None:
         opened: list[socket.socket] = []
         try:
-            for channel in self._channels:
+            for bus in self._buses:
                 opened.append(socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
                 opened[-1].setblocking(False)
                 opened[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
                 opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)
                 opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
-                opened[-1].bind((channel,))
-        except OSError:
+                opened[-1].bind((bus.channel,))
+                check_device(opened[-1:], bus)
+        except (OSError, WrongDeviceError):
             for one in opened:
                 one.close()
             raise
@@ -84,7 +90,7 @@ class Bridge:
                 except BlockingIOError:
                     break
                 except OSError as error:
-                    if error.errno in GONE:
+                    if error.errno in GONE or (self._matched and error.errno == errno.ENETDOWN):
                         self._gone()
                         return count
                     break  # down: told by the port of this bus
@@ -103,7 +109,7 @@ class Bridge:
         now_ns = time.monotonic_ns()
         if now_ns >= self._not_before_ns:
             self._not_before_ns = now_ns + REOPEN_NS
-            with suppress(OSError):
+            with suppress(OSError, WrongDeviceError):  # told by the port of this bus
                 self._open()
 
     def close(self) -> None:
@@ -137,8 +143,7 @@ class InLine:
         if not self._real:
             log.warning("gateway=nothing-passes others are passed on with socketcan only")
         elif not self._kernel:
-            channels = first.channel, second.channel
-            self._bridge = Bridge(channels, excluded(deployment), on_fault)
+            self._bridge = Bridge((first, second), excluded(deployment), on_fault)
 
     def wait(self, seconds: float, reckons: Reckons, ports: Mapping[str, Port]) -> None:
         """Until a deadline pass on what comes; frames of the levers first.

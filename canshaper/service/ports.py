@@ -3,7 +3,7 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from canshaper.can.bus import BusError, ListeningPort, Port, open_port
+from canshaper.can.bus import BusError, ListeningPort, Port, WrongBusError, open_port
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
 from canshaper.config.bus import Bus
@@ -23,7 +23,7 @@ def open_ports(
         on_fault: called with every fault of a bus.
 
     Raises:
-        BusError: a bus cannot be opened; what is open stays as it is.
+        BusError: a bus cannot be opened, or is another device; what is open stays as it is.
     """
     ports: dict[str, Port] = {}
     try:
@@ -32,8 +32,11 @@ def open_ports(
             port = opened.get(bus) or open_port(name, bus, on_fault, ids)
             listens = deployment.listen_only and bus not in opened
             ports[name] = ListeningPort(port, ids) if listens else port
-    except BusError:
+    except BusError as error:
         close_ports(new_ports(ports, opened))
+        if isinstance(error, WrongBusError):
+            place = ("buses", error.bus, "match")
+            raise BusError(str(deployment.source.problem(place, error.why))) from error
         raise
     return ports
 

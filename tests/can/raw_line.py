@@ -11,6 +11,7 @@ from typing import Any
 import can
 from can.interfaces.socketcan.socketcan import build_can_frame
 
+from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.raw import SIZE, RawPort
 from canshaper.can.socketcan import Ids
@@ -57,16 +58,24 @@ class Line:
 
     Args:
         ids: the messages of the port, which then has three sockets; without, it has one.
+        matched: the deployment names the device of the bus.
     """
 
-    def __init__(self, ids: Ids | None = IDS) -> None:
+    def __init__(self, ids: Ids | None = IDS, *, matched: bool = False) -> None:
         self.faults: list[FrameFault] = []
         self.asked: list[Ids | None] = []
-        self.refuse: OSError | None = None
+        self.refuse: OSError | WrongDeviceError | None = None
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
-        self.port = RawPort("crane", self._open, ids, self.faults.append, confirms=ids is not None)
+        self.port = RawPort(
+            "crane",
+            self._open,
+            ids,
+            self.faults.append,
+            confirms=ids is not None,
+            matched=matched,
+        )
 
     def _open(self, ids: Ids | None) -> list[socket.socket]:
         self.asked.append(ids)

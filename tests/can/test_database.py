@@ -210,7 +210,7 @@ def test_messages_of_another_kind(
         # status
         ("State : 0|4@1+", "State : 0|2@1+", "SlewStatus", "State cannot carry 5 with 2 bits"),
         ("Reason : 8|8", "Reason : 8|6", "SlewStatus", "Reason cannot carry 72 with 6 bits"),
-        ("LastFault : 0|8", "LastFault : 0|2", "ShaperStatus", "LastFault cannot carry 22"),
+        ("LastFault : 0|8", "LastFault : 0|2", "ShaperStatus", "LastFault cannot carry 23"),
         (
             "PredictedSway : 48|16@1- (0.01,0)",
             "PredictedSway : 48|16@1- (0,0)",

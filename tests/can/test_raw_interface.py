@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from canshaper.can import raw
+from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import BusState, FrameFault
 from canshaper.can.raw import PROBE_NS, REOPEN_NS, RawPort
 from canshaper.can.socketcan import Ids
@@ -134,6 +135,127 @@ def test_a_bus_that_cannot_be_opened_is_no_port() -> None:
 
     with pytest.raises(OSError, match="no such device"):
         RawPort("crane", refuse, None, lambda _fault: None, confirms=False)
+
+
+# -- a deployment that names the device ------------------------------------------------------------
+
+WRONG = WrongDeviceError("expected serial number 1, but can0 has serial number 2")
+
+
+@pytest.fixture
+def matched(make_line: Callable[..., Line]) -> Line:
+    return make_line(matched=True)
+
+
+def later(line: Line) -> None:
+    """One try to open it again."""
+    line.now_ns += REOPEN_NS
+    assert line.heard() == []
+
+
+def gone(line: Line) -> None:
+    line.put(message(0x110))
+    line.near[TAKEN].fail = OSError(errno.ENODEV, "gone")
+    assert line.heard() == []
+
+
+@pytest.mark.parametrize("away", [gone, down])
+def test_another_device_under_the_name_is_not_used(
+    matched: Line, away: Callable[[Line], None]
+) -> None:
+    """However long it is there: nothing is sent and nothing taken until the right one is back."""
+    away(matched)
+    told = [FrameFault.BUS_GONE if away is gone else FrameFault.BUS_DOWN]
+    assert matched.faults == told
+    matched.refuse = WRONG
+    far = matched.far
+    far[TAKEN].setblocking(False)
+    for _ in range(100):
+        matched.now_ns += TICK_NS
+        assert matched.heard() == []
+        assert not matched.port.send(VALVE)
+        assert matched.port.fileno() == -1
+    assert matched.port.state is BusState.WRONG_DEVICE
+    assert matched.faults == [*told, FrameFault.BUS_WRONG_DEVICE]
+    assert len(matched.asked) == 1 + 100 * TICK_NS // REOPEN_NS
+    matched.refuse = None
+    later(matched)
+    assert matched.port.state is BusState.UP
+    assert matched.port.send(VALVE)
+    assert len(matched.sent()) == 1
+    matched.put(message(0x110))
+    assert len(matched.heard()) == 1
+    assert matched.faults == [*told, FrameFault.BUS_WRONG_DEVICE]
+
+
+def test_a_matched_interface_that_is_down_is_opened_again_and_told_once(matched: Line) -> None:
+    """Name and bit rate may be others when it is back; whether it is up, only its frames say."""
+    down(matched)
+    assert matched.port.fileno() == -1
+    assert not matched.port.send(VALVE)
+    for _ in range(3):  # opened, and still down
+        matched.now_ns += REOPEN_NS
+        assert [*matched.port.frames()] == []
+        down(matched)
+    assert matched.port.state is BusState.DOWN
+    assert matched.faults == [FrameFault.BUS_DOWN]
+    later(matched)
+    assert matched.port.state is BusState.DOWN
+    assert matched.port.send(VALVE)
+    matched.confirm(VALVE)
+    matched.heard()
+    assert matched.port.state is BusState.UP
+
+
+def test_a_matched_interface_is_not_tried_in_every_tick(matched: Line) -> None:
+    down(matched)
+    matched.now_ns += REOPEN_NS - 1
+    assert matched.heard() == []
+    assert len(matched.asked) == 1
+
+
+def test_a_bus_that_was_blocked_is_tried_at_once_when_it_is_back(matched: Line) -> None:
+    matched.unconfirmed()
+    gone(matched)
+    later(matched)
+    assert matched.port.send(VALVE)
+
+
+def test_what_comes_after_a_wrong_device_is_told(matched: Line) -> None:
+    gone(matched)
+    matched.refuse = WRONG
+    later(matched)
+    matched.refuse = OSError(errno.EMFILE, "too many files")  # says nothing of the device
+    later(matched)
+    assert matched.port.state is BusState.WRONG_DEVICE
+    matched.refuse = OSError(errno.ENODEV, "no such device")
+    later(matched)
+    assert matched.port.state is BusState.GONE
+    matched.refuse = WRONG
+    later(matched)
+    assert matched.port.state is BusState.WRONG_DEVICE
+    assert matched.faults == [
+        FrameFault.BUS_GONE,
+        FrameFault.BUS_WRONG_DEVICE,
+        FrameFault.BUS_GONE,
+        FrameFault.BUS_WRONG_DEVICE,
+    ]
+
+
+def test_a_try_that_fails_for_another_reason_waits_for_the_next(matched: Line) -> None:
+    gone(matched)
+    matched.refuse = OSError(errno.EMFILE, "too many files")
+    later(matched)
+    assert matched.heard() == []
+    assert len(matched.asked) == 2
+
+
+def test_a_wrong_device_at_the_start_is_no_port() -> None:
+    def refuse(_ids: Ids | None) -> list[socket.socket]:
+        raise WRONG
+
+    with pytest.raises(WrongDeviceError, match="expected serial number 1"):
+        RawPort("crane", refuse, None, lambda _fault: None, confirms=False, matched=True)
 
 
 def test_a_closed_port_does_nothing_more(line: Line) -> None:

@@ -1,0 +1,58 @@
+"""Questions to the kernel over rtnetlink; formats of linux/netlink.h and linux/rtnetlink.h."""
+
+import os
+import socket
+import struct
+from collections.abc import Iterator
+
+REQUEST, ACKNOWLEDGE, DUMP, ERROR, DONE = 0x1, 0x4, 0x300, 2, 3
+_HEADER = struct.Struct("=IHHII")  # nlmsghdr
+_ATTRIBUTE = struct.Struct("=HH")  # rtattr
+TYPE_MASK = 0x3FFF  # NLA_TYPE_MASK: without the flags for nested and for the byte order
+ROOM = 1 << 16
+
+
+def attribute(kind: int, payload: bytes) -> bytes:
+    """One attribute of a message, filled up to whole words."""
+    part = _ATTRIBUTE.pack(_ATTRIBUTE.size + len(payload), kind) + payload
+    return part + bytes(-len(part) % 4)
+
+
+def attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
+    """(kind, payload) of each attribute; one that is cut short ends them."""
+    at = 0
+    while at + _ATTRIBUTE.size <= len(data):
+        length, kind = _ATTRIBUTE.unpack_from(data, at)
+        if length < _ATTRIBUTE.size:
+            return
+        yield kind & TYPE_MASK, data[at + _ATTRIBUTE.size : at + length]
+        at += -(-length // 4) * 4
+
+
+def ask(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
+    """Send one request; yield the bodies of the answers.
+
+    Args:
+        kind: type of the message.
+        flags: ACKNOWLEDGE or DUMP, so that the kernel marks the end of its answers.
+        body: behind the header.
+
+    Raises:
+        OSError: the kernel refuses, or this process may not open such a socket.
+    """
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as asked:
+        header = _HEADER.pack(_HEADER.size + len(body), kind, REQUEST | flags, 1, 0)
+        asked.send(header + body)
+        while True:
+            data = asked.recv(ROOM)
+            at = 0
+            while at < len(data):
+                length, answer, _flags, _number, _port = _HEADER.unpack_from(data, at)
+                content = data[at + _HEADER.size : at + length]
+                if answer in (ERROR, DONE):
+                    code = -struct.unpack_from("=i", content)[0] if len(content) >= 4 else 0
+                    if code:
+                        raise OSError(code, os.strerror(code))
+                    return
+                yield content
+                at += -(-length // 4) * 4
