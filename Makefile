@@ -7,7 +7,7 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb clean
+.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -103,6 +103,10 @@ bench-realtime: .venv/test-ready
 # dist/canshaper_VERSION_ARCH.deb: docs/service.md
 deb:
 	tools/deb.sh
+
+# Newer versions for the package: tools/deb/*requirements.txt
+lock:
+	tools/lock.sh
 
 clean:
 	rm -rf .venv out dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

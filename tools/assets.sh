@@ -1,18 +1,19 @@
 #!/bin/sh
 # Fetch and pack the libraries of the live page into canshaper/studio/static/vendor; needs npm.
 # The result is kept in the repository: neither the page nor its tests need this script.
+#
+# Versions stand in tools/assets/package.json, the hashes of their packages in package-lock.json,
+# those of the result in vendor/SHA256SUMS. After a change of a version:
+# npm install --package-lock-only --omit-lockfile-registry-resolved
 set -eu
 cd "$(dirname "$0")/.."
 vendor=$PWD/canshaper/studio/static/vendor
-THREE=0.187.0
-UPLOT=1.6.32
-ESBUILD=0.28.2
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
+cp tools/assets/package.json tools/assets/package-lock.json "$work"
 cd "$work"
-echo '{"private": true}' >package.json
-npm install --silent --no-audit --no-fund --save-exact "three@$THREE" "uplot@$UPLOT" "esbuild@$ESBUILD"
+npm ci --silent --no-audit --no-fund
 
 # Only what the page uses of three.js: the whole of it is four times as large.
 cat >three.js <<'END'
@@ -25,10 +26,12 @@ export {
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 END
 echo 'export { default } from "uplot";' >uplot.js
-for pinned in "three $THREE" "uplot $UPLOT"; do
-  name=${pinned% *}
+for name in three uplot; do
+  version=$(node -p "require('./node_modules/$name/package.json').version")
   ./node_modules/.bin/esbuild "$name.js" --bundle --minify --format=esm --legal-comments=none \
-    --banner:js="/* $pinned, MIT licence: $name.LICENSE */" --outfile="$vendor/$name.js"
+    --banner:js="/* $name $version, MIT licence: $name.LICENSE */" --outfile="$vendor/$name.js"
   cp "node_modules/$name/LICENSE" "$vendor/$name.LICENSE"
 done
 cp node_modules/uplot/dist/uPlot.min.css "$vendor/uplot.css"
+cd "$vendor"
+sha256sum three.LICENSE three.js uplot.LICENSE uplot.css uplot.js >SHA256SUMS

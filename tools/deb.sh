@@ -54,8 +54,11 @@ mkdir -p "$library" "$documents" "$root/DEBIAN" "$root/usr/bin" "$root/usr/share
 # The daemon and what it imports. dpkg keeps the list of files; pip's own lists would name this
 # directory.
 "$python" -m venv "$work/venv"
-"$work/venv/bin/pip" install --quiet --disable-pip-version-check --no-compile \
-    --target "$library" .
+pip_install() { "$work/venv/bin/pip" install --quiet --disable-pip-version-check "$@"; }
+# Exact versions with hashes (tools/lock.sh): the same package today and in a year, or none.
+pip_install --require-hashes -r tools/deb/build-requirements.txt
+pip_install --no-compile --require-hashes --target "$library" -r tools/deb/requirements.txt
+pip_install --no-compile --no-deps --no-build-isolation --target "$library" --upgrade .
 rm -rf "$library/bin" "$library"/*.dist-info/RECORD "$library"/*.dist-info/direct_url.json
 find "$library" -name '*.py[ci]' -delete
 # One copy of the shipped deployments, where an administrator looks for it.
@@ -76,7 +79,10 @@ done
 
 sed "s|@LIBRARY@|/usr/lib/canshaper|" tools/deb/canshaper >"$root/usr/bin/canshaper"
 chmod 755 "$root/usr/bin/canshaper"
-cp docs/service.md docs/deployment.md docs/states.md "$documents"
+cp docs/service.md docs/deployment.md docs/states.md docs/safety.md docs/machine-manual.md \
+    SECURITY.md "$documents"
+"$work/venv/bin/python" tools/deb/sbom.py "$library" "$version" \
+    >"$documents/sbom.cdx.json"
 gzip -9n <tools/deb/canshaper.1 >"$root/usr/share/man/man1/canshaper.1.gz"
 cp tools/deb/lintian-overrides "$root/usr/share/lintian/overrides/canshaper"
 { cat tools/deb/copyright && "$python" tools/deb/bundled.py "$library"; } >"$documents/copyright"

@@ -17,5 +17,11 @@ def licence(package: Distribution) -> str:
     raise SystemExit(f"{package.name} does not say its licence")
 
 
-for package in sorted(distributions(path=[sys.argv[1]]), key=lambda p: p.name.lower()):
-    print(f" {package.name} {package.version}: {licence(package)}")
+def main() -> None:
+    """Print the lines."""
+    for package in sorted(distributions(path=[sys.argv[1]]), key=lambda p: p.name.lower()):
+        print(f" {package.name} {package.version}: {licence(package)}")
+
+
+if __name__ == "__main__":
+    main()

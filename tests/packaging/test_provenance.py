@@ -1,0 +1,96 @@
+"""What a package is built from: exact versions with hashes, vendored files with theirs, a bill."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+import tomllib
+from hashlib import sha256
+from pathlib import Path
+
+import pytest
+from cyclonedx.schema import SchemaVersion
+from cyclonedx.validation.json import JsonStrictValidator
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
+
+ROOT = Path(__file__).parents[2]
+VENDOR = ROOT / "canshaper" / "studio" / "static" / "vendor"
+LOCKS = ("requirements.txt", "build-requirements.txt")
+PIN = re.compile(r"^([a-z0-9-]+)(?:\[[a-z,-]+\])?==(\S+) \\$")
+HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}( \\)?$")
+
+
+def pins(name: str) -> dict[str, str]:
+    """Version of every package of a lock; each line is a pin, a hash or a comment."""
+    found: dict[str, str] = {}
+    hashes = 1
+    for line in (ROOT / "tools" / "deb" / name).read_text(encoding="utf-8").splitlines():
+        if pin := PIN.match(line):
+            assert hashes, f"{list(found)[-1]} has no hash"
+            found[pin[1]], hashes = pin[2], 0
+        elif HASH.match(line):
+            hashes += 1
+        else:
+            assert line.startswith("#"), line
+    assert hashes
+    return found
+
+
+@pytest.mark.parametrize("name", LOCKS)
+def test_every_package_of_a_lock_has_a_version_and_hashes(name: str) -> None:
+    assert pins(name)
+
+
+def test_the_lock_fits_the_dependencies() -> None:
+    locked = pins("requirements.txt")
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    for text in project["dependencies"]:
+        wanted = Requirement(text)
+        assert wanted.specifier.contains(locked[canonicalize_name(wanted.name)]), text
+
+
+def test_the_package_is_built_from_the_locks_only() -> None:
+    lines = (ROOT / "tools" / "deb.sh").read_text(encoding="utf-8").splitlines()
+    installs = [line for line in lines if line.startswith("pip_install ")]
+    assert len(installs) == len(LOCKS) + 1
+    for line in installs:
+        assert "--require-hashes" in line or "--no-deps --no-build-isolation" in line
+
+
+def test_vendored_files_are_those_that_were_packed() -> None:
+    listed = {}
+    for line in (VENDOR / "SHA256SUMS").read_text(encoding="utf-8").splitlines():
+        value, name = line.split()
+        listed[name] = value
+    there = {p.name: sha256(p.read_bytes()).hexdigest() for p in VENDOR.iterdir()}
+    del there["SHA256SUMS"]
+    assert there == listed
+
+
+def test_packages_of_the_page_have_hashes() -> None:
+    lock = json.loads((ROOT / "tools" / "assets" / "package-lock.json").read_text("utf-8"))
+    packages = {name: one for name, one in lock["packages"].items() if name}
+    assert packages
+    assert all(one["integrity"].startswith("sha512-") for one in packages.values())
+
+
+def test_the_bill_is_valid_and_names_everything(tmp_path: Path) -> None:
+    """Of a directory that is laid out as that of a package."""
+    vendor = tmp_path / "canshaper" / "studio" / "static" / "vendor"
+    shutil.copytree(VENDOR, vendor)
+    about = tmp_path / "some_package-2.0.dist-info" / "METADATA"
+    about.parent.mkdir()
+    about.write_text("Metadata-Version: 2.1\nName: some-package\nVersion: 2.0\nLicense: MIT\n")
+    command = [sys.executable, str(ROOT / "tools" / "deb" / "sbom.py"), str(tmp_path), "1.2.3"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    assert done.stderr == ""
+    assert JsonStrictValidator(SchemaVersion.V1_6).validate_str(done.stdout) is None
+    bill = json.loads(done.stdout)
+    assert bill["metadata"]["component"]["version"] == "1.2.3"
+    parts = {one["name"]: one for one in bill["components"]}
+    assert parts.keys() == {"some-package", "three", "uplot"}
+    packed = sha256((VENDOR / "three.js").read_bytes()).hexdigest()
+    assert parts["three"]["hashes"] == [{"alg": "SHA-256", "content": packed}]
+    assert parts["some-package"]["licenses"] == [{"license": {"id": "MIT"}}]
