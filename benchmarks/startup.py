@@ -21,10 +21,11 @@ from canshaper.config.bus import Bus
 
 PEER = """
 import sys, can, cantools
+from canshaper.can.multicast import LocalMulticastBus
 database = cantools.database.load_file(sys.argv[1])
 message = database.get_message_by_name("SlewCommand")
 data = message.encode({"Velocity": 0, "AliveCounter": 0})
-with can.Bus(interface="udp_multicast", channel=sys.argv[2], ignore_config=True) as bus:
+with LocalMulticastBus(sys.argv[2]) as bus:
     bus.send(can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data))
 """
 

@@ -147,6 +147,9 @@ class _Binder(FilterBinder):
                 self.add(("buses", name), f"has the channel {bus.channel} of bus {seen[key]}")
             seen[key] = name
             self._check_match(name, bus)
+            if bus.network and bus.interface != "udp_multicast":
+                text = f"found true with {bus.interface}, allowed is it with udp_multicast only"
+                self.add(("buses", name, "network"), text)
             if bus.j1939 is None:
                 continue
             # Behind a gateway both may meet, and nobody would know which is meant.

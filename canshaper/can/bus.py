@@ -5,8 +5,6 @@ the next tick, so an interface that comes back is used again.
 """
 
 import errno
-import os
-import socket
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import suppress
@@ -17,6 +15,7 @@ import can
 
 from canshaper.can.device import WrongDeviceError, whereabouts
 from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.can.multicast import LocalMulticastBus, receive_one_group
 from canshaper.can.raw import MOST_FRAMES, RawPort
 from canshaper.can.socketcan import Ids, open_sockets
 from canshaper.config.bus import Bus
@@ -26,8 +25,6 @@ MOST_ECHOES = 256
 # Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
 # behind it must not grow old; a bus that is gone fails at every call.
 MOST_FAILURES = 20
-# linux/in.h, linux/in6.h; Python has no names for these.
-IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 
 
 class BusError(Exception):
@@ -160,22 +157,10 @@ class PythonCanPort:
         self.name = name
         self.state = BusState.UP
         self._on_fault = on_fault
-        options: dict[str, Any] = {} if config.bitrate is None else {"bitrate": config.bitrate}
-        # ignore_config: files and variables of the environment must not change the bus
-        self._bus = can.Bus(
-            interface=config.interface,
-            channel=config.channel,
-            ignore_config=True,
-            receive_own_messages=False,
-            **options,
-        )
+        self._bus = open_python_can(config)
         # Multicast brings back what this process sent; the others do not.
-        self._echoes: deque[Frame] | None = None
-        if config.interface == "udp_multicast":
-            self._echoes = deque(maxlen=MOST_ECHOES)
-            hear_one_group(self._bus.fileno())
-            while self._bus.recv(0) is not None:  # of other groups, until now
-                pass
+        multicast = config.interface == "udp_multicast"
+        self._echoes: deque[Frame] | None = deque(maxlen=MOST_ECHOES) if multicast else None
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -241,14 +226,25 @@ class PythonCanPort:
             self._bus.shutdown()
 
 
-def hear_one_group(fileno: int) -> None:
-    """Let a multicast socket hear its own group only.
+def open_python_can(config: Bus) -> can.BusABC:
+    """Open a bus of python-can; ``udp_multicast`` stays on this machine but with ``network``.
 
-    Linux hands it the frames of every group that any program of this machine has joined at the
-    same port, so that two buses would be one.
+    Raises:
+        Exception: each interface raises its own kinds.
     """
-    with socket.socket(fileno=os.dup(fileno)) as one:
-        if one.family == socket.AF_INET6:
-            one.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
-        else:
-            one.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+    if config.interface == "udp_multicast" and not config.network:
+        return LocalMulticastBus(config.channel)
+    options: dict[str, Any] = {} if config.bitrate is None else {"bitrate": config.bitrate}
+    # ignore_config: files and variables of the environment must not change the bus
+    bus = can.Bus(
+        interface=config.interface,
+        channel=config.channel,
+        ignore_config=True,
+        receive_own_messages=False,
+        **options,
+    )
+    if config.interface == "udp_multicast":
+        receive_one_group(bus.fileno())
+        while bus.recv(0) is not None:  # of other groups, until now
+            pass
+    return bus

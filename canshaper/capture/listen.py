@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import can
 
-from canshaper.can.bus import BusError, hear_one_group
+from canshaper.can.bus import BusError, open_python_can
 from canshaper.can.raw import CAN_FRAME
 from canshaper.can.socketcan import dropped_frames, open_sockets
 from canshaper.capture.text import ERROR_FLAG
@@ -92,14 +92,7 @@ class Listener:
             self._sockets[one] = name, bus.channel
             self._files.append(one)
             return
-        options: dict[str, Any] = {} if bus.bitrate is None else {"bitrate": bus.bitrate}
-        opened = can.Bus(
-            interface=bus.interface, channel=bus.channel, ignore_config=True, **options
-        )
-        if bus.interface == "udp_multicast":
-            hear_one_group(opened.fileno())
-            while opened.recv(0) is not None:  # of other groups, until now
-                pass
+        opened = open_python_can(bus)
         self._sockets[opened] = name, bus.channel
         with suppress(Exception):  # not every interface has one
             if opened.fileno() >= 0:

@@ -11,6 +11,7 @@ from canshaper.cli.common import (
     EXIT_NO_BUS,
     FILE,
     INTERFACE,
+    NETWORK,
     fail,
     loader,
     refuse_shipped,
@@ -47,6 +48,7 @@ def calibrate(
     write: bool = typer.Option(False, "--write", help="Write the curve into the file."),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
     changes: list[str] | None = SET,
 ) -> None:
     """Measure at which command a valve opens, and what it gives, in each direction.
@@ -75,7 +77,7 @@ def calibrate(
     from canshaper.config.source import DeploymentError
 
     try:
-        deployment = loader(file, interface, channel)()
+        deployment = loader(file, interface, channel, network=network)()
         if write:
             refuse_shipped(file)
         ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)

@@ -26,6 +26,10 @@ CHANNEL = typer.Option(
     help="Channel instead of the file's; with several buses NAME=CHANNEL, once for each.",
 )
 
+NETWORK = typer.Option(
+    False, "--network", help="Share a bus of udp_multicast over the network; else it stays local."
+)
+
 
 def data_directory() -> Path:
     """Directory that holds ``config`` and ``dbc``: in the installed package, or the checkout."""
@@ -55,14 +59,18 @@ def refuse_shipped(file: str) -> None:
 
 
 def loader(
-    file: str, interface: str | None = None, channels: list[str] | None = None
+    file: str,
+    interface: str | None = None,
+    channels: list[str] | None = None,
+    *,
+    network: bool = False,
 ) -> Callable[[], Deployment]:
     """A function that loads the deployment with the bus options of the command line put in."""
     path = deployment_path(file)
 
     def load() -> Deployment:
         deployment = load_deployment(path)
-        if not interface and not channels:
+        if not interface and not channels and not network:
             return deployment
         buses = dict(deployment.config.buses)
         for item in channels or []:
@@ -73,8 +81,14 @@ def loader(
                 text = f"found {item!r}, allowed is NAME=CHANNEL with a bus of {', '.join(buses)}"
                 raise DeploymentError([Problem("command line", None, "--channel", text)])
             buses[name] = buses[name].model_copy(update={"channel": channel})
-        if interface:
-            buses = {n: b.model_copy(update={"interface": interface}) for n, b in buses.items()}
+        if interface:  # what the file says of sharing was said of its own interface
+            update = {"interface": interface, "network": False}
+            buses = {n: b.model_copy(update=update) for n, b in buses.items()}
+        if network:
+            if others := {b.interface for b in buses.values()} - {"udp_multicast"}:
+                text = f"found the interface {', '.join(others)}, allowed is udp_multicast only"
+                raise DeploymentError([Problem("command line", None, "--network", text)])
+            buses = {n: b.model_copy(update={"network": True}) for n, b in buses.items()}
         if len({(b.interface, b.channel) for b in buses.values()}) < len(buses):
             text = f"two of the buses {', '.join(buses)} have one channel; allowed is one for each"
             raise DeploymentError([Problem("command line", None, "--channel", text)])

@@ -6,13 +6,14 @@ from types import FrameType
 import typer
 from rich.console import Console
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
 
 
 def monitor(
     file: str = FILE,
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
     refresh_hz: float = typer.Option(
         5.0, "--refresh", metavar="HZ", min=0.2, max=10.0, help="How often the picture is drawn."
     ),
@@ -45,7 +46,7 @@ def monitor(
     stop = _Stop()
     console = Console()
     try:
-        deployment = loader(file, interface, channel)()
+        deployment = loader(file, interface, channel, network=network)()
         if plain or not console.is_terminal:
             run_plain(deployment, _write, stop.going)
         else:

@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 from rich.live import Live
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -30,6 +30,7 @@ def record(
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
 ) -> None:
     """Record every frame on the buses of a deployment; nothing is sent.
 
@@ -57,7 +58,7 @@ def record(
     if out.suffix not in (".zip", ".log"):
         raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
     try:
-        deployment = loader(file, interface, channel)()
+        deployment = loader(file, interface, channel, network=network)()
     except DeploymentError as error:
         raise fail(error) from None
     console = Console(stderr=True)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -16,6 +16,7 @@ def run(
     file: str = FILE,
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
     listen_only: bool = typer.Option(
         False, "--listen-only", help="Reckon and tell the status; send no valve frame."
     ),
@@ -48,7 +49,7 @@ def run(
 
     journal.set_up()
     try:
-        load = loader(file, interface, channel)
+        load = loader(file, interface, channel, network=network)
         daemon = Daemon(_changed(load, listen_only=listen_only, control=control))
     except DeploymentError as error:
         raise fail(error) from None

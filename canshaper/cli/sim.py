@@ -2,7 +2,7 @@
 
 import typer
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, fail, loader
 
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
@@ -18,6 +18,7 @@ def sim(
     file: str = FILE,
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
     changes: list[str] | None = SET,
     machine: str | None = typer.Option(
         None,
@@ -58,7 +59,7 @@ def sim(
             for name, value in parameter_names(parameters).items():
                 typer.echo(f"{name}={value:g}")
             return
-        deployment = loader(file, interface, channel)()
+        deployment = loader(file, interface, channel, network=network)()
         driven = one_crane(deployment, crane) if crane else deployment
         run_plant(driven, parameters, machine)
     except (DeploymentError, BusError, ValueError) as error:
@@ -71,6 +72,7 @@ def operator(
     bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway switched off."),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
     crane: str | None = CRANE,
     show: bool = typer.Option(False, "--list", help="List the scripts and exit."),
 ) -> None:
@@ -99,7 +101,7 @@ def operator(
         typer.echo("random-<seed>        30.0 s  any number, always the same strokes")
         return
     try:
-        deployment = loader(file, interface, channel)()
+        deployment = loader(file, interface, channel, network=network)()
         if crane:
             deployment = one_crane(deployment, crane)
         axes = [axis for axis in ALL_AXES if axis in deployment.axes]

@@ -95,5 +95,8 @@ class Bus(Section):
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )
+    network: bool = Field(
+        False, description="share a bus of udp_multicast over the network; else it stays local"
+    )
     j1939: J1939 | None = None
     canopen: Canopen | None = None

@@ -72,7 +72,11 @@ def choose_transport(wish: str, deployment: Deployment) -> Transport:
 
 def on_transport(deployment: Deployment, transport: Transport) -> Deployment:
     """The deployment with its bus put on this transport."""
-    change = {"interface": transport.interface, "channel": transport.channel}
+    change = {
+        "interface": transport.interface,
+        "channel": transport.channel,
+        "network": False,  # whatever the machine's own bus is
+    }
     buses = {n: b.model_copy(update=change) for n, b in deployment.config.buses.items()}
     return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
 

@@ -169,5 +169,16 @@ def test_two_buses_on_one_channel(machine: Machine) -> None:
     ]
 
 
+def test_a_bus_that_is_no_multicast_is_not_shared(machine: Machine) -> None:
+    line = machine.in_yaml(
+        "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "{ interface: socketcan, channel: vcan0, bitrate: 250000, network: true }",
+    )
+    assert machine.problems() == [
+        f"machine.yaml:{line}: buses.crane.network: found true with socketcan, allowed is it with"
+        " udp_multicast only"
+    ]
+
+
 def test_no_binding_problem_reaches_the_controller(machine: Machine) -> None:
     Controller(machine.load())

@@ -16,6 +16,7 @@ import can
 import pytest
 from typer.testing import CliRunner
 
+from canshaper.can.multicast import LocalMulticastBus
 from canshaper.capture.bundle import unpack
 from canshaper.capture.listen import Listener
 from canshaper.capture.record import Recording
@@ -142,7 +143,7 @@ def test_a_listener_hears_everything_and_sends_nothing(monkeypatch: pytest.Monke
     really = bus_type.send
     monkeypatch.setattr(bus_type, "send", lambda self, m, timeout=None: sent.append(m))
     listener = Listener(loader("forwarder.yaml", "udp_multicast", [GROUP])().config.buses.items())
-    other = can.Bus(interface="udp_multicast", channel=GROUP, ignore_config=True)
+    other = LocalMulticastBus(GROUP)
     wanted = [
         can.Message(arbitration_id=0x110, is_extended_id=False, data=b"\x01\x02"),
         can.Message(arbitration_id=0x1ABCDEF0, data=b""),

@@ -15,10 +15,10 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-import can
 import pytest
 from typer.testing import CliRunner
 
+from canshaper.can.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 
 GROUP = f"239.75.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
@@ -108,7 +108,7 @@ def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
 
 
 def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
-    with can.Bus(interface="udp_multicast", channel=GROUP, ignore_config=True) as bus:
+    with LocalMulticastBus(GROUP) as bus:
         monitor = subprocess.Popen(
             [*COMMAND, "monitor", "forwarder.yaml", *BUS], stdout=subprocess.PIPE, text=True
         )

@@ -162,6 +162,26 @@ def test_bus_options(two_buses: Path) -> None:
     assert {n: b.channel for n, b in buses.items()} == {"crane": "can0", "boom": "can1"}
 
 
+def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path) -> None:
+    """What a file says of sharing is not said of another interface."""
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    bus = "{ interface: socketcan, channel: vcan0, bitrate: 250000 }"
+    shared = tmp_path / "machine.yaml"
+    shared.write_text(
+        text.replace(bus, "{ interface: udp_multicast, channel: 239.1.2.3, network: true }"),
+        encoding="utf-8",
+    )
+    multicast = (str(shared), "udp_multicast")
+    assert loader(str(shared))().config.buses["crane"].network
+    assert loader(str(shared), None, ["239.1.2.4"])().config.buses["crane"].network
+    assert not loader(*multicast)().config.buses["crane"].network
+    assert loader(*multicast, network=True)().config.buses["crane"].network
+    assert not loader(str(SHIPPED), "udp_multicast", ["239.1.2.3"])().config.buses["crane"].network
+    says = "--network: found the interface socketcan, allowed is udp_multicast only"
+    with pytest.raises(DeploymentError, match=says):
+        loader(str(SHIPPED), network=True)()
+
+
 @pytest.mark.parametrize(
     ("channels", "says"),
     [

@@ -15,7 +15,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.can.binding import load_deployment
-from canshaper.can.bus import hear_one_group
+from canshaper.can.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 
 ROOT = Path(__file__).parents[2]
@@ -147,10 +147,7 @@ def test_one_that_listens_tells_its_status_and_no_valve(tmp_path: Path) -> None:
     reasons: set[str] = set()
     shaped = 0.0
     counters = {}
-    with can.Bus(interface="udp_multicast", channel=GROUP, receive_own_messages=False) as bus:
-        hear_one_group(bus.fileno())
-        while bus.recv(0):  # of other groups, until now
-            pass
+    with LocalMulticastBus(GROUP) as bus:
         begin = time.monotonic()
         mine: list[bytes] = []
         for number in range(10_000):

@@ -1,0 +1,84 @@
+"""python-can's ``udp_multicast`` kept on this machine.
+
+python-can itself joins the group on the network card, sends there and takes what comes from there:
+the frames of a bench would reach every computer of the network, and any of them could add some.
+"""
+
+import os
+import socket
+import struct
+
+import can
+from can.interfaces.udp_multicast.bus import GeneralPurposeUdpMulticastBus, UdpMulticastBus
+
+LOOPBACK = "lo"
+PORT = 43113  # that of python-can
+# linux/in.h, linux/in6.h, asm/socket.h; Python has no names for these.
+IP_MULTICAST_ALL, IPV6_MULTICAST_ALL, SO_TIMESTAMPNS = 49, 29, 35
+# struct ip_mreqn: group, address of an interface, its index
+_MEMBERSHIP = struct.Struct("@4s4si")
+
+
+class LocalMulticastBus(UdpMulticastBus):
+    """``udp_multicast`` over the loopback interface: nothing leaves, nothing comes in.
+
+    Args:
+        channel: an IPv4 group, such as 239.1.2.3; every program of this machine may join it.
+
+    Raises:
+        ValueError: it is none.
+        can.CanInitializationError: the loopback interface is down.
+    """
+
+    def __init__(self, channel: str) -> None:
+        if not _is_group(channel):
+            text = "allowed is a group of IPv4 such as 239.1.2.3; any other needs network: true"
+            raise ValueError(text)
+        self._multicast = _LocalSocket(channel, PORT, hop_limit=0)
+        # Not that of UdpMulticastBus, which joins the group on the network card.
+        can.BusABC.__init__(self, channel)
+        self._can_protocol = can.CanProtocol.CAN_FD
+
+
+class _LocalSocket(GeneralPurposeUdpMulticastBus):
+    """Its socket: bound to the group, joined on the loopback interface alone, TTL 0."""
+
+    def _create_socket(self, address_family: socket.AddressFamily) -> socket.socket:
+        one = socket.socket(address_family, socket.SOCK_DGRAM)
+        try:
+            group = socket.inet_aton(self.group)
+            membership = _MEMBERSHIP.pack(group, bytes(4), socket.if_nametoindex(LOOPBACK))
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+            one.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
+            one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+            one.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, membership)
+            one.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, self.hop_limit)
+            # Only of what this socket has joined, on the interface where it has.
+            one.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
+            one.bind((self.group, self.port))  # nothing that is sent to this machine by its address
+            one.setsockopt(socket.IPPROTO_IP, socket.IP_ADD_MEMBERSHIP, membership)
+        except OSError:
+            one.close()
+            raise
+        self.timestamp_nanosecond = True
+        return one
+
+
+def _is_group(channel: str) -> bool:
+    try:
+        return 224 <= socket.inet_pton(socket.AF_INET, channel)[0] <= 239
+    except OSError:
+        return False
+
+
+def receive_one_group(fileno: int) -> None:
+    """Let a multicast socket receive the frames of its own group only.
+
+    Linux hands it the frames of every group that any program of this machine has joined at the
+    same port, so that two buses would be one.
+    """
+    with socket.socket(fileno=os.dup(fileno)) as one:
+        if one.family == socket.AF_INET6:
+            one.setsockopt(socket.IPPROTO_IPV6, IPV6_MULTICAST_ALL, 0)
+        else:
+            one.setsockopt(socket.IPPROTO_IP, IP_MULTICAST_ALL, 0)
