@@ -13,8 +13,10 @@ from canshaper.service.controller import Controller
 from tests.faults import inject
 from tests.faults.hand import path
 from tests.faults.inject import Fault
+from tests.faults.inputs import Lever
 from tests.faults.judge import CONTESTED_NS, Judge, Violation
-from tests.faults.machine import Input, Lever, Machine
+from tests.faults.machine import Machine
+from tests.faults.senders import Sender, radius_frames
 from tests.faults.variants import NAMES, machine
 
 # Most of a drive's ticks lie under faults; the rest is the way back to normal work.
@@ -40,39 +42,6 @@ def plan(driven: Machine, rng: random.Random) -> tuple[int, list[Fault]]:
     """How many ticks lie under faults, and the faults."""
     ticks = rng.randint(*BODY_TICKS)
     return ticks, inject.random_faults(driven, rng, ticks)
-
-
-class Sender:
-    """A node that sends one input in its cycle, with the counter running."""
-
-    def __init__(self, source: Input, tick_ms: int, rng: random.Random) -> None:
-        self.source = source
-        self._tick_ms = tick_ms
-        self._phase = rng.randrange(source.cycle_ms)
-        self._late = rng.choice((0.0, 0.0, 0.1, 0.3))  # how often a frame slips into the next tick
-        self._rng = rng
-        self._count = rng.randrange(256)
-        self._waiting: list[bytes] = []
-
-    def due(self, tick: int) -> int:
-        """How many frames are due in the tick that ends at this one."""
-        cycle, end = self.source.cycle_ms, tick * self._tick_ms + self._phase
-        return end // cycle - (end - self._tick_ms) // cycle
-
-    def counted(self, raw: dict[str, int]) -> dict[str, int]:
-        """Raw values with the next alive counter."""
-        self._count += 1
-        if counter := self.source.counter:
-            return {**raw, counter.name: self._count & counter.mask}
-        return raw
-
-    def passed(self, frames: list[bytes]) -> list[bytes]:
-        """What of these frames arrives now."""
-        frames = self._waiting + frames
-        self._waiting = []
-        if frames and self._rng.random() < self._late:
-            self._waiting = [frames.pop()]
-        return frames
 
 
 class Drive:
@@ -218,7 +187,7 @@ class Drive:
                     sent = spoil(fault, sent)
             frames += [Frame(*lever.key, data) for data in sender.passed(sent)]
         frames += self._stop_frames(active)
-        frames += self._radius_frames(active)
+        frames += radius_frames(self.machine, self._radius, active)
         for fault in active:
             if extra := inject.EXTRA.get(fault.kind):
                 frames += extra(fault)
@@ -238,23 +207,6 @@ class Drive:
             if data:
                 frames.append(data)
         return [Frame(*stop.key, data) for data in sender.passed(frames)]
-
-    def _radius_frames(self, active: list[Fault]) -> list[Frame]:
-        if self.machine.radius is None:
-            return []
-        key, length, field = self.machine.radius
-        value = self._radius
-        for fault in active:
-            if fault.kind == "radius: none":
-                return []
-            if fault.kind == "radius: jumping":
-                value = fault.rng.randint(0, field.full)
-            elif fault.kind == "radius: anything":
-                value = fault.rng.randint(field.low, field.high)
-            elif fault.kind == "radius: wrong length":
-                length += fault.rng.choice((-1, 1))
-        word = field.put(value) & ((1 << 8 * length) - 1)
-        return [Frame(*key, word.to_bytes(length, "little"))]
 
     def _step(self, missed: int, active: list[Fault]) -> None:
         """One body of the loop."""

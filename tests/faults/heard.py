@@ -1,6 +1,8 @@
 """What was heard of the inputs, from the bytes on the bus alone."""
 
-from tests.faults.machine import Axis, Field, Input, Lever
+from tests.faults.fields import Field
+from tests.faults.inputs import Input, Lever
+from tests.faults.machine import Axis
 
 LONG_AGO = -(10**15)
 

@@ -16,7 +16,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from canshaper.can.frame import Frame
-from tests.faults.machine import Axis, Input, Lever, Machine
+from tests.faults.inputs import Input, Lever
+from tests.faults.machine import Axis, Machine
 
 Raw = dict[str, int]
 
@@ -55,7 +56,8 @@ def _code(name: str) -> Callable[[Fault, Raw], None]:
 
 def _out_of_range(fault: Fault, raw: Raw) -> None:
     stick, rng = fault.axis.stick, fault.rng
-    beyond = (stick.full + 1, -stick.full - 1, stick.low, rng.randint(stick.full + 1, stick.high))
+    least = min(stick.full + 1, stick.high)  # one that fills its bits has no more
+    beyond = (least, -stick.full - 1, stick.low, rng.randint(least, stick.high))
     raw[stick.name] = rng.choice(beyond)
 
 

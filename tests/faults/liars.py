@@ -9,7 +9,8 @@ from typing import Any
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.service.controller import Controller
-from tests.faults.machine import Lever, Machine
+from tests.faults.inputs import Lever
+from tests.faults.machine import Machine
 
 
 class Honest:

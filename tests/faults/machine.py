@@ -3,16 +3,16 @@
 Everything the judge and the generator of faults know of a deployment stands here.
 """
 
-import functools
-import operator
-from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import cantools
 import yaml
-from cantools.database.can import Message, Signal
+from cantools.database.can import Message
+
+from tests.faults.fields import Field
+from tests.faults.inputs import Input, Key, Lever, key_of
 
 # Reasons why a stick is none, by their numbers in docs/states.md.
 STICK_ERROR, STICK_NOT_AVAILABLE, STICK_OUT_OF_RANGE, STICK_CONTRADICTORY = 33, 34, 35, 38
@@ -21,104 +21,24 @@ STICK_ERROR, STICK_NOT_AVAILABLE, STICK_OUT_OF_RANGE, STICK_CONTRADICTORY = 33, 
 MOST_STATUSES = 5000
 
 
-class Field:
-    """The bits of one little-endian integer signal, in a frame read as one number."""
+@dataclass(frozen=True)
+class Node:
+    """A node of CANopen whose heartbeats count."""
 
-    __slots__ = ("full", "high", "low", "mask", "name", "scale", "sign", "special", "start")
-
-    def __init__(self, signal: Signal) -> None:
-        assert signal.byte_order == "little_endian", signal.name
-        assert not signal.is_float, signal.name
-        self.name = signal.name
-        self.start = signal.start
-        self.mask = (1 << signal.length) - 1
-        self.sign = 1 << (signal.length - 1) if signal.is_signed else 0
-        self.low, self.high = -self.sign, self.mask - self.sign
-        self.scale = signal.scale
-        # raw value of full deflection; offsets are not used in these machines
-        assert not signal.offset, signal.name
-        self.full = round((signal.maximum or 0) / signal.scale)
-        self.special = {int(raw): str(name) for raw, name in (signal.choices or {}).items()}
-
-    def get(self, word: int) -> int:
-        value = (word >> self.start) & self.mask
-        return value - 2 * self.sign if value & self.sign else value
-
-    def put(self, raw: int) -> int:
-        return (raw & self.mask) << self.start
-
-    def code(self, kind: str) -> int | None:
-        """Raw value that the DBC names so, such as Error."""
-        return next((raw for raw, name in self.special.items() if name == kind), None)
+    bus: str
+    number: int
+    timeout_ns: int
 
 
-def crc8(polynomial: int, end: int) -> Callable[[bytes], int]:
-    """A CRC of eight bits that starts with 0xFF, bit by bit, from a table."""
-    table = []
-    for byte in range(256):
-        for _ in range(8):
-            byte = (byte << 1) ^ (polynomial if byte & 0x80 else 0)  # noqa: PLW2901
-        table.append(byte & 0xFF)
-    return lambda data: functools.reduce(lambda crc, b: table[crc ^ b], data, 0xFF) ^ end
+@dataclass(frozen=True)
+class Words:
+    """Control and status word of a valve of CiA 408, and its node."""
 
-
-CHECKSUMS: dict[str, Callable[[bytes], int]] = {
-    "xor": lambda data: functools.reduce(operator.xor, data, 0),
-    "sum": lambda data: sum(data) % 256,
-    "crc8_sae_j1850": crc8(0x1D, 0xFF),
-    "crc8_autosar": crc8(0x2F, 0xFF),
-}
-
-
-class Input:
-    """A message that the controller takes: a lever or the emergency stop."""
-
-    def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
-        self.name = name
-        self.key = (section["bus"], message.frame_id, message.is_extended_frame)
-        self.length = message.length
-        self.cycle_ms = message.cycle_time or 0
-        self.timeout_ns = section["timeout_ms"] * 1_000_000
-        self.fields = {s.name: Field(s) for s in message.signals}
-        self.max_step = section.get("alive_max_step", 3)
-        self.qualify = section.get("qualify", 1)
-        counter = section.get("alive_counter")
-        self.counter = self.fields[counter] if counter else None
-        self.checksum: Callable[[bytes], int] | None = None
-        self.checksum_byte = 0
-        if check := section.get("checksum"):
-            self.checksum = CHECKSUMS[check["kind"]]
-            self.checksum_byte = self.fields[check["signal"]].start // 8
-
-    def data(self, raw: dict[str, int], spoiled: int = 0) -> bytes:
-        """Bytes of a frame; the checksum is right, or spoiled by these bits."""
-        fields = self.fields
-        word = 0
-        for name, value in raw.items():
-            word |= fields[name].put(value)
-        data = word.to_bytes(self.length, "little")
-        if self.checksum is None:
-            return data
-        at = self.checksum_byte
-        found = self.checksum(data[:at] + data[at + 1 :]) ^ spoiled
-        return data[:at] + bytes([found]) + data[at + 1 :]
-
-    def whole(self, data: bytes) -> bool:
-        """Whether the checksum is right, or there is none."""
-        at = self.checksum_byte
-        return self.checksum is None or self.checksum(data[:at] + data[at + 1 :]) == data[at]
-
-
-class Lever(Input):
-    """A joystick message with its switches."""
-
-    def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
-        super().__init__(name, section, message)
-        self.enable = self.fields[section["enable"]]
-        self.reset = self.fields[section["reset"]] if "reset" in section else None
-        self.off = self.fields[section["anti_sway_off"]] if "anti_sway_off" in section else None
-        self.frozen_ns = round(section.get("frozen_s", 20.0) * 1e9)
-        self.axes: list[Axis] = []
+    node: Node
+    control: Field
+    key: Key
+    status: Field
+    timeout_ns: int
 
 
 @dataclass
@@ -131,17 +51,21 @@ class Axis:
     band: float
     valve: Field
     valve_message: Message
-    valve_key: tuple[str, int, bool]
+    valve_key: Key
     valve_counter: Field | None
-    status_key: tuple[str, int, bool] | None
+    valve_timeout_ns: int
+    status_key: Key | None
     status_message: Message | None
     period_ticks: int
     tick_s: float
     filter: str
     limits: dict[str, Any]
     flags: "tuple[Field, Field, Field] | None"  # neutral, negative, positive
+    negative: Field | None = None  # of a rocker: the signal of the other direction
+    direction: "tuple[str, dict[int, int]] | None" = None  # of the valve: signal, code to sign
     compensates: "Axis | None" = None
     largest_added: float = 0.0
+    words: Words | None = None
     steps: int = field(init=False)
 
     def __post_init__(self) -> None:
@@ -169,8 +93,8 @@ class Axis:
             return 0.0, STICK_ERROR if name == "Error" else STICK_NOT_AVAILABLE
         if abs(raw) > stick.full:
             return 0.0, STICK_OUT_OF_RANGE
-        if self.flags is None:
-            return raw / stick.full, 0
+        if self.negative or self.flags is None:
+            return self._rocker(raw, word) if self.negative else (raw / stick.full, 0)
         neutral, negative, positive = flags = tuple(f.get(word) for f in self.flags)
         codes = {f for f in flags if f > 1}
         if codes:
@@ -179,8 +103,22 @@ class Axis:
             return 0.0, STICK_CONTRADICTORY
         return (positive - negative) * raw / stick.full, 0
 
+    def _rocker(self, raw: int, word: int) -> tuple[float, int]:
+        """Deflection of a rocker with a signal for each direction."""
+        assert self.negative
+        other = self.negative.get(word)
+        if name := self.negative.special.get(other):
+            return 0.0, STICK_ERROR if name == "Error" else STICK_NOT_AVAILABLE
+        if other > self.negative.full:
+            return 0.0, STICK_OUT_OF_RANGE
+        if min(raw, other) > 0.05 * self.stick.full:
+            return 0.0, STICK_CONTRADICTORY
+        return (raw - other) / self.stick.full, 0
+
     def raw(self, value: int) -> dict[str, int]:
         """Raw values that a healthy lever sends for a signed deflection of so many raw steps."""
+        if self.negative:
+            return {self.stick.name: max(0, value), self.negative.name: max(0, -value)}
         if self.flags is None:
             return {self.stick.name: value}
         neutral = abs(value) <= self.band * self.stick.full
@@ -204,7 +142,13 @@ class Axis:
         if found is None:
             values: Any = self.valve_message.decode(data, decode_choices=False, scaling=False)
             count = values[self.valve_counter.name] if self.valve_counter else 0
-            found = self._frames[data] = values[self.valve.name], count
+            raw = values[self.valve.name]
+            if self.direction:
+                signal, signs = self.direction
+                raw *= signs[values[signal]]
+            if len(self._frames) < MOST_STATUSES:
+                self._frames[data] = raw, count
+            return raw, count
         return found
 
     def velocity(self, raw: int) -> float:
@@ -224,6 +168,13 @@ def _flags(lever: Lever, stick: dict[str, Any]) -> tuple[Field, Field, Field] | 
     return field[names["neutral"]], field[names["negative"]], field[names["positive"]]
 
 
+def _direction(section: dict[str, Any] | None) -> tuple[str, dict[int, int]] | None:
+    if section is None:
+        return None
+    signs = {section["neutral"]: 0, section["positive"]: 1, section["negative"]: -1}
+    return section["signal"], signs
+
+
 class Machine:
     """A deployment file with its DBC files."""
 
@@ -237,12 +188,26 @@ class Machine:
         self.tick_ms: int = data["tick_ms"]
         self.tick_ns = self.tick_ms * 1_000_000
         self.buses = list(data["buses"])
+        self.gateway = "gateway" in data
+        self.nodes = {
+            (bus, name): Node(bus, node["id"], node["heartbeat_ms"] * 1_000_000)
+            for bus, section in data["buses"].items()
+            for name, node in section.get("canopen", {}).get("nodes", {}).items()
+        }
+        self.addresses: dict[str, int] = {
+            b: s["j1939"]["address"] for b, s in data["buses"].items() if "j1939" in s
+        }
         self.levers = {
             n: Lever(n, section, messages[section["message"]])
             for n, section in data["levers"].items()
         }
+        self.lever_nodes = {
+            name: self.nodes[section["bus"], section["node"]]
+            for name, section in data["levers"].items()
+            if "node" in section
+        }
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
-        self.radius: tuple[tuple[str, int, bool], int, Field] | None = None
+        self.radius: tuple[Key, int, Field] | None = None
         for axis, section in data["axes"].items():
             if radial := section.get("radial_compensation"):
                 self._radial(self.axes[axis], radial, messages)
@@ -251,18 +216,21 @@ class Machine:
             self.stop = Input("stop", stop, messages[stop["message"]])
             self.stop_field = self.stop.fields[stop["signal"]]
         inputs = [*self.levers.values(), *([self.stop] if self.stop else [])]
-        self.inputs: dict[tuple[str, int, bool], Input] = {i.key: i for i in inputs}
+        self.inputs: dict[Key, Input] = {i.key: i for i in inputs}
         self.valves = {a.valve_key: a for a in self.axes.values()}
         self.statuses = {a.status_key: a for a in self.axes.values() if a.status_key}
-        self.service: tuple[str, int, bool] | None = None
+        self.service: Key | None = None
         self.service_message: Message | None = None
         if section := data.get("status"):
             self.service_message = message = messages[section["message"]]
-            self.service = (section["bus"], message.frame_id, message.is_extended_frame)
+            self.service = self._sent(section["bus"], message)
         self.shortest_timeout_ns = min(v.timeout_ns for v in self.levers.values())
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns
+
+    def _sent(self, bus: str, message: Message) -> Key:
+        return key_of(bus, message, self.addresses.get(bus))
 
     def _axis(self, name: str, section: dict[str, Any], messages: dict[str, Message]) -> Axis:
         stick, valve = section["stick"], section["valve"]
@@ -279,20 +247,39 @@ class Machine:
             band=stick.get("neutral_pct", 2.0) / 100.0,
             valve=Field(signals[valve["signal"]]),
             valve_message=message,
-            valve_key=(valve["bus"], message.frame_id, message.is_extended_frame),
+            valve_key=self._sent(valve["bus"], message),
             valve_counter=Field(signals[counter]) if counter else None,
-            status_key=(
-                (status["bus"], shown.frame_id, shown.is_extended_frame) if shown else None
-            ),
+            valve_timeout_ns=valve["timeout_ms"] * 1_000_000,
+            status_key=self._sent(status["bus"], shown) if shown else None,
             status_message=shown,
             period_ticks=(message.cycle_time or 0) // self.tick_ms,
             tick_s=self.tick_ms / 1000.0,
             filter=section["filter"]["kind"] or "off",  # to PyYAML, off is false
             limits=section.get("limits", {}),
             flags=_flags(lever, stick),
+            negative=lever.fields[stick["negative"]] if "negative" in stick else None,
+            direction=_direction(valve.get("direction")),
+            words=self._words(valve, message, messages),
         )
         lever.axes.append(axis)
         return axis
+
+    def _words(
+        self, valve: dict[str, Any], command: Message, messages: dict[str, Message]
+    ) -> Words | None:
+        if (section := valve.get("cia408")) is None:
+            return None
+        status = section["status"]
+        message = messages[status["message"]]
+        control = next(s for s in command.signals if s.name == section["control"])
+        word = next(s for s in message.signals if s.name == status["signal"])
+        return Words(
+            self.nodes[valve["bus"], section["node"]],
+            Field(control),
+            self._sent(status["bus"], message),
+            Field(word),
+            status["timeout_ms"] * 1_000_000,
+        )
 
     def _radial(self, axis: Axis, section: dict[str, Any], messages: dict[str, Message]) -> None:
         axis.compensates = self.axes[section["axis"]]

@@ -11,9 +11,10 @@ import pytest
 
 from tests.faults import inject
 from tests.faults.drive import Drive, plan
+from tests.faults.fields import CHECKSUMS
+from tests.faults.inputs import Input
 from tests.faults.judge import Violation
 from tests.faults.liars import LIARS, Honest
-from tests.faults.machine import CHECKSUMS, Input
 from tests.faults.variants import NAMES, machine
 
 DRIVES = 10_000

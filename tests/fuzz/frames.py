@@ -2,8 +2,8 @@
 
 from canshaper.can.frame import Frame
 from canshaper.service.controller import Controller
+from tests.faults.inputs import Input
 from tests.faults.judge import Judge
-from tests.faults.machine import Input
 from tests.faults.variants import NAMES, machine
 
 # More bytes than this say nothing new and take time.

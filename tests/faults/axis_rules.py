@@ -1,0 +1,163 @@
+"""What one axis may do by the rules of docs/safety.md; see ``rules``."""
+
+from collections import deque
+
+from canshaper.can.frame import Frame
+from tests.faults.heard import LONG_AGO, HeardLever
+from tests.faults.judge import CONTESTED_NS, OWED, ROUNDING
+from tests.faults.machine import Axis
+
+# Where the daemon may be a tick, and the wait for it, behind what is on the bus.
+SLACK_NS = 2_000_000
+RELEASED = "enable released"
+
+
+class AxisRules:
+    """What one axis may do."""
+
+    def __init__(self, axis: Axis, lever: HeardLever, tick_ns: int) -> None:
+        self.axis, self.lever = axis, lever
+        self.velocity = 0.0
+        self.raw = 0
+        self.causes: set[str] = set()  # of neutral at once, since it was decided last
+        self.contested_ns = LONG_AGO
+        self.armed = self.latched = False
+        self.moved_ns = LONG_AGO
+        self._tick_ns = tick_ns
+        self._stop_until_ns: int | None = None
+        self._asks: deque[tuple[int, float]] = deque()
+        self._low = self._high = self._command = 0.0
+        self._why = ""
+        self._releases = 0
+        self._presses = 0
+        self._pressed_again = False
+        self._count: int | None = None
+
+    # -- before a frame ---------------------------------------------------------------------------
+
+    def decide(self, now_ns: int, *, lever_works: bool) -> None:
+        """Take what has been read up to now.
+
+        Args:
+            now_ns: when it was read.
+            lever_works: whether the node of the joystick does.
+        """
+        lever, axis = self.lever, self.axis
+        causes, self.causes = self.causes, set()
+        if self._stop_until_ns is not None and now_ns > self._stop_until_ns:
+            self._stop_until_ns = None
+        if lever.releases > self._releases or lever.enable() == 0:
+            causes.add(RELEASED)
+        if now_ns - self.contested_ns < CONTESTED_NS - 2 * self._tick_ns:
+            causes.add("another sender")
+        presses = lever.presses[axis.name] + lever.resets
+        pressed = presses > self._presses or self._pressed_again
+        self._releases, self._presses = lever.releases, presses
+        # Released and pressed again between two ticks is a press, though a release too.
+        self._pressed_again = pressed and causes == {RELEASED} and lever.enable() == 1
+        # Silence counts a tick later, when the loop looks.
+        faults = lever.faults(axis, now_ns - self._tick_ns - SLACK_NS) if lever_works else {0}
+        stick = lever.sticks[axis.name][0]
+        healthy = not causes and not faults
+        centred = healthy and abs(stick) <= axis.band and lever.enable() == 1
+        if causes:
+            self.latched |= self.velocity != 0.0 or "another sender" in causes
+            self.armed, self._stop_until_ns = False, None
+        elif self.latched:
+            self.latched = not (pressed and centred)
+        elif faults:
+            if self.armed:
+                self.may_stop(now_ns)
+            self.armed = False
+        elif centred and (self._stop_until_ns is None or not self.velocity):
+            self.armed = True  # a stop that is not at rest goes on, whatever the stick does
+        self._why = ", ".join(sorted(causes))
+        usable = healthy and self.armed and not self.latched and abs(stick) > axis.band
+        self._ask(now_ns, stick if usable else 0.0)
+        # In a stop the stick does not count, and the loop may take it for silent already.
+        if self._stop_until_ns is not None or lever.faults(axis, now_ns):
+            self._command = 0.0
+
+    def may_stop(self, now_ns: int) -> None:
+        """The axis stops, or may: until then it runs out, wherever the stick is."""
+        if self._stop_until_ns is None:
+            stop_ns = (self.axis.stop * self.axis.period_ticks + 1) * self._tick_ns
+            self._stop_until_ns = now_ns + stop_ns + SLACK_NS
+
+    def _ask(self, now_ns: int, command: float) -> None:
+        axis, asks = self.axis, self._asks
+        self._command = command
+        asks.append((now_ns, command))
+        tail_ns = (axis.tail + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
+        # What was asked until the next entry counts up to there.
+        while len(asks) > 1 and asks[1][0] < now_ns - tail_ns:
+            asks.popleft()
+        commands = [c for _, c in asks]
+        self._low, self._high = min(0.0, *commands), max(0.0, *commands)
+
+    def stood_still(self, why: str) -> None:
+        """The loop did: neutral from now on."""
+        self.causes.add(why)
+        self._why = self._why or why
+
+    # -- a frame ----------------------------------------------------------------------------------
+
+    def check(self, frame: Frame, now_ns: int, ticks: int) -> str:
+        """What is wrong with a frame of the valve; nothing when it is allowed.
+
+        Args:
+            frame: the frame.
+            now_ns: when it is sent.
+            ticks: how often the axis may have moved since its last frame.
+        """
+        raw, _ = self.axis.sent(frame.data)
+        before, self.velocity = self.velocity, self.axis.velocity(raw)
+        self.raw = raw
+        if raw:
+            self.moved_ns = now_ns
+        wrong = self._wrong(before, self.velocity, now_ns, ticks) if raw else ""
+        return f"sent {raw}: {wrong}" if wrong else ""
+
+    def count(self, frame: Frame) -> str:
+        """What is wrong with the alive counter of a frame."""
+        field = self.axis.valve_counter
+        if field is None or self.axis.valve_key[1] == self.axis.lever.key[1]:  # the lever's own
+            return ""
+        last, self._count = self._count, self.axis.sent(frame.data)[1]
+        if last is None or self._count == (last + 1) & field.mask:
+            return ""
+        return f"alive counter {self._count} after {last}"
+
+    def _wrong(self, before: float, now: float, now_ns: int, ticks: int) -> str:
+        if self._why:
+            return f"allowed is neutral: {self._why}"
+        if self.latched:
+            return "allowed is neutral: latched, and not reset with the stick in neutral"
+        if not self.armed and self._stop_until_ns is None:
+            return "allowed is neutral: no enabled stick seen in neutral"
+        return self._too_fast(before, now, ticks)
+
+    def _too_fast(self, before: float, now: float, ticks: int) -> str:
+        axis = self.axis
+        slack = ROUNDING * axis.step + 1e-9
+        low, high = self._low, self._high
+        if axis.allow_faster:
+            low, high = -float(low < 0.0), float(high > 0.0)
+        if axis.allow_reverse:
+            low, high = min(low, -high), max(high, -low)
+        elif self._command > 0.0:
+            low = 0.0
+        elif self._command < 0.0:
+            high = 0.0
+        if axis.largest_added:
+            most = axis.largest_added + OWED + ROUNDING * axis.step
+            low, high = low - most, high + most
+        fall = ticks * axis.fall - slack
+        low, high = max(low, -axis.maximum), min(high, axis.maximum)
+        low, high = min(low - slack, before + fall), max(high + slack, before - fall)
+        if not low <= now <= high:
+            return f"{now:.4f} after {before:.4f}, allowed is {low:.4f} to {high:.4f}"
+        most = ticks * max(axis.rise, axis.fall) + slack
+        if abs(now - before) > most:
+            return f"{now:.4f} after {before:.4f}, a jump: rates allow {most:.4f}"
+        return ""

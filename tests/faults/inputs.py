@@ -1,0 +1,75 @@
+"""The messages that a machine takes: its levers and its emergency stop."""
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from cantools.database.can import Message
+
+from tests.faults.fields import CHECKSUMS, Field
+
+if TYPE_CHECKING:
+    from tests.faults.machine import Axis
+
+# Source address that stands for any in a DBC file of J1939, and that of the joysticks there.
+ANY_SOURCE, JOYSTICK = 0xFE, 0x33
+
+Key = tuple[str, int, bool]
+
+
+def key_of(bus: str, message: Message, source: int | None) -> Key:
+    """A message on a bus; ``source`` is the address of its sender where it is one of J1939."""
+    can_id, extended = message.frame_id, message.is_extended_frame
+    if extended and source is not None and can_id & 0xFF == ANY_SOURCE:
+        can_id = can_id & ~0xFF | source
+    return bus, can_id, extended
+
+
+class Input:
+    """A message that the controller takes: a lever or the emergency stop."""
+
+    def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
+        self.name = name
+        self.key = key_of(section["bus"], message, JOYSTICK)
+        self.length = message.length
+        self.cycle_ms = message.cycle_time or 0
+        self.timeout_ns = section["timeout_ms"] * 1_000_000
+        self.fields = {s.name: Field(s) for s in message.signals}
+        self.max_step = section.get("alive_max_step", 3)
+        self.qualify = section.get("qualify", 1)
+        counter = section.get("alive_counter")
+        self.counter = self.fields[counter] if counter else None
+        self.checksum: Callable[[bytes], int] | None = None
+        self.checksum_byte = 0
+        if check := section.get("checksum"):
+            self.checksum = CHECKSUMS[check["kind"]]
+            self.checksum_byte = self.fields[check["signal"]].start // 8
+
+    def data(self, raw: dict[str, int], spoiled: int = 0) -> bytes:
+        """Bytes of a frame; the checksum is right, or spoiled by these bits."""
+        fields = self.fields
+        word = 0
+        for name, value in raw.items():
+            word |= fields[name].put(value)
+        data = word.to_bytes(self.length, "little")
+        if self.checksum is None:
+            return data
+        at = self.checksum_byte
+        found = self.checksum(data[:at] + data[at + 1 :]) ^ spoiled
+        return data[:at] + bytes([found]) + data[at + 1 :]
+
+    def whole(self, data: bytes) -> bool:
+        """Whether the checksum is right, or there is none."""
+        at = self.checksum_byte
+        return self.checksum is None or self.checksum(data[:at] + data[at + 1 :]) == data[at]
+
+
+class Lever(Input):
+    """A joystick message with its switches."""
+
+    def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
+        super().__init__(name, section, message)
+        self.enable = self.fields[section["enable"]]
+        self.reset = self.fields[section["reset"]] if "reset" in section else None
+        self.off = self.fields[section["anti_sway_off"]] if "anti_sway_off" in section else None
+        self.frozen_ns = round(section.get("frozen_s", 20.0) * 1e9)
+        self.axes: list[Axis] = []

@@ -1,0 +1,167 @@
+"""The rules of docs/safety.md, judged by what is on the buses and when: no state machine in it.
+
+It knows the deployment file, the DBC and every frame that the daemon has read or sent, and neither
+the daemon's states nor what they are called. For every axis, in every frame of its valve:
+
+    no motion unless an enabled, valid stick was seen in neutral since the start, a fault or a trip
+    neutral while enable is off, the valve or its node has a fault, somebody else commands it, or
+    our address is another's; and, where it moved, until a press with the stick in neutral
+    neutral and latched after a standstill of the loop
+    neutral within ``stop_s`` after the input is lost or invalid
+    never faster than asked within the tail, never against the stick, or on the way back from there
+    no jump: never quicker than the valve's rates, but to neutral
+    the alive counter goes on by one
+
+A reload, a change of a number: nothing of this ends with them, so the rules do not know them.
+"""
+
+from canshaper.can.frame import Frame
+from tests.faults.axis_rules import AxisRules
+from tests.faults.heard import HeardLever
+from tests.faults.judge import Violation
+from tests.faults.machine import Key, Machine
+from tests.faults.other_nodes import AddressRules, NodeRules, WordRules
+
+
+class Rules:
+    """All axes of a machine, and its nodes."""
+
+    def __init__(self, machine: Machine) -> None:
+        self.machine = machine
+        levers = {name: HeardLever(v) for name, v in machine.levers.items()}
+        self._levers = {v.source.key: v for v in levers.values()}
+        self.axes = {
+            name: AxisRules(axis, levers[axis.lever.name], machine.tick_ns)
+            for name, axis in machine.axes.items()
+        }
+        self._by_valve: dict[Key, list[AxisRules]] = {}
+        for one in self.axes.values():
+            self._by_valve.setdefault(one.axis.valve_key, []).append(one)
+        self._nodes = {node: NodeRules(node, machine.tick_ns) for node in machine.nodes.values()}
+        self._words = {
+            name: WordRules(axis.words, machine.tick_ns)
+            for name, axis in machine.axes.items()
+            if axis.words
+        }
+        self.addresses = {bus: AddressRules(bus, own) for bus, own in machine.addresses.items()}
+        # A standstill of the loop that it must not go on after; it counts whole ticks.
+        waits = [
+            a.valve_timeout_ns - (a.period_ticks - 1) * machine.tick_ns
+            for a in machine.axes.values()
+        ]
+        shortest_ns = min(machine.shortest_timeout_ns, *waits)
+        self._longest_hold_ns = shortest_ns + 2 * machine.tick_ns
+        self._pending_ns: int | None = None
+        self._ticked_ns = -1
+        self._ticks: dict[Key, int] = dict.fromkeys(self._by_valve, 0)
+        self._last: dict[Key, tuple[Frame, int]] = {}
+        self.frames = self.moves = 0
+
+    # -- what comes in ----------------------------------------------------------------------------
+
+    def commanded(self, frame: Frame) -> list[AxisRules]:
+        """The axes whose valve this frame of somebody else commands."""
+        if frame.bus in self.addresses and frame.extended:
+            group = frame.can_id & 0x03FFFF00
+            return [
+                one
+                for (bus, can_id, _), found in self._by_valve.items()
+                if bus == frame.bus and can_id & 0x03FFFF00 == group
+                for one in found
+            ]
+        return self._by_valve.get(frame[:3], [])
+
+    def reads(self, now_ns: int) -> None:
+        """The daemon begins to read."""
+        self._pending_ns = now_ns
+
+    def hear(self, frame: Frame, arrived_ns: int) -> None:
+        """The daemon has read a frame."""
+        if lever := self._levers.get(frame[:3]):
+            lever.hear(frame.data, arrived_ns)
+        for one in self.commanded(frame):
+            one.contested_ns = arrived_ns
+            one.causes.add("another sender")
+        for node in self._nodes.values():
+            node.hear(frame, arrived_ns)
+        for words in self._words.values():
+            words.hear(frame, arrived_ns)
+        for address in self.addresses.values():
+            address.hear(frame, arrived_ns)
+
+    def held(self, held_ns: int, now_ns: int) -> None:
+        """The daemon stood still for so long: what it sends next was reckoned before."""
+        for one in self.axes.values():
+            if held_ns > self._longest_hold_ns:
+                one.stood_still(f"stood still for {held_ns // 1_000_000} ms")
+            elif held_ns > self._longest_hold_ns - 4 * self.machine.tick_ns:
+                one.may_stop(now_ns)
+
+    def failed(self, frame: Frame, now_ns: int) -> None:
+        """A frame did not get onto its bus."""
+        for one in self._by_valve.get(frame[:3], ()):
+            one.count(frame)
+            one.causes.add("the last frame was not sent")
+
+    def decide(self) -> None:
+        """Bring every axis to what has been read."""
+        now_ns, self._pending_ns = self._pending_ns, None
+        if now_ns is None:
+            return
+        if now_ns != self._ticked_ns:  # what waited behind a standstill is read in many rounds
+            self._ticked_ns = now_ns
+            for key in self._ticks:
+                self._ticks[key] += 1
+        for name, one in self.axes.items():
+            if words := self._words.get(name):
+                one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
+            node = self.machine.lever_nodes.get(one.axis.lever.name)
+            works = node is None or not self._nodes[node].seen(now_ns)
+            one.decide(now_ns, lever_works=works)
+        for node_rules in self._nodes.values():
+            node_rules.looked_at()
+
+    # -- what goes out ----------------------------------------------------------------------------
+
+    def sent(self, frame: Frame, now_ns: int) -> None:
+        """The daemon has sent a frame.
+
+        Raises:
+            Violation: it must not be.
+        """
+        if not self.machine.gateway:  # there a frame leaves while others are read
+            self.decide()
+        for address in self.addresses.values():
+            if wrong := address.sent(frame, now_ns):
+                raise Violation(wrong)
+        found = self._by_valve.get(frame[:3])
+        if not found:
+            return
+        self.frames += 1
+        self._last[frame[:3]] = frame, now_ns
+        ticks, self._ticks[frame[:3]] = self._ticks[frame[:3]], 0
+        if wrong := found[0].count(frame):
+            raise Violation(f"{found[0].axis.name}: {wrong}")
+        for one in found:
+            if wrong := one.check(frame, now_ns, ticks):
+                raise Violation(f"{one.axis.name}: {wrong}")
+            self.moves += one.raw != 0
+
+    def words(self) -> str:
+        """What is allowed now, for a reader."""
+        return "; ".join(
+            f"{name} {one.velocity:.3f}{' armed' * one.armed}{' latched' * one.latched}"
+            for name, one in self.axes.items()
+        )
+
+    def end(self, now_ns: int) -> None:
+        """The daemon has ended.
+
+        Raises:
+            Violation: the last frame of a valve is not neutral, and the valve has not closed.
+        """
+        for key, (frame, sent_ns) in self._last.items():
+            for one in self._by_valve[key]:
+                silent = key[0] in self.addresses and now_ns - sent_ns > one.axis.valve_timeout_ns
+                if one.axis.sent(frame.data)[0] and not silent:
+                    raise Violation(f"{one.axis.name}: the last frame is not neutral")

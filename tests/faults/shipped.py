@@ -1,0 +1,72 @@
+"""The deployments of config/ as they are, and copies of them to reload: changed, or with more."""
+
+import functools
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+from tests.faults.machine import Machine
+from tests.faults.variants import ROOT
+
+CONFIG = ROOT / "config"
+NAMES = (
+    "forwarder",
+    "forwarder-robust",
+    "forwarder-joints",
+    "j1939-forwarder",
+    "canopen-forwarder",
+    "gateway-forwarder",
+    "two-cranes",
+)
+
+
+@dataclass(frozen=True)
+class Shipped:
+    """A deployment of config/.
+
+    Attributes:
+        machine: what its files say.
+        adjustable: the same with numbers that may be set while it runs: keys, least and most.
+        changed: another one to reload, that allows no more than this one.
+    """
+
+    machine: Machine
+    file: Path
+    adjustable: Path
+    ranges: dict[str, tuple[float, float]]
+    changed: Path
+
+
+@functools.cache
+def _directory() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="canshaper-shipped-")
+
+
+@functools.cache
+def shipped(name: str) -> Shipped:
+    """A deployment by the name of its file."""
+    file = CONFIG / f"{name}.yaml"
+    machine = Machine(name, file)
+    ranges = _ranges(machine)
+    numbers = "".join(f"    {key}: [{low}, {high}]\n" for key, (low, high) in ranges.items())
+    control = f"\ncontrol:\n  adjustable:\n{numbers}"
+    text = file.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    assert "rise_per_s: 5," in text
+    changed = text.replace("rise_per_s: 5,", "max_pct: 70, rise_per_s: 4,")
+    copies = {"adjustable": text + control, "changed": changed}
+    paths = {}
+    for kind, copy in copies.items():
+        paths[kind] = Path(_directory().name) / f"{name}-{kind}.yaml"
+        paths[kind].write_text(copy, encoding="utf-8")
+    return Shipped(machine, file, paths["adjustable"], ranges, paths["changed"])
+
+
+def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
+    """Numbers of every axis, and ranges in which it never moves quicker than by its file."""
+    found: dict[str, tuple[float, float]] = {}
+    for name, axis in machine.axes.items():
+        found[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
+        if axis.filter == "gff":
+            found[f"axes.{name}.filter.a1"] = (0.6, 0.8)
+            found[f"axes.{name}.filter.a2"] = (0.08, 0.16)
+    return found
