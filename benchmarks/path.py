@@ -26,6 +26,7 @@ from canshaper.can.frame import Frame
 from canshaper.can.raw import CAN_FRAME, RawPort
 from canshaper.service.controller import Controller
 from canshaper.service.exchange import exchange
+from canshaper.service.standstill import Standstill
 from canshaper_sim.hand import Hand, Held
 
 TICKS = 400  # enough for the axis to move and for the input to be trusted
@@ -69,13 +70,15 @@ def count() -> Counted:
         deployment = load_deployment(slew_only(Path(name), "vcan0", 1))
     controller, hand, counted = Controller(deployment), Hand(deployment), Counted()
     port = Traced("crane", lambda _ids: [near], None, lambda _fault: None, confirms=False)
+    standstill = Standstill(deployment)
+    standstill.clock = lambda: 0
     for tick in range(TICKS):
         speed = 0.0 if tick < 20 else 0.2 + 0.6 * (tick % 50) / 50  # neutral first
         for frame in hand.frames(tick, Held({"slew": speed}, enable=True)):
             far.send(CAN_FRAME.pack(frame.can_id, len(frame.data), frame.data))
         if tick == TICKS - 1:
             sys.settrace(counted.trace)
-        exchange(controller, {"crane": port}, tick * TICK_NS, 0, stalled=False)
+        exchange(controller, {"crane": port}, tick * TICK_NS, 0, standstill)
         with suppress(BlockingIOError):
             while True:
                 far.recv(CAN_FRAME.size)

@@ -115,6 +115,11 @@ class CalibrationDrive:
         """Axes that are not measured and whose stick is not in neutral."""
         return " and ".join(name for name, lever in self._levers.items() if lever.moved)
 
+    @property
+    def moves(self) -> bool:
+        """Whether the frame that was handed out last may move a valve."""
+        return self._controller.moves
+
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
         self._speed.receive(frame, now_ns)

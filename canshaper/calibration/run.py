@@ -10,8 +10,9 @@ from canshaper.calibration.drive import CalibrationDrive
 from canshaper.can.bus import Port, open_port
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import FrameFault
-from canshaper.service.exchange import exchange, stall_ns
+from canshaper.service.exchange import exchange
 from canshaper.service.loop import run_at_deadlines
+from canshaper.service.standstill import Standstill
 
 # How often the end is told to every valve: a frame may be lost.
 LAST_FRAMES = 3
@@ -47,12 +48,11 @@ def run_live(
     for number in STOPS:
         signal.signal(number, stop)
     told_ns = 0
-    tick_ns, longest_ns = deployment.config.tick_ms * 1_000_000, stall_ns(deployment)
+    standstill = Standstill(deployment)
 
     def body(now_ns: int, missed: int, _late_ns: int) -> bool:
         nonlocal told_ns
-        stalled = missed * tick_ns > longest_ns
-        exchange(drive, ports, now_ns, missed, stalled=stalled)
+        exchange(drive, ports, now_ns, missed, standstill)
         if now_ns >= told_ns:
             told_ns = now_ns + 200_000_000
             tell(drive)
@@ -65,7 +65,7 @@ def run_live(
             ports[name] = open_port(name, bus, ignore)
             open_ports.callback(ports[name].close)
         try:
-            run_at_deadlines(tick_ns, body)
+            run_at_deadlines(deployment.config.tick_ms * 1_000_000, body)
         finally:
             for _ in range(LAST_FRAMES):
                 for frame in drive.neutral_frames():

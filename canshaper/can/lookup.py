@@ -169,13 +169,14 @@ class Lookup:
         return not why
 
     def timeout(self, place: Place, timeout_ms: int, message: Message) -> None:
-        """A message counts as lost only after it has missed once."""
-        least = 2 * (message.cycle_time or 0)
+        """A message counts as lost only after it, or a tick that looks at it, has missed once."""
+        cycle, tick = message.cycle_time or 0, self.config.tick_ms
+        least = 2 * max(cycle, tick)
         if timeout_ms < least:
+            twice = f"the cycle of {message.name}" if cycle >= tick else "tick_ms"
             self.add(
                 (*place, "timeout_ms"),
-                f"found {timeout_ms}, allowed is {least} ms or more:"
-                f" twice the cycle of {message.name}",
+                f"found {timeout_ms}, allowed is {least} ms or more: twice {twice}",
             )
 
     def period(self, file: DbcFile, message: Message) -> int:

@@ -14,8 +14,8 @@ from canshaper.capture.sorting import Key
 from canshaper.capture.ticks import Tick, Timed
 from canshaper.service.controller import Controller
 from canshaper.service.counters import Counters
-from canshaper.service.exchange import stall_ns
 from canshaper.service.runner import AxisRunner
+from canshaper.service.standstill import Standstill
 from canshaper.shaping.states import Reason, State
 
 # A status waits for its turn on the bus; a valve frame of the next tick may be seen before it.
@@ -99,6 +99,7 @@ class Stepper:
         carried: frames that were there at the last tick and that it has not read.
         number: of the last tick.
         heard: time of the last tick that has read a frame, by message.
+        standstill: the daemon's own, by the times of the log.
     """
 
     def __init__(self, load: Callable[[], Deployment], *, compare: bool) -> None:
@@ -112,10 +113,9 @@ class Stepper:
         self.carried: list[Timed] = []
         self.heard: dict[Key, int] = {}
         self.number = -1
-        self._now_ns = 0
         self.fresh = True
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        self._stall_ns = stall_ns(deployment)
+        self.standstill = Standstill(deployment)
         self._waiting: dict[Key, deque[bytes]] = {}
         self._valves = {a.valve.message.sender.key for a in deployment.axes.values()}
         self._service = deployment.status.sender.key if deployment.status else None
@@ -131,12 +131,11 @@ class Stepper:
         is not in the log; the model begins at rest.
         """
         if not self.fresh:
-            before, stood_ns = self.controller, tick.now_ns - self._now_ns
+            before, last_ns = self.controller, self.standstill.last_ns
             self._begin(self._load())
             if tick.reloaded:
                 self.controller.follow(before)
-                if stood_ns > self._stall_ns:
-                    self.controller.stalled()
+                self.standstill.last_ns = last_ns
         self.fresh = False
         if tick.starts:
             return
@@ -190,8 +189,9 @@ class Stepper:
             sent += controller.neutral_frames()
         number = tick.number - (choice.earlier if choice else 0)
         missed = number - self.number - 1
-        self.number, self._now_ns = number, tick.now_ns
-        stalled = missed * self._tick_ns > self._stall_ns
+        self.number = number
+        stalled = self.standstill.over(now_ns)
+        self.standstill.last_ns = tick.now_ns
         if stalled:
             controller.stalled()
         for _, frame in taken:

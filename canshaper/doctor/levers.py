@@ -4,12 +4,12 @@ import json
 import math
 import select
 import socket
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.clock import boottime_ns
 from canshaper.can.deployment import Deployment
 from canshaper.can.raw import CAN_FRAME
 from canshaper.doctor.processes import LEVERS_PRIORITY, real_time, say_ready
@@ -46,7 +46,7 @@ class Levers:
 
     Attributes:
         sent: for each bus and frame, in order: number of its lever in the deployment (-1 for
-            other messages), monotonic ns.
+            other messages), ns by ``boottime_ns``.
     """
 
     def __init__(self, deployment: Deployment, sockets: dict[str, socket.socket]) -> None:
@@ -79,7 +79,7 @@ class Levers:
         for frame in self._node.frames(self._time_ms) if now else ():
             word = frame.can_id | socket.CAN_EFF_FLAG if frame.extended else frame.can_id
             data = CAN_FRAME.pack(word, len(frame.data), frame.data)
-            at_ns = time.monotonic_ns()
+            at_ns = boottime_ns()
             try:
                 self._sockets[frame.bus].send(data)
             except BlockingIOError:  # the loop stands still

@@ -3,22 +3,23 @@
 import json
 import select
 import socket
-import time
 from array import array
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.clock import boottime_ns
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.raw import RawPort
 from canshaper.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.service.controller import Controller
 from canshaper.service.events import Event
-from canshaper.service.exchange import exchange, stall_ns
+from canshaper.service.exchange import exchange
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.service.standstill import Standstill
 
 
 class WatchedPort(RawPort):
@@ -80,7 +81,7 @@ class Loop:
         for i, axis in enumerate(deployment.axes.values()):
             self._valves.setdefault(axis.valve.message.sender.key, []).append(i)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        self._stall_ns = stall_ns(deployment)
+        self._standstill = Standstill(deployment)
         self._seconds_ns = round(seconds * 1e9)
         self._until_ns = 0
         self._collector = Collector()
@@ -96,26 +97,25 @@ class Loop:
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])
-        self._until_ns = time.monotonic_ns() + self._seconds_ns
+        self._until_ns = boottime_ns() + self._seconds_ns
         run_at_deadlines(self._tick_ns, self._body)
         for port in self._ports.values():
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        stalled = missed * self._tick_ns > self._stall_ns
-        exchange(self._controller, self._ports, now_ns, missed, stalled=stalled)
+        exchange(self._controller, self._ports, now_ns, missed, self._standstill)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
         self._taken.extend(port.taken for port in self._ports.values())
         self._missed += missed
-        self._ended.append(time.monotonic_ns())
+        self._ended.append(boottime_ns())
         return now_ns < self._until_ns
 
     def _note(self, frame: Frame) -> None:
         tick = len(self._late)
         for axis in self._valves.get(frame[:3], ()):
-            self._sent.extend((tick, axis, time.monotonic_ns()))
+            self._sent.extend((tick, axis, boottime_ns()))
 
     def _housekeeping(self, now_ns: int) -> None:
         for event in self._controller.events:

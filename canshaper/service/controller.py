@@ -43,6 +43,7 @@ class Controller:
         counters: what went wrong so far.
         levers: the levers by name.
         events: changes of state since the owner last emptied the list.
+        moves: whether the frame that was handed out last may move a valve.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -113,6 +114,7 @@ class Controller:
         self._late = 0
         self._overrun = False
         self._stood_still = False
+        self.moves = False
 
     def follow(self, before: "Controller") -> None:
         """Keep latched what was latched in the controller that ran before: a reload is no reset.
@@ -166,7 +168,9 @@ class Controller:
         """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
         for line in self._lines.values():
             if line.news():
-                return line.pass_on(frame.data, now_ns)
+                passed = line.pass_on(frame.data, now_ns)
+                self.moves = line.moved
+                return passed
         return None
 
     def _usual(self, frame: Frame) -> bool:
@@ -193,7 +197,7 @@ class Controller:
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
-        self._stood_still = False
+        self._stood_still = self.moves = False
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
         overrun = self._overruns(missed) if missed or self._late else False
@@ -205,6 +209,7 @@ class Controller:
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
+                self.moves |= runner.axis.raw != 0
                 if line is not None:
                     if (frame := line.own(now_ns)) is not None:
                         yield frame
@@ -216,6 +221,7 @@ class Controller:
                 if transition is not None:
                     self.events.append(Event(name, transition))
                     changed.append(runner)
+        self.moves = False
         yield from self._statuses(changed, last, now, silent)
         if self._network.nodes:
             yield from self._network.frames(now_ns)

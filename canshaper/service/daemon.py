@@ -8,18 +8,20 @@ from types import FrameType
 from typing import Any
 
 from canshaper.can.bus import BusError, Port
+from canshaper.can.clock import boottime_ns
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.control.server import ControlServer
 from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
-from canshaper.service.exchange import exchange, stall_ns
+from canshaper.service.exchange import exchange
 from canshaper.service.gateway import InLine
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
 from canshaper.service.ports import close_ports, new_ports, open_ports, pass_over
 from canshaper.service.reading import Reading
 from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.service.standstill import Standstill
 
 log = logging.getLogger("canshaper")
 
@@ -57,7 +59,6 @@ class Daemon:
         self._reading: Reading | None = None
         self._next: Deployment | None = None  # read, and good
         self._waiting_told = False
-        self._stood_still = False  # for a reload, before the first tick of its loop
         self._manager = ServiceManager()
         self._collector = Collector()
         self._logged_fault = FrameFault.NONE
@@ -67,6 +68,7 @@ class Daemon:
         deployment = load()
         self._ports = open_ports(deployment, {}, self._on_fault)
         self._line = self._in_line(deployment)
+        self._standstill = Standstill(deployment)
         self._use(deployment)
         self._control = self._open_control(deployment)
 
@@ -107,12 +109,10 @@ class Daemon:
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
         """Take all waiting frames, tick the axes, send, then housekeeping.
 
-        A reload that is refused has taken its time as all else has: its deadlines were missed.
+        A reload, refused or not, has taken its time as all else has: the next tick sees it.
         """
         controller = self._controller
-        stalled = self._stood_still or missed * self._tick_ns > self._stall_ns
-        self._stood_still = False
-        exchange(controller, self._ports, now_ns, missed, stalled=stalled)
+        exchange(controller, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._latest_ns = max(self._latest_ns, late_ns)
@@ -125,7 +125,7 @@ class Daemon:
     def _wait(self, seconds: float) -> None:
         """In a gateway: pass frames on until the next deadline."""
         assert self._line is not None  # asked of a gateway only
-        self._line.wait(seconds, self._controller, self._ports)
+        self._line.wait(seconds, self._controller, self._ports, self._standstill)
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""
@@ -196,7 +196,6 @@ class Daemon:
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
-        self._stall_ns = stall_ns(deployment)
 
     def _in_line(self, deployment: Deployment) -> InLine | None:
         """What passes frames on, where we stand in a line."""
@@ -248,7 +247,6 @@ class Daemon:
         Returns:
             Whether it was replaced; a loop with its tick has to begin.
         """
-        began_ns = time.monotonic_ns()
         self._manager.reloading()
         self._next = None
         config = self._controller.deployment.config
@@ -275,13 +273,13 @@ class Daemon:
         if self._control:
             self._control.close()
         self._use(deployment, before=self._controller)
+        self._standstill = Standstill(deployment, before=self._standstill)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
         self._log_identity()
         self._manager.ready("reload applied")
-        self._told_ns = time.monotonic_ns() + SECOND_NS
+        self._told_ns = boottime_ns() + SECOND_NS
         self._collector.freeze()
-        self._stood_still = time.monotonic_ns() - began_ns > self._stall_ns
         return True
 
     def _refuse(self, why: str) -> None:
@@ -290,7 +288,7 @@ class Daemon:
         for line in lines:
             log.error("reload=refused %s", line)
         self._manager.status(f"reload refused: {lines[0]}")
-        self._told_ns = time.monotonic_ns() + SECOND_NS
+        self._told_ns = boottime_ns() + SECOND_NS
 
     # -- ends ----------------------------------------------------------------------------------
 

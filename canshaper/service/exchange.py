@@ -4,8 +4,8 @@ from collections.abc import Iterator, Mapping
 from typing import Protocol
 
 from canshaper.can.bus import Port
-from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
+from canshaper.service.standstill import Standstill
 
 # After a standstill ports are asked so often until none has anything more: a port hands out 2000
 # frames at a time, a queue holds more, and 100 000 is more than any.
@@ -14,6 +14,10 @@ MOST_ROUNDS = 50
 
 class Reckons(Protocol):
     """Frames in, frames out: a ``Controller``, or what stands around one."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the frame that was handed out last may move a valve."""
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
@@ -28,21 +32,8 @@ class Reckons(Protocol):
         """A frame did not reach its bus."""
 
 
-def stall_ns(deployment: Deployment) -> int:
-    """Longest standstill of the loop, in ns, after which an axis in motion may go on.
-
-    After the shortest age limit of an input, what waits in the sockets must not look fresh; after
-    the shortest timeout of a valve, that valve has closed, and would get full speed in one step.
-    """
-    limits = [lever.config.timeout_ms for lever in deployment.levers.values()]
-    limits += [axis.config.valve.timeout_ms for axis in deployment.axes.values()]
-    if deployment.emergency_stop:
-        limits.append(deployment.emergency_stop.config.timeout_ms)
-    return min(limits) * 1_000_000
-
-
-def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int) -> int:
-    """Take all waiting frames; those of a lever that pass a gateway leave at once.
+def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: Standstill) -> int:
+    """Take all waiting frames; those of a lever that pass a gateway leave at once, or not at all.
 
     Returns:
         How many there were.
@@ -52,33 +43,46 @@ def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int) -> int:
         for frame in port.frames():
             count += 1
             passed = reckons.receive(frame, now_ns)
-            if passed is not None and not ports[passed.bus].send(passed):
+            if passed is None or (reckons.moves and standstill.clock() > standstill.until_ns):
+                continue
+            if not ports[passed.bus].send(passed):
                 reckons.send_failed(passed)
     return count
 
 
 def exchange(
-    reckons: Reckons, ports: Mapping[str, Port], now_ns: int, missed: int, *, stalled: bool
+    reckons: Reckons,
+    ports: Mapping[str, Port],
+    now_ns: int,
+    missed: int,
+    standstill: Standstill,
 ) -> None:
     """Take all waiting frames, tick, send, then take what can wait.
+
+    A frame that moves a valve and was computed before the process was held up does not leave
+    after that. Its tick is none that was made, so the next one sees how long the loop stood still.
 
     Args:
         reckons: what the frames are for.
         ports: the buses by name.
-        now_ns: monotonic time of this tick.
+        now_ns: time of this tick, by ``boottime_ns``.
         missed: deadlines missed since the last one.
-        stalled: that was longer than ``stall_ns``.
+        standstill: when the last tick was.
     """
-    if stalled:
+    if standstill.over(now_ns):
         reckons.stalled()
         for _ in range(MOST_ROUNDS):
-            if not take(reckons, ports, now_ns):
+            if not take(reckons, ports, now_ns, standstill):
                 break
     else:
-        take(reckons, ports, now_ns)
+        take(reckons, ports, now_ns, standstill)
+    made_ns = now_ns
     for frame in reckons.tick(now_ns, missed):
-        if not ports[frame.bus].send(frame):
+        if reckons.moves and standstill.clock() > standstill.until_ns:
+            made_ns = standstill.last_ns
+        elif not ports[frame.bus].send(frame):
             reckons.send_failed(frame)
+    standstill.last_ns = made_ns
     for port in ports.values():
         for frame in port.others():
             reckons.receive(frame, now_ns)

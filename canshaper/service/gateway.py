@@ -19,6 +19,7 @@ from canshaper.can.raw import GONE, REOPEN_NS, SIZE
 from canshaper.can.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.config.bus import Bus
 from canshaper.service.exchange import Reckons, take
+from canshaper.service.standstill import Standstill
 
 log = logging.getLogger("canshaper")
 
@@ -145,13 +146,19 @@ class InLine:
         elif not self._kernel:
             self._bridge = Bridge((first, second), excluded(deployment), on_fault)
 
-    def wait(self, seconds: float, reckons: Reckons, ports: Mapping[str, Port]) -> None:
+    def wait(
+        self,
+        seconds: float,
+        reckons: Reckons,
+        ports: Mapping[str, Port],
+        standstill: Standstill,
+    ) -> None:
         """Until a deadline pass on what comes; frames of the levers first.
 
         What comes later is left to the tick, which knows whether the loop stood still: it must not
         leave with the velocities from before.
         """
-        clock = time.monotonic_ns
+        clock = standstill.clock
         until_ns = clock() + round(seconds * 1e9)
         empty = 0
         while (left_ns := until_ns - clock()) > 0:
@@ -162,9 +169,10 @@ class InLine:
             if self._bridge:
                 waiting += [one.fileno() for one in self._bridge.sockets]
             ready, _, _ = select.select(waiting, [], [], left_ns / 1e9)
-            if not ready or clock() >= until_ns:
+            now_ns = clock()
+            if not ready or now_ns >= until_ns or standstill.over(now_ns):
                 return
-            empty += not (take(reckons, ports, clock()) + self.pass_others())
+            empty += not (take(reckons, ports, now_ns, standstill) + self.pass_others())
 
     def pass_others(self) -> int:
         """Pass on a few frames of others, where that is our part; how many there were."""

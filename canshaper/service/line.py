@@ -24,6 +24,9 @@ class Line:
         message: what leaves.
         lever: the lever.
         runners: the axes with their velocities in it.
+
+    Attributes:
+        moved: whether the last frame may move a valve.
     """
 
     def __init__(
@@ -34,7 +37,7 @@ class Line:
         self._lever = lever
         self._runners = runners
         self._seen = lever.raw
-        self._moved = False  # by the last frame
+        self.moved = False
         self._passed_ns = 0
         cycle_ms = message.sender.fields.message.cycle_time or 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
@@ -50,7 +53,7 @@ class Line:
         for runner in self._runners:
             if runner.trip is not None:  # the loop stood still, or the like: this is old
                 runner.bound.valve.put(0)
-        self._moved = self._moves()
+        self.moved = self._moves()
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
@@ -59,14 +62,14 @@ class Line:
         tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
         lost = self._lever.lost(now_ns) is not None
         late = tripped and now_ns - self._passed_ns > self._late_ns
-        if not (lost or late) or not (stopping or self._moved):
+        if not (lost or late) or not (stopping or self.moved):
             return None
-        self._moved = self._moves()
+        self.moved = self._moves()
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
         """What is sent before we go: neutral, where the last frame was not."""
-        return [self._message.own(enabled=False)] if self._moved else []
+        return [self._message.own(enabled=False)] if self.moved else []
 
     def _moves(self) -> bool:
         return any(runner.axis.raw and runner.trip is None for runner in self._runners)

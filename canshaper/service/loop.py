@@ -1,7 +1,9 @@
-"""A loop at fixed absolute deadlines on the monotonic clock."""
+"""A loop at fixed absolute deadlines, on a clock that no one sets."""
 
 import time
 from collections.abc import Callable
+
+from canshaper.can.clock import boottime_ns
 
 
 def run_at_deadlines(
@@ -16,11 +18,12 @@ def run_at_deadlines(
 
     Args:
         period_ns: time between two deadlines.
-        body: called with the monotonic time, the number of deadlines missed since its last call,
-            and how late it is, in ns after the first deadline it has not yet been called for.
+        body: called with the time by ``boottime_ns``, the number of deadlines missed since its
+            last call, and how late it is, in ns after the first deadline it has not yet been called
+            for.
         wait: lets so many seconds pass; by default it sleeps.
     """
-    clock = time.monotonic_ns
+    clock = boottime_ns
     deadline = now = clock()
     while True:
         late = now - deadline

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.service.controller import Controller
-from canshaper.service.exchange import stall_ns
+from canshaper.service.standstill import Standstill
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import script_named
 
@@ -59,6 +59,7 @@ def log_of(
     deployment = load()
     controller = Controller(deployment)
     tick_ns = deployment.config.tick_ms * 1_000_000
+    standstill = Standstill(deployment)
     lines: list[tuple[int, int, str]] = []
     order = iter(range(10**9))
 
@@ -84,8 +85,9 @@ def log_of(
         late = now - deadline
         missed = max(0, late) // tick_ns
         deadline += missed * tick_ns
-        if missed * tick_ns > stall_ns(deployment):
+        if standstill.over(now):
             controller.stalled()
+        standstill.last_ns = now
         while waiting and waiting[0][0] <= now:
             controller.receive(waiting.pop(0)[1], now)
         at_ns = now + chance.randrange(20_000, 20_001 + hardness.think_ns)
@@ -107,8 +109,6 @@ def log_of(
             before, controller = controller, Controller(load())
             controller.follow(before)
             now = deadline = at_ns + 500_000 + opens_ns
-            if opens_ns > stall_ns(deployment):
-                controller.stalled()
     for number, frame in enumerate(controller.neutral_frames()):
         logged(at_ns + 50_000 * number, frame)
     return [line for _, _, line in sorted(lines)]

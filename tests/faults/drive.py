@@ -137,7 +137,7 @@ class Drive:
         if self._untold:
             missed, self._untold = self._untold, 0
             return 0, missed, False
-        limit = self.machine.shortest_timeout_ns // self.machine.tick_ns
+        limit = self.machine.longest_gap_ns // self.machine.tick_ns
         for fault in active:
             once = fault.start == self.tick_number or "done" not in fault.memory
             if fault.kind == "loop: late often":
@@ -147,7 +147,7 @@ class Drive:
                 continue
             if fault.kind == "loop: late once":
                 fault.memory["done"] = True
-                missed = fault.rng.randint(1, limit)
+                missed = fault.rng.randint(1, limit - 1)
                 return 1 + missed, missed, False
             if fault.kind == "loop: late, told later":
                 # A loop that was held up in its sleep hears of it after the next body.
@@ -157,7 +157,7 @@ class Drive:
                 return late, 0, False
             if fault.kind == "loop: stands still":
                 fault.memory["done"] = True
-                missed = limit + fault.rng.randint(1, 40)
+                missed = limit + fault.rng.randint(0, 39)
                 return 1 + missed, missed, True
         return 1, 0, False
 

@@ -225,6 +225,14 @@ class Machine:
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
         self.shortest_timeout_ns = min(v.timeout_ns for v in self.levers.values())
+        # longest time between two ticks after which an axis in motion may go on
+        waits_ms = [
+            section["valve"]["timeout_ms"] - (self.axes[n].period_ticks - 1) * self.tick_ms
+            for n, section in data["axes"].items()
+        ]
+        self.longest_gap_ns = min(
+            *(v.timeout_ns for v in self.inputs.values()), *(ms * 1_000_000 for ms in waits_ms)
+        )
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns

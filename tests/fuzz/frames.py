@@ -58,8 +58,9 @@ class Script:
 
     def tick(self, missed: int = 0, late_ns: int = 0) -> None:
         """One body of the loop; after too many missed ticks it stood still."""
-        self.now_ns += (1 + missed) * self.machine.tick_ns + late_ns
-        if missed * self.machine.tick_ns > self.machine.shortest_timeout_ns:
+        gap_ns = (1 + missed) * self.machine.tick_ns + late_ns
+        self.now_ns += gap_ns
+        if gap_ns > self.machine.longest_gap_ns:
             self.judge.stalled()
             self.controller.stalled()
         sent, failed = [], []

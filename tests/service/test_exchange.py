@@ -5,12 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.can.frame import BusState, Frame
-from canshaper.service.exchange import exchange, stall_ns
+from canshaper.service.exchange import exchange
+from canshaper.service.standstill import Standstill
 from canshaper.shaping.states import State
 from tests.service.conftest import ROOT, SLOW_VALVE, TICK_NS, Rig
-from tests.service.emergency import DBC, LAST, PRESSED, READY, STOP, Machine
+from tests.service.emergency import PRESSED, READY, Machine
 from tests.service.gateway_rig import GatewayRig
 from tests.service.j1939_rig import Rig as J1939Rig
 from tests.service.j1939_rig import bjm
@@ -52,17 +52,12 @@ class Waiting:
 
 
 def tick(rig: Rig, port: Waiting, missed: int = 0) -> None:
-    """A tick as the daemon has it."""
+    """A tick as the daemon has it, after one in time."""
+    standstill = Standstill(rig.deployment)
+    standstill.last_ns = rig.now_ns
     rig.now_ns += TICK_NS * (1 + missed)
-    stalled = missed * TICK_NS > stall_ns(rig.deployment)
-    exchange(rig.controller, {"crane": port}, rig.now_ns, missed, stalled=stalled)
-
-
-def test_the_shortest_age_limit_or_valve_timeout_is_the_limit(changed_rig: Make) -> None:
-    shipped = load_deployment(ROOT / "config" / "forwarder.yaml")
-    assert stall_ns(shipped) == 100_000_000
-    assert stall_ns(changed_rig(PATIENT).deployment) == 600_000_000
-    assert stall_ns(changed_rig({LAST: STOP + LAST}, DBC).deployment) == 60_000_000
+    standstill.clock = lambda: rig.now_ns
+    exchange(rig.controller, {"crane": port}, rig.now_ns, missed, standstill)
 
 
 def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: Make) -> None:
@@ -112,14 +107,11 @@ def test_a_frame_that_waited_is_not_passed_on(tmp_path: Path) -> None:
     before = gateway.decoded(gateway.left[-2])
     port, machine = Waiting(), Waiting()
     port.queue = [gateway.lever(Slew=1000) for _ in range(10)]
+    standstill = Standstill(gateway.deployment)
+    standstill.last_ns = gateway.now_ns
     gateway.now_ns += 10 * TICK_NS
-    exchange(
-        gateway.controller,
-        {"levers": port, "machine": machine},
-        gateway.now_ns,
-        10,
-        stalled=True,
-    )
+    ports = {"levers": port, "machine": machine}
+    exchange(gateway.controller, ports, gateway.now_ns, 10, standstill)
     (own,) = (f for f in machine.sent if f.can_id == 0x110)
     after = gateway.decoded(own)
     assert (after["Slew"], after["Enable"]) == (0, 0)

@@ -14,6 +14,7 @@ from canshaper.can.frame import FrameFault
 from canshaper.can.raw import CAN_FRAME, RawPort
 from canshaper.service import gateway
 from canshaper.service.gateway import CHECK_NS, MOST_EMPTY, InLine
+from canshaper.service.standstill import Standstill
 from tests.service.gateway_rig import GatewayRig
 
 WAIT_S = 0.1
@@ -55,7 +56,7 @@ def test_a_joystick_frame_does_not_wait_for_the_tick(rig: GatewayRig, ends: Ends
     frames = [rig.lever() for _ in range(3)]
     for frame in frames:
         others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
+    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
     for frame in frames:
         word, length, data = CAN_FRAME.unpack(others["machine"].recv(CAN_FRAME.size))
         assert (word, length) == (0x110, 8)
@@ -79,8 +80,9 @@ def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
         return select(*arguments)
 
     monkeypatch.setattr(gateway.select, "select", stopped)
-    monkeypatch.setattr(gateway.time, "monotonic_ns", lambda: now_ns[0])
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
+    standstill = Standstill(rig.deployment)
+    standstill.clock = lambda: now_ns[0]
+    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, standstill)
     with pytest.raises(BlockingIOError):
         others["machine"].recv(CAN_FRAME.size)
     assert [one.can_id for one in ports["levers"].frames()] == [frame.can_id]
@@ -98,7 +100,7 @@ def test_what_is_of_no_use_does_not_keep_the_loop_busy(
     monkeypatch.setattr(
         gateway.select, "select", lambda *a: asked.append(1) or select(*a), raising=True
     )
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
+    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
     assert len(asked) <= MOST_EMPTY + 1
     assert set(faults) == {FrameFault.WRONG_LENGTH}
 
@@ -108,7 +110,7 @@ def test_a_port_that_is_gone_is_waited_for(rig: GatewayRig, ends: Ends) -> None:
     ports["machine"].close()
     frame = rig.lever()
     others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports)
+    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
     assert rig.controller.counters.last_fault is FrameFault.SEND_FAILED
 
 
@@ -117,7 +119,7 @@ def test_ports_without_a_file_descriptor_are_read_with_the_tick(rig: GatewayRig)
     buses = rig.deployment.config.buses
     ports = {name: open_port(name, bus, ignore) for name, bus in buses.items()}
     assert [port.fileno() for port in ports.values()] == [-1, -1]
-    InLine(rig.deployment, ignore).wait(0.001, rig.controller, ports)
+    InLine(rig.deployment, ignore).wait(0.001, rig.controller, ports, Standstill(rig.deployment))
     for port in ports.values():
         port.close()
 

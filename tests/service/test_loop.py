@@ -24,7 +24,7 @@ class Clock:
         self.slept: list[float] = []
         self._late_ns = [*late_ns] or [0]
 
-    def monotonic_ns(self) -> int:
+    def boottime_ns(self) -> int:
         return self.now_ns
 
     def sleep(self, seconds: float) -> None:
@@ -48,6 +48,7 @@ def calls(clock: Clock, work_ns: list[int]) -> list[tuple[int, int, int]]:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loop, "time", clock)
+        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
         loop.run_at_deadlines(PERIOD_NS, body)
     return seen
 
@@ -163,6 +164,7 @@ def test_who_waits_otherwise_is_told_for_how_long() -> None:
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(loop, "time", clock)
+        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
         loop.run_at_deadlines(PERIOD_NS, lambda *_: next(left), wait)
     assert waited == [0.02, 0.02]
     assert clock.slept == []

@@ -15,7 +15,7 @@ from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.can.socketcan import Ids
 from canshaper.config.bus import Bus
 from canshaper.service import daemon as module
-from canshaper.service import loop
+from canshaper.service import loop, standstill
 from canshaper.service import ports as service_ports
 from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
@@ -96,6 +96,8 @@ class Bench:
         self._handlers: dict[int, Any] = {}
         for one in (module, loop, service_ports):
             monkeypatch.setattr(one, "time", self)
+        for one in (module, loop, standstill):
+            monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         monkeypatch.setattr(service_ports, "open_port", self._open)
         monkeypatch.setattr(module, "Reading", Read)
@@ -108,9 +110,6 @@ class Bench:
             "run_at_deadlines",
             lambda period_ns, body, wait: run_at_deadlines(period_ns, self._before(body), wait),
         )
-
-    def monotonic_ns(self) -> int:
-        return self.now_ns
 
     def monotonic(self) -> float:
         return self.now_ns / 1e9
