@@ -182,3 +182,12 @@ def test_a_bus_that_is_no_multicast_is_not_shared(machine: Machine) -> None:
 
 def test_no_binding_problem_reaches_the_controller(machine: Machine) -> None:
     Controller(machine.load())
+
+
+def test_an_age_limit_of_less_than_two_ticks_would_make_each_tick_a_standstill(
+    machine: Machine,
+) -> None:
+    machine.in_yaml("tick_ms: 20", "tick_ms: 50")
+    line = machine.in_yaml("timeout_ms: 100", "timeout_ms: 99")
+    says = "levers.left.timeout_ms: found 99, allowed is 100 ms or more: twice tick_ms"
+    assert [p for p in machine.problems() if p.endswith(says)] == [f"machine.yaml:{line}: {says}"]
