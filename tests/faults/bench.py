@@ -21,7 +21,9 @@ from canshaper.config.bus import Bus
 from canshaper.config.source import DeploymentError
 from canshaper.service import daemon as module
 from canshaper.service import gateway as gateway_module
+from canshaper.service import loop as loop_module
 from canshaper.service import ports as ports_module
+from canshaper.service import standstill as standstill_module
 from tests.faults.machine import Key
 from tests.faults.rules import Rules
 from tests.faults.world import World
@@ -217,6 +219,8 @@ class Bench:
 
     def _replaced(self) -> Iterator[tuple[Any, str, Any]]:
         yield time, "monotonic_ns", self.now_ns
+        for one in (module, loop_module, standstill_module):
+            yield one, "boottime_ns", self.now_ns
         yield time, "monotonic", lambda: self.now_ns() / 1e9
         yield time, "sleep", self.sleep
         yield module.signal, "signal", self._handlers.__setitem__
