@@ -11,6 +11,7 @@ from canshaper.can.inputs import BoundSwitch
 from canshaper.can.kernel_check import neutral_fault
 from canshaper.can.rewrite import RewrittenMessage
 from canshaper.can.signals import find_signal, special_name, status_faults
+from canshaper.can.stopping import stated_fault
 from canshaper.can.valve import ValveMessage
 from canshaper.config.bus import LAST_SPN, Bus, J1939Name
 from canshaper.config.gateway import Gateway
@@ -190,7 +191,11 @@ class _Binder(FilterBinder):
         if bound is None or len(self.problems) > before:
             return None
         message, codec, ticks = bound
-        self.check_filters(place, axis, ticks * self.config.tick_ms / 1000.0)
+        period_s = ticks * self.config.tick_ms / 1000.0
+        self.check_filters(place, axis, period_s)
+        timeout_ms = self.config.levers[axis.stick.lever].timeout_ms
+        if fault := stated_fault(axis, timeout_ms=timeout_ms, period_s=period_s):
+            self.add((*place, "limits", "stop_distance_m"), fault)
         if len(self.problems) > before:
             return None
         return BoundAxis(

@@ -17,14 +17,22 @@ FALLBACKS = {
 def check(file: str = FILE) -> None:
     """Load a deployment against its DBC files and report every problem at once.
 
+    Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
+    and how far its limits allow.
+
     Exit code 0 when it is good, 2 when it is not. A bus that is loaded above 50 % at its bit rate
-    is a warning.
+    is a warning; so is an axis that may travel on for more than 2 m without a stop_distance_m in
+    the file, with which run does not start.
 
     Examples:
 
       canshaper check config/forwarder.yaml
     """
-    from canshaper.config.source import DeploymentError
+    from rich.console import Console
+
+    from canshaper.can.stopping import unstated
+    from canshaper.cli.stopping import print_stopping
+    from canshaper.config.source import DeploymentError, Source
 
     try:
         deployment = loader(file)()
@@ -52,6 +60,9 @@ def check(file: str = FILE) -> None:
     typer.echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
         typer.echo(f"    {line}")
+    print_stopping(deployment, Console())
+    for place, text in unstated(deployment):
+        typer.echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
 
 
 def _load(deployment: Deployment, bus: str) -> str:

@@ -149,14 +149,23 @@ def _write(
     deployment: "Deployment", findings: Sequence["Finding"], advice: Sequence["Advice"]
 ) -> list[str]:
     """Write what is known of each axis; the axes that were written."""
+    from canshaper.can.stopping import stop_fault
     from canshaper.config.edit import Value, set_values
+    from canshaper.config.sway import Sway
     from canshaper.identification.recommend import flow
 
     usable = [a for a in advice if all(f.usable for f in findings if f.axis == a.axis)]
     for one in usable:
-        if deployment.axes[one.axis].config.sway is None:
+        config = deployment.axes[one.axis].config
+        if config.sway is None:
             raise ValueError(
                 f"axis {one.axis}: found no section sway to write to; put in sway: {flow(one.sway)}"
+            )
+        faster = config.model_copy(update={"sway": Sway.model_validate(one.sway)})
+        if fault := stop_fault(deployment, one.axis, faster):
+            raise ValueError(
+                f"axis {one.axis}: with sway: {flow(one.sway)}, limits.stop_distance_m: {fault};"
+                " change the limits first"
             )
     for one in usable:
         sway = deployment.axes[one.axis].config.sway

@@ -10,6 +10,8 @@ from rich.table import Table
 from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
+    from canshaper.can.deployment import Deployment
+    from canshaper.config.filters import Filter
     from canshaper.tuning.evaluate import Evaluation
 
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
@@ -42,6 +44,7 @@ def robust(
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
     """
     from canshaper.config.edit import Value, set_values
+    from canshaper.config.filters import RobustFilter
     from canshaper.config.source import DeploymentError
     from canshaper.shaping.registry import build_shaper
     from canshaper.tuning.evaluate import Machine, evaluate
@@ -92,11 +95,8 @@ def robust(
         if write:
             gone = bound.config.filter.model_dump(exclude_none=True).keys()
             values: dict[str, Value] = {"kind": "robust", **dict.fromkeys(gone - {"kind"})}
-            set_values(
-                deployment.path,
-                ("axes", axis, "filter"),
-                {**values, "tick_ms": tick_ms, "taps": taps},
-            )
+            values |= {"tick_ms": tick_ms, "taps": taps}
+            set_values(deployment.path, ("axes", axis, "filter"), values)
     except DeploymentError as error:
         raise fail(error) from None
     except ValueError as error:
@@ -108,17 +108,30 @@ def robust(
         highlight=False,
     )
     console.print(_table(measured))
-    if limits.tail_s < found.duration_s:
-        console.print(
-            f"tail_s is {limits.tail_s:g} s: it ends the run-on early; give {axis} at least"
-            f" tail_s: {found.duration_s + 0.1:.1f}",
-            highlight=False,
-        )
+    chosen = RobustFilter(kind="robust", tick_ms=tick_ms, taps=taps)
+    _tell_stop(deployment, axis, chosen, found.duration_s, console)
     if write:
         console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     else:
         text = ", ".join(f"{tap:g}" for tap in taps)
         typer.echo(f"filter: {{ kind: robust, tick_ms: {tick_ms}, taps: [{text}] }}")
+
+
+def _tell_stop(
+    deployment: "Deployment", axis: str, chosen: "Filter", duration_s: float, console: Console
+) -> None:
+    """Tell what tail the filter needs, and how far the tip travels."""
+    from canshaper.cli.stopping import consequences
+
+    tail_s = deployment.axes[axis].config.limits.tail_s
+    needed_s = round(duration_s + 0.1, 1) if tail_s < duration_s else None
+    if needed_s is not None:
+        console.print(
+            f"tail_s is {tail_s:g} s: it ends the run-on early; give {axis} at least"
+            f" tail_s: {needed_s:.1f}",
+            highlight=False,
+        )
+    console.print(consequences(deployment, axis, chosen, needed_s), highlight=False)
 
 
 def _table(measured: "Evaluation") -> Table:

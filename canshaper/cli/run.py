@@ -32,6 +32,9 @@ def run(
     With --listen-only it can run beside the controller that drives the machine now: nothing is
     sent but the status messages, which tell what the valves would be told.
 
+    Limits that let an axis travel on for more than 2 m after release have to be meant: without a
+    stop_distance_m in the file it does not start, and a reload is refused.
+
     Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened.
 
     Examples:
@@ -62,12 +65,16 @@ def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, control: str | None
 ) -> "Callable[[], Deployment]":
     """The same with these options put in."""
-    from canshaper.config.source import DeploymentError, Problem
+    from canshaper.can.stopping import unstated
+    from canshaper.config.source import DeploymentError, Problem, Source
 
     def changed() -> "Deployment":
         deployment = load()
         if listen_only:
             deployment = deployment.listening()
+        elif faults := list(unstated(deployment)):
+            source = Source(deployment.path)
+            raise DeploymentError([source.problem(place, text) for place, text in faults])
         if control is None:
             return deployment
         section = deployment.config.control

@@ -207,6 +207,7 @@ def _report(
     as_json: bool,
 ) -> None:
     """Measure, draw, write, tell."""
+    from canshaper.cli.stopping import consequences
     from canshaper.tuning import deploy
     from canshaper.tuning.evaluate import Machine
     from canshaper.tuning.table import table
@@ -249,7 +250,8 @@ def _report(
             f" {tuning.build_s + tuning.solve_s:.2f} s",
             highlight=False,
         )
-    console.print(f"\n[b]{sentence}[/b]", highlight=False)
+    stop = consequences(deployment, bound.name, found.filter, tail[0] if tail else None)
+    console.print(f"\n[b]{sentence}[/b]\n{stop}", highlight=False)
     none = f"none, matplotlib is missing: {INSTALL_TOOLS}"
     console.print(f"Picture: {picture or none}", highlight=False, markup=False)
     if write:

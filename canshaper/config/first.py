@@ -9,9 +9,13 @@ from dataclasses import dataclass
 from canshaper.config.filters import GffFilter
 from canshaper.config.load import limits
 from canshaper.config.sway import Sway
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.stopping import allowed_s
 
 # Of full speed, for the first motion; raised step by step while it works.
 FIRST_MAX_PCT = 40
+# Tail and longest stop: what the run-on of a filter for a swing of two to three seconds takes.
+FIRST_TAIL_S = 2.2
 # Poles beside the frequency of the swing: the first step of the filter is what was asked, no more.
 POLES_TO_OMEGA = (0.9, 1.1)
 # Room for a wrong stopwatch in what may be changed while it works.
@@ -108,6 +112,23 @@ def plain(text: str) -> str:
     return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
 
 
+def stop_distance_m(full_speed_m_s: float, lever_timeout_ms: int, valve_timeout_ms: int) -> float:
+    """How far the first limits let the tip travel at full speed, rounded up to a tenth of a metre.
+
+    Args:
+        full_speed_m_s: speed of the tip.
+        lever_timeout_ms: age at which the joystick counts as lost.
+        valve_timeout_ms: that of the valve, of which its cycle is a third at most.
+    """
+    way_s = allowed_s(
+        OutputLimits(tail_s=FIRST_TAIL_S),
+        stop_s=FIRST_TAIL_S,
+        timeout_s=lever_timeout_ms / 1000.0,
+        period_s=valve_timeout_ms / 3000.0,
+    )
+    return math.ceil(10.0 * full_speed_m_s * way_s) / 10.0
+
+
 def first_deployment(machine: FirstMachine) -> str:
     """The deployment file, with a filter to begin with and reduced speed."""
     return "\n".join(_lines(machine)) + "\n"
@@ -137,8 +158,9 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
                 yield f"    {key}: {signal}"
     yield ""
     yield "axes:"
+    timeouts_ms = {lever.name: lever.timeout_ms for lever in machine.levers}
     for axis in machine.axes:
-        yield from _axis(axis)
+        yield from _axis(axis, timeouts_ms[axis.lever])
         yield ""
     for key in ("status", "identity"):
         if (message := getattr(machine, key)) is not None:
@@ -154,7 +176,7 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
             yield f"    axes.{axis.name}.sway.period_s: [{low}, {high}]"
 
 
-def _axis(axis: FirstAxis) -> Iterator[str]:
+def _axis(axis: FirstAxis, lever_timeout_ms: int) -> Iterator[str]:
     counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
     valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
     yield f"  {axis.name}:"
@@ -176,7 +198,13 @@ def _axis(axis: FirstAxis) -> Iterator[str]:
     yield "    # To begin with; better is `canshaper robust FILE --axis NAME --write`."
     yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
     yield "    # First motion at reduced speed: raise max_pct when all is well."
-    yield f"    limits: {{ {limits}, tail_s: 2.2, stop_s: 2.2 }}"
+    distance = stop_distance_m(swing.full_speed_m_s, lever_timeout_ms, axis.timeout_ms)
+    yield "    # stop_distance_m: farthest that the tip may travel when it stops from max_pct: 100."
+    yield "    # `canshaper check` shows what the filter needs; make tail_s, stop_s and it smaller."
+    yield "    # Of an axis that turns check shows degrees, at the largest radius, with a line like"
+    yield "    #   slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9 }"
+    tail = f"tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
+    yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
 
 
 def _rounded(number: float) -> str:

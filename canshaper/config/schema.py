@@ -160,6 +160,17 @@ class RadialConfig(Section):
         return self
 
 
+class Slewing(Section):
+    """What full speed of a slewing axis is in angle, and how far out the tip may be meanwhile."""
+
+    full_speed_rad_s: Annotated[
+        float, number(0.05, 3, "rad/s", "angular speed at full slew command")
+    ]
+    largest_radius_m: Annotated[
+        float, number(0.5, 40, "m", "radius of the tip when the boom is all out")
+    ]
+
+
 class Limits(Section):
     """Output limits of an axis; see ``OutputLimits``."""
 
@@ -187,6 +198,10 @@ class Limits(Section):
     stop_s: Annotated[
         float, number(0.1, 5, "s", "longest shaped stop after the input was lost")
     ] = 2.0
+    stop_distance_m: (
+        Annotated[float, number(0.05, 200, "m", "farthest that the tip may travel when it stops")]
+        | None
+    ) = None
     allow_faster: bool = Field(False, description="the output may exceed what the operator asks")
     allow_reverse: bool = Field(False, description="the output may go against the lever")
 
@@ -237,6 +252,7 @@ class AxisConfig(Section):
     feedback: Feedback | None = None
     status: Status | None = None
     sway: Sway | None = None
+    slewing: Slewing | None = None
     filter: Filter = Field(discriminator="kind", description="filter of the axis")
     sets: list[SetConfig] = Field([], description="sway and filter by the state of the grapple")
     feels: dict[str, Feel] = Field({}, description="other filters that the operator may choose")
@@ -251,6 +267,16 @@ class AxisConfig(Section):
             )
         if fault := sets_fault(self.filter.kind, self.sets):
             raise ValueError(fault)
+        return self
+
+    @model_validator(mode="after")
+    def _one_speed(self) -> Self:
+        slewing, radial = self.slewing, self.radial_compensation
+        if slewing and radial and slewing.full_speed_rad_s != radial.full_speed_rad_s:
+            raise ValueError(
+                f"full_speed_rad_s is {slewing.full_speed_rad_s:g} in slewing and"
+                f" {radial.full_speed_rad_s:g} in radial_compensation; allowed is the same in both"
+            )
         return self
 
 

@@ -6,6 +6,7 @@ The new numbers are lost when the daemon ends or reads its file again.
 from collections.abc import Iterable, Mapping
 
 from canshaper.can.filters import filter_fault
+from canshaper.can.stopping import stop_fault
 from canshaper.config.adjust import Key, adjusted, value
 from canshaper.config.schema import AxisConfig
 from canshaper.service.controller import Controller
@@ -21,7 +22,8 @@ class Adjuster:
 
     def __init__(self, controller: Controller) -> None:
         self._axes = controller.axes
-        control = controller.deployment.config.control
+        self._deployment = controller.deployment
+        control = self._deployment.config.control
         self._ranges = control.adjustable if control else {}
         self._in_file = {text: self._now(text) for text in self._ranges}
 
@@ -89,6 +91,8 @@ class Adjuster:
         rate = config.limits.slowest_per_s
         if fault := filter_fault(config.filter, config.sway, runner.period_s, rate):
             raise ValueError(f"axes.{name}.filter: {fault}")
+        if fault := stop_fault(self._deployment, name, config):
+            raise ValueError(f"axes.{name}.limits.stop_distance_m: {fault}")
         return config
 
 

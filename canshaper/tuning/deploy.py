@@ -5,6 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
+from canshaper.config.filters import GffFilter
 from canshaper.shaping.gff import denominator_from_poles, poles_from_denominator
 from canshaper.shaping.sway import SwayMode
 from canshaper.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, gff
@@ -33,6 +34,12 @@ class Setting:
     poles_rad_s: tuple[float, float]
     third_pole_rad_s: float | None
     measures: Evaluation
+
+    @property
+    def filter(self) -> GffFilter:
+        """The same as the filter of an axis."""
+        third = self.third_pole_rad_s
+        return GffFilter(kind="gff", a1=self.a1, a2=self.a2, third_pole_rad_s=third)
 
     def values(self) -> dict[str, float | None]:
         """Keys of the filter section; None for those that have to go."""

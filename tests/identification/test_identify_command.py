@@ -48,6 +48,20 @@ def said(result: Result) -> str:
     return " ".join(result.output.split())
 
 
+def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
+    tmp_path: Path, file: Path, logs: Path
+) -> None:
+    """The file would be refused at the next start."""
+    text = file.read_text().replace("full_speed_m_s: 1.0", "full_speed_m_s: 0.5")
+    file.write_text(text.replace("stop_distance_m: 2.2", "stop_distance_m: 1.1"))
+    before = file.read_text()
+    result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
+    assert result.exit_code == 2
+    assert "axis near_far: with sway: { period_s: 2.20" in said(result)
+    assert "limits.stop_distance_m: found 1.1 m; max_pct, tail_s" in said(result)
+    assert file.read_text() == before
+
+
 def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) -> None:
     before = file.read_text().splitlines()
     result = run(tmp_path, logs / "empty.log", "--file", file, "--write")

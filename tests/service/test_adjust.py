@@ -252,3 +252,39 @@ def test_radial_compensation_takes_the_new_sway_of_near_far(tmp_path: Path) -> N
         sent.append(rows)
     assert any(sent[0])
     assert sent[0] == sent[1] != sent[2]
+
+
+@pytest.mark.parametrize(
+    ("stated", "values", "why"),
+    [
+        # 4.8 m/s at the largest radius: 2.03 s at max_pct and the fall are within 8 m at 78 %.
+        (8, {"axes.slew.limits.max_pct": 79}, "found 8 m; .* allow 8.0[0-9] m"),
+        (8, {"axes.slew.limits.max_pct": 70}, None),
+        (None, {"axes.slew.limits.max_pct": 41}, "missing: to stop, the limits allow 3.93 m"),
+        (None, {"axes.slew.limits.max_pct": 20}, None),
+    ],
+)
+def test_a_stop_over_a_longer_way_than_is_stated_is_refused(
+    make: Make, stated: float | None, values: dict[str, object], why: str | None
+) -> None:
+    slew = "stop_s: 2.0, stop_distance_m: 200 }\n\n  near_far"
+    limits = f"max_pct: 40, stop_distance_m: {stated}" if stated else "max_pct: 20"
+    radius = "9.6" if stated else "9.0"
+    rig = make({slew: slew.replace("stop_distance_m: 200", limits), "9.6": radius})
+    adjuster = Adjuster(rig.controller)
+    if why is None:
+        assert adjuster.change(values)
+        return
+    with pytest.raises(ValueError, match=r"^axes\.slew\.limits\.stop_distance_m: " + why):
+        adjuster.change(values)
+    assert adjuster.table()["axes.slew.limits.max_pct"]["now"] == (40 if stated else 20)
+
+
+def test_a_faster_tip_counts_where_nothing_else_says_how_fast_it_is(make: Make) -> None:
+    slewing = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
+    adjuster = Adjuster(
+        make({slewing: "", "stop_distance_m: 200": "stop_distance_m: 4"}).controller
+    )
+    adjuster.change({"axes.slew.sway.full_speed_m_s": 1.8})
+    with pytest.raises(ValueError, match=r"found 4 m; .* allow 4.2[0-9] m"):
+        adjuster.change({"axes.slew.sway.full_speed_m_s": 2.0})

@@ -14,7 +14,7 @@ from canshaper.shaping.sway import SwayModel
 from tests.service.conftest import Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
-LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0 }"
+LIMITS = "limits: { deadband_pct: 5, rise_per_s: 5, fall_per_s: 5, tail_s: 2.0, stop_s: 2.0"
 SLEW = "BO_ 512 SlewCommand: 2 SHAPER\n SG_ Velocity : 0|8@1- (0.8,0)"
 
 

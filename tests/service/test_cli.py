@@ -67,7 +67,7 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
     identity = load_deployment(SHIPPED).identity
     assert result.exit_code == 0
     assert result.stderr == ""
-    assert result.stdout.splitlines() == [
+    assert result.stdout.splitlines()[:5] == [
         f"{SHIPPED}: good",
         "  bus crane: socketcan vcan0, its 10 messages load 12% of 250 kbit/s",
         "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
@@ -76,6 +76,55 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
         f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
         *(f"    {line}" for line in identity.lines()[1:]),
     ]
+
+
+def test_check_shows_how_far_every_axis_travels_on() -> None:
+    lines = invoke("check", str(SHIPPED)).stdout.splitlines()
+    lines = lines[next(i for i, line in enumerate(lines) if "stops from" in line) :]
+    assert max(map(len, lines)) <= 80
+    rows = {line[:26].strip(): line[26:].split() for line in lines if line.startswith(" ")}
+    # 0.5 rad/s at 9.6 m; lift has no speed
+    assert rows["joystick released"] == ["3.63", "m", "22", "deg", "0.74", "m", "0.11", "s"]
+    assert rows["joystick lost"] == ["4.11", "m", "25", "deg", "0.84", "m", "0.21", "s"]
+    assert rows["limits allow"] == ["10.22", "m", "61", "deg", "2.13", "m", "0.63", "s"]
+    assert rows["stop_distance_m"] == ["10.5", "m", "2.2", "m", "-"]
+    assert "WARNING" not in "".join(lines)
+    assert "lift: in seconds of full speed" in "".join(lines)
+    assert "slewing: of one that slews" not in "".join(lines)
+
+
+def unstated(tmp_path: Path) -> Path:
+    """The shipped machine, whose slew does not state how far it may travel on."""
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    file = tmp_path / "unstated.yaml"
+    file.write_text(text.replace(", stop_distance_m: 10.5", "").replace("    slewing:", "    #"))
+    return file
+
+
+LONG_WAY = (
+    "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow 3.2 m, which is more"
+    " than 2 m; where that is meant, state stop_distance_m: 3.2"
+)
+
+
+def test_check_warns_of_a_long_way_that_is_not_stated(tmp_path: Path) -> None:
+    file = unstated(tmp_path)
+    result = invoke("check", str(file))
+    assert result.exit_code == 0
+    line = file.read_text().splitlines().index("  near_far:") - 1
+    assert result.stdout.splitlines()[-1] == f"WARNING: {file}:{line}: {LONG_WAY}"
+    assert "slewing: of one that slews" in " ".join(result.stdout.split())
+
+
+def test_run_moves_nothing_over_a_long_way_that_is_not_stated(
+    tmp_path: Path, opened: list[dict[str, Any]]
+) -> None:
+    file = unstated(tmp_path)
+    result = invoke("run", str(file))
+    assert result.exit_code == 2
+    assert LONG_WAY in result.stderr
+    assert opened == []
+    assert invoke("run", str(file), "--listen-only").exit_code == 3  # as it moves nothing
 
 
 def test_check_of_a_broken_file_tells_every_problem(broken: Path) -> None:

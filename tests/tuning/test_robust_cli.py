@@ -51,6 +51,15 @@ def test_a_tail_too_short_is_told(file: Path) -> None:
     assert "tail_s" not in run(str(file), "--axis", "near_far", "--duration", "1.6")[1]
 
 
+def test_it_tells_how_far_the_tip_travels_and_what_a_longer_tail_would_need(file: Path) -> None:
+    words = (str(file), "--axis", "near_far", "--duration")
+    good, long = (" ".join(run(*words, seconds)[1].split()) for seconds in ("1.8", "2.4"))
+    assert "near_far travels 0.85 m with it; its limits allow 2.13 m." in good
+    assert "stop_distance_m" not in good
+    assert "For tail_s: 2.5, stop_distance_m: found 2.2 m; max_pct" in long
+    assert "allow 2.63 m." in long
+
+
 @pytest.mark.parametrize(
     "words, message",
     [

@@ -47,6 +47,7 @@ def test_result_and_picture(file: Path) -> None:
         "cost at most 1 % more",
         "3 of 3 starts ended here",
         "Use a1: 0.6995, a2: 0.122325 for near_far",
+        "Released at full speed, near_far travels 0.7",
     ):
         assert text in re.sub(r"\s*\n", " ", result.output) or text in result.output
     picture = file.parent / "out" / "near_far.png"

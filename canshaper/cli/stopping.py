@@ -1,0 +1,151 @@
+"""Stopping distances of a deployment as a table: what the tip travels after each event."""
+
+import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+from rich.box import SIMPLE_HEAD
+from rich.console import Console, Group, RenderableType
+from rich.table import Table
+from rich.text import Text
+
+from canshaper.can.deployment import BoundAxis, Deployment
+from canshaper.can.stopping import FullSpeed, full_speed, stop_fault
+from canshaper.config.filters import Filter
+from canshaper.config.schema import AxisConfig
+from canshaper.config.sets import Feel
+from canshaper.service.lever import LeverInput
+from canshaper.service.runner import AxisRunner
+from canshaper.shaping.stopping import Travel, allowed_s, travel
+
+# Of a proportional valve with a first-order lag: that of the simulated crane, typical of pilot
+# stages. The tip travels on for so long at its last speed, whatever the commands did before.
+VALVE_LAG_S = 0.1
+_AXES_A_TABLE = 3  # as many as fit 80 columns
+
+
+@dataclass(frozen=True, slots=True)
+class Stopping:
+    """Stopping of one axis from its full speed; travel in seconds of full speed."""
+
+    name: str
+    speed: FullSpeed
+    maximum: float
+    travel: Travel
+    allowed_s: float
+    stated_m: float | None
+
+    def cell(self, way_s: float) -> str:
+        """A travel as it is read: metres, degrees too where it slews; seconds without a speed."""
+        if self.speed.m_s is None:
+            return f"{way_s:.2f} s"
+        text = f"{way_s * self.speed.m_s:.2f} m"
+        if self.speed.rad_s is not None:
+            text += f"  {math.degrees(way_s * self.speed.rad_s):.0f} deg"
+        return text
+
+
+def stopping(deployment: Deployment) -> list[Stopping]:
+    """Stopping of every axis, with the worst of its filters."""
+    return [_stopping(deployment, bound) for bound in deployment.axes.values()]
+
+
+def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: float | None) -> str:
+    """What another filter of an axis, and a longer tail, make of its stopping distance."""
+    bound = deployment.axes[name]
+    changes: dict[str, Any] = {"filter": chosen, "sets": [], "feels": {}}
+    one = _stopping(deployment, replace(bound, config=bound.config.model_copy(update=changes)))
+    text = (
+        f"Released at full speed, {name} travels {one.cell(one.travel.release)} with it;"
+        f" its limits allow {one.cell(one.allowed_s)}."
+    )
+    if tail_s is None:
+        return text
+    limits = bound.config.limits.model_copy(update={"tail_s": tail_s})
+    fault = stop_fault(deployment, name, bound.config.model_copy(update={"limits": limits}))
+    return f"{text} For tail_s: {tail_s:g}, stop_distance_m: {fault}." if fault else text
+
+
+def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
+    lever = deployment.levers[bound.config.stick.lever]
+    limits = bound.config.limits
+    tick_s = deployment.config.tick_ms / 1000.0
+    period_s, timeout_s = tick_s * bound.period_ticks, lever.config.timeout_ms / 1000.0
+    travels = [
+        travel(
+            lambda one=one: AxisRunner(one, tick_s, LeverInput(lever)).axis,  # type: ignore[misc]
+            timeout_s=timeout_s,
+            period_s=period_s,
+        )
+        for one in _variants(bound)
+    ]
+    allowed = allowed_s(
+        limits.output_limits(), stop_s=limits.stop_s, timeout_s=timeout_s, period_s=period_s
+    )
+    return Stopping(
+        bound.name,
+        full_speed(bound.config),
+        limits.max_pct / 100.0,
+        Travel.worst(travels),
+        allowed,
+        limits.stop_distance_m,
+    )
+
+
+def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
+    """The axis with each sway and filter that its file names."""
+    config = bound.config
+    parts: list[AxisConfig | Feel] = [config, *config.feels.values()]
+    for part in parts:
+        pairs = [(config.sway, part.filter), *((one.sway, one.filter) for one in part.sets)]
+        for sway, chosen in pairs:
+            changes = {"sway": sway, "filter": chosen}
+            yield replace(bound, config=config.model_copy(update=changes))
+
+
+def print_stopping(deployment: Deployment, console: Console) -> None:
+    """Print the distances; they fit in 80 columns."""
+    axes = stopping(deployment)
+    for first in range(0, len(axes), _AXES_A_TABLE):
+        console.print(_table(axes[first : first + _AXES_A_TABLE]))
+    console.print(Group(*_notes(axes)), highlight=False)
+
+
+def _table(axes: list[Stopping]) -> Table:
+    table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    table.add_column("stops from full speed in", no_wrap=True)
+    for axis in axes:
+        table.add_column(axis.name, justify="right")
+
+    def row(title: str, cell: Callable[[Stopping], str]) -> None:
+        table.add_row(title, *(cell(axis) for axis in axes))
+
+    row("joystick released", lambda a: a.cell(a.travel.release))
+    row("joystick reversed", lambda a: a.cell(a.travel.reversal))
+    row("joystick lost", lambda a: a.cell(a.travel.lost))
+    row("enable lost, e-stop", lambda a: a.cell(a.travel.enable))
+    row("limits allow", lambda a: a.cell(a.allowed_s))
+    row("stop_distance_m", lambda a: "-" if a.stated_m is None else f"{a.stated_m:g} m")
+    row("valve's lag adds", lambda a: a.cell(a.maximum * VALVE_LAG_S))
+    return table
+
+
+def _notes(axes: list[Stopping]) -> Iterator[RenderableType]:
+    yield Text(
+        "Travel of the commands from the event on: it waits for the next command, a lost joystick"
+        f" for its timeout. The valve's lag is assumed to be {VALVE_LAG_S:g} s.",
+        "dim",
+    )
+    if unknown := [axis.name for axis in axes if axis.speed.m_s is None]:
+        yield Text(
+            f"{', '.join(unknown)}: in seconds of full speed; the file has no speed of the tip"
+            " (sway.full_speed_m_s, or slewing).",
+            "dim",
+        )
+    if all(axis.speed.rad_s is None for axis in axes):
+        yield Text(
+            "No axis has the section slewing: of one that slews these are metres at the radius of"
+            " its sway.full_speed_m_s, not at the largest one.",
+            "dim",
+        )

@@ -1,0 +1,107 @@
+"""How far an axis still travels after its input ends, at full speed.
+
+Travel is in seconds of full speed: times the speed of the tip it is metres, times the angular speed
+of a slewing axis radians. It is that of the commands; the valve adds its own lag.
+"""
+
+import copy
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import Self
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.states import MOVING, Reason, StickInput
+
+# Until a filter of the schema gives full speed: five times the longest time constant.
+WARM_UP_S = 25.0
+# Longer than the longest tail and the slowest fall of the schema.
+LONGEST_STOP_S = 15.0
+
+
+@dataclass(frozen=True, slots=True)
+class Travel:
+    """Travel after each event, seconds of full speed.
+
+    Attributes:
+        release: the joystick goes to neutral.
+        reversal: the joystick goes to full speed the other way; what is still travelled in the old
+            direction.
+        lost: the joystick's frames end.
+        enable: enable released, or emergency stop.
+    """
+
+    release: float
+    reversal: float
+    lost: float
+    enable: float
+
+    @classmethod
+    def worst(cls, travels: "list[Travel]") -> Self:
+        """The longest after each event."""
+        return cls(*(max(getattr(t, f.name) for t in travels) for f in fields(cls)))
+
+
+def allowed_s(limits: OutputLimits, *, stop_s: float, timeout_s: float, period_s: float) -> float:
+    """Travel that the limits allow after release or a lost joystick, whatever the filter does.
+
+    Full speed until the event is seen, full speed for the whole tail, then the slowest fall.
+
+    Args:
+        limits: limits of the axis.
+        stop_s: longest duration of STOPPING.
+        timeout_s: age at which the joystick counts as lost.
+        period_s: time between two commands to the valve; an event waits so long at most.
+
+    Returns:
+        Seconds of full speed.
+    """
+    full, fall = limits.maximum, limits.fall_per_s
+    # Durations are whole ticks; the longest that rounding makes of them.
+    tail_s, stop_s = limits.tail_s + 0.5 * period_s, max(stop_s + 0.5 * period_s, period_s)
+    falling_s = min(full / fall, max(0.0, stop_s - tail_s))
+    stop = full * min(tail_s, stop_s) + (full - 0.5 * fall * falling_s) * falling_s
+    release = full * tail_s + 0.5 * full * full / fall
+    return max(full * (timeout_s + period_s) + stop, full * period_s + release)
+
+
+def travel(new_axis: Callable[[], Axis], *, timeout_s: float, period_s: float) -> Travel:
+    """Travel of an axis with its filter, computed by letting it run, in the worse direction.
+
+    Args:
+        new_axis: makes the axis.
+        timeout_s: age at which the joystick counts as lost.
+        period_s: time between two calls of ``Axis.tick``.
+    """
+    return Travel.worst([_travel(new_axis(), sign, timeout_s, period_s) for sign in (1.0, -1.0)])
+
+
+def _travel(axis: Axis, sign: float, timeout_s: float, period_s: float) -> Travel:
+    axis.tick(StickInput())
+    for _ in range(round(WARM_UP_S / period_s)):
+        axis.tick(StickInput(sign))
+    # An event waits for the next tick, and silence for the timeout before; until then it goes on.
+    full = sign * axis.sent
+
+    def after(stick: StickInput, wait_s: float = period_s) -> float:
+        return full * wait_s + _way_s(axis, stick, sign, period_s)
+
+    return Travel(
+        release=after(StickInput()),
+        reversal=after(StickInput(-sign)),
+        lost=after(StickInput(fault=Reason.STICK_TIMEOUT), timeout_s + period_s),
+        enable=after(StickInput(enabled=False)),
+    )
+
+
+def _way_s(steady: Axis, stick: StickInput, sign: float, period_s: float) -> float:
+    """How far the axis gets in the old direction."""
+    axis = copy.deepcopy(steady)
+    way_s = most_s = 0.0
+    for _ in range(round(LONGEST_STOP_S / period_s)):
+        axis.tick(stick)
+        if axis.state not in MOVING:
+            break
+        way_s += sign * axis.sent * period_s
+        most_s = max(most_s, way_s)
+    return most_s
