@@ -3,8 +3,10 @@
 import typer
 
 from canshaper.can.deployment import Deployment
+from canshaper.can.device import match_fault, whereabouts
 from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
+from canshaper.config.bus import Bus
 
 # What joysticks do while the daemon is away.
 FALLBACKS = {
@@ -21,8 +23,9 @@ def check(file: str = FILE) -> None:
     and how far its limits allow.
 
     Exit code 0 when it is good, 2 when it is not. A bus that is loaded above 50 % at its bit rate
-    is a warning; so is an axis that may travel on for more than 2 m without a stop_distance_m in
-    the file, with which run does not start.
+    is a warning; so is an interface of this machine that is not the device of its bus, and an axis
+    that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
+    not start.
 
     Examples:
 
@@ -46,6 +49,8 @@ def check(file: str = FILE) -> None:
     typer.echo(f"{deployment.path}: good")
     for name, bus in config.buses.items():
         typer.echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
+        if bus.match:
+            typer.echo(f"    match {_match(bus)}")
     if gateway := config.gateway:
         ends, away = " and ".join(gateway.between), FALLBACKS[gateway.fallback]
         typer.echo(f"  gateway between {ends}: others pass by the {gateway.passing}, {away}")
@@ -63,6 +68,15 @@ def check(file: str = FILE) -> None:
     print_stopping(deployment, Console())
     for place, text in unstated(deployment):
         typer.echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
+
+
+def _match(bus: Bus) -> str:
+    """Whether it holds on this machine, in words; the file is good either way."""
+    try:
+        fault = match_fault(bus)
+    except OSError as error:
+        return f"not looked at: {bus.channel}: {error.strerror}{whereabouts(bus)}"
+    return f"WARNING: {fault}" if fault else "holds now"
 
 
 def _load(deployment: Deployment, bus: str) -> str:

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.config.bus import Bus
+from canshaper.doctor.devices import device_findings
 from canshaper.doctor.finding import Finding, Level
 
 # Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands
@@ -67,6 +68,7 @@ def bus_findings(buses: dict[str, Bus]) -> list[Finding]:
             findings.append(Finding(f"bus {name}", Level.BAD, kernel, remedy))
         else:
             findings += link_findings(read_link(bus.channel), bus)
+            findings += device_findings(name, bus)
     return findings
 
 

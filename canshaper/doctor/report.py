@@ -136,7 +136,8 @@ def _line(finding: Finding) -> Text:
     level = Text(f"{finding.level.value:8}", style=STYLES[finding.level])
     line = Text.assemble(level, f"{finding.subject}: {finding.found}")
     if finding.remedy:
-        line.append(f"\n        -> {finding.remedy}", style="bold")
+        remedy = finding.remedy.replace("\n", "\n           ")
+        line.append(f"\n        -> {remedy}", style="bold")
     return line
 
 

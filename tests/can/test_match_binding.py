@@ -9,11 +9,12 @@ from typer.testing import CliRunner
 from canshaper.can import bus as module
 from canshaper.can.binding import load_deployment
 from canshaper.can.bus import BusError
-from canshaper.can.device import WrongDeviceError
+from canshaper.can.device import WrongDeviceError, read_device, whereabouts
 from canshaper.cli.app import app
 from canshaper.config.bus import Match
 from canshaper.config.source import DeploymentError
 from canshaper.service.ports import open_ports
+from tests.can.fake_devices import FakeDevices
 
 ROOT = Path(__file__).parents[2]
 ONE = "channel: vcan0, bitrate: 250000"
@@ -134,3 +135,31 @@ def test_run_ends_with_that_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert result.exit_code == 3
     text = "buses.front.match: expected driver peak_usb, but vcan0 has driver vcan"
     assert result.stderr == f"{file}:{line_of(file, ONE)}: {text}\n"
+
+
+def test_the_check_says_whether_it_holds_now(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The file is good either way: it may be checked on another PC."""
+    devices = FakeDevices(tmp_path / "root")
+    devices.add("vcan0", None, driver="vcan", bitrate=None)
+    for function in (read_device, whereabouts):
+        monkeypatch.setattr(function, "__defaults__", (devices.root, devices.ask))
+
+    def checked(match: str) -> str:
+        result = CliRunner().invoke(app, ["check", str(machine(tmp_path, match, match))])
+        assert result.exit_code == 0
+        return str(result.stdout)
+
+    assert "    match holds now\n" in checked("{ driver: vcan }")
+    text = checked("{ driver: peak_usb }")
+    assert "    match WARNING: expected driver peak_usb, but vcan0 has driver vcan\n" in text
+    assert "    match not looked at: vcan1: No such device\n" in text
+
+
+def test_without_match_the_check_is_silent_about_it(tmp_path: Path) -> None:
+    file = machine(tmp_path, "{ driver: vcan }")
+    file.write_text(file.read_text().replace(", match: { driver: vcan }", ""))
+    result = CliRunner().invoke(app, ["check", str(file)])
+    assert "  bus front: " in result.stdout
+    assert "    match " not in result.stdout
