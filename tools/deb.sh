@@ -67,7 +67,8 @@ rmdir "$library/canshaper/data"
 ln -s ../../../share/canshaper "$library/canshaper/data"
 mv "$root/usr/share/canshaper/config/systemd"/*.service "$root/lib/systemd/system"
 mv "$root/usr/share/canshaper/config/systemd"/*.conf "$root/usr/share/canshaper"
-mv "$root/usr/share/canshaper/config/networkd" "$root/usr/share/canshaper"
+mv "$root/usr/share/canshaper/config/networkd" "$root/usr/share/canshaper/config/udev" \
+    "$root/usr/share/canshaper"
 rmdir "$root/usr/share/canshaper/config/systemd"
 
 # The administrator's copies: DBC files in a directory beside the deployments.

@@ -127,7 +127,7 @@ def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
         if error.errno == errno.ENODEV:
             raise
         raise WrongDeviceError(f"{bus.channel} cannot be looked at: {error.strerror}") from error
-    # Each socket was bound by the name, and the kernel tells the name that its device has now.
+    # Each socket was bound by the name, and the kernel returns the name that its device has now.
     if {*names, *(one.getsockname()[0] for one in sockets)} != {device.name}:
         raise WrongDeviceError(f"the name {bus.channel} changed hands while it was opened")
     if fault := device_fault(bus, device):
@@ -171,7 +171,7 @@ def match_fault(bus: Bus) -> str | None:
 def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate) -> str:
     """Which interface is the device of a bus now, behind a message; empty where none is named.
 
-    It is only told, never used by itself: which bus is driven stands in the file.
+    It is only reported, never used by itself: which bus is driven stands in the file.
     """
     match = bus.match
     if match is None or (match.serial is None and match.path is None):

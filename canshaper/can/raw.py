@@ -277,7 +277,7 @@ class RawPort:
             self._on_fault(FrameFault.BUS_ERROR)
 
     def _away(self, state: BusState, fault: FrameFault) -> None:
-        """Take and send nothing until the interface is opened again; a fault is told once."""
+        """Take and send nothing until the interface is opened again; report a fault once."""
         self.close()
         self._not_before_ns = time.monotonic_ns() + REOPEN_NS
         if self.state is not state:

@@ -87,15 +87,17 @@ def doctor(
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
+    from canshaper.can.device import WrongDeviceError
     from canshaper.doctor.finding import Finding, Level
     from canshaper.doctor.listen import heard_findings, listen
 
     try:
         with _progress(f"listening, {seconds:g} s", seconds) as tell:
             heard = listen(deployment, seconds, tell)
-    except OSError as error:
+    except (OSError, WrongDeviceError) as error:
         remedy = "mend the interface first"
-        return [Finding("levers", Level.BAD, f"cannot listen: {error.strerror}", remedy)]
+        why = error.strerror if isinstance(error, OSError) else error
+        return [Finding("levers", Level.BAD, f"cannot listen: {why}", remedy)]
     return heard_findings(deployment, heard)
 
 

@@ -86,7 +86,8 @@ def _look_at_devices(deployment: "Deployment") -> None:
     for name in deployment.config.gateway.between:
         bus = deployment.config.buses[name]
         try:
-            why = match_fault(bus) if bus.match else None
+            named = bus.match and bus.interface == "socketcan"  # not so with --interface
+            why = match_fault(bus) if named else None
         except OSError as error:
             why = f"{bus.channel} cannot be looked at: {error.strerror}"
         if why:

@@ -39,15 +39,15 @@ def device_findings(
     except OSError as error:
         if error.errno == errno.ENODEV:  # said of the interface itself
             return []
-        found = f"cannot be looked at: {error.strerror}"
-        return [Finding(subject, Level.BAD if bus.match else Level.WARNING, found)]
+        level = Level.BAD if bus.match else Level.WARNING
+        return [Finding(subject, level, f"cannot be looked at: {error.strerror}")]
     if bus.match is None:
         level = Level.WARNING if device.serial or device.path else Level.NOTE
-        found = f"bus {name} has no match: whatever is called {bus.channel} is driven"
-        return [Finding(subject, level, found, to_paste(name, device, root))]
+        text = f"bus {name} has no match: whatever is called {bus.channel} is driven"
+        return [Finding(subject, level, text, to_paste(name, device, root))]
     if fault := device_fault(bus, device):
         there = whereabouts(bus, root, ask_kernel)
-        remedy = "nothing is sent there: plug it in where it was, or mend names or match"
+        remedy = "nothing is sent there: plug it in where it was, or correct names or match"
         return [Finding(subject, Level.BAD, f"{fault}{there}", remedy)]
     return [Finding(subject, Level.OK, f"match of bus {name} holds")]
 
@@ -75,7 +75,7 @@ def to_paste(name: str, device: Device, root: Path = ROOT) -> str:
         return lines[0]
     new = f"can-{re.sub('[^0-9A-Za-z]+', '-', name)}"[:LONGEST_NAME].rstrip("-")
     lines.append(f"for a name of its own (then channel: {new} in the deployment file)")
-    if device.channels == 1:  # a .link file cannot tell channels apart
+    if device.channels == 1:  # a .link file cannot distinguish channels
         if device.serial:
             which = f"Property=ID_SERIAL_SHORT={_REPLACED.sub('_', device.serial)}"
         else:

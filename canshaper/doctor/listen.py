@@ -37,6 +37,7 @@ def listen(
 
     Raises:
         OSError: an interface cannot be opened.
+        WrongDeviceError: one is another device than the deployment names.
     """
     inputs = inputs_of(deployment)
     names = {bound.key: name for name, bound in inputs.items()}

@@ -110,7 +110,7 @@ class Bridge:
         now_ns = time.monotonic_ns()
         if now_ns >= self._not_before_ns:
             self._not_before_ns = now_ns + REOPEN_NS
-            with suppress(OSError, WrongDeviceError):  # told by the port of this bus
+            with suppress(OSError, WrongDeviceError):  # reported by the port of this bus
                 self._open()
 
     def close(self) -> None:

@@ -165,8 +165,8 @@ def test_another_device_under_the_name_is_not_used(
 ) -> None:
     """However long it is there: nothing is sent and nothing taken until the right one is back."""
     away(matched)
-    told = [FrameFault.BUS_GONE if away is gone else FrameFault.BUS_DOWN]
-    assert matched.faults == told
+    reported = [FrameFault.BUS_GONE if away is gone else FrameFault.BUS_DOWN]
+    assert matched.faults == reported
     matched.refuse = WRONG
     far = matched.far
     far[TAKEN].setblocking(False)
@@ -176,7 +176,7 @@ def test_another_device_under_the_name_is_not_used(
         assert not matched.port.send(VALVE)
         assert matched.port.fileno() == -1
     assert matched.port.state is BusState.WRONG_DEVICE
-    assert matched.faults == [*told, FrameFault.BUS_WRONG_DEVICE]
+    assert matched.faults == [*reported, FrameFault.BUS_WRONG_DEVICE]
     assert len(matched.asked) == 1 + 100 * TICK_NS // REOPEN_NS
     matched.refuse = None
     later(matched)
@@ -185,10 +185,10 @@ def test_another_device_under_the_name_is_not_used(
     assert len(matched.sent()) == 1
     matched.put(message(0x110))
     assert len(matched.heard()) == 1
-    assert matched.faults == [*told, FrameFault.BUS_WRONG_DEVICE]
+    assert matched.faults == [*reported, FrameFault.BUS_WRONG_DEVICE]
 
 
-def test_a_matched_interface_that_is_down_is_opened_again_and_told_once(matched: Line) -> None:
+def test_a_matched_interface_that_is_down_is_opened_again_and_reported_once(matched: Line) -> None:
     """Name and bit rate may be others when it is back; whether it is up, only its frames say."""
     down(matched)
     assert matched.port.fileno() == -1
@@ -221,7 +221,7 @@ def test_a_bus_that_was_blocked_is_tried_at_once_when_it_is_back(matched: Line) 
     assert matched.port.send(VALVE)
 
 
-def test_what_comes_after_a_wrong_device_is_told(matched: Line) -> None:
+def test_what_comes_after_a_wrong_device_is_reported(matched: Line) -> None:
     gone(matched)
     matched.refuse = WRONG
     later(matched)

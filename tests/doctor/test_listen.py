@@ -1,5 +1,6 @@
 """What was heard of the levers, against their cycle and their timeout."""
 
+import errno
 import os
 import socket
 import struct
@@ -11,8 +12,10 @@ from typing import Any
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import Frame
 from canshaper.can.raw import CAN_FRAME
+from canshaper.cli.doctor import _listened
 from canshaper.doctor import listen as listening
 from canshaper.doctor.finding import Finding, Level
 from canshaper.doctor.listen import SO_TIMESTAMPNS, heard_findings
@@ -114,3 +117,22 @@ def test_levers_of_j1939_are_heard_from_whatever_address(monkeypatch: pytest.Mon
         "lever right": 20,
     }
     assert {f.level for f in heard_findings(deployment, heard)} == {Level.OK}
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (OSError(errno.ENODEV, "No such device"), "No such device"),
+        (WrongDeviceError("expected driver a, but vcan0 has driver b"), "expected driver a, but"),
+    ],
+)
+def test_an_interface_that_cannot_be_listened_to_is_a_finding(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, why: str
+) -> None:
+    def refuse(*_arguments: Any) -> list[Any]:
+        raise error
+
+    monkeypatch.setattr(listening, "open_sockets", refuse)
+    (finding,) = _listened(DEPLOYMENT, 0.1)
+    assert (finding.subject, finding.level) == ("levers", Level.BAD)
+    assert finding.found.startswith(f"cannot listen: {why}")

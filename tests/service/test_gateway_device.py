@@ -190,9 +190,12 @@ def test_no_rule_leads_to_the_wrong_device(
     assert changed == []
 
 
-@pytest.mark.parametrize(("state", "looked"), [("running", ["vcan1"]), ("down", [])])
+@pytest.mark.parametrize(
+    ("words", "looked"),
+    [(["running"], ["vcan1"]), (["down"], []), (["running", "--interface", "virtual"], [])],
+)
 def test_rules_between_the_right_devices(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, state: str, looked: list[str]
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], looked: list[str]
 ) -> None:
     """To remove them is right whatever the device is."""
     seen: list[str] = []
@@ -200,5 +203,5 @@ def test_rules_between_the_right_devices(
     monkeypatch.setattr(cangw, "load_module", lambda: None)
     monkeypatch.setattr(cangw, "make", lambda *_: ([], []))
     file = matched_file(tmp_path, "{ driver: a }")
-    assert CliRunner().invoke(app, ["gateway", str(file), state]).exit_code == 0
+    assert CliRunner().invoke(app, ["gateway", str(file), *words]).exit_code == 0
     assert seen == looked
