@@ -38,11 +38,16 @@ class _RampLever:
         self.command = 0.0
         self.moved = False
 
+    @property
+    def releases(self) -> int:
+        """How often its enable was seen released."""
+        return self._lever.releases
+
     def stick(
-        self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
         """What the axis may use now."""
-        found = self._lever.stick(signal, now_ns, since_ns, trip, neutral_band)
+        found = self._lever.stick(signal, now_ns, releases, trip, neutral_band)
         usable = found.fault is None and found.enabled
         self.moved = usable and abs(found.command) > neutral_band
         if not usable:
@@ -120,10 +125,10 @@ class CalibrationDrive:
         """Whether the frame that was handed out last may move a valve."""
         return self._controller.moves
 
-    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
-        self._speed.receive(frame, now_ns)
-        return self._controller.receive(frame, now_ns)
+        self._speed.receive(frame, arrived_ns)
+        return self._controller.receive(frame, arrived_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send."""

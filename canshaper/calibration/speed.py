@@ -52,10 +52,10 @@ class SpeedFeedback:
         measured_ns = self._input.measured_ns
         return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
 
-    def receive(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: Frame, arrived_ns: int) -> None:
         """Take a frame, where it is one of this message."""
         if self._mine(frame):
-            self._input.receive(frame.data, now_ns)
+            self._input.receive(frame.data, arrived_ns)
 
     def _mine(self, frame: Frame) -> bool:
         if not self._bound.by_group:

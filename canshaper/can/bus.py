@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 import can
 
+from canshaper.can.arrival import Arrivals
 from canshaper.can.device import WrongDeviceError, whereabouts
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.can.multicast import LocalMulticastBus, receive_one_group
@@ -52,6 +53,13 @@ class Port(Protocol):
     @property
     def state(self) -> BusState:
         """How the bus is."""
+
+    @property
+    def arrived_ns(self) -> int:
+        """When the frame arrived that ``frames`` has just handed out, by ``boottime_ns``.
+
+        Where no one stamps the frames: when the bus was last seen empty, which is before that.
+        """
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
@@ -124,6 +132,11 @@ class ListeningPort:
         """State of the bus."""
         return self._port.state
 
+    @property
+    def arrived_ns(self) -> int:
+        """When the frame arrived that was just handed out."""
+        return self._port.arrived_ns
+
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits."""
         return self._port.frames()
@@ -156,6 +169,8 @@ class PythonCanPort:
     def __init__(self, name: str, config: Bus, on_fault: Callable[[FrameFault], None]) -> None:
         self.name = name
         self.state = BusState.UP
+        self.arrived_ns = 0
+        self._arrivals = Arrivals()  # before a frame can arrive
         self._on_fault = on_fault
         self._bus = open_python_can(config)
         # Multicast brings back what this process sent; the others do not.
@@ -165,6 +180,8 @@ class PythonCanPort:
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
         receive, failures = self._bus.recv, 0
+        # python-can's own times are those of whatever clock an interface has.
+        self.arrived_ns = self._arrivals.begin()
         for _ in range(MOST_FRAMES):
             try:
                 message = receive(0)
@@ -176,6 +193,7 @@ class PythonCanPort:
                     return
                 continue
             if message is None:
+                self._arrivals.emptied()
                 return
             self.state = BusState.UP
             if message.is_error_frame:  # first: its id is an error class, and could match

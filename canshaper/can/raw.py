@@ -13,6 +13,7 @@ from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
+from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
 from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.can.socketcan import Ids, dropped_frames, set_filters
@@ -66,6 +67,8 @@ class RawPort:
 
     Attributes:
         state: of the bus, as far as seen.
+        arrived_ns: when the frame arrived that ``frames`` has just handed out, by
+            ``boottime_ns``.
 
     Raises:
         OSError: the sockets cannot be opened.
@@ -84,6 +87,7 @@ class RawPort:
     ) -> None:
         self.name = name
         self.state = UP
+        self.arrived_ns = 0
         self._open = open_sockets
         self._on_fault = on_fault
         self._confirms = confirms
@@ -97,7 +101,7 @@ class RawPort:
         self._valves = _words(ids.valves if ids else ())
         self._claims = _words(ids.claims if ids else ())
         self._claimed: deque[Any] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
-        self._use(open_sockets(ids))
+        self._use()
 
     # -- receiving -----------------------------------------------------------------------------
 
@@ -105,12 +109,14 @@ class RawPort:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
         if not self._sockets and not self._reopened():
             return
-        waiting, receive = self._waiting[0], self._receive
+        waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
+        arrivals.begin()
         for _ in _EACH_FRAME:
             if not waiting(0):  # cheaper than the exception of a socket with nothing to read
+                arrivals.emptied()
                 return
             try:
-                data = receive(SIZE)
+                data, ancillary, _flags, _sender = receive(SIZE, ANCILLARY_BYTES)
             except OSError as error:
                 self._failed(error)
                 return
@@ -120,6 +126,7 @@ class RawPort:
             if frame is not None:
                 if self.state is not UP and self.state in LOST:
                     self._up()
+                self.arrived_ns = arrivals.of(ancillary)
                 yield frame
 
     def others(self) -> Iterator[Frame]:
@@ -284,10 +291,13 @@ class RawPort:
             self.state = state
             self._on_fault(fault)
 
-    def _use(self, sockets: list[socket.socket]) -> None:
-        self._sockets = sockets
+    def _use(self) -> None:
+        arrivals = Arrivals()  # before a frame can arrive
+        self._sockets = sockets = self._open(self._ids)
+        self._arrivals = arrivals
+        sockets[0].setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
         self._waiting = [_poll(one) for one in sockets]
-        self._receive = sockets[0].recv
+        self._receive = sockets[0].recvmsg
         self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
         self._forget()
         self._claimed.clear()
@@ -299,7 +309,7 @@ class RawPort:
         if self.state not in AWAY or time.monotonic_ns() < self._not_before_ns:
             return False
         try:
-            self._use(self._open(self._ids))
+            self._use()
         except WrongDeviceError:
             self._away(BusState.WRONG_DEVICE, FrameFault.BUS_WRONG_DEVICE)
             return False

@@ -2,7 +2,6 @@
 
 import select
 import socket
-import struct
 import time
 from collections.abc import Iterable
 from contextlib import suppress
@@ -10,15 +9,13 @@ from typing import Any, NamedTuple
 
 import can
 
+from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
 from canshaper.can.bus import BusError, open_python_can
 from canshaper.can.raw import CAN_FRAME
 from canshaper.can.socketcan import dropped_frames, open_sockets
 from canshaper.capture.text import ERROR_FLAG
 from canshaper.config.bus import Bus
 
-# asm/socket.h: the time of reception by the kernel, so that our own lateness does not count.
-SO_TIMESTAMPNS = 35
-_STAMP = struct.Struct("=qq")
 # Frames taken from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
 # Of every signal that asks us to end, the next one must not wait for a frame.
@@ -138,14 +135,11 @@ class Listener:
 def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
     """The next frame of SocketCAN; None when none waits."""
     try:
-        data, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, 128)
+        data, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
     except BlockingIOError:
         return None
-    time_ns = time.time_ns()
-    for level, kind, value in ancillary:
-        if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
-            seconds, ns = _STAMP.unpack(value[: _STAMP.size])
-            time_ns = seconds * 1_000_000_000 + ns
+    stamp = stamp_ns(ancillary)
+    time_ns = time.time_ns() if stamp is None else stamp
     word, length, payload = CAN_FRAME.unpack(data)
     payload = payload[: min(length, 8)]
     if word & socket.CAN_ERR_FLAG:

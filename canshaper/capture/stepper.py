@@ -98,7 +98,7 @@ class Stepper:
         controller: the daemon's own.
         carried: frames that were there at the last tick and that it has not read.
         number: of the last tick.
-        heard: time of the last tick that has read a frame, by message.
+        heard: when the last frame that was read arrived, by message.
         standstill: the daemon's own, by the times of the log.
     """
 
@@ -113,6 +113,9 @@ class Stepper:
         self.carried: list[Timed] = []
         self.heard: dict[Key, int] = {}
         self.number = -1
+        self._stamped = {
+            n for n, b in deployment.config.buses.items() if b.interface == "socketcan"
+        }
         self.fresh = True
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         self.standstill = Standstill(deployment)
@@ -189,15 +192,17 @@ class Stepper:
             sent += controller.neutral_frames()
         number = tick.number - (choice.earlier if choice else 0)
         missed = number - self.number - 1
-        self.number = number
+        self.number, before_ns = number, self.standstill.last_ns
         stalled = self.standstill.over(now_ns)
         self.standstill.last_ns = tick.now_ns
         if stalled:
             controller.stalled()
-        for _, frame in taken:
-            controller.receive(frame, now_ns)
+        for time_ns, frame in taken:
+            # Without stamps a port knows only when it was read before.
+            arrived_ns = min(time_ns if frame.bus in self._stamped else before_ns, now_ns)
+            controller.receive(frame, arrived_ns)
             if not stalled:
-                self.heard[frame[:3]] = now_ns
+                self.heard[frame[:3]] = arrived_ns
         sent += controller.tick(now_ns, missed)
         for frame in tick.others:
             controller.receive(frame, now_ns)

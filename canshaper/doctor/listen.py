@@ -2,11 +2,11 @@
 
 import select
 import socket
-import struct
 import time
 from collections.abc import Callable
 from itertools import pairwise
 
+from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput
@@ -16,9 +16,6 @@ from canshaper.doctor.figures import summary
 from canshaper.doctor.finding import Finding, Level
 from canshaper.service.finder import InputFinder
 
-# asm/socket.h: the time of reception by the kernel, so that our own lateness does not count.
-SO_TIMESTAMPNS = 35
-_STAMP = struct.Struct("=qq")
 LOOK_S = 0.2
 
 
@@ -69,17 +66,14 @@ def listen(
 
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
     """The next data frame of a socket and when the kernel received it, ns; None for another one."""
-    packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, 128)
+    packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
     word, length, data = CAN_FRAME.unpack(packet)
     if word & (socket.CAN_ERR_FLAG | socket.CAN_RTR_FLAG):
         return None
     extended = bool(word & socket.CAN_EFF_FLAG)
     frame = Frame(bus, word & socket.CAN_EFF_MASK, extended, data[:length])
-    for level, kind, value in ancillary:
-        if level == socket.SOL_SOCKET and kind == SO_TIMESTAMPNS:
-            seconds, ns = _STAMP.unpack(value[: _STAMP.size])
-            return frame, seconds * 1_000_000_000 + ns
-    return None
+    time_ns = stamp_ns(ancillary)
+    return None if time_ns is None else (frame, time_ns)
 
 
 def heard_findings(deployment: Deployment, heard: dict[str, list[int]]) -> list[Finding]:

@@ -58,20 +58,20 @@ class RemoteNode:
         self._heard_ns = 0
         self._start_ns = 0
 
-    def heartbeat(self, data: bytes, now_ns: int) -> FrameFault:
+    def heartbeat(self, data: bytes, arrived_ns: int) -> FrameFault:
         """Take a heartbeat; a node that boots has no emergency any more."""
         if len(data) != 1:
             return FrameFault.WRONG_LENGTH
         self.state = data[0] & STATE_MASK
-        self._heard_ns = now_ns
+        self._heard_ns = arrived_ns
         if self.state != NodeState.OPERATIONAL:
             self.stops += 1
         if self.state == NodeState.BOOT_UP:
             self.emergency = NO_EMERGENCY
-            self._start_ns = now_ns
+            self._start_ns = arrived_ns
         return FrameFault.NONE
 
-    def alarm(self, data: bytes, _now_ns: int) -> FrameFault:
+    def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
         """Take an emergency message.
 
         Error code 0 tells that one error is over; only with an error register of 0 are all.

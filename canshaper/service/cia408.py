@@ -51,13 +51,17 @@ class ValveControl(Input):
         self._go(0, None)
 
     def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
     ) -> FrameFault:
         """The low four bits tell the state; that it has left ACTIVE takes no trust."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
         if counts:
-            self._state, self._told_ns = state, now_ns
+            self._state, self._told_ns = state, arrived_ns
         return GOOD
 
     def gate(self, neutral: bool, now_ns: int) -> Reason | None:

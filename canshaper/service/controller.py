@@ -136,39 +136,44 @@ class Controller:
         """Buses on which we have no address yet, or no longer."""
         return self._network.silent if self._network.nodes else NOWHERE
 
-    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
-        """Take a frame from a bus; ``now_ns`` is the monotonic time of its reception.
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        """Take a frame from a bus.
+
+        Args:
+            frame: the frame.
+            arrived_ns: time of its arrival, from which its age counts; not after the tick that
+                follows.
 
         Returns:
             What it leaves as on the other bus of a gateway, to be sent at once.
         """
         if self._stood_still:
             if self._stop is not None:
-                self._stop.waited(frame, now_ns)
+                self._stop.waited(frame, arrived_ns)
             return None
         key = frame[:3]
         entry = self._inputs.get(key)
         if entry is not None:
-            fault = entry.receive(frame.data, now_ns)
+            fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
             for runner in self._by_message.get(key, ()):
-                runner.contested_ns = now_ns
+                runner.contest(arrived_ns)
         elif frame.extended and (group := self._network.entry(key[0], key[1])):
-            fault = group.receive(frame, now_ns)
+            fault = group.receive(frame, arrived_ns)
         elif key[1:] in self._others or self._usual(frame):
             return None
         else:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
-        return self._passed_on(frame, now_ns) if self._lines else None
+        return self._passed_on(frame, arrived_ns) if self._lines else None
 
-    def _passed_on(self, frame: Frame, now_ns: int) -> Frame | None:
+    def _passed_on(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
         for line in self._lines.values():
             if line.news():
-                passed = line.pass_on(frame.data, now_ns)
+                passed = line.pass_on(frame.data, arrived_ns)
                 self.moves = line.moved
                 return passed
         return None

@@ -19,7 +19,7 @@ class Reckons(Protocol):
     def moves(self) -> bool:
         """Whether the frame that was handed out last may move a valve."""
 
-    def receive(self, frame: Frame, now_ns: int) -> Frame | None:
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
@@ -35,6 +35,12 @@ class Reckons(Protocol):
 def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: Standstill) -> int:
     """Take all waiting frames; those of a lever that pass a gateway leave at once, or not at all.
 
+    Args:
+        reckons: what the frames are for.
+        ports: the buses by name.
+        now_ns: time by ``boottime_ns``; no frame is younger.
+        standstill: until when a frame that moves a valve may leave.
+
     Returns:
         How many there were.
     """
@@ -42,7 +48,8 @@ def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: S
     for port in ports.values():
         for frame in port.frames():
             count += 1
-            passed = reckons.receive(frame, now_ns)
+            arrived_ns = port.arrived_ns
+            passed = reckons.receive(frame, arrived_ns if arrived_ns < now_ns else now_ns)
             if passed is None or (reckons.moves and standstill.clock() > standstill.until_ns):
                 continue
             if not ports[passed.bus].send(passed):

@@ -63,7 +63,7 @@ class _Noted(Generic[_Input]):
         self._finder = finder
         self._bound = bound
 
-    def receive(self, _data: bytes, _now_ns: int, /) -> FrameFault:
+    def receive(self, _data: bytes, _arrived_ns: int, /) -> FrameFault:
         """Tell it."""
         self._finder.note(self._bound)
         return FrameFault.NONE

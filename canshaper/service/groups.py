@@ -12,7 +12,7 @@ from canshaper.service.runner import AxisRunner
 class Taken(Protocol):
     """Takes the frames of one message."""
 
-    def receive(self, data: bytes, now_ns: int, /) -> FrameFault:
+    def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
         """Take one."""
 
     def forget(self) -> None:
@@ -66,12 +66,12 @@ class AnySource:
         self._ignored: set[int] = set()
         self._heard_ns = 0
 
-    def receive(self, frame: Frame, now_ns: int) -> FrameFault:
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
         """Take a frame; two levers that send the same group cannot be told apart."""
         source = frame.can_id & 0xFF
         if source != self._source:
             if self._source is not None:
-                if now_ns - self._heard_ns <= self._timeout_ns:
+                if arrived_ns - self._heard_ns <= self._timeout_ns:
                     return self._other(source, self._source)
                 # No tick need have seen the silence in between.
                 self._input.forget()
@@ -80,8 +80,8 @@ class AnySource:
             self._source = source
             self._ignored.clear()
             self.events.append(SourceEvent(self._bus, self._message, source, source))
-        self._heard_ns = now_ns
-        return self._input.receive(frame.data, now_ns)
+        self._heard_ns = arrived_ns
+        return self._input.receive(frame.data, arrived_ns)
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""
@@ -110,14 +110,14 @@ class TakenGroup:
         self.of: dict[int, Taken] = {}
         self.rest: AnySource | None = None
 
-    def receive(self, frame: Frame, now_ns: int) -> FrameFault:
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
         """Take a frame; from an address that nobody asked for it is other traffic."""
         source = frame.can_id & 0xFF
         if source == self._own:
             return FrameFault.SECOND_SENDER
         if (one := self.of.get(source)) is not None:
-            return one.receive(frame.data, now_ns)
-        return self.rest.receive(frame, now_ns) if self.rest else FrameFault.NONE
+            return one.receive(frame.data, arrived_ns)
+        return self.rest.receive(frame, arrived_ns) if self.rest else FrameFault.NONE
 
 
 class CommandedByOthers:
@@ -128,12 +128,12 @@ class CommandedByOthers:
             (runner, _destination(runner.bound.valve.message.sender.key[1])) for runner in runners
         ]
 
-    def receive(self, frame: Frame, now_ns: int) -> FrameFault:
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
         """Two controllers must not drive one crane; a valve at another destination is not ours."""
         to, fault = _destination(frame.can_id), FrameFault.NONE
         for runner, destination in self._runners:
             if to in (destination, GLOBAL):
-                runner.contested_ns = now_ns
+                runner.contest(arrived_ns)
                 fault = FrameFault.SECOND_SENDER
         return fault
 

@@ -15,6 +15,9 @@ GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
 class Input(ABC):
     """What is known of one message now.
 
+    Its age begins with the arrival of its frame. What is bad news in a frame counts from when the
+    frame is read: it is numbered, not dated, so that none is too old to be seen.
+
     Attributes:
         raw: raw values of the last frame that counted, by signal.
         commands: its velocities, or why there is none, by signal.
@@ -31,38 +34,42 @@ class Input(ABC):
         self.raw: dict[str, Any] = {}
         self.commands: dict[str, float | Reason] = {}
 
-    def receive(self, data: bytes, now_ns: int) -> FrameFault:
+    def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
         """Take a frame, or say what is wrong with it; only a good one is news."""
         try:
             raw, commands = self._codec.decode(data)
         except WrongLengthError:
             return FrameFault.WRONG_LENGTH
         guard = self._guard
-        if self._heard_ns is None or now_ns - self._heard_ns > self._timeout_ns:
+        if self._heard_ns is None or arrived_ns - self._heard_ns > self._timeout_ns:
             guard.begin_anew()
         fault = guard.judge(data, raw[self._counter] if self._counter else 0)
         if fault is CHECKSUM:
-            self._refused_ns = now_ns
+            self._refused_ns = arrived_ns
             return fault
-        self._heard_ns = now_ns
+        self._heard_ns = arrived_ns
         counts = guard.qualified and not fault
-        content = self.heard(raw, commands, now_ns, counts)
+        content = self.heard(raw, commands, arrived_ns, counts)
         if not counts:
-            self._refused_ns = now_ns
+            self._refused_ns = arrived_ns
             return fault
-        self.raw, self.commands, self._received_ns = raw, commands, now_ns
+        self.raw, self.commands, self._received_ns = raw, commands, arrived_ns
         return content
 
     @abstractmethod
     def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
     ) -> FrameFault:
         """A frame with the right checksum came; the last one still stands in ``raw``.
 
         Args:
             raw: its raw values, by signal.
             commands: its velocities, or why there is none, by signal.
-            now_ns: when it came.
+            arrived_ns: when it arrived.
             counts: whether it may be used. A switch may tell something without that.
 
         Returns:
@@ -83,42 +90,50 @@ class Input(ABC):
 
 
 class EmergencyStopInput(Input):
-    """The emergency stop of a deployment."""
+    """The emergency stop of a deployment.
+
+    Attributes:
+        presses: how often it was seen pressed.
+    """
 
     def __init__(self, bound: BoundInput, signal: str) -> None:
         super().__init__(bound)
         self._signal = signal
         self._keys = frozenset(bound.keys)
-        self._pressed_ns = -1
+        self.presses = 0
         self._pressed = False
 
     def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
     ) -> FrameFault:
         """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
         if raw[self._signal] != 0:
-            self._pressed_ns = now_ns
+            self.presses += 1
             self._pressed = True
         elif counts:
             self._pressed = False
         return GOOD
 
-    def waited(self, frame: Frame, now_ns: int) -> None:
+    def waited(self, frame: Frame, arrived_ns: int) -> None:
         """Look at any frame that waited while the loop stood still.
 
         Only a press counts of it, for that one has to be reset though it may be over by now.
         """
         if frame[:3] in self._keys:
-            self.receive(frame.data, now_ns)
+            self.receive(frame.data, arrived_ns)
             self.forget()
 
-    def stop(self, now_ns: int, since_ns: int) -> Reason | None:
+    def stop(self, now_ns: int, presses: int) -> Reason | None:
         """Why nothing may move now, or None.
 
         Args:
             now_ns: monotonic time.
-            since_ns: when this was asked last.
+            presses: as they were when this was asked last.
         """
-        if self._pressed or self._pressed_ns > since_ns:
+        if self._pressed or self.presses > presses:
             return Reason.EMERGENCY_STOP
         return Reason.EMERGENCY_STOP_LOST if self.lost(now_ns) else None

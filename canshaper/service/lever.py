@@ -11,7 +11,12 @@ _new = tuple.__new__  # StickInput(...) in half the time
 
 
 class LeverInput(Input):
-    """Takes the frames of one lever; answers what an axis may use of them at a moment."""
+    """Takes the frames of one lever; answers what an axis may use of them at a moment.
+
+    Attributes:
+        releases: how often its enable was seen released. A release counts when it is read, however
+            long ago its frame arrived; all that has an age is as old as its arrival.
+    """
 
     def __init__(self, lever: BoundLever) -> None:
         super().__init__(lever)
@@ -21,12 +26,16 @@ class LeverInput(Input):
         self._off = config.anti_sway_off
         self._frozen_ns = round(config.frozen_s * 1e9)
         self._changed_ns: dict[str, int] = {}
-        self._released_ns = -1
+        self.releases = 0
         self._released = False
-        self._doubted_ns = -1  # when it was seen released in a frame that does not count
+        self._doubted = 0  # number of the last release in a frame that does not count
 
     def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
     ) -> FrameFault:
         """Note since when each stick is where it is; codes that are no measurement are a fault.
 
@@ -34,10 +43,10 @@ class LeverInput(Input):
         """
         enable = raw[self._enable]
         if enable == 0:
-            self._released_ns = now_ns
+            self.releases += 1
             self._released = True
             if not counts:
-                self._doubted_ns = now_ns
+                self._doubted = self.releases
         elif counts:
             self._released = False
         if not counts:
@@ -46,29 +55,29 @@ class LeverInput(Input):
         last = self.commands
         for name, command in commands.items():
             if command != last.get(name):
-                self._changed_ns[name] = now_ns
+                self._changed_ns[name] = arrived_ns
             if type(command) is Reason:
                 valid = False
         return GOOD if valid else FrameFault.INVALID_SIGNAL
 
     def stick(
-        self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
         """Input of the axis that this signal drives.
 
         Args:
             signal: name of its velocity signal.
             now_ns: monotonic time.
-            since_ns: when this axis asked last.
+            releases: as they were when this axis asked last.
             trip: a cause for neutral at once, handed through.
             neutral_band: |stick| up to which it counts as neutral and may stand still for ever.
         """
-        released = self._released or self._released_ns > since_ns
+        released = self._released or self.releases > releases
         received_ns = self._received_ns
         if received_ns is None or now_ns - received_ns > self._timeout_ns:
             lost = self.lost(now_ns)
             # Seen released is more than lost: an immediate stop, not the shaped one.
-            released = self._released_ns > since_ns or (
+            released = self.releases > releases or (
                 self._released and lost is Reason.STICK_UNTRUSTED
             )
             # What the switches did meanwhile is not known; one that is held was not pressed.
@@ -88,7 +97,7 @@ class LeverInput(Input):
             fault = Reason.STICK_FROZEN
         else:
             return _new(StickInput, (command, None, True, bypass, reset, trip))
-        if released and enable != 0 and (self._released or self._doubted_ns > since_ns):
+        if released and enable != 0 and (self._released or self._doubted > releases):
             fault = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
         elif fault is None:
             return StickInput(command, enabled=False, reset=reset, trip=trip)

@@ -47,9 +47,9 @@ class Line:
         before, self._seen = self._seen, self._lever.raw
         return self._seen is not before
 
-    def pass_on(self, data: bytes, now_ns: int) -> Frame:
+    def pass_on(self, data: bytes, arrived_ns: int) -> Frame:
         """A frame of the lever as it leaves; nothing else in it is changed."""
-        self._passed_ns = now_ns
+        self._passed_ns = arrived_ns
         for runner in self._runners:
             if runner.trip is not None:  # the loop stood still, or the like: this is old
                 runner.bound.valve.put(0)

@@ -52,10 +52,10 @@ class Node:
             return Reason.ADDRESS_NOT_CLAIMED if neutral else Reason.SEND_FAILED
         return None
 
-    def receive(self, frame: Frame, now_ns: int) -> FrameFault:
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
         """Take a claim or a request; a claim that wins over ours is a fault."""
         before = self._claim.state
-        self._claim.receive(frame, now_ns)
+        self._claim.receive(frame, arrived_ns)
         lost = self._claim.state is ClaimState.LOST and before is not ClaimState.LOST
         return FrameFault.ADDRESS_LOST if lost else FrameFault.NONE
 

@@ -14,11 +14,11 @@ class RadiusInput:
         self._fixed_m = bound.config.radius_m
         self._measured = _measured(bound.radius) if bound.radius else None
 
-    def receive(self, data: bytes, now_ns: int) -> FrameFault:
+    def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
         """Take a frame; a fixed radius has none."""
         if self._measured is None:
             return FrameFault.WRONG_LENGTH
-        return self._measured.receive(data, now_ns)
+        return self._measured.receive(data, arrived_ns)
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""

@@ -32,9 +32,13 @@ class StickSource(Protocol):
     """Where an axis gets its stick from."""
 
     def stick(
-        self, signal: str, now_ns: int, since_ns: int, trip: Reason | None, neutral_band: float
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
         """What the axis may use now, see ``LeverInput``."""
+
+    @property
+    def releases(self) -> int:
+        """How often its enable was seen released."""
 
 
 class AxisRunner:
@@ -45,7 +49,7 @@ class AxisRunner:
         period_ticks, period_s: time between two commands to its valve.
         trip: a cause for neutral at once, noted since the last tick.
         lost: the input was lost since the last tick, though it may be back: neutral comes first.
-        contested_ns: when a frame of another sender with the id of this valve was last seen.
+        contested_ns: when the last frame of another sender with the id of this valve arrived.
         added: velocity that another axis asks of this one, fraction of full speed.
         control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
@@ -58,7 +62,7 @@ class AxisRunner:
         config = bound.config
         self.bound = bound
         self._lever = lever
-        self._ticked_ns = -1
+        self._releases = self._presses = 0  # as this axis knows them
         self._signal = config.stick.signal
         self._neutral_band = config.stick.neutral_pct / 100.0
         self.period_ticks = bound.period_ticks
@@ -93,6 +97,11 @@ class AxisRunner:
             self.control = ValveControl(bound.status_word, control, bound.valve.message)
             self.gates.append(self.control.gate)
         self.compensator: Compensator | None = None
+
+    def contest(self, arrived_ns: int) -> None:
+        """Another sender has sent the id of this valve: neutral at once, however long ago."""
+        self.trip = self.trip or Reason.SECOND_SENDER
+        self.contested_ns = arrived_ns
 
     def replace_lever(self, lever: StickSource) -> None:
         """Take the stick from somewhere else."""
@@ -137,8 +146,8 @@ class AxisRunner:
         if emergency or self.gates or self.lost or self.contested_ns is not None:
             fault = self._objections(now_ns, emergency)
         trip, self.trip = self.trip, None
-        stick = self._lever.stick(self._signal, now_ns, self._ticked_ns, trip, self._neutral_band)
-        self._ticked_ns = now_ns
+        stick = self._lever.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
+        self._releases = self._lever.releases
         # A release is more than a fault.
         if fault is not None and (stick.enabled or self.axis.neutral):
             stick = StickInput(fault=fault, reset=stick.reset, trip=trip)
@@ -175,8 +184,10 @@ class AxisRunner:
                 trip = trip or found
             else:
                 fault = fault or found
-        if emergency is not None and (stop := emergency.stop(now_ns, self._ticked_ns)):
-            if stop is Reason.EMERGENCY_STOP or not neutral:
+        if emergency is not None:
+            stop = emergency.stop(now_ns, self._presses)
+            self._presses = emergency.presses
+            if stop is Reason.EMERGENCY_STOP or (stop and not neutral):
                 trip = trip or stop
             else:  # not heard of yet: nothing to trip, but nothing may begin
                 fault = fault or stop

@@ -25,7 +25,7 @@ class ValueInput(Input):
 
     Attributes:
         value: the last one that counted, in the unit of the DBC.
-        measured_ns: when it came; None when there is none.
+        measured_ns: when it arrived; None when there is none.
     """
 
     def __init__(
@@ -41,7 +41,11 @@ class ValueInput(Input):
         self.measured_ns: int | None = None
 
     def heard(
-        self, raw: dict[str, Any], commands: dict[str, float | Reason], now_ns: int, counts: bool
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
     ) -> FrameFault:
         """An error code is no value, nor is what lies outside the range, or is no number."""
         code = raw[self._name]
@@ -49,7 +53,7 @@ class ValueInput(Input):
         if code in self._special or not self._low <= value <= self._high:
             return FrameFault.INVALID_SIGNAL
         if counts:
-            self.value, self.measured_ns = value, now_ns
+            self.value, self.measured_ns = value, arrived_ns
         return GOOD
 
     def fresh(self, now_ns: int) -> float | None:

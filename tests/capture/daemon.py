@@ -6,7 +6,7 @@ are late or missing, clocks that drift apart.
 
 import math
 import random
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 from canshaper.can.deployment import Deployment
@@ -88,8 +88,8 @@ def log_of(
         if standstill.over(now):
             controller.stalled()
         standstill.last_ns = now
-        while waiting and waiting[0][0] <= now:
-            controller.receive(waiting.pop(0)[1], now)
+        for arrived_ns, frame in _read(waiting, now):
+            controller.receive(frame, arrived_ns)
         at_ns = now + chance.randrange(20_000, 20_001 + hardness.think_ns)
         for frame in controller.tick(now, missed):
             logged(at_ns, frame)
@@ -112,6 +112,12 @@ def log_of(
     for number, frame in enumerate(controller.neutral_frames()):
         logged(at_ns + 50_000 * number, frame)
     return [line for _, _, line in sorted(lines)]
+
+
+def _read(waiting: list[tuple[int, Frame]], now_ns: int) -> Iterator[tuple[int, Frame]]:
+    """What a tick reads of what waits."""
+    while waiting and waiting[0][0] <= now_ns:
+        yield waiting.pop(0)
 
 
 def _levers(

@@ -11,6 +11,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.can.arrival import SO_TIMESTAMPNS
 from canshaper.can.binding import load_deployment
 from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import Frame
@@ -18,7 +19,7 @@ from canshaper.can.raw import CAN_FRAME
 from canshaper.cli.doctor import _listened
 from canshaper.doctor import listen as listening
 from canshaper.doctor.finding import Finding, Level
-from canshaper.doctor.listen import SO_TIMESTAMPNS, heard_findings
+from canshaper.doctor.listen import heard_findings
 from tests.doctor.conftest import ROOT, SHIPPED
 from tests.service.j1939_rig import bjm
 

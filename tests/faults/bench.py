@@ -41,6 +41,7 @@ class BenchPort:
         self.name, self.channel = name, channel
         self.waiting: deque[tuple[Frame, int]] = deque()
         self.late: deque[tuple[Frame, int]] = deque()  # of our own ids: read behind the tick
+        self.arrived_ns = 0
         self._bench = bench
 
     def frames(self) -> Iterator[Frame]:
@@ -56,6 +57,7 @@ class BenchPort:
             frame, arrived_ns = waiting.popleft()
             self._bench.tell(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
             self._bench.rules.hear(frame, arrived_ns)
+            self.arrived_ns = arrived_ns
             yield frame
 
     def send(self, frame: Frame) -> bool:

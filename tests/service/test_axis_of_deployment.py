@@ -95,6 +95,7 @@ def test_an_axis_without_sway_tells_none(changed_rig: Make) -> None:
 def test_an_axis_takes_its_stick_from_where_it_is_told(rig: Rig) -> None:
     class Elsewhere:
         command = 0.0
+        releases = 0
 
         def stick(self, *_arguments: object) -> StickInput:
             return StickInput(self.command)

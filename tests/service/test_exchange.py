@@ -26,6 +26,7 @@ class Waiting:
 
     name = "crane"
     state = BusState.UP
+    arrived_ns = 10**18  # younger than the clock of the rig: as old as the tick
 
     def __init__(self, most: int = 1000) -> None:
         self.queue: list[Frame] = []

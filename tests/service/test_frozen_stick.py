@@ -25,7 +25,7 @@ def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make)
     rig = changed_rig(ONE_SECOND)
     for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.STICK_FROZEN)):
         lever.receive(rig.lever(Slew=500).data, now_ns)
-        assert lever.stick("Slew", now_ns, -1, None, 0.02).fault is fault
+        assert lever.stick("Slew", now_ns, 0, None, 0.02).fault is fault
 
 
 ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    frozen_s: 1\n  right")}

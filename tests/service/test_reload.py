@@ -39,21 +39,24 @@ class FakePort:
         self.name = name
         self.channel = channel
         self.waiting: list[tuple[int, Frame]] = []
+        self.arrived_ns = 0
         self.closed = False
         self._bench = bench
 
     def frames(self) -> Iterator[Frame]:
-        yield from self._heard(lambda can_id: can_id < 0x200)
+        for arrived_ns, frame in self._heard(lambda can_id: can_id < 0x200):
+            self.arrived_ns = arrived_ns
+            yield frame
 
     def others(self) -> Iterator[Frame]:
-        yield from self._heard(lambda can_id: can_id >= 0x200)
+        yield from (frame for _, frame in self._heard(lambda can_id: can_id >= 0x200))
 
-    def _heard(self, wanted: Callable[[int], bool]) -> list[Frame]:
+    def _heard(self, wanted: Callable[[int], bool]) -> list[tuple[int, Frame]]:
         assert not self.closed
         now_ns = self._bench.now_ns
-        found = [f for at, f in self.waiting if at <= now_ns and wanted(f.can_id)]
+        found = [(t, f) for t, f in self.waiting if t <= now_ns and wanted(f.can_id)]
         self.waiting = [(t, f) for t, f in self.waiting if t > now_ns or not wanted(f.can_id)]
-        return [frame._replace(bus=self.name) for frame in found]
+        return [(at, frame._replace(bus=self.name)) for at, frame in found]
 
     def send(self, frame: Frame) -> bool:
         assert not self.closed
