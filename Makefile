@@ -88,6 +88,7 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/replay.py
 	.venv/bin/python benchmarks/tune.py
 	.venv/bin/python benchmarks/frames.py
+	.venv/bin/python benchmarks/hostile.py
 	.venv/bin/python benchmarks/kilohertz.py
 	.venv/bin/python benchmarks/kilohertz.py --vcan --seconds 3
 	.venv/bin/python benchmarks/memory.py --minutes 1 --every 5

@@ -7,7 +7,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.can.canopen import STATE_BITS, service_of
 from canshaper.can.codecs import Sender
-from canshaper.can.database import DbcFile, Messages, load_dbc
+from canshaper.can.database import MOST_BYTES, DbcFile, Messages, load_dbc
 from canshaper.can.j1939 import NULL, WITHOUT_PRIORITY, has_destination, with_source
 from canshaper.can.layout import is_j1939
 from canshaper.can.protection import Protection
@@ -34,6 +34,9 @@ class Lookup:
     def load(self, directory: Path) -> Messages | None:
         """Load the DBC files; None when one is none, so that its messages are not missed too."""
         files = []
+        if (size := sum(_size(directory / name) for name in self.config.dbc)) > MOST_BYTES:
+            self.add(("dbc",), f"found {size} bytes in all, allowed are {MOST_BYTES} at most")
+            return None
         for i, name in enumerate(self.config.dbc):
             try:
                 file, problems = load_dbc(directory / name)
@@ -188,3 +191,11 @@ class Lookup:
             self.problems.append(file.problem(message, text))
             return 0
         return cycle // tick
+
+
+def _size(path: Path) -> int:
+    """Bytes of a file; 0 for one that cannot be read, which is a problem of its own."""
+    try:
+        return path.stat().st_size
+    except (OSError, ValueError):
+        return 0

@@ -15,8 +15,9 @@ from typing import Any
 
 import yaml
 
+from canshaper.config.bounded import read_bounded
 from canshaper.config.load import load_config
-from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.config.source import MOST_BYTES, DeploymentError, Place, Problem, Source
 
 Value = float | str | Sequence[float] | None
 """A value to write, a number, a plain word or a list of numbers; None takes the key away."""
@@ -226,7 +227,7 @@ def _expected(data: Any, place: Place, values: Mapping[str, Value]) -> Any:
 
 def _read(path: Path) -> str:
     try:
-        return path.read_bytes().decode("utf-8")
+        return read_bounded(path, MOST_BYTES).decode("utf-8")
     except OSError as error:
         raise _failed(path, error) from None
     except UnicodeDecodeError:

@@ -8,10 +8,18 @@ from typing import Any
 
 import yaml
 
+from canshaper.config.bounded import read_bounded
+
 Place = tuple[str | int, ...]
 
-# Far beyond any machine; anchors within anchors can make a few lines grow without end.
-MOST_NODES = 50_000
+# Far beyond any machine: the shipped files have 5 kB and 500 nodes at most. A file that others made
+# must not take the memory or the time of who reads it.
+MOST_BYTES = 262_144
+MOST_NODES = 10_000  # anchors within anchors can make a few lines grow without end
+MOST_NESTED = 50
+# Of one file, and of one problem: a person reads no more.
+MOST_PROBLEMS = 100
+MOST_LETTERS = 2000
 
 _TAG = "tag:yaml.org,2002:"
 _SCALARS = frozenset(_TAG + t for t in ("str", "int", "float", "bool", "null", "timestamp"))
@@ -34,15 +42,38 @@ class Problem:
 
     def __str__(self) -> str:
         place = self.file if self.line is None else f"{self.file}:{self.line}"
-        return ": ".join(part for part in (place, self.where, self.message) if part)
+        text = ": ".join(part for part in (place, self.where, self.message) if part)
+        return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."
 
 
 class DeploymentError(Exception):
     """A deployment that must not start; carries every problem found."""
 
     def __init__(self, problems: list[Problem]) -> None:
-        super().__init__("\n".join(str(p) for p in problems))
+        lines = [str(problem) for problem in problems[:MOST_PROBLEMS]]
+        if more := len(problems) - len(lines):
+            lines.append(f"and {more} more problems")
+        super().__init__("\n".join(lines))
         self.problems = problems
+
+
+class _Loader(yaml.SafeLoader):
+    """Gives up early: where the file nests without end each token takes longer than the last."""
+
+    _nodes = 0
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """The next node of the file."""
+        self._nodes += 1
+        if self._nodes > MOST_NODES:
+            raise yaml.MarkedYAMLError(None, None, "too large", self.get_mark())
+        return super().compose_node(parent, index)
+
+    def fetch_flow_collection_start(self, token: type[yaml.Token]) -> None:
+        """An opening bracket."""
+        if self.flow_level >= MOST_NESTED:
+            raise yaml.MarkedYAMLError(None, None, "nested too deeply", self.get_mark())
+        super().fetch_flow_collection_start(token)
 
 
 class Source:
@@ -62,10 +93,10 @@ class Source:
         self._count = 0
         content = ""
         try:
-            data = path.read_bytes()
+            data = read_bounded(path, MOST_BYTES)
             self.sha256 = sha256(data).hexdigest()
             content = data.decode("utf-8")
-            node = yaml.compose(content, Loader=yaml.SafeLoader)
+            node = yaml.compose(content, Loader=_Loader)
             self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:
             raise DeploymentError([self.problem((), error.strerror or str(error))]) from None

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.config import bounded
 from canshaper.config.source import DeploymentError, Source
 
 Problems = Callable[[str | bytes], list[str]]
@@ -42,7 +43,8 @@ def unreadable(path: Path) -> str:
         (bytes(range(256)), ":2: not YAML: 'utf-8' codec can't decode"),
         (b"a: 1\r\n\n\xff", ":3: not YAML: 'utf-8' codec can't decode byte 0xff in position 7"),
         ('a: "\\UFFFFFFFF"\n', ": not YAML: "),
-        ("[" * 3000, ": nested too deeply"),
+        ("[" * 3000, ":1: not YAML: nested too deeply"),
+        ("- " * 3000, ": nested too deeply"),
         ("a: &a [*a]\n", ":1: nested too deeply, or an anchor that contains itself"),
         ("a: &a {b: *a}\n", ":1: nested too deeply, or an anchor that contains itself"),
     ],
@@ -97,7 +99,7 @@ def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     def refuse(*_args: object, **_options: object) -> str:
         raise PermissionError(13, "Permission denied")
 
-    monkeypatch.setattr(Path, "read_bytes", refuse)
+    monkeypatch.setattr(bounded.os, "open", refuse)
     assert unreadable(tmp_path / "a.yaml") == ": Permission denied"
 
 

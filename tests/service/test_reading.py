@@ -15,6 +15,7 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
 from canshaper.config.source import DeploymentError, Problem
+from canshaper.service import reading as reading_module
 from canshaper.service.controller import Controller
 from canshaper.service.reading import Reading
 from tests.service.conftest import ROOT, TICK_NS
@@ -121,6 +122,43 @@ def test_a_reader_that_dies_is_a_refusal(end: Callable[[], None], status: int) -
         raise AssertionError
 
     assert read(load) == f"its reader ended with status {status}"
+
+
+def test_a_reader_that_takes_the_memory_is_a_refusal() -> None:
+    def load() -> Deployment:
+        bytearray(2 * reading_module.MOST_BYTES)
+        raise AssertionError
+
+    assert read(load) == "its reader took more than 140 MB"
+
+
+def test_a_reader_that_takes_the_processor_is_a_refusal(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(reading_module, "MOST_CPU_S", 1)
+
+    def load() -> Deployment:
+        while True:
+            pass
+
+    assert read(load) == "its reader took more than 1 s of a processor"
+
+
+def test_a_reader_that_never_ends_is_a_refusal_and_leaves_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    before = descriptors(), children()
+    now_s = [1000.0]
+    monkeypatch.setattr(reading_module.time, "monotonic", lambda: now_s[0])
+
+    def load() -> Deployment:
+        signal.pause()
+        raise AssertionError
+
+    reading = Reading(load)
+    now_s[0] += 59.9
+    assert reading.result() is None
+    now_s[0] += 0.1
+    assert reading.result() == "its reader took longer than 60 s"
+    assert (descriptors(), children()) == before
 
 
 def test_its_reader_never_has_the_priority_of_the_loop() -> None:
