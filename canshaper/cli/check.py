@@ -40,8 +40,7 @@ def check(file: str = FILE) -> None:
     try:
         deployment = loader(file)()
     except DeploymentError as error:
-        for problem in error.problems:
-            typer.echo(str(problem), err=True)
+        typer.echo(str(error), err=True)
         count = len(error.problems)
         typer.echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
         raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None

@@ -10,9 +10,14 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-# One request or answer; a deployment with a hundred adjustable numbers takes a tenth of it.
+# An answer; a deployment with a hundred adjustable numbers takes a tenth of it.
 MOST_BYTES = 65536
+# A request: to read and refuse nonsense of this size costs the loop a tenth of a millisecond
+# (benchmarks/control.py).
+MOST_REQUEST = 4096
 MOST_CLIENTS = 4
+# Who asks nothing for so long leaves room for others.
+SILENT_NS = 10_000_000_000
 # Between two requests: a slider that is dragged must not keep the loop busy.
 LEAST_BETWEEN_NS = 50_000_000
 _PEER = struct.Struct("3i")  # struct ucred: pid, uid, gid
@@ -35,22 +40,27 @@ class ControlServer:
     def __init__(self, path: Path, mode: int) -> None:
         self._path = path
         self._clients: dict[int, socket.socket] = {}
+        self._spoke_ns: dict[int, int] = {}  # when a client came, or asked last
         self._not_before_ns = 0
         self._socket = _listening(path, mode)
         self._poll = select.poll()
         self._poll.register(self._socket, select.POLLIN)
 
     def serve(self, answer: Answer, now_ns: int) -> None:
-        """Take what waits: a new client, or one request."""
+        """Take what waits: a new client, and one request of the client that asked longest ago."""
         if now_ns < self._not_before_ns:
             return
-        for number, _ in self._poll.poll(0):
-            client = self._clients.get(number)
-            if client is None:
-                self._accept()
+        waiting = {number for number, _ in self._poll.poll(0)}
+        if self._socket.fileno() in waiting:
+            self._accept(now_ns)
+        for number, spoke_ns in sorted(self._spoke_ns.items(), key=lambda item: item[1]):
+            if number not in waiting:
+                if now_ns - spoke_ns > SILENT_NS:
+                    self._drop(number)
                 continue
+            client = self._clients[number]
             try:
-                data = client.recv(MOST_BYTES)
+                data = client.recv(MOST_REQUEST + 1)  # of a longer message the rest is lost
                 if data:
                     client.send(_answered(data, answer, _peer(client)), socket.MSG_DONTWAIT)
             except OSError:  # gone, or does not read its answers
@@ -58,6 +68,7 @@ class ControlServer:
             if not data:
                 self._drop(number)
                 continue
+            self._spoke_ns[number] = now_ns
             self._not_before_ns = now_ns + LEAST_BETWEEN_NS
             return
 
@@ -69,7 +80,7 @@ class ControlServer:
         with suppress(OSError):
             self._path.unlink()
 
-    def _accept(self) -> None:
+    def _accept(self, now_ns: int) -> None:
         with suppress(OSError):
             client, _ = self._socket.accept()
             if len(self._clients) >= MOST_CLIENTS:
@@ -77,10 +88,12 @@ class ControlServer:
                 return
             client.setblocking(False)
             self._clients[client.fileno()] = client
+            self._spoke_ns[client.fileno()] = now_ns
             self._poll.register(client, select.POLLIN)
 
     def _drop(self, number: int) -> None:
         self._poll.unregister(number)
+        del self._spoke_ns[number]
         self._clients.pop(number).close()
 
 
@@ -123,6 +136,10 @@ def _peer(client: socket.socket) -> str:
 
 def _answered(data: bytes, answer: Answer, peer: str) -> bytes:
     try:
+        if len(data) > MOST_REQUEST:
+            raise ValueError(
+                f"found a request of more than {MOST_REQUEST} bytes, allowed are no more"
+            )
         # A number of a thousand digits is infinite like every other that is too large.
         request = json.loads(data, parse_int=float)
         if not isinstance(request, dict):

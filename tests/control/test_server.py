@@ -13,7 +13,13 @@ from typing import Any
 import pytest
 
 from canshaper.control import client
-from canshaper.control.server import LEAST_BETWEEN_NS, MOST_BYTES, MOST_CLIENTS, ControlServer
+from canshaper.control.server import (
+    LEAST_BETWEEN_NS,
+    MOST_BYTES,
+    MOST_CLIENTS,
+    SILENT_NS,
+    ControlServer,
+)
 
 
 class Rig:
@@ -70,8 +76,11 @@ def test_a_request_is_answered_and_says_who_asks(rig: Rig) -> None:
         (b"\xff\xfe\x00", "codec"),
         (b"[1]", "found no object"),
         (b'{"bad": 1}', "no such thing"),
-        (b"[" * 60000, "recursion"),
-        (b'{"a": ' + b"9" * 50000 + b', "bad": 1}', "no such thing"),
+        (b"[" * 4096, "recursion"),
+        (b'{"a": ' + b"9" * 4000 + b', "bad": 1}', "no such thing"),
+        (b'{"bad": 1' + b" " * 4086 + b"}", "no such thing"),
+        (b'{"bad": 1' + b" " * 4087 + b"}", "found a request of more than 4096 bytes"),
+        (b"[" * 60000, "found a request of more than 4096 bytes"),
     ],
 )
 def test_nonsense_is_told_and_the_next_request_served(rig: Rig, data: bytes, why: str) -> None:
@@ -107,6 +116,46 @@ def test_more_clients_than_there_is_room_for_are_sent_away(rig: Rig) -> None:
         assert next_one.recv(MOST_BYTES)
     for one in clients:
         one.close()
+
+
+def test_silent_clients_leave_room_for_others(rig: Rig) -> None:
+    """Also one that has asked before; one that asks now and then stays."""
+    asks, silent, *others = (rig.connected() for _ in range(MOST_CLIENTS))
+    begin = rig.now_ns
+    silent.send(b"{}")
+    rig.serve()
+    while rig.now_ns <= begin + 2 * SILENT_NS:
+        asks.send(b"{}")
+        rig.serve()
+        assert asks.recv(MOST_BYTES)
+        rig.now_ns += SILENT_NS // 3
+    assert silent.recv(MOST_BYTES)
+    assert [one.recv(10) for one in (silent, *others)] == [b""] * (MOST_CLIENTS - 1)
+    with rig.connected() as late:
+        late.send(b"{}")
+        rig.serve()
+        assert late.recv(MOST_BYTES)
+    for one in (asks, silent, *others):
+        one.close()
+
+
+def test_a_client_that_waits_no_longer_than_allowed_stays(rig: Rig) -> None:
+    with rig.connected() as one:
+        rig.now_ns = SILENT_NS
+        rig.serve()
+        one.send(b"{}")
+        rig.serve()
+        assert one.recv(MOST_BYTES)
+
+
+def test_who_asks_all_the_time_does_not_keep_others_out(rig: Rig) -> None:
+    with rig.connected() as greedy, rig.connected() as other:
+        for _ in range(5):
+            greedy.send(b'{"who": 1}')
+        rig.serve()
+        other.send(b'{"who": 2}')
+        rig.serve(2)
+    assert [request["who"] for request in rig.asked] == [1, 2, 1]
 
 
 def test_a_client_that_reads_no_answers_is_dropped(rig: Rig) -> None:

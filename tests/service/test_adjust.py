@@ -112,6 +112,11 @@ def test_in_motion_nothing_jumps_and_the_new_filter_is_in_force(make: Make, at: 
     [
         ({}, "^found no number to change$"),
         (
+            {f"axes.slew.sway.{i}": 1.0 for i in range(17)},
+            "^found 17 numbers, allowed are 16 in one request$",
+        ),
+        ({f"axes.slew.sway.{i}": 1.0 for i in range(16)}, "axes.slew.sway.0: not adjustable"),
+        (
             {"axes.slew.stick.neutral_pct": 2.0},
             r"not adjustable; allowed are axes\.slew\.sway\.period_s, axes\.slew\.sway\.full",
         ),
