@@ -3,11 +3,12 @@
 
 # make coverage   every line and branch of what decides whether a valve moves (within make test)
 # make mutation   does a test notice every small change of it? (mutation-core: within make test)
+# make paper   the paper's figures and numbers beside ours, in out/paper
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core fuzz soak j1939 bench bench-realtime deb lock clean
+.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -71,6 +72,10 @@ FUZZ_S ?= 60
 fuzz: .venv/fuzz-ready
 	set -e; for target in frames ports deployment dbc yaml; do \
 		.venv/bin/python -m tests.fuzz $$target --seconds $(FUZZ_S); done
+
+paper: .venv/test-ready
+	.venv/bin/python -m studies.paper
+	.venv/bin/python -m pytest -q studies
 
 MINUTES ?= 30
 soak: .venv/test-ready

@@ -12,8 +12,8 @@ import time
 
 from canshaper.can.binding import load_deployment
 from canshaper.cli.common import deployment_path
+from canshaper.design.lockstep import drive
 from canshaper_sim.crane import Crane
-from canshaper_sim.lockstep import drive
 from canshaper_sim.operator import SCRIPTS
 
 

@@ -19,10 +19,10 @@ from pathlib import Path
 import can
 
 from canshaper.can.frame import Frame
-from canshaper.capture.log import read_log
-from canshaper.capture.replay import Replay, look
 from canshaper.cli.common import loader
 from canshaper.cli.replay import _without_collector
+from canshaper.recording.log import read_log
+from canshaper.recording.replay import Replay, look
 from canshaper.service.controller import Controller
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import script_named

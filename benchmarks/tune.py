@@ -20,9 +20,9 @@ from numpy.typing import NDArray
 from scipy.linalg import expm
 from scipy.optimize import minimize
 
+from canshaper.design.tuning.formulation import Requirements, Task
+from canshaper.design.tuning.optimal import Tuning, tune
 from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.formulation import Requirements, Task
-from canshaper.tuning.optimal import Tuning, tune
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 TASKS = {

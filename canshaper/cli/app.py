@@ -18,7 +18,6 @@ from canshaper.cli import (
     monitor,
     record,
     replay,
-    reproduce,
     robust,
     run,
     set,
@@ -71,7 +70,6 @@ app.command("studio")(studio.studio)
 app.command("compare")(compare.compare)
 app.command("tune")(tune.tune)
 app.command("robust")(robust.robust)
-app.command("reproduce")(reproduce.reproduce)
 app.command("config-schema")(config_schema.config_schema)
 
 

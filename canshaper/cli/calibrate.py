@@ -19,9 +19,9 @@ from canshaper.cli.common import (
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
-    from canshaper.calibration.drive import CalibrationDrive
-    from canshaper.calibration.fit import Calibration
     from canshaper.can.deployment import Deployment
+    from canshaper.commissioning.calibration.drive import CalibrationDrive
+    from canshaper.commissioning.calibration.fit import Calibration
 
 # Speed of each axis as `canshaper sim` tells it.
 SIMULATED = {
@@ -69,11 +69,11 @@ def calibrate(
 
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """
-    from canshaper.calibration.drive import CalibrationDrive
-    from canshaper.calibration.fit import CalibrationError
-    from canshaper.calibration.ramp import Ramp
-    from canshaper.calibration.run import run_live
     from canshaper.can.bus import BusError
+    from canshaper.commissioning.calibration.drive import CalibrationDrive
+    from canshaper.commissioning.calibration.fit import CalibrationError
+    from canshaper.commissioning.calibration.ramp import Ramp
+    from canshaper.commissioning.calibration.run import run_live
     from canshaper.config.source import DeploymentError
 
     try:
@@ -99,7 +99,7 @@ def calibrate(
             if live:
                 run_live(drive, deployment, tell)
             else:
-                from canshaper_sim.calibrating import run_simulated
+                from canshaper.commissioning.calibration.simulated import run_simulated
                 from canshaper_sim.parameters import changed_parameters
 
                 run_simulated(drive, deployment, changed_parameters(changes or []), tell)

@@ -14,7 +14,7 @@ from rich.table import Table
 from canshaper.cli.common import INSTALL_TOOLS, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper_sim.comparison.summary import Row
+    from canshaper.design.comparison.summary import Row
 
 
 def compare(
@@ -44,10 +44,10 @@ def compare(
       canshaper compare --json --processes 1
     """
     from canshaper.config.source import DeploymentError
-    from canshaper_sim.comparison.candidates import candidates, nominal_mode
-    from canshaper_sim.comparison.manoeuvres import manoeuvres
-    from canshaper_sim.comparison.measure import measure_all
-    from canshaper_sim.comparison.summary import recommendations, rows
+    from canshaper.design.comparison.candidates import candidates, nominal_mode
+    from canshaper.design.comparison.manoeuvres import manoeuvres
+    from canshaper.design.comparison.measure import measure_all
+    from canshaper.design.comparison.summary import recommendations, rows
 
     console = Console(stderr=as_json)
     try:
@@ -87,8 +87,8 @@ def compare(
     else:
         _tell(table, [why for _, why in advice.values()], console, slew=axis == "slew")
     try:
+        from canshaper.design.comparison.limits import limits_for
         from canshaper.report.pareto import Point, draw
-        from canshaper_sim.comparison.limits import limits_for
     except ImportError:
         console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
         return
@@ -106,7 +106,7 @@ def compare(
 
 def _tell(table: "list[Row]", advice: list[str], console: Console, *, slew: bool) -> None:
     """Table, recommendations, and which of ours beats each of the others."""
-    from canshaper_sim.comparison.summary import beaten_by
+    from canshaper.design.comparison.summary import beaten_by
 
     console.print(_table(table, slew=slew))
     for why in advice:

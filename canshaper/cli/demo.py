@@ -12,7 +12,7 @@ from canshaper.cli.common import INSTALL_TOOLS, fail, loader
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
-    from canshaper.report.recording import Recording
+    from canshaper_sim.recording import Recording
 
 # What `report.json` says of a drive without a bus.
 LOCKSTEP = "lock-step, no bus"
@@ -45,12 +45,12 @@ def demo(
       canshaper demo --set grapple.l2_m=1.5
     """
     from canshaper.config.source import DeploymentError
+    from canshaper.design.lockstep import drive
+    from canshaper.design.processes import DriveError, choose_transport, drive_on_bus
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
-    from canshaper_sim.lockstep import drive
     from canshaper_sim.operator import script_named
     from canshaper_sim.parameters import changed_parameters
-    from canshaper_sim.processes import DriveError, choose_transport, drive_on_bus
 
     console = Console()
     try:

@@ -14,7 +14,7 @@ from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
-    from canshaper.doctor.finding import Finding
+    from canshaper.commissioning.doctor.finding import Finding
 
 EXIT_NOT_FIT = 1
 
@@ -53,14 +53,14 @@ def doctor(
 
       canshaper doctor config/forwarder.yaml --no-load --listen 10
     """
+    from canshaper.commissioning.doctor.finding import fit
+    from canshaper.commissioning.doctor.interfaces import bus_findings
+    from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
+    from canshaper.commissioning.doctor.machine import machine_findings
+    from canshaper.commissioning.doctor.measure import measure
+    from canshaper.commissioning.doctor.processes import MeasureError
+    from canshaper.commissioning.doctor.report import as_dict, print_report
     from canshaper.config.source import DeploymentError
-    from canshaper.doctor.finding import fit
-    from canshaper.doctor.interfaces import bus_findings
-    from canshaper.doctor.judge import IDLE, LOADED, measured_findings
-    from canshaper.doctor.machine import machine_findings
-    from canshaper.doctor.measure import measure
-    from canshaper.doctor.processes import MeasureError
-    from canshaper.doctor.report import as_dict, print_report
 
     try:
         deployment = loader(file, interface, channel)()
@@ -88,8 +88,8 @@ def doctor(
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
     from canshaper.can.device import WrongDeviceError
-    from canshaper.doctor.finding import Finding, Level
-    from canshaper.doctor.listen import heard_findings, listen
+    from canshaper.commissioning.doctor.finding import Finding, Level
+    from canshaper.commissioning.doctor.listen import heard_findings, listen
 
     try:
         with _progress(f"listening, {seconds:g} s", seconds) as tell:

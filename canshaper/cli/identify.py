@@ -12,8 +12,8 @@ from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
-    from canshaper.identification.judge import Finding
-    from canshaper.identification.recommend import Advice
+    from canshaper.commissioning.identification.judge import Finding
+    from canshaper.commissioning.identification.recommend import Advice
 
 EXIT_TOO_POOR = 1
 
@@ -81,8 +81,8 @@ def identify(
         signals_named,
         timed_by_hand,
     )
+    from canshaper.commissioning.identification.recommend import advise
     from canshaper.config.source import DeploymentError
-    from canshaper.identification.recommend import advise
 
     try:
         deployment = loader(file)() if file else None
@@ -136,7 +136,7 @@ def _draw(
     if not seen:
         return None
     try:
-        from canshaper.identification.plot import draw
+        from canshaper.commissioning.identification.plot import draw
     except ImportError:
         return f"none, matplotlib is missing: {INSTALL_TOOLS}"
     out.mkdir(parents=True, exist_ok=True)
@@ -150,9 +150,9 @@ def _write(
 ) -> list[str]:
     """Write what is known of each axis; the axes that were written."""
     from canshaper.can.stopping import stop_fault
+    from canshaper.commissioning.identification.recommend import flow
     from canshaper.config.edit import Value, set_values
     from canshaper.config.sway import Sway
-    from canshaper.identification.recommend import flow
 
     usable = [a for a in advice if all(f.usable for f in findings if f.axis == a.axis)]
     for one in usable:
@@ -185,7 +185,7 @@ def _tell(
     *,
     as_json: bool,
 ) -> None:
-    from canshaper.identification.report import as_dict, lines, set_lines
+    from canshaper.commissioning.identification.report import as_dict, lines, set_lines
 
     if as_json:
         result = as_dict(findings, advice)

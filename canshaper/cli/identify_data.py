@@ -13,8 +13,8 @@ from canshaper.cli.common import data_directory
 if TYPE_CHECKING:
     from canshaper.can.database import Messages
     from canshaper.can.deployment import Deployment
-    from canshaper.identification.judge import Finding
-    from canshaper.identification.series import Series
+    from canshaper.commissioning.identification.judge import Finding
+    from canshaper.commissioning.identification.series import Series
 
 # Swing of each axis as `canshaper sim` tells it.
 SIMULATED = {
@@ -27,8 +27,8 @@ UNNAMED = "swing"
 
 def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) -> "Finding":
     """What a stopwatch tells."""
-    from canshaper.identification.judge import Finding
-    from canshaper.identification.stopwatch import stopwatch
+    from canshaper.commissioning.identification.judge import Finding
+    from canshaper.commissioning.identification.stopwatch import stopwatch
 
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
@@ -89,10 +89,10 @@ def logged(
     about_s: float | None,
 ) -> list["Finding"]:
     """What logs tell, by axis and label."""
-    from canshaper.identification.canlog import read_can
-    from canshaper.identification.judge import identify as judged
-    from canshaper.identification.phone import series_of
-    from canshaper.identification.table import is_table, read_table
+    from canshaper.commissioning.identification.canlog import read_can
+    from canshaper.commissioning.identification.judge import identify as judged
+    from canshaper.commissioning.identification.phone import series_of
+    from canshaper.commissioning.identification.table import is_table, read_table
 
     if not logs:
         raise ValueError("found no log and no stopwatch; see canshaper identify --help")

@@ -40,8 +40,8 @@ def monitor(
       canshaper monitor machine.yaml --plain | tee monitor.txt
     """
     from canshaper.can.bus import BusError
+    from canshaper.commissioning.monitor.run import run_live, run_plain
     from canshaper.config.source import DeploymentError
-    from canshaper.monitor.run import run_live, run_plain
 
     stop = _Stop()
     console = Console()

@@ -15,7 +15,7 @@ from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK,
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
-    from canshaper.capture.record import Recording
+    from canshaper.recording.record import Recording
 
 EXIT_NOT_WRITTEN = 1
 
@@ -51,8 +51,8 @@ def record(
       canshaper record machine.yaml --out drive.log
     """
     from canshaper.can.bus import BusError
-    from canshaper.capture.record import Recording
     from canshaper.config.source import DeploymentError
+    from canshaper.recording.record import Recording
 
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", ".log"):
@@ -113,7 +113,7 @@ def _bundle(
     failure: Exception | None,
 ) -> None:
     """Put everything into one file."""
-    from canshaper.capture.bundle import pack
+    from canshaper.recording.bundle import pack
 
     facts = {
         "seconds": round(recording.seconds, 3),

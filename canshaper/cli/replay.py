@@ -16,8 +16,8 @@ from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
-    from canshaper.capture.replay import Drive
-    from canshaper.capture.report import Replayed
+    from canshaper.recording.replay import Drive
+    from canshaper.recording.report import Replayed
 
 EXIT_DIFFERENT = 1
 DAEMON, CLOCK = "daemon", "clock"
@@ -64,9 +64,9 @@ def replay(
 
       canshaper replay recording.zip --verify
     """
-    from canshaper.capture.bundle import unpack
-    from canshaper.capture.frames import LogError
     from canshaper.config.source import DeploymentError
+    from canshaper.recording.bundle import unpack
+    from canshaper.recording.frames import LogError
 
     if ticks not in (None, DAEMON, CLOCK):
         raise typer.BadParameter(f"found {ticks}, allowed are {DAEMON} and {CLOCK}")
@@ -103,9 +103,9 @@ def _run(
     out: Path,
 ) -> "list[Replayed]":
     """Replay every deployment, one after the other."""
-    from canshaper.capture.frames import LogError
-    from canshaper.capture.replay import look
-    from canshaper.capture.report import Replayed
+    from canshaper.recording.frames import LogError
+    from canshaper.recording.replay import look
+    from canshaper.recording.report import Replayed
 
     loads = [loader(config) for config in configs]
     names = _names([deployment_path(config) for config in configs])
@@ -138,10 +138,10 @@ def _one(
     tell: Callable[[float], None],
 ) -> "Replayed":
     """Replay one deployment, and write its log and its events."""
-    from canshaper.capture.replay import Replay
-    from canshaper.capture.report import Replayed
-    from canshaper.capture.trace import Trace
-    from canshaper.capture.write import LogWriter
+    from canshaper.recording.replay import Replay
+    from canshaper.recording.report import Replayed
+    from canshaper.recording.trace import Trace
+    from canshaper.recording.write import LogWriter
 
     replay = Replay(load, drive, by_daemon=by_daemon)
     done = Replayed(name, deployment, replay, Trace(deployment, *window))
@@ -168,7 +168,7 @@ def _one(
 
 def _show(replays: "list[Replayed]", out: Path, console: Console) -> bool:
     """Print and write everything; whether anything was not the same as in the log."""
-    from canshaper.capture.report import print_replays, verdict_lines
+    from canshaper.recording.report import print_replays, verdict_lines
 
     first = replays[0]
     seconds = (first.trace.end_ns - (first.trace.start_ns or 0)) / 1e9
@@ -193,7 +193,7 @@ def _show(replays: "list[Replayed]", out: Path, console: Console) -> bool:
     (out / "replay.json").write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     made = [f"{one.name}.log" for one in replays] + ["replay.json"]
     try:
-        from canshaper.capture.plot import draw
+        from canshaper.recording.plot import draw
     except ImportError:
         console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
     else:

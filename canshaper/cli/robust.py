@@ -12,7 +12,7 @@ from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
     from canshaper.config.filters import Filter
-    from canshaper.tuning.evaluate import Evaluation
+    from canshaper.design.tuning.evaluate import Evaluation
 
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
@@ -46,9 +46,9 @@ def robust(
     from canshaper.config.edit import Value, set_values
     from canshaper.config.filters import RobustFilter
     from canshaper.config.source import DeploymentError
+    from canshaper.design.tuning.evaluate import Machine, evaluate
+    from canshaper.design.tuning.robust import least_residual, shortest
     from canshaper.shaping.registry import build_shaper
-    from canshaper.tuning.evaluate import Machine, evaluate
-    from canshaper.tuning.robust import least_residual, shortest
 
     console = Console()
     try:

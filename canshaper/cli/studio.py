@@ -15,7 +15,7 @@ from canshaper.cli.common import CHANNEL, INTERFACE, deployment_path, fail, load
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
-    from canshaper_sim.processes import Transport
+    from canshaper.design.processes import Transport
 
 # What only the extra ``studio`` installs.
 NEEDS = ("starlette", "uvicorn", "websockets")
@@ -110,9 +110,9 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     Raises:
         ValueError: a channel on which the sticks might move a real machine.
     """
-    from canshaper.doctor.interfaces import read_link
+    from canshaper.commissioning.doctor.interfaces import read_link
+    from canshaper.design.processes import Transport
     from canshaper.studio.crane import groups
-    from canshaper_sim.processes import Transport
 
     if interface == "udp_multicast" and channels:
         return [Transport(interface, one, one) for one in channels[:2]]

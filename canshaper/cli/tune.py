@@ -14,10 +14,10 @@ from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader, refuse_shipp
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import BoundAxis, Deployment
-    from canshaper.tuning.deploy import Setting
-    from canshaper.tuning.evaluate import Machine
-    from canshaper.tuning.formulation import Task
-    from canshaper.tuning.optimal import Tuning
+    from canshaper.design.tuning.deploy import Setting
+    from canshaper.design.tuning.evaluate import Machine
+    from canshaper.design.tuning.formulation import Task
+    from canshaper.design.tuning.optimal import Tuning
 
 
 def tune(
@@ -138,7 +138,7 @@ def _task(
     **options: Any,
 ) -> "Task":
     """What the options ask, with what the deployment says of the axis where they say nothing."""
-    from canshaper.tuning.formulation import Requirements, Task, Weights
+    from canshaper.design.tuning.formulation import Requirements, Task, Weights
 
     assert bound.config.sway is not None
     limits = bound.config.limits
@@ -163,7 +163,7 @@ def _task(
 def _solve(
     task: "Task", method: str, starts: int, tell: Callable[[str, float], None], *, beyond: bool
 ) -> "Tuning":
-    from canshaper.tuning.manual import manual
+    from canshaper.design.tuning.manual import manual
 
     if method == "manual":
         if beyond:
@@ -175,7 +175,7 @@ def _solve(
     if method != "optimal":
         raise ValueError(f"method is {method}, allowed are optimal, manual")
     tell("loading the solver", 0.0)
-    from canshaper.tuning.optimal import tune as optimal
+    from canshaper.design.tuning.optimal import tune as optimal
 
     return optimal(task, starts, tell)
 
@@ -208,9 +208,9 @@ def _report(
 ) -> None:
     """Measure, draw, write, tell."""
     from canshaper.cli.stopping import consequences
-    from canshaper.tuning import deploy
-    from canshaper.tuning.evaluate import Machine
-    from canshaper.tuning.table import table
+    from canshaper.design.tuning import deploy
+    from canshaper.design.tuning.evaluate import Machine
+    from canshaper.design.tuning.table import table
 
     config = bound.config
     machine = Machine(
@@ -270,7 +270,7 @@ def _draw(
 ) -> Path | None:
     """Draw the picture; None where matplotlib is missing."""
     try:
-        from canshaper.tuning.plot import draw
+        from canshaper.design.tuning.plot import draw
     except ImportError:
         return None
     assert bound.config.sway is not None

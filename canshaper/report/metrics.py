@@ -5,7 +5,6 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from canshaper.report.recording import AxisTrace, Recording
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
@@ -13,6 +12,7 @@ from canshaper.report.strokes import (
     find_strokes,
     residual_windows,
 )
+from canshaper_sim.recording import AxisTrace, Recording
 
 __all__ = [
     "RESIDUAL_DWELL_S",

@@ -12,7 +12,6 @@ from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from canshaper.report.recording import Recording
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
@@ -30,6 +29,7 @@ from canshaper.report.style import (
     plain,
 )
 from canshaper.report.table import NOTHING, axis_title, change_text
+from canshaper_sim.recording import Recording
 
 WINDOW_COLOUR = "#FFF1BF"
 SIZE_PX, DPI = (1600, 1000), 100

@@ -4,7 +4,7 @@ import math
 import statistics
 from dataclasses import dataclass
 
-from canshaper.report.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, Recording
 
 NEUTRAL_BAND = 0.02  # stick: two steps of a joystick frame of 1/125 and a little, never a command
 PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far

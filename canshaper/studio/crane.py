@@ -13,11 +13,11 @@ from pathlib import Path
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
+from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
-from canshaper.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
+from canshaper.design.processes import Transport, end
 from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import Tell
-from canshaper_sim.processes import Transport, end
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0

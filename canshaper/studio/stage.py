@@ -12,8 +12,9 @@ from typing import Any
 from canshaper.can.bus import Port
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
+from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY
 from canshaper.control import client
-from canshaper.doctor.processes import LEVERS_PRIORITY
+from canshaper.design.processes import Transport, on_transport
 from canshaper.service.loop import run_at_deadlines
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
@@ -21,7 +22,6 @@ from canshaper.studio.events import Events
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.view import CraneView
 from canshaper_sim.hand import Hand, Held
-from canshaper_sim.processes import Transport, on_transport
 from canshaper_sim.realtime import open_ports
 
 SHAPED, RAW, MACHINE = "shaped", "raw", "machine"

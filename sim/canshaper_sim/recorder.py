@@ -11,11 +11,11 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundLever
 from canshaper.can.j1939 import NULL, with_source
-from canshaper.report.recording import AxisTrace, Recording
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.recording import AxisTrace, Recording
 
 # Slewing is told by both; a machine moved by its tip need not send JointVelocity.
 _SPEED_SIGNALS = {

@@ -20,8 +20,8 @@ from canshaper.can.frame import Frame
 from canshaper.can.multicast import PORT
 from canshaper.cli.common import loader
 from canshaper.config.schema import Bus
+from canshaper.design.processes import choose_transport, drive_on_bus
 from canshaper_sim.operator import script_named
-from canshaper_sim.processes import choose_transport, drive_on_bus
 
 CARD, WIRE = "out0", "wire0"
 ADDRESS, NEIGHBOUR = "192.0.2.1", "192.0.2.9"

@@ -10,9 +10,9 @@ from canshaper.can import identity as module
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.capture.listen import Heard
 from canshaper.cli.app import app
-from canshaper.monitor.state import Monitor
+from canshaper.commissioning.monitor.state import Monitor
+from canshaper.recording.listen import Heard
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [

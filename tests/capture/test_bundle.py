@@ -9,9 +9,9 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.binding import load_deployment
-from canshaper.capture.bundle import history_lines, pack, unpack
-from canshaper.capture.frames import LogError
-from canshaper.capture.history import History, Told
+from canshaper.recording.bundle import history_lines, pack, unpack
+from canshaper.recording.frames import LogError
+from canshaper.recording.history import History, Told
 
 ROOT = Path(__file__).parents[2]
 

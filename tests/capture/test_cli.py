@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.capture.log import read_log
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
+from canshaper.recording.log import read_log
 from tests.capture.daemon import Hardness, log_of
 
 DATA = Path(__file__).parent / "data"

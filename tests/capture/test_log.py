@@ -8,7 +8,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.capture.log import CutOffError, LogError, LogFile, TimedFrame, read_log
+from canshaper.recording.log import CutOffError, LogError, LogFile, TimedFrame, read_log
 from tests.capture.writing import messages, written
 
 FRAMES = [

@@ -17,11 +17,11 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.can.multicast import LocalMulticastBus
-from canshaper.capture.bundle import unpack
-from canshaper.capture.listen import Listener
-from canshaper.capture.record import Recording
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
+from canshaper.recording.bundle import unpack
+from canshaper.recording.listen import Listener
+from canshaper.recording.record import Recording
 
 # Of this process alone: two runs of the tests on one machine must not hear each other.
 GROUP = f"239.74.{os.getpid() // 256 % 256}.{os.getpid() % 256}"

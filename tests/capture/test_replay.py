@@ -9,10 +9,10 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.deployment import Deployment
-from canshaper.capture.bundle import unpack
-from canshaper.capture.frames import LogError
-from canshaper.capture.replay import Replay, look
 from canshaper.cli.common import loader
+from canshaper.recording.bundle import unpack
+from canshaper.recording.frames import LogError
+from canshaper.recording.replay import Replay, look
 from tests.capture.daemon import Hardness, log_of
 
 DATA = Path(__file__).parent / "data"

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.frame import Frame
-from canshaper.capture.snapshot import Snapshot
 from canshaper.cli.common import loader
+from canshaper.recording.snapshot import Snapshot
 from canshaper.service.controller import Controller
 
 FILES = (Path(__file__).parents[2] / "config").glob("*.yaml")

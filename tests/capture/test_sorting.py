@@ -5,9 +5,9 @@ from dataclasses import replace
 import pytest
 
 from canshaper.can.deployment import Deployment
-from canshaper.capture.frames import LogError
-from canshaper.capture.sorting import Kind, Sorter, bus_of_channel
 from canshaper.cli.common import loader
+from canshaper.recording.frames import LogError
+from canshaper.recording.sorting import Kind, Sorter, bus_of_channel
 
 
 @pytest.fixture(scope="module")

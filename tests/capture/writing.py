@@ -5,7 +5,7 @@ from pathlib import Path
 
 import can
 
-from canshaper.capture.log import TimedFrame
+from canshaper.recording.log import TimedFrame
 
 
 def messages(frames: Iterable[TimedFrame], first: int = 0) -> list[can.Message]:

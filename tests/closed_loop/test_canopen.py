@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.design.lockstep import drive
 from canshaper.report.metrics import compare
-from canshaper_sim.lockstep import drive
 from canshaper_sim.operator import SCRIPTS
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"

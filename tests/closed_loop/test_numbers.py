@@ -9,11 +9,11 @@ from typing import Any
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
+from canshaper.design.lockstep import drive
 from canshaper.report.metrics import compare
 from canshaper.service.controller import Controller
 from canshaper.shaping.gff import poles_from_denominator
 from canshaper.shaping.sway import SwayMode
-from canshaper_sim.lockstep import drive
 from canshaper_sim.operator import SCRIPTS, Script, Stroke
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"

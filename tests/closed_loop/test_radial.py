@@ -6,10 +6,10 @@ import pytest
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
-from canshaper.report.recording import Recording
-from canshaper.tuning.robust import least_residual
-from canshaper_sim.lockstep import drive
+from canshaper.design.lockstep import drive
+from canshaper.design.tuning.robust import least_residual
 from canshaper_sim.operator import SCRIPTS
+from canshaper_sim.recording import Recording
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"

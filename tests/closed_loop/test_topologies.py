@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.design.lockstep import DriveError, drive
 from canshaper.report.metrics import compare
 from canshaper_sim.cranes import cranes, one_crane
-from canshaper_sim.lockstep import DriveError, drive
 from canshaper_sim.operator import SCRIPTS
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"

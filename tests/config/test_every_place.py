@@ -18,7 +18,7 @@ from canshaper.config.load import load_section
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
 from canshaper.config.source import DeploymentError, Place, Problem
-from canshaper.crane.config import CraneConfig
+from canshaper.design.crane.config import CraneConfig
 from canshaper.shaping.registry import KINDS
 
 FILES = [(DeploymentConfig, kind) for kind in KINDS] + [(CraneConfig, "")]

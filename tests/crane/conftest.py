@@ -5,9 +5,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from canshaper.crane.config import CraneConfig, GrappleData, load_crane
-from canshaper.crane.dynamics import SwayDynamics
-from canshaper.crane.kinematics import Kinematics
+from canshaper.design.crane.config import CraneConfig, GrappleData, load_crane
+from canshaper.design.crane.dynamics import SwayDynamics
+from canshaper.design.crane.kinematics import Kinematics
 from tests.crane.motion import SwayStates
 
 ROOT = Path(__file__).parents[2]

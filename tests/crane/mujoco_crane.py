@@ -22,8 +22,8 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from canshaper.crane.config import CraneConfig
-from canshaper.crane.kinematics import Array
+from canshaper.design.crane.config import CraneConfig
+from canshaper.design.crane.kinematics import Array
 from tests.crane.motion import Motion
 
 ROTOR = 1e14

@@ -9,9 +9,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from canshaper.crane.config import GrappleData
-from canshaper.crane.dynamics import TipMotion
-from canshaper.crane.kinematics import Array
+from canshaper.design.crane.config import GrappleData
+from canshaper.design.crane.dynamics import TipMotion
+from canshaper.design.crane.kinematics import Array
 from canshaper.shaping.sway import GRAVITY_M_S2
 
 PRINTED_TURN = math.pi / 2.0

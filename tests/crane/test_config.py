@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.config.source import DeploymentError
-from canshaper.crane.config import CraneConfig, load_crane
+from canshaper.design.crane.config import CraneConfig, load_crane
 from canshaper_sim.grapple import Grapple
 
 

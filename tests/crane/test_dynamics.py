@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from canshaper.crane.config import GrappleData
-from canshaper.crane.dynamics import SwayDynamics, TipMotion
-from canshaper.crane.kinematics import Array, Kinematics
+from canshaper.design.crane.config import GrappleData
+from canshaper.design.crane.dynamics import SwayDynamics, TipMotion
+from canshaper.design.crane.kinematics import Array, Kinematics
 from canshaper_sim import grapple as simulated
 from tests.crane.motion import SwayStates, swing
 

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from canshaper.crane.config import GrappleData
-from canshaper.crane.dynamics import SwayDynamics
-from canshaper.crane.kinematics import Kinematics
-from canshaper.crane.linear import (
+from canshaper.design.crane.config import GrappleData
+from canshaper.design.crane.dynamics import SwayDynamics
+from canshaper.design.crane.kinematics import Kinematics
+from canshaper.design.crane.linear import (
     OperatingPoint,
     closed_form,
     hanging_angle,

@@ -4,9 +4,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from canshaper.crane.config import CraneConfig
-from canshaper.crane.dynamics import SwayDynamics
-from canshaper.crane.kinematics import Kinematics
+from canshaper.design.crane.config import CraneConfig
+from canshaper.design.crane.dynamics import SwayDynamics
+from canshaper.design.crane.kinematics import Kinematics
 from tests.crane.motion import random_motion, swing
 from tests.crane.mujoco_crane import accelerations, model_of, simulate
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from canshaper.crane.config import CraneConfig
-from canshaper.crane.kinematics import Kinematics
+from canshaper.design.crane.config import CraneConfig
+from canshaper.design.crane.kinematics import Kinematics
 from canshaper_sim.kinematics import Boom
 
 

@@ -10,9 +10,9 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from canshaper.crane.config import GrappleData
-from canshaper.crane.dynamics import SwayDynamics, TipMotion
-from canshaper.crane.kinematics import Array
+from canshaper.design.crane.config import GrappleData
+from canshaper.design.crane.dynamics import SwayDynamics, TipMotion
+from canshaper.design.crane.kinematics import Array
 from tests.crane.motion import SwayStates
 from tests.crane.printed import (
     PRINTED_TURN,

@@ -6,7 +6,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.doctor.measure import Run
+from canshaper.commissioning.doctor.measure import Run
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "config" / "forwarder.yaml"

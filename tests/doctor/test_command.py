@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.doctor.load import load_kinds
+from canshaper.commissioning.doctor.load import load_kinds
 from tests.doctor.conftest import SHIPPED
 
 # Only to end a test that hangs.
@@ -161,7 +161,7 @@ def test_nothing_stays_however_it_ends(
 def test_the_daemon_does_not_import_it() -> None:
     code = (
         "import sys, canshaper.cli.app, canshaper.service.daemon, canshaper.cli.common;"
-        "print([m for m in sys.modules if m.startswith('canshaper.doctor')])"
+        "print([m for m in sys.modules if m.startswith('canshaper.commissioning.doctor')])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout == "[]\n"

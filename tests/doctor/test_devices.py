@@ -7,10 +7,10 @@ from typing import Any
 import pytest
 import yaml
 
+from canshaper.commissioning.doctor import interfaces
+from canshaper.commissioning.doctor.devices import device_findings
+from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.config.bus import Bus, Match
-from canshaper.doctor import interfaces
-from canshaper.doctor.devices import device_findings
-from canshaper.doctor.finding import Finding, Level
 from tests.can.fake_devices import HUB, PCI, USB, FakeDevices
 
 

@@ -10,16 +10,16 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.bus import Bus
-from canshaper.doctor import interfaces
-from canshaper.doctor.finding import Finding, Level
-from canshaper.doctor.interfaces import (
+from canshaper.commissioning.doctor import interfaces
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.interfaces import (
     bus_findings,
     link_findings,
     parse_ip,
     read_link,
     read_sys,
 )
+from canshaper.config.bus import Bus
 
 IP = Path(__file__).parent / "ip"
 OK, NOTE, WARNING, BAD = Level.OK, Level.NOTE, Level.WARNING, Level.BAD

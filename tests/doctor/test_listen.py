@@ -17,9 +17,9 @@ from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import Frame
 from canshaper.can.raw import CAN_FRAME
 from canshaper.cli.doctor import _listened
-from canshaper.doctor import listen as listening
-from canshaper.doctor.finding import Finding, Level
-from canshaper.doctor.listen import heard_findings
+from canshaper.commissioning.doctor import listen as listening
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.listen import heard_findings
 from tests.doctor.conftest import ROOT, SHIPPED
 from tests.service.j1939_rig import bjm
 

@@ -6,9 +6,9 @@ import mujoco
 import numpy as np
 import pytest
 
-from canshaper.crane.config import load_crane
-from canshaper.identification.judge import Finding, identify
-from canshaper.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.commissioning.identification.judge import Finding, identify
+from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.design.crane.config import load_crane
 from canshaper_sim.grapple import Grapple, Sway
 from tests.crane.mujoco_crane import model_of, simulate
 from tests.identification.machine import (

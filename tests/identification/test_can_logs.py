@@ -11,10 +11,10 @@ import pytest
 from canshaper.can.binding import load_deployment
 from canshaper.can.database import Messages, load_dbc
 from canshaper.can.deployment import Deployment
-from canshaper.capture.log import LogError
+from canshaper.commissioning.identification.canlog import bind, read_can
+from canshaper.commissioning.identification.series import IdentificationError, Kind
 from canshaper.config.source import DeploymentError
-from canshaper.identification.canlog import bind, read_can
-from canshaper.identification.series import IdentificationError, Kind
+from canshaper.recording.log import LogError
 from tests.identification.machine import FILE, ROOT, Push, candump, driven
 
 PUSHES = [Push("slew", 2.0, 1.0, 0.5), Push("near_far", 6.0, 1.0, -0.4)]

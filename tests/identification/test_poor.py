@@ -5,9 +5,9 @@ import math
 import numpy as np
 import pytest
 
-from canshaper.identification.decay import Value
-from canshaper.identification.judge import Finding, identify
-from canshaper.identification.series import (
+from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.judge import Finding, identify
+from canshaper.commissioning.identification.series import (
     Array,
     IdentificationError,
     Kind,
@@ -16,7 +16,7 @@ from canshaper.identification.series import (
     ordered,
     unit_of,
 )
-from canshaper.identification.stopwatch import stopwatch
+from canshaper.commissioning.identification.stopwatch import stopwatch
 from tests.identification.machine import Coloured
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")

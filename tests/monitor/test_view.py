@@ -9,10 +9,10 @@ from rich.console import Console
 
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.capture.listen import Heard
 from canshaper.cli.common import loader
-from canshaper.monitor.state import Monitor
-from canshaper.monitor.view import bar, screen, status_line
+from canshaper.commissioning.monitor.state import Monitor
+from canshaper.commissioning.monitor.view import bar, screen, status_line
+from canshaper.recording.listen import Heard
 from canshaper.shaping.states import Reason, State
 from tests.service.j1939_rig import bjm
 

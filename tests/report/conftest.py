@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.report.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, Recording
 
 DT_S = 0.02
 Signal = Callable[[float], float]

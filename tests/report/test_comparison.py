@@ -9,7 +9,7 @@ from itertools import pairwise
 import pytest
 
 from canshaper.report.metrics import AxisMetrics, compare, report_dict
-from canshaper.report.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, Recording
 
 HandMade = Callable[..., Recording]
 Signal = Callable[[float], float]

@@ -4,7 +4,7 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.report.metrics import axis_metrics
-from canshaper.report.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, Recording
 
 HandMade = Callable[..., Recording]
 Signal = Callable[[float], float]

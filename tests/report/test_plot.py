@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from canshaper.report.metrics import report_dict
 from canshaper.report.plot import draw, figure
-from canshaper.report.recording import Recording
 from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR
+from canshaper_sim.recording import Recording
 
 Pair = tuple[Recording, Recording]
 

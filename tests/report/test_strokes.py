@@ -3,8 +3,8 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.report.metrics import axis_metrics
-from canshaper.report.recording import Recording
 from canshaper.report.strokes import aligned, find_strokes, residual_windows
+from canshaper_sim.recording import Recording
 
 HandMade = Callable[..., Recording]
 Signal = Callable[[float], float]

@@ -5,8 +5,8 @@ import pytest
 from rich.console import Console
 
 from canshaper.report.metrics import report_dict
-from canshaper.report.recording import Recording
 from canshaper.report.table import print_report
+from canshaper_sim.recording import Recording
 
 
 def printed(report: dict[str, Any], *, encoding: str = "utf-8") -> str:

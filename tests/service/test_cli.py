@@ -328,7 +328,6 @@ def without(gone: tuple[str, ...], folder: Path, *arguments: str) -> "subprocess
         ("numpy", ("robust", str(SHIPPED), "--axis", "slew")),
         ("scipy", ("robust", str(SHIPPED), "--axis", "slew")),
         ("numpy", ("compare",)),
-        ("numpy", ("reproduce",)),
     ],
 )
 def test_without_the_tools_a_verb_says_what_to_install(

@@ -8,7 +8,7 @@ from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput
-from canshaper.identification.commands import Commands
+from canshaper.commissioning.identification.commands import Commands
 from canshaper.service.finder import InputFinder
 from tests.service.j1939_rig import JOYSTICK, OTHER, OWN, ROOT, bjm
 

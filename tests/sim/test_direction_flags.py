@@ -4,7 +4,7 @@ from pathlib import Path
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
-from canshaper_sim.lockstep import drive
+from canshaper.design.lockstep import drive
 from canshaper_sim.operator import random_script
 
 ROOT = Path(__file__).parents[2]

@@ -5,10 +5,10 @@ from pathlib import Path
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.design.lockstep import drive
 from canshaper.report.metrics import compare
 from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.grapple import Sway
-from canshaper_sim.lockstep import drive
 from canshaper_sim.machines import build_machine
 from canshaper_sim.operator import SCRIPTS, random_script, script_named
 

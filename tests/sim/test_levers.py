@@ -11,10 +11,10 @@ from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
+from canshaper.design.lockstep import drive
 from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
-from canshaper_sim.lockstep import drive
 from canshaper_sim.operator import SCRIPTS, random_script
 
 ROOT = Path(__file__).parents[2]

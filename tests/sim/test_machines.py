@@ -12,10 +12,10 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.cli.app import app
 from canshaper.config.source import DeploymentError
+from canshaper.design.lockstep import DriveError, drive
 from canshaper_sim.axes import JOINT_AXES, TIP_AXES
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.levers import LeverNode
-from canshaper_sim.lockstep import DriveError, drive
 from canshaper_sim.machines import MACHINES, TipControlledCrane, build_machine, machine_for
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.parameters import changed_parameters, parameter_names

@@ -5,12 +5,12 @@ import re
 import numpy as np
 import pytest
 
+from canshaper.design.tuning.conflict import Infeasible, explain, feasible_point
+from canshaper.design.tuning.evaluate import gff, step_response
+from canshaper.design.tuning.formulation import Requirements, Task
+from canshaper.design.tuning.optimal import tune
+from canshaper.design.tuning.program import Program
 from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.conflict import Infeasible, explain, feasible_point
-from canshaper.tuning.evaluate import gff, step_response
-from canshaper.tuning.formulation import Requirements, Task
-from canshaper.tuning.optimal import tune
-from canshaper.tuning.program import Program
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 

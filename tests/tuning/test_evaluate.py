@@ -4,11 +4,11 @@ import math
 
 import pytest
 
+from canshaper.design.tuning.evaluate import Machine, evaluate, gff, press
+from canshaper.design.tuning.formulation import POLE_PER_RATE
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off, build_shaper
 from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.evaluate import Machine, evaluate, gff, press
-from canshaper.tuning.formulation import POLE_PER_RATE
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 WIDE = Machine(

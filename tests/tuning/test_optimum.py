@@ -8,9 +8,8 @@ import pytest
 from scipy.linalg import expm
 from scipy.optimize import brute, minimize
 
-from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.evaluate import gff, step_response
-from canshaper.tuning.formulation import (
+from canshaper.design.tuning.evaluate import gff, step_response
+from canshaper.design.tuning.formulation import (
     PAPER_NEAR_FAR,
     PAPER_SLEW,
     Requirements,
@@ -19,8 +18,9 @@ from canshaper.tuning.formulation import (
     at_length,
     lengths,
 )
-from canshaper.tuning.optimal import tune
-from canshaper.tuning.program import Program, Vector
+from canshaper.design.tuning.optimal import tune
+from canshaper.design.tuning.program import Program, Vector
+from canshaper.shaping.sway import SwayMode
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 FREE = Requirements(within_command=False)

@@ -4,11 +4,17 @@ import math
 
 import pytest
 
+from canshaper.design.tuning.formulation import (
+    PAPER_NEAR_FAR,
+    PAPER_SLEW,
+    Requirements,
+    Task,
+    Weights,
+)
+from canshaper.design.tuning.manual import manual
+from canshaper.design.tuning.optimal import Tuning, tune
 from canshaper.shaping.gff import denominator_from_poles
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
-from canshaper.tuning.formulation import PAPER_NEAR_FAR, PAPER_SLEW, Requirements, Task, Weights
-from canshaper.tuning.manual import manual
-from canshaper.tuning.optimal import Tuning, tune
 
 # The paper publishes no pendulum. With these two, and Q on the deviation of the state, one second
 # of a step at 20 ms and 14e in the sense of the text, its printed poles are the optimum.

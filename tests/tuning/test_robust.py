@@ -3,9 +3,14 @@ import math
 import numpy as np
 import pytest
 
+from canshaper.design.tuning.robust import (
+    least_residual,
+    modes_over_range,
+    shortest,
+    time_optimal_s,
+)
 from canshaper.shaping.fir import residual_left
 from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.robust import least_residual, modes_over_range, shortest, time_optimal_s
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}

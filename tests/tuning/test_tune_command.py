@@ -12,11 +12,11 @@ from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
 from canshaper.config.load import load_config
+from canshaper.design.tuning.deploy import deployed, setting
+from canshaper.design.tuning.evaluate import Machine
+from canshaper.design.tuning.manual import manual
+from canshaper.design.tuning.optimal import Tuning
 from canshaper.shaping.sway import SwayMode
-from canshaper.tuning.deploy import deployed, setting
-from canshaper.tuning.evaluate import Machine
-from canshaper.tuning.manual import manual
-from canshaper.tuning.optimal import Tuning
 
 ROOT = Path(__file__).resolve().parents[2]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
@@ -162,7 +162,7 @@ def test_the_daemon_never_imports_the_tuner() -> None:
         "import sys, canshaper.cli.app, canshaper.service.daemon\n"
         "heavy = ('casadi', 'scipy', 'numpy', 'matplotlib')\n"
         "bad = [m for m in sys.modules if m.split('.')[0] in heavy"
-        " or m.startswith('canshaper.tuning')]\n"
+        " or m.startswith('canshaper.design.tuning')]\n"
         "assert not bad, bad\n"
     )
     subprocess.run([sys.executable, "-c", code], check=True)

@@ -1,0 +1,202 @@
+"""Drives one axis through a ramp with the daemon's own controller, and listens to its speed.
+
+Everything that may stop the daemon stops this too: enable, timeouts, emergency stop, a second
+sender. The stick has to stay in neutral; moving it ends the measurement.
+"""
+
+import statistics
+from collections.abc import Iterator
+
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.commissioning.calibration.fit import Calibration, CalibrationError, Sample, fit
+from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.speed import SpeedFeedback
+from canshaper.service.controller import Controller
+from canshaper.service.lever import LeverInput
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off
+from canshaper.shaping.states import MOVING, Reason, State, StickInput
+
+# A command below this is neutral: the ramp begins there.
+NEUTRAL_BAND = 1e-4
+# Fall of the command when the measurement ends early, full commands per second.
+FALL_PER_S = 5.0
+
+
+class _RampLever:
+    """A lever that is held in neutral with its enable on; the ramp stands for its stick.
+
+    Attributes:
+        command: of the ramp; that of an axis which is not measured stays 0.
+        moved: whether the stick itself is not in neutral.
+    """
+
+    def __init__(self, lever: LeverInput) -> None:
+        self._lever = lever
+        self.command = 0.0
+        self.moved = False
+
+    @property
+    def releases(self) -> int:
+        """How often its enable was seen released."""
+        return self._lever.releases
+
+    def stick(
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
+    ) -> StickInput:
+        """What the axis may use now."""
+        found = self._lever.stick(signal, now_ns, releases, trip, neutral_band)
+        usable = found.fault is None and found.enabled
+        self.moved = usable and abs(found.command) > neutral_band
+        if not usable:
+            return found
+        if self.moved:
+            return StickInput(fault=Reason.STICK_NOT_NEUTRAL, trip=found.trip)
+        return found._replace(command=self.command, bypass=False)
+
+
+class CalibrationDrive:
+    """A measurement in progress: frames in, frames out.
+
+    Args:
+        deployment: the machine.
+        axis: name of one of its axes.
+        speed: (message, signal) of the feedback of its speed.
+        ramp: the command.
+
+    Attributes:
+        ended: why it is over; empty while it goes on.
+        progress: how much of the ramp is done, 0 to 1.
+
+    Raises:
+        DeploymentError: no such message or signal.
+    """
+
+    def __init__(
+        self, deployment: Deployment, axis: str, speed: tuple[str, str], ramp: Ramp
+    ) -> None:
+        self._speed = SpeedFeedback(deployment, axis, *speed)
+        self._controller = Controller(deployment)
+        self._runner = runner = self._controller.axes[axis]
+        period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
+        runner.chooser = None
+        runner.axis = Axis(
+            period_s,
+            OutputLimits(maximum=1.0, rise_per_s=FALL_PER_S, fall_per_s=FALL_PER_S, tail_s=0.0),
+            sway=None,
+            shaper=Off(),
+            neutral_band=NEUTRAL_BAND,
+            stop_s=1.0,
+            grid_steps=runner.bound.valve.steps,
+        )
+        # Nothing moves but this axis: no other one gets its stick, nor moves for another one.
+        self._levers: dict[str, _RampLever] = {}
+        for name, one in self._controller.axes.items():
+            lever = _RampLever(self._controller.levers[one.bound.config.stick.lever])
+            one.compensator = None
+            one.replace_lever(lever)
+            self._levers[name] = lever
+        self._lever = self._levers.pop(axis)
+        self._ramp = ramp
+        self._begun_ns: int | None = None
+        self._samples: dict[str, list[Sample]] = {}
+        self.ended = ""
+        self.progress = 0.0
+
+    @property
+    def waiting_for(self) -> str:
+        """What the axis still waits for, before the ramp begins."""
+        if self._begun_ns is not None:
+            return ""
+        axis = self._runner.axis
+        if axis.state is not State.READY:
+            return axis.reason.name
+        return f"the stick of {moved}" if (moved := self._moved) else "feedback"
+
+    @property
+    def _moved(self) -> str:
+        """Axes that are not measured and whose stick is not in neutral."""
+        return " and ".join(name for name, lever in self._levers.items() if lever.moved)
+
+    @property
+    def moves(self) -> bool:
+        """Whether the frame that was handed out last may move a valve."""
+        return self._controller.moves
+
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
+        self._speed.receive(frame, arrived_ns)
+        return self._controller.receive(frame, arrived_ns)
+
+    def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
+        """One tick: the frames to send."""
+        axis = self._runner.axis
+        state = axis.state
+        heard = self._speed.heard(now_ns)
+        if self._begun_ns is None and state is State.READY and heard and not self._moved:
+            self._begun_ns = now_ns
+        if self._begun_ns is not None and not self.ended:
+            time_s = (now_ns - self._begun_ns) / 1e9
+            self.progress = min(1.0, time_s / self._ramp.duration_s)
+            self._lever.command = self._ramp.command(time_s)
+            self._sample(time_s)
+            if time_s >= self._ramp.duration_s:
+                self.ended = "done"
+            elif state not in MOVING and state is not State.READY:
+                self.ended = f"stopped: {axis.reason.name}"
+            elif self._moved:
+                self.ended = f"stopped: the stick of {self._moved} was moved"
+            elif not heard:
+                self.ended = "stopped: the feedback fell silent, or tells an error"
+            if self.ended:
+                self._lever.command = 0.0
+        yield from self._controller.tick(now_ns, missed)
+        self._controller.events.clear()
+
+    def send_failed(self, frame: Frame) -> None:
+        """A frame did not reach its bus; the axes of a valve frame trip."""
+        self._controller.send_failed(frame)
+
+    def stalled(self) -> None:
+        """The loop stood still: what moves goes to neutral."""
+        self._controller.stalled()
+
+    def _sample(self, time_s: float) -> None:
+        sent = self._runner.axis.raw / self._runner.bound.valve.steps
+        part = self._ramp.part(time_s)
+        self._samples.setdefault(part, []).append(Sample(sent, self._speed.value))
+
+    def neutral_frames(self) -> list[Frame]:
+        """A neutral frame for every valve."""
+        return self._controller.neutral_frames()
+
+    def result(self) -> Calibration:
+        """What was measured.
+
+        Raises:
+            CalibrationError: it did not go to its end, or makes no curve.
+        """
+        if self.ended != "done":
+            raise CalibrationError(f"the measurement was not taken to its end: {self.ended}")
+        rest = [s.speed for s in self._samples.get("rest", [])]
+        if len(rest) < 2:
+            raise CalibrationError("no feedback came while the axis was at rest")
+        noise, zero = statistics.pstdev(rest), statistics.fmean(rest)
+        found = []
+        for sign, mark in ((1.0, "+"), (-1.0, "-")):
+            # The feedback may count the other way round than the command.
+            parts = [self._samples.get(f"{way}{mark}", []) for way in ("up", "held", "down")]
+            way = 1.0 if sum(s.speed - zero for s in parts[0]) >= 0.0 else -1.0
+            up, held, down = (
+                [Sample(abs(s.command), way * (s.speed - zero)) for s in part] for part in parts
+            )
+            try:
+                found.append((sign * way, fit(up, held, down, noise)))
+            except CalibrationError as error:
+                direction = "positive" if sign > 0 else "negative"
+                raise CalibrationError(f"{direction} commands: {error}") from None
+        if found[0][0] != found[1][0]:
+            raise CalibrationError("both directions moved the same way; is the feedback signed?")
+        return Calibration(found[0][1], found[1][1])

@@ -1,0 +1,74 @@
+"""Where a measurement runs: on the buses of the machine, or on the simulated crane in lock-step."""
+
+import signal
+import time
+from collections.abc import Callable
+from contextlib import ExitStack
+from types import FrameType
+
+from canshaper.can.bus import Port, open_port
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import FrameFault
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.service.exchange import exchange
+from canshaper.service.loop import run_at_deadlines
+from canshaper.service.standstill import Standstill
+
+# How often the end is told to every valve: a frame may be lost.
+LAST_FRAMES = 3
+# All that can end or hold a program from its terminal: a valve must not stay open behind it.
+STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+
+
+def run_live(
+    drive: CalibrationDrive, deployment: Deployment, tell: Callable[[CalibrationDrive], None]
+) -> None:
+    """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
+
+    However it ends, neutral is the last that every valve is told.
+
+    Args:
+        drive: the measurement.
+        deployment: its machine.
+        tell: called now and then.
+
+    Raises:
+        BusError: a bus cannot be opened.
+    """
+    ports: dict[str, Port] = {}
+    stopped = ""
+
+    def ignore(_fault: FrameFault) -> None:
+        pass
+
+    def stop(number: int, _frame: FrameType | None) -> None:
+        nonlocal stopped
+        stopped = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
+
+    for number in STOPS:
+        signal.signal(number, stop)
+    told_ns = 0
+    standstill = Standstill(deployment)
+
+    def body(now_ns: int, missed: int, _late_ns: int) -> bool:
+        nonlocal told_ns
+        exchange(drive, ports, now_ns, missed, standstill)
+        if now_ns >= told_ns:
+            told_ns = now_ns + 200_000_000
+            tell(drive)
+        if stopped and not drive.ended:
+            drive.ended = f"stopped: {stopped}"
+        return not drive.ended
+
+    with ExitStack() as open_ports:
+        for name, bus in deployment.config.buses.items():
+            ports[name] = open_port(name, bus, ignore)
+            open_ports.callback(ports[name].close)
+        try:
+            run_at_deadlines(deployment.config.tick_ms * 1_000_000, body)
+        finally:
+            for _ in range(LAST_FRAMES):
+                for frame in drive.neutral_frames():
+                    ports[frame.bus].send(frame)
+                time.sleep(deployment.config.tick_ms / 1000.0)
+    tell(drive)

@@ -1,0 +1,45 @@
+"""A measurement of a valve on the simulated crane, in lock-step."""
+
+from collections.abc import Callable
+
+from canshaper.can.deployment import Deployment
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import Script
+from canshaper_sim.plant import PlantNode
+
+# A measurement that has not begun by then waits for something that never comes.
+LONGEST_WAIT_S = 5.0
+
+
+def run_simulated(
+    drive: CalibrationDrive,
+    deployment: Deployment,
+    parameters: CraneParameters | None,
+    tell: Callable[[CalibrationDrive], None],
+) -> None:
+    """Drive the axis of the simulated crane, with the enable switch held, to the end.
+
+    Raises:
+        DeploymentError: the deployment does not fit the machine.
+    """
+    plant = PlantNode(deployment, parameters)
+    levers = LeverNode(deployment, Script("held", (), 1e9))
+    tick_ms = deployment.config.tick_ms
+    time_ms = 0
+    while not drive.ended:
+        now_ns = time_ms * 1_000_000
+        for frame in levers.frames_of_tick(time_ms, tick_ms):
+            if (passed := drive.receive(frame, now_ns)) is not None:
+                plant.receive(passed)
+        for frame in drive.tick(now_ns):
+            plant.receive(frame)
+        plant.advance(tick_ms / 1000.0)
+        for frame in plant.feedback():
+            drive.receive(frame, now_ns + tick_ms * 1_000_000)
+        time_ms += tick_ms
+        if drive.waiting_for and time_ms > 1000 * LONGEST_WAIT_S:
+            drive.ended = f"stopped: waits for {drive.waiting_for}"
+        if time_ms % 1000 == 0:
+            tell(drive)

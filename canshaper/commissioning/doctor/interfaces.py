@@ -1,0 +1,259 @@
+"""The CAN interfaces of a deployment, as the system set them up; nothing is opened or sent."""
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from canshaper.commissioning.doctor.devices import device_findings
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.config.bus import Bus
+
+# Frames that may wait in the queue: less, and the frames of one tick do not fit; more, and commands
+# go out that are long out of date (20 of 8 bytes are 13 ms at 250 kbit/s).
+SHORTEST_QUEUE, LONGEST_QUEUE = 10, 20
+# Not in the path of an ordinary user everywhere.
+SBIN = ":/usr/sbin:/sbin"
+ARPHRD_CAN = 280  # linux/if_arp.h
+IFF_UP = 0x1  # linux/if.h
+
+
+@dataclass(frozen=True)
+class Link:
+    """A network interface.
+
+    Attributes:
+        name: of the interface.
+        can: whether it is a CAN interface.
+        kind: of its driver: can (a controller), vcan, vxcan; None where it is not told.
+        up: whether it is set up.
+        queue: length of its transmit queue, frames.
+        data: details of a controller, in the words of ``ip``; empty where there are none.
+        counts: its errors since it was set up first.
+    """
+
+    name: str
+    can: bool
+    kind: str | None
+    up: bool
+    queue: int
+    data: dict[str, Any]
+    counts: dict[str, int]
+
+    @property
+    def bitrate(self) -> int | None:
+        """Bit rate, bit/s."""
+        timing = self.data.get("bittiming", {})
+        found = timing.get("bitrate", self.data.get("bittiming_bitrate"))
+        return int(found) if found else None
+
+
+def bus_findings(buses: dict[str, Bus]) -> list[Finding]:
+    """Checks of all buses of a deployment."""
+    findings = []
+    kernel: str | None = None
+    for name, bus in buses.items():
+        if bus.interface != "socketcan":
+            found = f"python-can interface {bus.interface} {bus.channel}: cannot be checked"
+            findings.append(Finding(f"bus {name}", Level.NOTE, found))
+            continue
+        kernel = kernel or kernel_fault()
+        if kernel:
+            remedy = "sudo modprobe can_raw; where there is no such module, another kernel"
+            findings.append(Finding(f"bus {name}", Level.BAD, kernel, remedy))
+        else:
+            findings += link_findings(read_link(bus.channel), bus)
+            findings += device_findings(name, bus)
+    return findings
+
+
+def kernel_fault() -> str | None:
+    """Why this kernel has no SocketCAN, or None where it has."""
+    try:
+        socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
+    except OSError as error:
+        return f"no SocketCAN in this kernel: {error.strerror}"
+    return None
+
+
+# -- reading ---------------------------------------------------------------------------------------
+
+
+def read_link(name: str, root: Path = Path("/")) -> Link | None:
+    """The interface of that name by ``ip``, or without one by /sys; None where there is none."""
+    tool = shutil.which("ip", path=os.environ.get("PATH", "") + SBIN)
+    if tool:
+        command = [tool, "-details", "-statistics", "-json", "link", "show", "dev", name]
+        done = subprocess.run(command, capture_output=True, text=True, check=False)
+        if done.returncode == 0 and (link := parse_ip(done.stdout)):
+            return link
+    return read_sys(name, root)
+
+
+def parse_ip(text: str) -> Link | None:
+    """An interface from the output of ``ip -details -statistics -json link show``."""
+    try:
+        found = [entry for entry in json.loads(text) if entry.get("ifname")]
+    except ValueError:  # an ip without -json
+        return None
+    if not found:
+        return None
+    entry = found[0]
+    info = entry.get("linkinfo", {})
+    return Link(
+        name=entry["ifname"],
+        can=entry.get("link_type") == "can",
+        kind=info.get("info_kind"),
+        up="UP" in entry["flags"],
+        queue=entry.get("txqlen", 0),
+        data=info.get("info_data", {}),
+        counts=info.get("info_xstats", {}),
+    )
+
+
+def read_sys(name: str, root: Path) -> Link | None:
+    """An interface from /sys/class/net, which has no details of controllers."""
+    directory = root / "sys/class/net" / name
+    try:
+        texts = {f: (directory / f).read_text().strip() for f in ("type", "flags", "tx_queue_len")}
+    except OSError:
+        return None
+    return Link(
+        name=name,
+        can=int(texts["type"]) == ARPHRD_CAN,
+        kind=None,
+        up=bool(int(texts["flags"], 0) & IFF_UP),
+        queue=int(texts["tx_queue_len"]),
+        data={},
+        counts={},
+    )
+
+
+# -- judging ---------------------------------------------------------------------------------------
+
+
+def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
+    """Checks of one interface of a deployment."""
+    name = bus.channel
+    if link is None:
+        remedy = f"plug the adapter in; a virtual bus: sudo ip link add {name} type vcan"
+        return [Finding(name, Level.BAD, "there is no such interface", remedy)]
+    if not link.can:
+        remedy = "name a CAN interface in the deployment file"
+        return [Finding(name, Level.BAD, "is no CAN interface", remedy)]
+    if link.kind in ("vcan", "vxcan"):
+        if link.up:
+            found = "up; a virtual bus, nothing else to check"
+            return [Finding(name, Level.NOTE, found)]
+        return [Finding(name, Level.BAD, "is down", f"sudo ip link set {name} up")]
+    if not link.data:
+        found = "no tool that tells bit rate, state and restart: not checked"
+        tool = Finding(name, Level.WARNING, found, "install iproute2")
+        return [up(link, bus), queue(link), tool]
+    checks: list[Callable[[Link], Finding | None]] = [queue, state, errors, restart, modes]
+    findings = [up(link, bus), bitrate(link, bus), *(check(link) for check in checks)]
+    return [finding for finding in findings if finding]
+
+
+def up(link: Link, bus: Bus) -> Finding:
+    """It is set up."""
+    if link.up:
+        return Finding(link.name, Level.OK, "up")
+    rate = link.bitrate or bus.bitrate or 250_000
+    remedy = f"sudo ip link set {link.name} up type can bitrate {rate} restart-ms 100"
+    return Finding(link.name, Level.BAD, "is down", remedy)
+
+
+def bitrate(link: Link, bus: Bus) -> Finding | None:
+    """Its bit rate is that of the file, where that has one."""
+    subject = f"{link.name} bit rate"
+    if link.bitrate is None:
+        return None
+    found = f"{link.bitrate} bit/s"
+    if bus.bitrate is None or bus.bitrate == link.bitrate:
+        return Finding(subject, Level.OK, found)
+    remedy = "one of both is wrong: a wrong bit rate disturbs the whole bus"
+    return Finding(subject, Level.BAD, f"{found}, in the file {bus.bitrate} bit/s", remedy)
+
+
+def queue(link: Link) -> Finding:
+    """Its transmit queue: short enough that no old command goes out."""
+    subject = f"{link.name} queue"
+    remedy = f"sudo ip link set {link.name} txqueuelen 16"
+    found = f"{link.queue} frames"
+    if link.queue > LONGEST_QUEUE:
+        text = f"{found}: commands long out of date could go out after a blocked bus"
+        return Finding(subject, Level.WARNING, text, remedy)
+    if link.queue < SHORTEST_QUEUE:
+        text = f"{found}: the frames of a tick may not fit"
+        return Finding(subject, Level.WARNING, text, remedy)
+    return Finding(subject, Level.OK, found)
+
+
+def state(link: Link) -> Finding | None:
+    """State of the controller; only while the interface is up, it has one that counts."""
+    told = link.data.get("state")
+    if told is None or not link.up:
+        return None
+    subject = f"{link.name} state"
+    wires = "look at wiring, termination (60 ohm between the lines), bit rate of all nodes"
+    if told == "ERROR-ACTIVE":
+        return Finding(subject, Level.OK, "error-active, as it should be")
+    if told == "ERROR-WARNING":
+        return Finding(subject, Level.WARNING, "error-warning: many errors", wires)
+    if told == "BUS-OFF":
+        remedy = f"{wires}; then sudo ip link set {link.name} type can restart"
+        return Finding(subject, Level.BAD, "bus-off: the controller has left the bus", remedy)
+    return Finding(subject, Level.BAD, told.lower(), wires)
+
+
+def errors(link: Link) -> Finding | None:
+    """Error counters of the controller, and what it has been through."""
+    if not link.up:
+        return None
+    counters = link.data.get("berr_counter", {})
+    names = {"bus_off": "bus-off", "error_passive": "passive", "bus_error": "bus errors"}
+    told = [f"{n} {counters[n]}" for n in ("tx", "rx") if counters.get(n)]
+    told += [f"{text} {link.counts[n]}" for n, text in names.items() if link.counts.get(n)]
+    subject = f"{link.name} errors"
+    if not told:
+        return Finding(subject, Level.OK, "none counted")
+    remedy = "wiring, termination, bit rates; some are counted since the adapter was plugged in"
+    return Finding(subject, Level.WARNING, "counted: " + ", ".join(told), remedy)
+
+
+def restart(link: Link) -> Finding:
+    """It comes back by itself after bus-off."""
+    subject = f"{link.name} restart"
+    restart_ms = link.data.get("restart_ms", 0)
+    if restart_ms:
+        return Finding(subject, Level.OK, f"{restart_ms} ms after bus-off")
+    return Finding(
+        subject,
+        Level.WARNING,
+        "restart-ms 0: silent after bus-off until somebody restarts it",
+        f"with {link.name} down: sudo ip link set {link.name} type can restart-ms 100",
+    )
+
+
+def modes(link: Link) -> Finding:
+    """Modes that are for tests, or change what a send means."""
+    on = set(link.data.get("ctrlmode", []))
+    subject = f"{link.name} modes"
+    low = f"with {link.name} down: sudo ip link set {link.name} type can"
+    if mute := on & {"LISTEN-ONLY", "LOOPBACK"}:
+        options = " ".join(f"{mode.lower()} off" for mode in sorted(mute))
+        found = ", ".join(sorted(mode.lower() for mode in mute))
+        return Finding(subject, Level.BAD, f"{found}: no frame gets out", f"{low} {options}")
+    if "ONE-SHOT" in on:
+        found = "one-shot: a frame that loses the bus to another one is not sent again"
+        return Finding(subject, Level.WARNING, found, f"{low} one-shot off")
+    if "BERR-REPORTING" in on:
+        found = "berr-reporting: a disturbed bus makes thousands of error frames a second"
+        return Finding(subject, Level.WARNING, found, f"{low} berr-reporting off")
+    return Finding(subject, Level.OK, "ordinary")

@@ -1,0 +1,140 @@
+"""What was measured, held against the tick."""
+
+from collections import Counter
+from collections.abc import Callable
+
+from canshaper.can.deployment import Deployment
+from canshaper.commissioning.doctor.figures import quantile, summary
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.measure import Run
+from canshaper.commissioning.doctor.processes import LOOP_PRIORITY
+
+# Names of the runs.
+IDLE, LOADED = "idle", "under load"
+# Parts of the tick, of the 99.9 % quantile: good up to the first, bad above the second.
+LATE_SHARES = (0.1, 0.5)
+BUSY_SHARES = (0.25, 0.5)
+# One in so many deadlines may be missed under load: as rare as the quantile counts.
+MISSED_ONE_IN = 1000
+# Reasons for which only a PC that is too slow is to blame.
+OVERLOADED = frozenset(("LOOP_OVERRUN", "LOOP_STALLED"))
+# States of an axis that lost its input, and what is said of it.
+LOST = frozenset(("STOPPING", "TRIPPED"))
+
+UNIT = "canshaper@.service"
+SERVICE = f"the service's unit does: {UNIT}"
+AS_ROOT = f"measure as root, with the priority that {UNIT} has"
+REAL_TIME = "see kernel, huge pages, governor, idle states and virtual machine below"
+
+
+def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Finding]:
+    """Findings on all runs, by their names."""
+    tick_ns = deployment.config.tick_ms * 1_000_000
+    findings = [check(next(iter(runs.values()))) for check in (policy, memory)]
+    checks: tuple[Callable[[str, Run, int], Finding], ...] = (lateness, deadlines, processing)
+    for name, run in runs.items():
+        findings += [check(name, run, tick_ns) for check in checks]
+        findings.append(joystick(name, run, deployment))
+        findings.append(motion(name, run, list(deployment.axes)))
+    return findings
+
+
+def _share_finding(
+    subject: str, times_ns: list[int], shares: tuple[float, float], tick_ns: int, remedy: str
+) -> Finding:
+    """Level by the 99.9 % quantile against parts of the tick."""
+    at_ns = quantile(sorted(times_ns), 0.999)
+    good, worst = shares
+    part = at_ns / tick_ns
+    found = f"p99.9 {at_ns / 1000:.0f} us, {100 * part:.1f} % of the tick"
+    if part <= good:
+        return Finding(subject, Level.OK, found)
+    if part <= worst:
+        return Finding(subject, Level.WARNING, f"{found}; good is up to {100 * good:g} %", remedy)
+    return Finding(subject, Level.BAD, f"{found}; allowed is up to {100 * worst:g} %", remedy)
+
+
+def _held_up(run: Run) -> str:
+    """What helps where others kept the loop from running."""
+    return AS_ROOT if run.policy else REAL_TIME
+
+
+def lateness(name: str, run: Run, tick_ns: int) -> Finding:
+    """How late the ticks come."""
+    return _share_finding(f"lateness {name}", run.late_ns, LATE_SHARES, tick_ns, _held_up(run))
+
+
+def processing(name: str, run: Run, tick_ns: int) -> Finding:
+    """How much of its tick the loop needs."""
+    remedy = _held_up(run)
+    if quantile(sorted(run.tick_ns), 0.5) > BUSY_SHARES[0] * tick_ns:  # it does so by itself
+        remedy = "a faster processor, a longer tick_ms or fewer axes"
+    return _share_finding(f"whole tick {name}", run.tick_ns, BUSY_SHARES, tick_ns, remedy)
+
+
+def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
+    """Deadlines at which nothing was computed; the valves held their last command."""
+    subject = f"deadlines {name}"
+    of = len(run.late_ns) + run.missed
+    found = f"{run.missed} of {of} missed"
+    if run.missed == 0:
+        return Finding(subject, Level.OK, found)
+    seldom = run.missed * MISSED_ONE_IN <= of
+    level = Level.WARNING if seldom and name == LOADED else Level.BAD
+    longest_ms = max(run.late_ns) / 1e6
+    return Finding(
+        subject, level, f"{found}, the latest tick {longest_ms:.1f} ms late", _held_up(run)
+    )
+
+
+def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
+    """Joystick to valve: the wait for the next valve frame, and what comes on top."""
+    subject = f"joystick to valve {name}"
+    found = summary(run.joystick_ns)
+    if found is None:
+        return Finding(
+            subject, Level.BAD, "no valve frame answered a joystick", "measure longer: --seconds"
+        )
+    tick_ms = deployment.config.tick_ms
+    longest_ms = tick_ms * max(axis.period_ticks for axis in deployment.axes.values())
+    text = f"p99.9 {found.p99_9 / 1000:.1f} ms, of which up to {longest_ms} ms wait for the cycle"
+    if found.p99_9 <= 1000.0 * (longest_ms + LATE_SHARES[1] * tick_ms):
+        return Finding(subject, Level.OK, text)
+    return Finding(subject, Level.WARNING, f"{text}: more than that explains", _held_up(run))
+
+
+def motion(name: str, run: Run, axes: list[str]) -> Finding:
+    """The axes were at work as on the machine, and none stopped."""
+    subject = f"axes {name}"
+    stops = Counter(
+        f"{axis} {state} {reason}" for axis, state, reason in run.events if state in LOST
+    )
+    text = ", ".join(f"{what} ({count})" for what, count in stops.items())
+    if OVERLOADED & {reason for _, _, reason in run.events}:
+        return Finding(subject, Level.BAD, f"the loop was too late: {text}", _held_up(run))
+    if stops:
+        remedy = "these levers are a program of this PC: it was too late with their frames"
+        return Finding(subject, Level.WARNING, f"stopped: {text}", remedy)
+    still = [axis for axis in axes if axis not in run.moved]
+    if still:
+        found = f"not in motion: {', '.join(still)}; measured with a neutral output"
+        return Finding(subject, Level.WARNING, found, "measure longer: --seconds")
+    return Finding(subject, Level.OK, "all in motion, none stopped")
+
+
+def policy(run: Run) -> Finding:
+    """The loop has a real-time priority."""
+    subject = "scheduling"
+    if run.policy is None:
+        return Finding(subject, Level.OK, f"SCHED_FIFO with priority {LOOP_PRIORITY}")
+    found = f"measured without SCHED_FIFO: {run.policy} (RLIMIT_RTPRIO)"
+    return Finding(subject, Level.WARNING, found, f"measure as root; {SERVICE}")
+
+
+def memory(run: Run) -> Finding:
+    """The loop's memory cannot be written out."""
+    subject = "memory"
+    if run.memory is None:
+        return Finding(subject, Level.OK, "locked")
+    found = f"measured without locked memory: {run.memory}"
+    return Finding(subject, Level.WARNING, found, f"measure as root; {SERVICE}")

@@ -1,0 +1,110 @@
+"""The levers on the real bus, only listened to: are they there, and how regular are they?"""
+
+import select
+import socket
+import time
+from collections.abc import Callable
+from itertools import pairwise
+
+from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundInput
+from canshaper.can.raw import CAN_FRAME
+from canshaper.can.socketcan import open_sockets
+from canshaper.commissioning.doctor.figures import summary
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.service.finder import InputFinder
+
+LOOK_S = 0.2
+
+
+def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
+    """Messages that the deployment needs all the time, by a name for people."""
+    found: dict[str, BoundInput] = {f"lever {n}": lv for n, lv in deployment.levers.items()}
+    if deployment.emergency_stop:
+        found["emergency stop"] = deployment.emergency_stop
+    return found
+
+
+def listen(
+    deployment: Deployment, seconds: float, tell: Callable[[float], None]
+) -> dict[str, list[int]]:
+    """Times of reception, ns, of the messages on SocketCAN buses, by the names of ``inputs_of``.
+
+    Raises:
+        OSError: an interface cannot be opened.
+        WrongDeviceError: one is another device than the deployment names.
+    """
+    inputs = inputs_of(deployment)
+    names = {bound.key: name for name, bound in inputs.items()}
+    finder = InputFinder(deployment.config.buses, inputs.values())
+    heard: dict[str, list[int]] = {}
+    sockets: dict[socket.socket, str] = {}
+    try:
+        for bus, config in deployment.config.buses.items():
+            wanted = [name for key, name in names.items() if key[0] == bus]
+            if wanted and config.interface == "socketcan":
+                (one,) = open_sockets(config, None)
+                sockets[one] = bus
+                one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+                heard |= {name: [] for name in wanted}
+        begin = time.monotonic()
+        while sockets and (passed := time.monotonic() - begin) < seconds:
+            tell(passed)
+            ready, _, _ = select.select(list(sockets), [], [], min(LOOK_S, seconds - passed))
+            for one in ready:
+                if taken := _next(one, sockets[one]):
+                    frame, time_ns = taken
+                    if bound := finder.find(frame, time_ns):
+                        heard[names[bound.key]].append(time_ns)
+    finally:
+        for one in sockets:
+            one.close()
+    return heard
+
+
+def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
+    """The next data frame of a socket and when the kernel received it, ns; None for another one."""
+    packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
+    word, length, data = CAN_FRAME.unpack(packet)
+    if word & (socket.CAN_ERR_FLAG | socket.CAN_RTR_FLAG):
+        return None
+    extended = bool(word & socket.CAN_EFF_FLAG)
+    frame = Frame(bus, word & socket.CAN_EFF_MASK, extended, data[:length])
+    time_ns = stamp_ns(ancillary)
+    return None if time_ns is None else (frame, time_ns)
+
+
+def heard_findings(deployment: Deployment, heard: dict[str, list[int]]) -> list[Finding]:
+    """Period and gaps of each message against its cycle and its timeout."""
+    findings = []
+    for name, bound in inputs_of(deployment).items():
+        if name in heard:
+            cycle_ms = bound.message.cycle_time or 0
+            findings.append(_regular(name, heard[name], cycle_ms, bound.config.timeout_ms))
+        else:
+            findings.append(Finding(name, Level.NOTE, "not on SocketCAN: not listened to"))
+    return findings
+
+
+def _regular(name: str, times_ns: list[int], cycle_ms: int, timeout_ms: int) -> Finding:
+    gaps_ns = [after - before for before, after in pairwise(times_ns)]
+    found = summary(gaps_ns)
+    if found is None:
+        remedy = "switch the machine on; look at bit rate, wiring and the id in the DBC file"
+        return Finding(name, Level.BAD, f"{len(times_ns)} frames heard", remedy)
+    text = (
+        f"{found.count + 1} frames, a period of {found.p50 / 1000:.1f} ms (DBC: {cycle_ms} ms),"
+        f" the longest {found.max / 1000:.1f} ms"
+    )
+    if found.max >= timeout_ms * 1000:
+        remedy = "joystick or bus are disturbed, or timeout_ms is too short for it"
+        return Finding(name, Level.BAD, f"{text}: lost by timeout_ms {timeout_ms}", remedy)
+    if not 0.5 * cycle_ms <= found.p50 / 1000 <= 1.5 * cycle_ms:
+        remedy = "give the message the GenMsgCycleTime that it really has"
+        return Finding(name, Level.WARNING, text, remedy)
+    if found.max >= timeout_ms * 500:
+        remedy = f"more than half of timeout_ms {timeout_ms}: how busy is the bus?"
+        return Finding(name, Level.WARNING, text, remedy)
+    return Finding(name, Level.OK, text)

@@ -1,0 +1,154 @@
+"""The daemon's loop as a process of its own, on sockets that stand for the buses."""
+
+import json
+import select
+import socket
+from array import array
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.clock import boottime_ns
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.raw import RawPort
+from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
+from canshaper.service.controller import Controller
+from canshaper.service.events import Event
+from canshaper.service.exchange import exchange
+from canshaper.service.loop import run_at_deadlines
+from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.service.standstill import Standstill
+
+
+class WatchedPort(RawPort):
+    """A bus on one end of a pair of sockets, whose frames are counted and noted.
+
+    Args:
+        name: of the bus.
+        one: the end.
+        on_fault: called with every fault of the bus.
+        on_sent: called with every frame as soon as it was sent.
+
+    Attributes:
+        taken: frames so far.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        one: socket.socket,
+        on_fault: Callable[[FrameFault], None],
+        on_sent: Callable[[Frame], None],
+    ) -> None:
+        self.taken = 0
+        self._on_sent = on_sent
+        super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False)
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits."""
+        for frame in super().frames():
+            self.taken += 1
+            yield frame
+
+    def send(self, frame: Frame) -> bool:
+        """Send a frame, or not at all; whether it was sent."""
+        sent = super().send(frame)
+        if sent:
+            self._on_sent(frame)
+        return sent
+
+
+class Loop:
+    """The ticks of the daemon, and what happened when.
+
+    Args:
+        deployment: what is run.
+        sockets: one end of a bus, by its name.
+        seconds: how long.
+    """
+
+    def __init__(
+        self, deployment: Deployment, sockets: dict[str, socket.socket], seconds: float
+    ) -> None:
+        self._controller = Controller(deployment)
+        faults = self._controller.counters.add
+        self._ports = {
+            name: WatchedPort(name, one, faults, self._note) for name, one in sockets.items()
+        }
+        self._valves: dict[tuple[str, int, bool], list[int]] = {}
+        for i, axis in enumerate(deployment.axes.values()):
+            self._valves.setdefault(axis.valve.message.sender.key, []).append(i)
+        self._tick_ns = deployment.config.tick_ms * 1_000_000
+        self._standstill = Standstill(deployment)
+        self._seconds_ns = round(seconds * 1e9)
+        self._until_ns = 0
+        self._collector = Collector()
+        # Arrays, not lists: the collector has nothing to look through in them.
+        self._late, self._began, self._ended = array("q"), array("q"), array("q")
+        self._taken, self._sent = array("q"), array("q")
+        self._missed = 0
+        self._events: list[tuple[str, str, str]] = []
+        self._moved: set[str] = set()
+
+    def run(self) -> None:
+        """Run, as the daemon does, once the first frame of a lever is there."""
+        self._collector.freeze()
+        say_ready()
+        select.select(list(self._ports.values()), [], [])
+        self._until_ns = boottime_ns() + self._seconds_ns
+        run_at_deadlines(self._tick_ns, self._body)
+        for port in self._ports.values():
+            port.close()
+
+    def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
+        exchange(self._controller, self._ports, now_ns, missed, self._standstill)
+        self._housekeeping(now_ns)
+        self._late.append(late_ns)
+        self._began.append(now_ns)
+        self._taken.extend(port.taken for port in self._ports.values())
+        self._missed += missed
+        self._ended.append(boottime_ns())
+        return now_ns < self._until_ns
+
+    def _note(self, frame: Frame) -> None:
+        tick = len(self._late)
+        for axis in self._valves.get(frame[:3], ()):
+            self._sent.extend((tick, axis, boottime_ns()))
+
+    def _housekeeping(self, now_ns: int) -> None:
+        for event in self._controller.events:
+            if isinstance(event, Event):
+                t = event.transition
+                self._events.append((event.axis, t.new.name, t.reason.name))
+        self._controller.events.clear()
+        self._moved |= {n for n, runner in self._controller.axes.items() if runner.axis.raw}
+        self._collector.pause(now_ns)
+
+    def record(self) -> dict[str, Any]:
+        """What happened: the fields of ``Record``."""
+        return {
+            "late_ns": list(self._late),
+            "began_ns": list(self._began),
+            "ended_ns": list(self._ended),
+            "taken": list(self._taken),
+            "sent": list(self._sent),
+            "missed": self._missed,
+            "events": self._events,
+            "moved": sorted(self._moved),
+            "faults": {k: v for k, v in self._controller.counters.values.items() if v},
+        }
+
+
+def main(options: dict[str, Any]) -> None:
+    """Run it as the service's unit would, as far as that is permitted; print the record."""
+    deployment = load_deployment(Path(options["file"]))
+    sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
+    for one in sockets.values():
+        one.setblocking(False)
+    loop = Loop(deployment, sockets, options["seconds"])
+    refuse_huge_pages()
+    policy, memory = real_time(LOOP_PRIORITY), lock_memory()
+    loop.run()
+    print(json.dumps(loop.record() | {"policy": policy, "memory": memory}))

@@ -1,0 +1,240 @@
+"""The PC itself: what kernel, processor and interpreter do to a loop with deadlines.
+
+Each check takes the root of the file system, or the text that a tool prints, so that it can be
+asked about another machine.
+"""
+
+import os
+import platform
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+from canshaper.commissioning.doctor.finding import Finding, Level
+
+# Clock sources that are read without leaving the processor.
+QUICK_CLOCKS = frozenset(
+    ("tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "timebase")
+)
+# A processor that takes longer than this part of the tick to wake up is late by itself.
+WAKE_SHARE = 0.1
+
+
+def _read(file: Path) -> str | None:
+    """Text of a file of the kernel, or None."""
+    try:
+        return file.read_text(encoding="utf-8", errors="replace").strip()
+    except OSError:
+        return None
+
+
+def machine_findings(tick_ms: int) -> list[Finding]:
+    """All checks of this machine."""
+    root = Path("/")
+    number = os.cpu_count() or 1
+    return [
+        preemption(root, platform.version()),
+        throttling(root),
+        swap(root),
+        huge_pages(root),
+        governor(root),
+        idle_states(root, tick_ms),
+        clock_source(root),
+        virtual(_virtualisation(), root),
+        processors(root, number),
+        others(os.getloadavg()[0], number),
+        interpreter(),
+    ]
+
+
+def preemption(root: Path, version: str) -> Finding:
+    """How soon the kernel lets a real-time process run.
+
+    Args:
+        root: root of the file system.
+        version: the kernel's version text, ``uname -v``.
+    """
+    real_time = "linux-image-rt-amd64 or the like of the distribution"
+    if re.search(r"PREEMPT[_ ]RT", version) or _read(root / "sys/kernel/realtime") == "1":
+        return Finding("kernel", Level.OK, "PREEMPT_RT")
+    if "PREEMPT_DYNAMIC" not in version:
+        if re.search(r"\bPREEMPT\b", version):
+            return Finding("kernel", Level.OK, "preemptible (PREEMPT)")
+        found = "does not let a real-time process interrupt it"
+        return Finding("kernel", Level.WARNING, found, f"install a PREEMPT_RT kernel ({real_time})")
+    modes = _read(root / "sys/kernel/debug/sched/preempt") or ""
+    told = re.search(r"\((\w+)\)", modes) or re.search(
+        r"\bpreempt=(\w+)", _read(root / "proc/cmdline") or ""
+    )
+    if told is None:
+        found = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt tells root which mode it is in"
+        return Finding("kernel", Level.NOTE, found, "boot with preempt=full to be sure")
+    found = f"PREEMPT_DYNAMIC in mode {told[1]}"
+    if told[1] in ("full", "lazy"):
+        return Finding("kernel", Level.OK, found)
+    remedy = f"boot with preempt=full, or install a PREEMPT_RT kernel ({real_time})"
+    return Finding("kernel", Level.WARNING, found, remedy)
+
+
+def throttling(root: Path) -> Finding:
+    """How much of the time the kernel gives to real-time processes."""
+    runtime = _read(root / "proc/sys/kernel/sched_rt_runtime_us")
+    period = _read(root / "proc/sys/kernel/sched_rt_period_us")
+    if runtime is None or period is None:
+        return Finding("real-time share", Level.NOTE, "the kernel does not tell")
+    if runtime == "-1":
+        return Finding("real-time share", Level.OK, "not limited")
+    share = int(runtime) / int(period)
+    found = f"{100 * share:.0f} % of the time"
+    if share >= 0.5:
+        return Finding("real-time share", Level.OK, found)
+    return Finding(
+        "real-time share",
+        Level.BAD if share == 0 else Level.WARNING,
+        found,
+        "sudo sysctl kernel.sched_rt_runtime_us=950000",
+    )
+
+
+def swap(root: Path) -> Finding:
+    """Memory that was written out, and is slow to come back."""
+    lines = (_read(root / "proc/swaps") or "").splitlines()[1:]
+    used_kib = sum(int(line.split()[3]) for line in lines)
+    if not lines:
+        return Finding("swap", Level.OK, "none")
+    if used_kib == 0:
+        return Finding("swap", Level.OK, "there, and not used")
+    return Finding(
+        "swap",
+        Level.WARNING,
+        f"{used_kib / 1024:.0f} MiB in use: memory is short",
+        "more memory or fewer programs; then sudo swapoff -a. The daemon's own memory is locked",
+    )
+
+
+def huge_pages(root: Path) -> Finding:
+    """Whose memory the kernel may join to pages of 2 MiB, in steps that nothing interrupts.
+
+    The daemon refuses it for its own memory; that of other programs is joined on any processor.
+    """
+    modes = _read(root / "sys/kernel/mm/transparent_hugepage/enabled") or ""
+    told = re.search(r"\[(\w+)\]", modes)
+    if told is None:
+        return Finding("huge pages", Level.OK, "none")
+    if told[1] != "always":
+        return Finding("huge pages", Level.OK, told[1])
+    found = "always: the kernel may hold up the loop for 1 ms when it makes one for any program"
+    remedy = "boot with transparent_hugepage=madvise"
+    return Finding("huge pages", Level.NOTE, found, remedy)
+
+
+def governor(root: Path) -> Finding:
+    """Whether the processors slow down when there is little to do."""
+    files = sorted((root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor"))
+    names = {text for file in files if (text := _read(file))}
+    if not names:
+        found = "no frequency scaling is to be seen (fixed, or set from outside of this system)"
+        return Finding("governor", Level.NOTE, found)
+    found = ", ".join(sorted(names))
+    if names == {"performance"}:
+        return Finding("governor", Level.OK, found)
+    return Finding(
+        "governor",
+        Level.WARNING,
+        f"{found}: the processor is slow when the loop wakes up",
+        "sudo cpupower frequency-set -g performance, at every boot",
+    )
+
+
+def idle_states(root: Path, tick_ms: int) -> Finding:
+    """How long the deepest sleep that a processor may fall into takes to wake up from."""
+    deepest_us, name = 0, ""
+    for state in (root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpuidle/state*"):
+        latency = _read(state / "latency")
+        if latency and _read(state / "disable") in ("0", None) and int(latency) > deepest_us:
+            deepest_us, name = int(latency), _read(state / "name") or state.name
+    if not name:
+        return Finding("idle states", Level.OK, "none that takes time to wake up from")
+    found = f"the deepest is {name}, {deepest_us} us to wake up"
+    if deepest_us <= WAKE_SHARE * tick_ms * 1000:
+        return Finding("idle states", Level.OK, found)
+    remedy = "sudo cpupower idle-set -D 100, or boot with intel_idle.max_cstate=1"
+    return Finding("idle states", Level.WARNING, found, remedy)
+
+
+def clock_source(root: Path) -> Finding:
+    """What the kernel reads the time from."""
+    directory = root / "sys/devices/system/clocksource/clocksource0"
+    name = _read(directory / "current_clocksource")
+    if name is None:
+        return Finding("clock source", Level.NOTE, "the kernel does not tell")
+    if name in QUICK_CLOCKS:
+        return Finding("clock source", Level.OK, name)
+    others = (_read(directory / "available_clocksource") or "").split()
+    better = [other for other in others if other in QUICK_CLOCKS]
+    if better:
+        remedy = f"boot with clocksource={better[0]}, unless the kernel's log calls it unstable"
+        return Finding("clock source", Level.WARNING, f"{name}, which is slow to read", remedy)
+    return Finding("clock source", Level.NOTE, name)
+
+
+def virtual(told: str | None, root: Path) -> Finding:
+    """Whether another system decides when this one runs.
+
+    Args:
+        told: output of ``systemd-detect-virt --vm``, None where there is no such program.
+        root: root of the file system.
+    """
+    if told is None and re.search(
+        r"^flags\b.*\bhypervisor\b", _read(root / "proc/cpuinfo") or "", re.MULTILINE
+    ):
+        told = "a hypervisor"
+    if told in (None, "none"):
+        return Finding("virtual machine", Level.OK, "none is to be seen")
+    return Finding(
+        "virtual machine",
+        Level.WARNING,
+        f"{told}: its host decides when this system runs",
+        "run the crane on a PC without one, or give the machine processors of its own",
+    )
+
+
+def _virtualisation() -> str | None:
+    try:
+        done = subprocess.run(
+            ["systemd-detect-virt", "--vm"], capture_output=True, text=True, check=False
+        )
+    except OSError:
+        return None
+    return done.stdout.strip() or None
+
+
+def processors(root: Path, number: int) -> Finding:
+    """How many processors there are, and which of them are kept free."""
+    isolated = _read(root / "sys/devices/system/cpu/isolated")
+    found = f"{number}, isolated: {isolated or 'none'}"
+    return Finding("processors", Level.NOTE, found)
+
+
+def others(load: float, number: int) -> Finding:
+    """What else was running before the first run: the run called idle has it too.
+
+    Args:
+        load: processes that ran or waited for a processor, mean of a minute.
+        number: of processors.
+    """
+    found = f"{load:.1f} processes ran or waited on {number} processors"
+    if load <= number:
+        return Finding("other programs", Level.NOTE, found)
+    remedy = "top shows which; end those that the machine does not need"
+    return Finding("other programs", Level.WARNING, f"{found}: idle was not idle", remedy)
+
+
+def interpreter() -> Finding:
+    """The Python that runs the loop, and whether it is one for searching errors."""
+    found = f"{platform.python_implementation()} {platform.python_version()}"
+    if hasattr(sys, "gettotalrefcount"):
+        remedy = "take the ordinary build"
+        return Finding("Python", Level.WARNING, f"{found}, a debug build", remedy)
+    return Finding("Python", Level.NOTE, f"{found}; garbage collector frozen while the loop runs")

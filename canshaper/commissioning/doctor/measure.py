@@ -1,0 +1,161 @@
+"""One run of the loop with levers, and the times that come of it."""
+
+import json
+import socket
+import subprocess
+import time
+from collections.abc import Callable
+from contextlib import ExitStack, suppress
+from dataclasses import dataclass
+from typing import Any
+
+from canshaper.can.deployment import Deployment
+from canshaper.can.raw import CAN_FRAME
+from canshaper.commissioning.doctor.load import load_kinds
+from canshaper.commissioning.doctor.processes import Children, MeasureError, output, ready
+
+# How often the run is looked after, and how much longer than asked it may take.
+LOOK_S = 0.2
+PATIENCE_S = 120.0
+
+
+@dataclass(frozen=True)
+class Run:
+    """What was measured in one run; times in ns.
+
+    Attributes:
+        late_ns: how late each tick began after its deadline; without the first, which sets them.
+        valve_ns: from the begin of a tick to its last valve frame, where it sent one.
+        tick_ns: from begin to end of each tick.
+        joystick_ns: from each frame of a lever to the next valve frame computed with it, for each
+            axis of the lever.
+        missed: deadlines missed.
+        events: changes of state (axis, new state, reason).
+        moved: axes that were in motion.
+        faults: counters of the status message that are not zero.
+        policy: why the loop has no real-time priority, or None where it has.
+        memory: why its memory is not locked, or None where it is.
+    """
+
+    late_ns: list[int]
+    valve_ns: list[int]
+    tick_ns: list[int]
+    joystick_ns: list[int]
+    missed: int
+    events: list[tuple[str, str, str]]
+    moved: list[str]
+    faults: dict[str, int]
+    policy: str | None
+    memory: str | None
+
+
+def measure(
+    deployment: Deployment, seconds: float, tell: Callable[[float], None], *, load: bool
+) -> Run:
+    """Run the loop of a deployment without its buses.
+
+    Args:
+        deployment: what is run.
+        seconds: how long.
+        tell: called with the seconds that have passed.
+        load: keep the PC busy meanwhile.
+
+    Raises:
+        MeasureError: a process failed.
+    """
+    with Children() as children, ExitStack() as ends:
+        loops, levers = {}, {}
+        for name in deployment.config.buses:
+            pair = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
+            loops[name], levers[name] = pair
+            for end in pair:
+                ends.enter_context(end)
+        file = str(deployment.path.resolve())
+        hand = children.start("levers", {n: s.fileno() for n, s in levers.items()}, file=file)
+        loop = children.start(
+            "loop", {n: s.fileno() for n, s in loops.items()}, file=file, seconds=seconds
+        )
+        for process in (hand, loop):
+            ready(process)
+        for process in [children.start("load", kind=kind) for kind in load_kinds() if load]:
+            ready(process)
+        for one in loops.values():
+            one.send(bytes(CAN_FRAME.size))  # the levers begin, and the loop with their first frame
+        ends.close()  # the children see each other end
+        record = _result(loop, hand, seconds, tell)
+        return run_of(deployment, record, json.loads(output(hand, PATIENCE_S)))
+
+
+def _result(
+    loop: "subprocess.Popen[str]",
+    hand: "subprocess.Popen[str]",
+    seconds: float,
+    tell: Callable[[float], None],
+) -> dict[str, Any]:
+    begin = time.monotonic()
+    while (passed := time.monotonic() - begin) < seconds + PATIENCE_S:
+        tell(passed)
+        if hand.poll():  # it fails before the loop can know
+            output(hand, PATIENCE_S)
+        with suppress(subprocess.TimeoutExpired):
+            found: dict[str, Any] = json.loads(output(loop, LOOK_S))
+            return found
+    raise MeasureError(f"the loop did not end within {seconds + PATIENCE_S:.0f} s")
+
+
+def run_of(
+    deployment: Deployment, record: dict[str, Any], hand: dict[str, list[tuple[int, int]]]
+) -> Run:
+    """Bring together what loop and levers noted.
+
+    Args:
+        deployment: what was run.
+        record: output of the loop process.
+        hand: output of the levers process.
+    """
+    began, ended = record["began_ns"], record["ended_ns"]
+    sent = list(zip(*[iter(record["sent"])] * 3, strict=True))  # tick, axis, ns
+    last = {tick: at_ns for tick, _, at_ns in sent}
+    return Run(
+        late_ns=record["late_ns"][1:],
+        valve_ns=[at_ns - began[tick] for tick, at_ns in last.items()],
+        tick_ns=[end - begin for begin, end in zip(began, ended, strict=True)],
+        joystick_ns=_joystick_ns(deployment, record["taken"], sent, hand),
+        missed=record["missed"],
+        events=[tuple(event) for event in record["events"]],
+        moved=record["moved"],
+        faults=record["faults"],
+        policy=record["policy"],
+        memory=record["memory"],
+    )
+
+
+def _joystick_ns(
+    deployment: Deployment,
+    taken: list[int],
+    sent: list[tuple[int, int, int]],
+    hand: dict[str, list[tuple[int, int]]],
+) -> list[int]:
+    """From each lever frame to the valve frames that are computed with it.
+
+    A bus keeps the order of its frames: the n-th one that a lever sent on it is the n-th that the
+    loop took. Frames from before the first tick are too old, those after the last valve frame have
+    no answer.
+    """
+    buses = list(deployment.config.buses)
+    levers = list(deployment.config.levers)
+    found: list[int] = []
+    for number, axis in enumerate(deployment.axes.values()):
+        lever = axis.config.stick.lever
+        bus = deployment.config.levers[lever].bus
+        counts = taken[buses.index(bus) :: len(buses)]  # frames taken, up to and with each tick
+        answers = [(tick, at_ns) for tick, valve, at_ns in sent if valve == number]
+        i = 0
+        for place, (which, at_ns) in enumerate(hand[bus]):
+            while i < len(answers) and counts[answers[i][0]] <= place:
+                i += 1
+            if i == len(answers):
+                break
+            if which == levers.index(lever) and place >= counts[0]:
+                found.append(answers[i][1] - at_ns)
+    return found

@@ -1,0 +1,126 @@
+"""Processes of a measurement: started, and ended whatever happens."""
+
+import ctypes
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Mapping
+from importlib import import_module
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+# linux/prctl.h
+PR_SET_PDEATHSIG = 1
+# The loop has the priority that the service's unit gives it; the levers come after it, so that
+# they never delay it.
+LOOP_PRIORITY = 40
+LEVERS_PRIORITY = LOOP_PRIORITY - 1
+
+_CODE = f"import sys; sys.path[:] = {{path!r}}; from {__name__} import be; be()"
+
+
+READY = "ready"
+
+
+class MeasureError(Exception):
+    """A process of the measurement failed."""
+
+
+class Children:
+    """Child processes, each a module of this package with a ``main``; none outlives the block."""
+
+    def __init__(self) -> None:
+        self._processes: list[subprocess.Popen[str]] = []
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        for process in self._processes:
+            process.kill()
+        for process in self._processes:
+            process.communicate()
+
+    def start(
+        self, module: str, sockets: Mapping[str, int] | None = None, **options: Any
+    ) -> subprocess.Popen[str]:
+        """Start ``canshaper.commissioning.doctor.MODULE``.
+
+        Args:
+            module: its name.
+            sockets: file descriptors that it inherits, by the name of the bus.
+            options: what its ``main`` gets, with ``sockets``.
+        """
+        sockets = dict(sockets or {})
+        options |= {"module": module, "parent": os.getpid(), "sockets": sockets}
+        # Isolated, with the path of this process: what finds canshaper here finds it there.
+        path = [str(Path(entry).resolve()) for entry in sys.path]
+        flags = ["-I", *(["-B"] if sys.dont_write_bytecode else [])]
+        code = _CODE.format(path=path)
+        process = subprocess.Popen(
+            [sys.executable, *flags, "-c", code, json.dumps(options)],
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            pass_fds=tuple(sockets.values()),
+            process_group=0,  # Ctrl-C is for the parent, which ends them
+        )
+        self._processes.append(process)
+        return process
+
+
+def ready(process: "subprocess.Popen[str]") -> None:
+    """Wait until a child says that it is ready; nothing else is printed before its end.
+
+    Raises:
+        MeasureError: it ended instead.
+    """
+    assert process.stdout is not None
+    if process.stdout.readline().strip() != READY:
+        output(process, None)
+        raise MeasureError(f"the measurement failed: {process.args!r} ended")
+
+
+def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
+    """What a child printed until its end.
+
+    Raises:
+        MeasureError: it failed.
+        TimeoutExpired: it has not ended yet.
+    """
+    out, err = process.communicate(timeout=limit_s)
+    if process.returncode:
+        raise MeasureError(f"the measurement failed: {err.strip() or process.returncode}")
+    return out
+
+
+def be() -> None:
+    """What a child does: tie itself to its parent, however that ends; then its ``main``."""
+    options: dict[str, Any] = json.loads(sys.argv[1])
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    if os.getppid() != options["parent"]:  # it ended before that call
+        sys.exit(1)
+    import_module(f"canshaper.commissioning.doctor.{options['module']}").main(options)
+
+
+def say_ready() -> None:
+    """Tell the parent that the work can begin."""
+    print(READY, flush=True)
+
+
+def real_time(priority: int) -> str | None:
+    """Ask for SCHED_FIFO with this priority; None, or why it is not permitted."""
+    try:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(priority))
+    except OSError as error:
+        return error.strerror
+    return None

@@ -1,0 +1,198 @@
+"""Signals of a CAN log, named by DBC, with the commands that stand beside them in the log."""
+
+import math
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+from cantools.database.can import Message, Signal
+
+from canshaper.can.database import Messages
+from canshaper.can.deployment import Deployment
+from canshaper.can.j1939 import NULL, group_of
+from canshaper.can.layout import Layout, is_j1939
+from canshaper.can.signals import find_signal, special_codes
+from canshaper.commissioning.identification.commands import Commands, Samples
+from canshaper.commissioning.identification.series import (
+    IdentificationError,
+    Kind,
+    Series,
+    Unit,
+    ordered,
+    unit_of,
+)
+from canshaper.recording.log import CutOffError, LogError, LogFile
+
+
+@dataclass
+class _Reader:
+    """A signal that is looked for in a log."""
+
+    name: str
+    message: Message
+    signal: Signal
+    unit: Unit
+    samples: Samples = field(default_factory=Samples)
+    senders: set[tuple[str, int]] = field(default_factory=set)
+    wrong_length: int = 0
+    no_value: int = 0
+
+    def __post_init__(self) -> None:
+        self._layout = Layout(self.message)
+        self._special = special_codes(self.signal)
+        low, high = self.signal.minimum, self.signal.maximum
+        bounded = low is not None and high is not None and low < high
+        self._low = float(low) if bounded and low is not None else -math.inf
+        self._high = float(high) if bounded and high is not None else math.inf
+
+    def wants(self, can_id: int, extended: bool) -> bool:
+        """Whether an identifier is that of its message, of J1939 whatever its priority."""
+        if extended != self.message.is_extended_frame:
+            return False
+        own = self.message.frame_id
+        if not is_j1939(self.message):
+            return can_id == own
+        sender = own & 0xFF
+        return group_of(can_id) == group_of(own) and sender in (NULL, can_id & 0xFF)
+
+    def take(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
+        """Take a frame."""
+        self.senders.add(sender)
+        if len(data) < self.message.length:
+            self.wrong_length += 1
+            return
+        raw = self._layout.decode(data[: self.message.length])[self.signal.name]
+        value = raw * self.signal.scale + self.signal.offset
+        if raw in self._special or not self._low <= value <= self._high:
+            self.no_value += 1
+            return
+        self.samples.add(time_s, value * self.unit.factor)
+
+
+def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
+    """Message, signal and unit of "Message.Signal".
+
+    Raises:
+        IdentificationError: it is not in the DBC files, or cannot be used.
+    """
+    message_name, dot, signal_name = name.partition(".")
+    if not (message_name and dot and signal_name):
+        raise IdentificationError(f"--signal: found {name!r}, allowed is AXIS=MESSAGE.SIGNAL")
+    found = messages.find(message_name)
+    if isinstance(found, str):
+        raise IdentificationError(f"--signal {name}: {found}")
+    message = found[1]
+    signal = find_signal(message, signal_name)
+    if signal is None:
+        names = ", ".join(s.name for s in message.signals)
+        raise IdentificationError(f"--signal {name}: {message_name} has the signals {names}")
+    if message.is_multiplexed():
+        raise IdentificationError(f"--signal {name}: multiplexed messages are not read")
+    try:
+        unit = unit_of(signal.unit or "")
+    except IdentificationError as error:
+        raise IdentificationError(f"--signal {name}: {error}") from None
+    return message, signal, unit
+
+
+def read_can(
+    path: Path,
+    label: str,
+    wanted: Mapping[str, str],
+    messages: Messages,
+    *,
+    deployment: Deployment | None = None,
+    channel: str | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> dict[str, Series]:
+    """Signals of a log by axis.
+
+    Args:
+        path: the log.
+        label: state of the grapple in it.
+        wanted: "Message.Signal" of each axis.
+        messages: of the DBC files.
+        deployment: names the commands of the axes and the signal of the grapple, where known.
+        channel: bus of the log that is read; by default all of them.
+        progress: is told what part is read, 0 to 1.
+
+    Raises:
+        IdentificationError: a signal is not in the log, or from two senders.
+        LogError: the log cannot be read.
+    """
+    readers = {axis: _Reader(name, *bind(name, messages)) for axis, name in wanted.items()}
+    grapple = deployment.grapple if deployment else None
+    weight = None
+    if grapple and (signal := find_signal(grapple.message, grapple.config.signal)):
+        weight = _Reader("grapple", grapple.message, signal, Unit(Kind.OTHER, 1.0, ""))
+    commands = Commands(deployment)
+    all_readers = [*readers.values(), *([weight] if weight else [])]
+    takers: dict[tuple[int, bool], list[_Reader]] = {}
+    notes: list[str] = []
+    frames, first_ns = 0, None
+    channels: set[str] = set()
+    try:
+        for frame in LogFile(path, progress):
+            channels.add(frame.channel)
+            if channel is not None and frame.channel != channel:
+                continue
+            frames += 1
+            first_ns = frame.time_ns if first_ns is None else first_ns
+            time_s = (frame.time_ns - first_ns) / 1e9
+            key = frame.can_id, frame.extended
+            if key not in takers:
+                takers[key] = [r for r in all_readers if r.wants(*key)]
+            for reader in takers[key]:
+                reader.take(time_s, (frame.channel, frame.can_id), frame.data)
+            commands.take(time_s, key, frame.data)
+    except CutOffError as error:
+        notes.append(f"{error}; what stands before it was used")
+    if channel is not None and not frames:
+        raise LogError(f"{path}: found no bus {channel!r}, its frames are of {_listed(channels)}")
+    idle = commands.idle()
+    at = float(np.median(weight.samples.arrays()[1])) if weight and weight.samples.value else None
+    result = {}
+    for axis, reader in readers.items():
+        told = _checked(path, reader, frames, set(takers), messages)
+        time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
+        source = f"{path.name}: {reader.name}"
+        command = commands.of(axis)
+        result[axis] = Series(
+            source, label, reader.unit, time, value, command, idle, at, [*notes, *told]
+        )
+    return result
+
+
+def _listed(names: set[str]) -> str:
+    return ", ".join(sorted(repr(n) for n in names)) or "none"
+
+
+def _checked(
+    path: Path, reader: _Reader, frames: int, seen: set[tuple[int, bool]], messages: Messages
+) -> list[str]:
+    """Notes on what was left out of a signal."""
+    if not reader.senders:
+        known = [m for m in messages.all() if (m.frame_id, m.is_extended_frame) in seen]
+        there = ", ".join(sorted(m.name for m in known)) or "none of the DBC files"
+        raise IdentificationError(
+            f"{path}: found no frame of {reader.message.name} (id {reader.message.frame_id:#x}) in"
+            f" {frames} frames; messages in the log are {there}. Is it the right log, and the"
+            " right DBC file?"
+        )
+    if len(reader.senders) > 1:
+        found = ", ".join(f"{i:#x}" + (f" on {c}" if c else "") for c, i in sorted(reader.senders))
+        raise IdentificationError(
+            f"{path}: {reader.message.name} comes from more than one sender: {found}; choose a bus"
+            " with --channel, or give the DBC message the address of one"
+        )
+    notes = []
+    for count, what in (
+        (reader.wrong_length, "frames were too short"),
+        (reader.no_value, "values were not available, errors or out of range"),
+    ):
+        if count:
+            notes.append(f"{path}: {reader.name}: {count} {what} and left out")
+    if not reader.samples.value:
+        raise IdentificationError(f"{notes[0]}; no value is left")
+    return notes

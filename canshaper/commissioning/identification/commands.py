@@ -1,0 +1,134 @@
+"""Commands of the axes in a CAN log: when each was told to move, and how fast."""
+
+from array import array
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from canshaper.can.codecs import WrongLengthError
+from canshaper.can.deployment import BoundAxis, Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundLever
+from canshaper.can.layout import Layout
+from canshaper.commissioning.identification.driven import STANDS
+from canshaper.commissioning.identification.series import Array, Command
+from canshaper.service.finder import InputFinder
+
+# Silence of a command's message after which nothing is known of the command, s.
+_SILENT_S = 2.0
+
+
+@dataclass
+class Samples:
+    """Times in s from the first frame of the log, and values."""
+
+    time_s: "array[float]" = field(default_factory=lambda: array("d"))
+    value: "array[float]" = field(default_factory=lambda: array("d"))
+
+    def add(self, time_s: float, value: float) -> None:
+        """Put one in."""
+        self.time_s.append(time_s)
+        self.value.append(value)
+
+    def arrays(self) -> tuple[Array, Array]:
+        """Times and values."""
+        return np.array(self.time_s), np.array(self.value)
+
+
+class Commands:
+    """Commands of the axes of a deployment, from valve frames, else from levers."""
+
+    def __init__(self, deployment: Deployment | None) -> None:
+        self._axes = dict(deployment.axes) if deployment else {}
+        self._valves: dict[str, Samples] = {n: Samples() for n in self._axes}
+        self._sticks: dict[str, Samples] = {n: Samples() for n in self._axes}
+        self._by_valve: dict[tuple[int, bool], list[BoundAxis]] = {}
+        self._layouts: dict[tuple[int, bool], tuple[Layout, int]] = {}
+        for bound in self._axes.values():
+            key = bound.valve.message.sender.key[1:]
+            self._by_valve.setdefault(key, []).append(bound)
+            self._layouts[key] = Layout(bound.valve_message), bound.valve_message.length
+        self._curves = {n: a.config.limits.curve() for n, a in self._axes.items()}
+        levers = list(deployment.levers.values()) if deployment else []
+        self._lever_buses = {lever.key[0] for lever in levers}
+        self._finder = InputFinder(deployment.config.buses if deployment else {}, levers)
+
+    def take(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
+        """Take a frame."""
+        valves = self._by_valve.get(key)
+        if valves:
+            layout, length = self._layouts[key]
+            if len(data) == length:
+                raw: dict[str, Any] = layout.decode(data)
+                for bound in valves:
+                    if (steps := bound.valve.read(raw)) is not None:
+                        part = steps / bound.valve.steps
+                        speed = self._speed(bound, part)
+                        self._valves[bound.name].add(time_s, speed)
+        for bus in self._lever_buses:  # which one a channel of the log is, nobody has said
+            if lever := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
+                self._take_lever(lever, time_s, data)
+
+    def _take_lever(self, lever: BoundLever, time_s: float, data: bytes) -> None:
+        try:
+            _, sticks = lever.codec.decode(data)
+        except WrongLengthError:
+            return
+        for name, bound in self._axes.items():
+            stick = bound.config.stick
+            value = sticks.get(stick.signal) if stick.lever == lever.name else None
+            if type(value) is float:
+                moved = abs(value) > stick.neutral_pct / 100.0
+                self._sticks[name].add(time_s, value if moved else 0.0)
+
+    def _speed(self, bound: BoundAxis, command: float) -> float:
+        """Speed that the valve gives by the limits of its axis, part of full."""
+        if (curve := self._curves[bound.name]) is not None:
+            return curve.velocity(command)
+        dead = bound.config.limits.deadband_pct / 100.0
+        opening = max(0.0, (abs(command) - dead) / (1.0 - dead))
+        return opening if command > 0.0 else -opening
+
+    def of(self, axis: str) -> Command | None:
+        """Commands of an axis; None where the log has none."""
+        for samples in (self._valves.get(axis), self._sticks.get(axis)):
+            if samples and samples.value:
+                time, speed = samples.arrays()
+                return Command(time, speed)
+        return None
+
+    def idle(self) -> list[tuple[float, float]] | None:
+        """Stretches in which every axis stands; None where no command is in the log."""
+        known = [c for c in (self.of(axis) for axis in self._axes) if c]
+        if not known:
+            return None
+        idle = [(max(float(c.time_s[0]) for c in known), min(float(c.time_s[-1]) for c in known))]
+        for command in known:
+            idle = _common(idle, _standing(command))
+        return idle
+
+
+def _standing(command: Command) -> list[tuple[float, float]]:
+    """Stretches in which a command is known to be zero."""
+    time = command.time_s
+    stands = (np.abs(command.speed[:-1]) < STANDS) & (np.diff(time) < _SILENT_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], stands.astype(int), [0]])))
+    pairs = zip(edges[::2], edges[1::2], strict=True)
+    return [(float(time[a]), float(time[b])) for a, b in pairs]
+
+
+def _common(
+    one: list[tuple[float, float]], other: list[tuple[float, float]]
+) -> list[tuple[float, float]]:
+    """What two lists of stretches, each in order, have in common."""
+    found, i, j = [], 0, 0
+    while i < len(one) and j < len(other):
+        start, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
+        if end > start:
+            found.append((start, end))
+        if one[i][1] < other[j][1]:
+            i += 1
+        else:
+            j += 1
+    return found

@@ -1,0 +1,269 @@
+"""What the signals of an axis tell of its swing, and whether that is enough to use."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from canshaper.commissioning.identification.decay import (
+    LARGEST_RAD,
+    DecayFit,
+    SegmentFit,
+    Value,
+    fit_decay,
+)
+from canshaper.commissioning.identification.doubts import clipped, mixed
+from canshaper.commissioning.identification.driven import DrivenFit, driven_s, fit_driven
+from canshaper.commissioning.identification.segments import (
+    SETTLING_S,
+    Found,
+    find_free,
+)
+from canshaper.commissioning.identification.series import Kind, Series
+from canshaper.commissioning.identification.swing import SAMPLES
+
+# Fewer full swings tell no damping.
+LEAST_SWINGS = 3.0
+# Widest intervals of what may be used: of the period, and of the damping ratio as a part of it or
+# as such. 3 % of the period are 6 % of the length, which every filter but ZV forgives.
+WIDEST_PERIOD = 0.03
+WIDEST_RATIO, WIDEST_RATIO_ABS = 0.4, 0.01
+# Largest swing that the correction for amplitude holds for, rad.
+LARGE_RAD = math.radians(60.0)
+# Part of the driven swing that the commands have to explain.
+LEAST_EXPLAINED = 0.8
+LEAST_EXPLAINED_ALONE = 0.9
+# Periods from which a driven swing is looked for, each some 30 % around, s.
+STARTS_S = (1.2, 1.7, 2.3, 3.2, 4.5)
+SWING_FREELY = (
+    "drive the axis shortly, let go of the levers so that it swings by some 10 degrees, and touch"
+    " nothing for ten swings"
+)
+
+
+@dataclass
+class Finding:
+    """One axis in one state of the grapple.
+
+    Attributes:
+        axis: its name.
+        label: state of the grapple, may be "".
+        at: value of the grapple's signal, where it is known.
+        series: the signals.
+        free: free swings, where there are any.
+        driven: driven swing, where commands are known.
+        period_s: period of small damped swings; None where nothing was found.
+        damping_ratio: damping ratio.
+        full_speed_m_s: speed of the tip at full command; None where that was not seen.
+        poor: why it cannot be used, each with what to do; empty where it can.
+        notes: what else a person should know.
+    """
+
+    axis: str
+    label: str
+    at: float | None
+    series: list[Series]
+    free: DecayFit | None = None
+    driven: DrivenFit | None = None
+    period_s: Value | None = None
+    damping_ratio: Value | None = None
+    full_speed_m_s: Value | None = None
+    poor: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def usable(self) -> bool:
+        """Whether period and damping are known well enough."""
+        return not self.poor and self.period_s is not None
+
+
+def identify(
+    axis: str, label: str, series: Sequence[Series], about_s: float | None = None
+) -> Finding:
+    """Period, damping and full speed of an axis from its signals in one state of the grapple.
+
+    Args:
+        axis: its name.
+        label: the state.
+        series: at least one signal.
+        about_s: the period as far as it is known, s.
+    """
+    values = [s.at for s in series if s.at is not None]
+    at = float(np.median(values)) if values else None
+    finding = Finding(axis, label, at, list(series))
+    for one in series:
+        finding.notes += [n for n in one.notes if n not in finding.notes]
+    good = [one for one in series if not _useless(finding, one)]
+    _free(finding, good, about_s)
+    _driven(finding, good, about_s)
+    if finding.period_s is None:
+        finding.poor = finding.poor or [_no_swing(good)]
+        return finding
+    finding.notes += finding.poor
+    _judge(finding)
+    return finding
+
+
+def _useless(finding: Finding, series: Series) -> bool:
+    """Whether a signal is none at all; notes why."""
+    if len(series.time_s) < 3 * SAMPLES:
+        text = f"only {len(series.time_s)} values; log for at least ten swings"
+    elif float(np.ptp(series.value)) == 0.0:
+        text = f"it stands at {series.value[0]:g}; is it the right signal, and the sensor on?"
+    elif (step := float(np.median(np.diff(series.time_s)))) > 0.25:
+        text = (
+            f"a value every {step:.2g} s; allowed are {SAMPLES} or more a swing: log it at 10 Hz"
+            " or faster"
+        )
+    else:
+        return False
+    finding.poor.append(f"{series.source}: {text}")
+    return True
+
+
+def _no_swing(series: Sequence[Series]) -> str:
+    """What to do where no swing was found."""
+    if not series:
+        return "no signal that could be used"
+    flat = clipped(series[0], None)
+    if flat:
+        return flat
+    names = ", ".join(s.source for s in series)
+    if any(s.idle is not None and not _long_enough(s) for s in series):
+        return f"{names}: never left to swing freely for two swings: {SWING_FREELY}"
+    return f"{names}: no decaying swing found: {SWING_FREELY}. Is it the right signal?"
+
+
+def _long_enough(series: Series) -> bool:
+    return any(b - a > SETTLING_S + 4.0 for a, b in series.idle or [])
+
+
+def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
+    """Free swings of all signals together."""
+    found = [(s, f) for s in series if (f := find_free(s, about_s))]
+    if not found:
+        return
+    best = max((f for _, f in found), key=lambda f: f.worth)
+    segments = []
+    for one, swings in found:
+        fitting: Found | None = swings
+        if abs(swings.period_s / best.period_s - 1.0) > 0.1:
+            fitting = find_free(one, best.period_s)
+        segments += fitting.segments if fitting else []
+    fit = fit_decay(segments, best.period_s, best.damping_ratio)
+    finding.free, finding.period_s, finding.damping_ratio = fit, fit.period_s, fit.damping_ratio
+
+
+def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
+    """Driven swings: full speed, and what free swings did not tell."""
+    if not any(driven_s(s) for s in series):
+        return
+    trusted = finding.free if finding.free and not _faults(finding) else None
+    starts = (about_s,) if about_s else STARTS_S
+    periods = (trusted.period_s.value,) if trusted else starts
+    fits = [f for p in periods if (f := fit_driven(series, p, trusted))]
+    if not fits:
+        return
+    fit = max(fits, key=lambda f: f.explained)
+    finding.driven = fit
+    if fit.explained < LEAST_EXPLAINED:
+        finding.notes.append(
+            f"full speed not told: the commands explain only {100 * max(fit.explained, 0):.0f} % of"
+            " the driven swing; drive this axis alone, in single strokes"
+        )
+        return
+    if trusted is None and fit.explained > LEAST_EXPLAINED_ALONE:
+        finding.free = None
+        finding.period_s, finding.damping_ratio = fit.period_s, fit.damping_ratio
+        finding.notes.append("from driven motion, as no free swing was good enough")
+    if fit.full_speed_m_s is None:
+        finding.notes.append("full speed not told: the signal is no angle and no rate of one")
+    elif fit.full_speed_m_s.relative < 0.3:
+        finding.full_speed_m_s = fit.full_speed_m_s
+
+
+def _judge(finding: Finding) -> None:
+    finding.poor = _faults(finding)
+    fit = finding.free
+    if fit is None:
+        return
+    if fit.friction and not finding.poor:
+        (large, at_large), (small, at_small) = fit.friction
+        unit, factor = _shown(fit.segments[0])
+        why = "dry friction" if at_small > at_large else "damping that grows with the swing"
+        finding.notes.append(
+            f"the damping ratio changes from {at_large:.3f} at {large * factor:.2g} {unit} to"
+            f" {at_small:.3f} at {small * factor:.2g} {unit}: {why}; the value given lies between"
+        )
+    largest = max(_angle(s) for s in fit.segments)
+    if LARGE_RAD < largest < LARGEST_RAD:
+        finding.notes.append(
+            f"swings of {math.degrees(largest):.0f} degrees are beyond the model: use smaller ones"
+        )
+
+
+def _faults(finding: Finding) -> list[str]:
+    """Why period and damping cannot be used."""
+    period, ratio, fit = finding.period_s, finding.damping_ratio, finding.free
+    assert period is not None and ratio is not None
+    faults = []
+    if fit is not None:
+        if fit.swings < LEAST_SWINGS:
+            faults.append(
+                f"only {fit.swings:.1f} swings, allowed are {LEAST_SWINGS:g} or more, better ten:"
+                f" {SWING_FREELY}"
+            )
+        largest = max(_angle(s) for s in fit.segments)
+        if largest >= LARGEST_RAD:
+            faults.append(
+                f"a swing of {math.degrees(largest):.3g} degrees: is the unit of the signal right?"
+            )
+        if text := mixed(fit):
+            faults.append(text)
+        flat = [c for s in finding.series if (c := clipped(s, fit))]
+        faults += flat[:1]
+    if period.relative > WIDEST_PERIOD:
+        faults.append(
+            f"the period is known to {100 * period.relative:.1f} % only, allowed are"
+            f" {100 * WIDEST_PERIOD:g} %: {_noise_text(fit)}"
+        )
+    elif ratio.half > max(WIDEST_RATIO * ratio.value, WIDEST_RATIO_ABS):
+        faults.append(
+            f"the damping ratio is {ratio.value:.3f}, known to {ratio.half:.3f} only, allowed are"
+            f" {100 * WIDEST_RATIO:g} %: {_noise_text(fit)}"
+        )
+    elif ratio.value <= ratio.half:
+        faults.append(
+            f"no decay is seen (damping ratio {ratio.value:.3f} ± {ratio.half:.3f}): was it driven"
+            f" all the time? {SWING_FREELY.capitalize()}"
+        )
+    return faults
+
+
+def _noise_text(fit: DecayFit | None) -> str:
+    """What is in the way of a better result."""
+    if fit is None:
+        return SWING_FREELY
+    best = max(fit.segments, key=lambda s: float(s.envelope[0]))
+    unit, factor = _shown(best)
+    first, noise = float(best.envelope[0]) * factor, best.noise * factor
+    if noise > 0.2 * first:
+        return f"swings of {first:.2g} {unit} in a noise of {noise:.2g}; {SWING_FREELY}"
+    return f"log more swings, best several times; {SWING_FREELY}"
+
+
+def _shown(fit: SegmentFit) -> tuple[str, float]:
+    """Unit for people and factor to it."""
+    kind = fit.segment.kind
+    if kind is Kind.OTHER:
+        return "units", 1.0
+    return ("degrees" if kind is Kind.ANGLE else "degrees/s"), math.degrees(1.0)
+
+
+def _angle(fit: SegmentFit) -> float:
+    """Amplitude at the start of a segment in rad, 0 where it is not known."""
+    first = float(fit.envelope[0])
+    if fit.segment.kind is Kind.OTHER:
+        return 0.0
+    return first * (1.0 if fit.segment.kind is Kind.ANGLE else fit.period_s.value / 2.0 / math.pi)

@@ -1,0 +1,110 @@
+"""From findings to sway data: one value, one in the middle, or a set for each state."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from canshaper.commissioning.identification.judge import Finding
+
+# Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
+# without a signal of the grapple; the robust shaper covers it.
+ONE_VALUE_PCT = 30.0
+# Up to here the difference needs no sets either.
+SAME_PCT = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """What to do with the findings of an axis.
+
+    Attributes:
+        axis: its name.
+        sway: values for the section ``sway``; empty where nothing can be used.
+        spread_pct: lengths of the pendulum around that value, +- %.
+        cover_pct: range of lengths for the robust shaper, +- %; 0 where one value will do.
+        sets: (value of the grapple's signal or None, label, sway) where sets are recommended.
+        text: one sentence for people.
+    """
+
+    axis: str
+    sway: dict[str, float]
+    spread_pct: float
+    cover_pct: int
+    sets: list[tuple[float | None, str, dict[str, float]]]
+    text: str
+
+
+def advise(
+    axis: str, findings: Sequence[Finding], speed_m_s: float | None, *, has_grapple: bool = False
+) -> Advice:
+    """Put the findings of one axis together.
+
+    Args:
+        axis: its name.
+        findings: one for each state of the grapple.
+        speed_m_s: full speed in the deployment, kept where none was measured.
+        has_grapple: whether the deployment has a signal of the grapple.
+    """
+    usable = [f for f in findings if f.usable]
+    if not usable:
+        return Advice(axis, {}, 0.0, 0, [], f"{axis}: nothing that can be used; see above.")
+    values = [_values(f, speed_m_s) for f in usable]
+    if len(usable) == 1:
+        text = f"Use sway: {flow(values[0])} for {axis}."
+        missing = len(findings) - 1
+        if missing:
+            text += f" {missing} of {len(findings)} states could not be used."
+        return Advice(axis, values[0], 0.0, 0, [], text)
+    lengths = [v["period_s"] ** 2 for v in values]
+    low, high = min(lengths), max(lengths)
+    middle = 0.5 * (low + high)
+    spread = 100.0 * (high - low) / (high + low)
+    ratio = sum(v["damping_ratio"] for v in values) / len(values)
+    sway = {"period_s": round(math.sqrt(middle), 4), "damping_ratio": round(ratio, 4)}
+    speeds = [v["full_speed_m_s"] for v in values if "full_speed_m_s" in v]
+    if speeds:
+        sway["full_speed_m_s"] = round(sum(speeds) / len(speeds), 3)
+    names = ", ".join(
+        f"{f.label or 'one'} {v['period_s']:.2f} s" for f, v in _pairs(usable, values)
+    )
+    if spread <= SAME_PCT:
+        text = f"One value is enough for {axis} ({names}): use sway: {flow(sway)}."
+        return Advice(axis, sway, spread, 0, [], text)
+    cover = math.ceil(spread + 3.0)
+    sets = [(f.at, f.label, v) for f, v in _pairs(usable, values)]
+    if has_grapple or spread > ONE_VALUE_PCT:
+        text = (
+            f"The lengths differ by ±{spread:.0f} % ({names}): give {axis} sets, one for each"
+            f" state{'' if has_grapple else ', with a grapple signal'}; until then sway:"
+            f" {flow(sway)}."
+        )
+        return Advice(axis, sway, spread, cover, sets, text)
+    text = (
+        f"Use sway: {flow(sway)} for {axis}, in the middle of {names}, with the robust shaper"
+        f" for ±{cover} % length."
+    )
+    return Advice(axis, sway, spread, cover, [], text)
+
+
+def flow(values: dict[str, float]) -> str:
+    """The values as they stand in a deployment file."""
+    return "{ " + ", ".join(f"{k}: {v:g}" for k, v in values.items()) + " }"
+
+
+def _pairs(
+    findings: Sequence[Finding], values: Sequence[dict[str, float]]
+) -> list[tuple[Finding, dict[str, float]]]:
+    return list(zip(findings, values, strict=True))
+
+
+def _values(finding: Finding, speed_m_s: float | None) -> dict[str, float]:
+    """Sway data of a finding as it is written."""
+    assert finding.period_s and finding.damping_ratio
+    values = {
+        "period_s": round(finding.period_s.value, 4),
+        "damping_ratio": round(min(max(finding.damping_ratio.value, 0.0), 0.95), 4),
+    }
+    speed = finding.full_speed_m_s.value if finding.full_speed_m_s else speed_m_s
+    if speed is not None:
+        values["full_speed_m_s"] = round(speed, 3)
+    return values

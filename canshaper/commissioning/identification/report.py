@@ -1,0 +1,112 @@
+"""Findings for people and for programs."""
+
+import math
+import statistics
+from collections.abc import Sequence
+from typing import Any
+
+from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.judge import Finding
+from canshaper.commissioning.identification.recommend import Advice, flow
+from canshaper.commissioning.identification.series import Kind
+from canshaper.report.table import axis_title
+
+
+def lines(finding: Finding) -> list[str]:
+    """A finding for people, one line a fact."""
+    told = [heading(finding), *(f"  {text}" for text in _basis(finding))]
+    told += [f"  note: {note}" for note in finding.notes]
+    told += [f"  too poor: {fault}" for fault in finding.poor]
+    return told
+
+
+def heading(finding: Finding) -> str:
+    """Name and numbers of a finding: "Slew, empty: period 2.356 ± 0.002 s, ..."."""
+    name = axis_title(finding.axis) + (f", {finding.label}" if finding.label else "")
+    if finding.period_s is None or finding.damping_ratio is None:
+        return f"{name}: nothing found"
+    period, ratio = finding.period_s, finding.damping_ratio
+    text = (
+        f"{name}: period {period.value:.3f} ± {period.half:.3f} s,"
+        f" damping ratio {ratio.value:.4f} ± {ratio.half:.4f}"
+    )
+    if finding.full_speed_m_s:
+        speed = finding.full_speed_m_s
+        text += f", full speed {speed.value:.2f} ± {speed.half:.2f} m/s"
+    return text if finding.usable else f"{text} (too poor)"
+
+
+def _basis(finding: Finding) -> list[str]:
+    """What the numbers rest on."""
+    texts = []
+    if (fit := finding.free) is not None:
+        first = max(float(s.envelope[0]) for s in fit.segments)
+        noise = statistics.median(s.noise for s in fit.segments)
+        kind = fit.segments[0].segment.kind
+        factor = 1.0 if kind is Kind.OTHER else math.degrees(1.0)
+        unit = {Kind.ANGLE: " degrees", Kind.RATE: " degrees/s"}.get(kind, "")
+        texts.append(
+            f"{len(fit.segments)} free decay{'s' * (len(fit.segments) != 1)},"
+            f" {fit.swings:.1f} swings, from {first * factor:.3g}{unit} on, noise"
+            f" {noise * factor:.2g}{unit}"
+        )
+    if (driven := finding.driven) is not None:
+        texts.append(
+            f"{len(driven.stretches)} driven stretch{'es' * (len(driven.stretches) != 1)}:"
+            f" {100 * max(driven.explained, 0.0):.0f} % explained by the commands,"
+            f" {driven.delay_s:.2f} s late"
+        )
+    if finding.at is not None:
+        texts.append(f"signal of the grapple: {finding.at:g}")
+    return texts
+
+
+def set_lines(advice: Advice) -> list[str]:
+    """The lines of ``sets`` for the deployment file; each still needs its filter."""
+    if not advice.sets:
+        return []
+    told = ["    sets:"]
+    for at, label, sway in sorted(advice.sets, key=lambda s: (s[0] is None, s[0])):
+        shown = "?" if at is None else f"{at:g}"
+        told.append(f"      - at: {shown} # {label or 'value of the grapple signal'}")
+        told.append(f"        sway: {flow(sway)}")
+        told.append("        filter: # design it for this sway data")
+    return told
+
+
+def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, Any]:
+    """Everything as JSON takes it."""
+    return {
+        "findings": [
+            {
+                "axis": f.axis,
+                "label": f.label,
+                "at": f.at,
+                "usable": f.usable,
+                "period_s": _value(f.period_s),
+                "damping_ratio": _value(f.damping_ratio),
+                "full_speed_m_s": _value(f.full_speed_m_s),
+                "free_decays": len(f.free.segments) if f.free else 0,
+                "swings": round(f.free.swings, 2) if f.free else None,
+                "too_poor": f.poor,
+                "notes": f.notes,
+            }
+            for f in findings
+        ],
+        "axes": {
+            a.axis: {
+                "sway": a.sway,
+                "spread_pct": round(a.spread_pct, 2),
+                "sets": [{"at": at, "label": label, "sway": sway} for at, label, sway in a.sets],
+                "recommendation": a.text,
+            }
+            for a in advice
+        },
+    }
+
+
+def _value(value: Value | None) -> dict[str, float] | None:
+    """Value and its interval of 95 %."""
+    if value is None:
+        return None
+    return {"value": value.value, "low": value.value - value.half, "high": value.value + value.half}

@@ -1,0 +1,118 @@
+"""Listening, and drawing now and then."""
+
+import time
+from collections.abc import Callable
+
+from rich.console import Console
+from rich.live import Live
+
+from canshaper.can.bus import BusError
+from canshaper.can.deployment import Deployment
+from canshaper.commissioning.monitor.state import Monitor
+from canshaper.commissioning.monitor.view import clock, screen, status_line
+from canshaper.recording.listen import Listener
+
+# How often a bus that has gone is looked for.
+REOPEN_S = 1.0
+SECOND_NS = 1_000_000_000
+
+
+class Ear:
+    """Hears the buses of a deployment; one that goes away is used again when it is back.
+
+    Raises:
+        BusError: a bus cannot be opened at the start.
+    """
+
+    def __init__(self, deployment: Deployment, monitor: Monitor) -> None:
+        self._buses = list(deployment.config.buses.items())
+        self._monitor = monitor
+        self._listener: Listener | None = Listener(self._buses)
+        self._again_s = 0.0
+
+    def listen(self, timeout_s: float) -> None:
+        """Take what waits; wait for no longer than the timeout."""
+        if self._listener is None:
+            self._reopen(timeout_s)
+            return
+        try:
+            for frame in self._listener.frames(timeout_s):
+                self._monitor.take(frame)
+        except BusError as error:
+            self._monitor.note(time.time_ns(), f"{error}; trying again")
+            self.close()
+            self._again_s = time.monotonic() + REOPEN_S
+
+    def _reopen(self, timeout_s: float) -> None:
+        if time.monotonic() < self._again_s:
+            time.sleep(timeout_s)
+            return
+        try:
+            self._listener = Listener(self._buses)
+            self._monitor.note(time.time_ns(), "the buses are open again")
+        except BusError:
+            self._again_s = time.monotonic() + REOPEN_S
+
+    def close(self) -> None:
+        """Hear no more."""
+        if self._listener is not None:
+            self._listener.close()
+            self._listener = None
+
+
+def run_live(
+    deployment: Deployment, console: Console, rate_hz: float, going: Callable[[], bool]
+) -> None:
+    """Draw until it is enough.
+
+    Args:
+        deployment: the machine.
+        console: the terminal.
+        rate_hz: how often.
+        going: whether to go on.
+
+    Raises:
+        BusError: a bus cannot be opened.
+    """
+    monitor = Monitor(deployment)
+    ear = Ear(deployment, monitor)
+    plain = not (console.encoding or "").lower().startswith("utf")
+    pause_s = 1.0 / rate_hz
+    try:
+        with Live(console=console, screen=True, auto_refresh=False) as live:
+            due_s = time.monotonic()
+            while going():
+                ear.listen(max(0.0, due_s - time.monotonic()))
+                if time.monotonic() < due_s:
+                    continue
+                due_s = time.monotonic() + pause_s
+                width, height = console.size
+                now_ns = time.time_ns()
+                live.update(screen(monitor, now_ns, width, height, plain=plain), refresh=True)
+    finally:
+        ear.close()
+
+
+def run_plain(
+    deployment: Deployment, write: Callable[[str], None], going: Callable[[], bool]
+) -> None:
+    """A line for every event, and one with everything every second.
+
+    Raises:
+        BusError: a bus cannot be opened.
+    """
+    monitor = Monitor(deployment)
+    ear = Ear(deployment, monitor)
+    due_ns = time.time_ns() + SECOND_NS
+    try:
+        while going():
+            ear.listen(0.1)
+            while monitor.events:
+                told = monitor.events.popleft()
+                write(f"{clock(told.time_ns)} {told.text}")
+            now_ns = time.time_ns()
+            if now_ns >= due_ns:
+                due_ns = max(due_ns + SECOND_NS, now_ns)
+                write(status_line(monitor, now_ns))
+    finally:
+        ear.close()

@@ -1,0 +1,147 @@
+"""What is known of a machine by the frames on its buses."""
+
+from collections import Counter, deque
+from dataclasses import dataclass, field
+
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.recording.history import History, Told
+from canshaper.recording.listen import Heard
+from canshaper.recording.sorting import Key
+from canshaper.service.finder import InputFinder
+
+# Rates are counted over so long.
+WINDOW_NS = 2_000_000_000
+# A message that is missing for so many cycles is silent, a status that long is stale; but not
+# for less than an eye sees, and after a second where the DBC gives no cycle.
+LATE_CYCLES, LEAST_LATE_NS, LATE_NS = 3, 300_000_000, 1_000_000_000
+MOST_EVENTS = 200
+
+
+@dataclass
+class MessageRate:
+    """How often one message of the deployment comes.
+
+    Attributes:
+        name: of the message, in the DBC.
+        cycle_ms: its cycle there; None without one.
+        last_ns: when it came last; None before.
+    """
+
+    name: str
+    cycle_ms: int | None
+    last_ns: int | None = None
+    times: deque[int] = field(default_factory=deque)
+
+    def take(self, time_ns: int) -> None:
+        """It came."""
+        self.last_ns = time_ns
+        self.times.append(time_ns)
+        self.forget(time_ns)
+
+    def forget(self, now_ns: int) -> None:
+        """What is older than the window does not count."""
+        while self.times and self.times[0] <= now_ns - WINDOW_NS:
+            self.times.popleft()
+
+    def per_s(self, now_ns: int) -> float:
+        """Frames a second."""
+        self.forget(now_ns)
+        return len(self.times) * 1e9 / WINDOW_NS
+
+    def silent_s(self, now_ns: int) -> float | None:
+        """For how long it is missing; None where it is not."""
+        if self.last_ns is None:
+            return None
+        limit_ns = LATE_NS
+        if self.cycle_ms:
+            limit_ns = max(LATE_CYCLES * self.cycle_ms * 1_000_000, LEAST_LATE_NS)
+        silent_ns = now_ns - self.last_ns
+        return silent_ns / 1e9 if silent_ns > limit_ns else None
+
+
+class Monitor:
+    """Takes every frame that is heard.
+
+    Args:
+        deployment: the machine.
+
+    Attributes:
+        history: of the status messages.
+        messages: rate of each message of the deployment, by bus, id and whether that is extended.
+        digest: what the daemon says that it runs; None before it says it.
+        events: what changed lately, oldest first.
+        others: frames that are no classical data frames, by kind.
+    """
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.deployment = deployment
+        self.history = History(deployment)
+        self.events: deque[Told] = deque(maxlen=MOST_EVENTS)
+        self.others: Counter[str] = Counter()
+        self.messages: dict[Key, MessageRate] = {}
+        self._finder = InputFinder(deployment.config.buses, deployment.inputs())
+        self._buses = {name: MessageRate(name, None) for name in deployment.config.buses}
+        self._seen = 0
+        self.digest: int | None = None
+        for bound in deployment.inputs():
+            self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
+        for axis in deployment.axes.values():
+            message = axis.valve_message
+            key = axis.valve.message.sender.key
+            self.messages.setdefault(key, MessageRate(message.name, message.cycle_time))
+            if axis.status:
+                self._status(axis.status.sender.key, axis.status.sender.fields.message)
+        if deployment.status:
+            self._status(deployment.status.sender.key, deployment.status.sender.fields.message)
+        if identity := deployment.identity_status:
+            self._status(identity.sender.key, identity.sender.fields.message)
+
+    def _status(self, key: Key, message: object) -> None:
+        name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
+        self.messages.setdefault(key, MessageRate(name, cycle))
+
+    def take(self, frame: Heard) -> None:
+        """Take a frame."""
+        self._buses[frame.bus].take(frame.time_ns)
+        if frame.kind:
+            self.others[frame.kind] += 1
+            return
+        key = (frame.bus, frame.can_id, frame.extended)
+        bound = self._finder.find(Frame(*key, frame.data), frame.time_ns)
+        rate = self.messages.get(bound.key if bound else key)
+        if rate is not None:
+            rate.take(frame.time_ns)
+        self.history.take(frame)
+        identity = self.deployment.identity_status
+        if identity and key == identity.sender.key:
+            self._compare_identity(identity.digest(frame.data), frame.time_ns)
+        changes = self.history.changes
+        self.events.extend(changes)
+        changes.clear()  # for a day there are many
+
+    def _compare_identity(self, digest: int | None, time_ns: int) -> None:
+        """Whether the daemon runs the files and the program that we have here."""
+        if digest is None or digest == self.digest:
+            return
+        self.digest, ours = digest, self.deployment.identity.digest
+        differs = "" if digest == ours else f", not {ours:#06x} of the files and program here"
+        self.note(time_ns, f"daemon runs digest {digest:#06x}{differs}")
+
+    def note(self, time_ns: int, text: str) -> None:
+        """Note something that did not come with a frame."""
+        self.events.append(Told(time_ns, text))
+
+    def frames_per_s(self, bus: str, now_ns: int) -> float:
+        """All frames of a bus."""
+        return self._buses[bus].per_s(now_ns)
+
+    def stale_s(self, axis: str, now_ns: int) -> float | None:
+        """For how long the status of an axis is missing; None where it is fresh, or never came."""
+        bound = self.deployment.axes[axis].status
+        return self.messages[bound.sender.key].silent_s(now_ns) if bound else None
+
+    def counters_stale_s(self, now_ns: int) -> float | None:
+        """The same of the service's counters."""
+        status = self.deployment.status
+        return self.messages[status.sender.key].silent_s(now_ns) if status else None

@@ -1,0 +1,1 @@
+"""Desk work: crane model, tuning, comparison. Never in the daemon."""

@@ -1,0 +1,140 @@
+"""The filters that are compared, made for one axis of a deployment."""
+
+from dataclasses import dataclass, replace
+
+from pydantic import TypeAdapter
+
+from canshaper.can.deployment import BoundRadial, Deployment
+from canshaper.config.filters import Filter, RobustFilter
+from canshaper.config.schema import RadialConfig
+from canshaper.design.tuning.robust import RobustShaper, least_residual
+from canshaper.shaping.fir import zv_taps
+from canshaper.shaping.sway import SwayMode
+
+# Time of the run-on that every filter is given: longer than the longest of them takes.
+TAIL_S = 3.0
+# Impulse responses: duration in swings, and the range of pendulum length they are made for.
+DESIGNS = ((0.41, 30.0), (0.7, 30.0), (0.73, 15.0), (0.77, 15.0), (0.82, 15.0), (1.0, 30.0))
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A filter with a name for tables, and whether it is one of ours.
+
+    Attributes:
+        name: what it is called.
+        filter: as it would stand in a deployment file.
+        ours: G_FF limit-aware or robust.
+        radial: with radial compensation (slew axes).
+    """
+
+    name: str
+    filter: Filter
+    ours: bool = False
+    radial: bool = False
+
+
+def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
+    """Every filter for this axis; the impulse responses are designed for its valve's rate.
+
+    Raises:
+        ValueError: there is no such axis, or it has no sway data.
+    """
+    bound = deployment.axes.get(axis)
+    if bound is None:
+        raise ValueError(f"axis {axis!r}, allowed {', '.join(deployment.axes)}")
+    config = bound.config
+    if config.sway is None:
+        raise ValueError(f"axis {axis} has no sway data: nothing to compare")
+    mode = config.sway.mode()
+    tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
+    rate = config.limits.slowest_per_s
+    omega, period = mode.omega_rad_s, mode.period_s
+    one = {"a1": 2.0000001 / omega, "a2": 1.0 / omega**2}
+    found = [
+        Candidate("off", _filter(kind="off")),
+        Candidate("first order", _filter(kind="first_order", time_constant_s=0.3 * period)),
+        Candidate(
+            "S-curve", _filter(kind="s_curve", rate_per_s=2.2 / period, jerk_per_s2=16.0 / period)
+        ),
+        Candidate("ZV", _filter(kind="zv")),
+        Candidate("ZVD", _filter(kind="zvd")),
+        Candidate("EI 5 %", _filter(kind="ei", residual_pct=5.0)),
+        Candidate("two-mode", _filter(kind="two_mode", period_s=0.4 * period, damping_ratio=0.02)),
+        Candidate("G_FF slew poles", _filter(kind="gff", a1=0.42, a2=0.043), ours=True),
+        Candidate("G_FF near-far poles", _filter(kind="gff", a1=0.708, a2=0.12), ours=True),
+        Candidate("G_FF no jump over 1", _filter(kind="gff", **one), ours=True),
+        Candidate("G_FF third pole -4", _third_pole(-4.0), ours=True),
+        Candidate("G_FF third pole -5", _third_pole(-5.0), ours=True),
+    ]
+    zv = zv_taps(mode, tick_s)
+    found.append(
+        Candidate(
+            "limit-aware ZV",
+            RobustFilter(kind="robust", tick_ms=round(1000.0 * tick_s), taps=zv),
+            ours=True,
+        )
+    )
+    for periods, range_pct in DESIGNS:
+        shaper = least_residual(
+            mode,
+            tick_s=tick_s,
+            duration_s=round(periods * period / tick_s) * tick_s,
+            range_pct=range_pct,
+            rate_per_s=rate,
+        )
+        name = f"robust {shaper.duration_s:.1f} s ±{range_pct:g} %"
+        found.append(Candidate(name, robust_filter(shaper, tick_s), ours=True))
+    if radial_of(deployment, axis) is not None:
+        robust = [c for c in found if c.name.startswith("robust")]
+        with_radial = [c for c in found if c.name in ("G_FF near-far poles", "G_FF third pole -4")]
+        with_radial += robust[2:]
+        found += [replace(c, name=f"{c.name} +radial", radial=True) for c in with_radial]
+    return found
+
+
+def robust_filter(shaper: RobustShaper, tick_s: float) -> RobustFilter:
+    """A designed impulse response as it stands in a deployment file."""
+    return RobustFilter(
+        kind="robust",
+        tick_ms=round(1000.0 * tick_s),
+        taps=[round(tap, 8) for tap in shaper.taps],
+    )
+
+
+def radial_of(deployment: Deployment, axis: str) -> BoundRadial | None:
+    """Radial compensation for a slew axis: that of the file, or one for the simulated crane."""
+    bound = deployment.axes[axis]
+    if bound.radial is not None:
+        return bound.radial
+    if axis != "slew" or "near_far" not in deployment.axes:
+        return None
+    if deployment.axes["near_far"].config.sway is None:
+        return None
+    return BoundRadial(RadialConfig(axis="near_far", full_speed_rad_s=0.5, radius_m=3.0), None)
+
+
+def with_candidate(deployment: Deployment, axis: str, candidate: Candidate) -> Deployment:
+    """The deployment with this filter on the axis, and with time enough to run on."""
+    bound = deployment.axes[axis]
+    limits = bound.config.limits.model_copy(update={"tail_s": TAIL_S})
+    config = bound.config.model_copy(update={"filter": candidate.filter, "limits": limits})
+    radial = radial_of(deployment, axis) if candidate.radial else None
+    axes = {**deployment.axes, axis: replace(bound, config=config, radial=radial)}
+    return replace(deployment, axes=axes)
+
+
+def nominal_mode(deployment: Deployment, axis: str) -> SwayMode:
+    """Sway mode of the axis as the deployment has it."""
+    sway = deployment.axes[axis].config.sway
+    assert sway is not None  # candidates() has refused it
+    return sway.mode()
+
+
+def _filter(**parameters: object) -> Filter:
+    adapter: TypeAdapter[Filter] = TypeAdapter(Filter)
+    return adapter.validate_python(parameters)
+
+
+def _third_pole(pole: float) -> Filter:
+    return _filter(kind="gff", poles_rad_s=[pole, pole], third_pole_rad_s=pole)

@@ -1,0 +1,197 @@
+"""Operator, daemon and plant as three processes on a bus, with a listener that records."""
+
+import os
+import select
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from canshaper.can.bus import BusError, Port
+from canshaper.can.deployment import Deployment
+from canshaper.design.lockstep import DriveError
+from canshaper_sim.operator import Script
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.realtime import open_ports
+from canshaper_sim.recorder import Recorder
+from canshaper_sim.recording import Recording
+
+__all__ = ["BusDrive", "Crew", "DriveError", "Transport", "choose_transport", "drive_on_bus"]
+
+# Processes import and open their buses; slow virtual machines take many times as long as a PC.
+START_LIMIT_S = 60.0
+STOP_LIMIT_S = 10.0
+# How often the children are looked after while nothing is on the buses.
+LISTEN_STEP_S = 0.1
+
+
+@dataclass(frozen=True)
+class Transport:
+    """The bus the processes meet on, as options of python-can."""
+
+    interface: str
+    channel: str
+    description: str
+
+
+@dataclass(frozen=True)
+class BusDrive:
+    """A drive on a bus, and the deadlines that the daemon missed in it."""
+
+    recording: Recording
+    missed_deadlines: int
+
+
+def choose_transport(wish: str, deployment: Deployment) -> Transport:
+    """SocketCAN where its channel opens, otherwise multicast; ``wish`` may name one.
+
+    Raises:
+        DriveError: the deployment has several buses, or the wished transport does not open.
+    """
+    if len(deployment.config.buses) > 1:
+        raise DriveError("this deployment has several buses; drive it with --lockstep")
+    # A group of this process alone: two demos on one machine must not hear each other.
+    group = f"239.{1 + os.getpid() // 65536 % 250}.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+    multicast = Transport("udp_multicast", group, "udp_multicast (python-can)")
+    channel = "vcan0" if wish == "auto" else wish
+    socketcan = Transport("socketcan", channel, f"{channel} (SocketCAN)")
+    if wish == "udp_multicast":
+        return multicast
+    try:
+        for port in open_ports(on_transport(deployment, socketcan)).values():
+            port.close()
+    except BusError as error:
+        if wish == "auto":
+            return multicast
+        raise DriveError(str(error)) from None
+    return socketcan
+
+
+def on_transport(deployment: Deployment, transport: Transport) -> Deployment:
+    """The deployment with its bus put on this transport."""
+    change = {
+        "interface": transport.interface,
+        "channel": transport.channel,
+        "network": False,  # whatever the machine's own bus is
+    }
+    buses = {n: b.model_copy(update=change) for n, b in deployment.config.buses.items()}
+    return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
+
+
+def drive_on_bus(
+    deployment: Deployment,
+    transport: Transport,
+    script: Script,
+    changes: list[str],
+    *,
+    bypass: bool,
+    progress: Callable[[float], None],
+) -> BusDrive:
+    """Drive a script with the three processes; the frames heard on the bus are recorded.
+
+    Args:
+        deployment: the machine.
+        transport: where the processes meet.
+        script: what the operator does.
+        changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
+        bypass: drive with anti-sway switched off.
+        progress: called with the seconds driven.
+
+    Raises:
+        DriveError: a process ended early or does not answer.
+    """
+    recorder = Recorder(deployment, changed_parameters(changes))
+    valves = {axis.valve_message.name for axis in deployment.axes.values()}
+    sets = [word for change in changes for word in ("--set", change)]
+    with tempfile.TemporaryDirectory() as logs:
+        ports = open_ports(on_transport(deployment, transport))
+        crew = Crew(deployment, transport, Path(logs))
+        try:
+            crew.start("sim", *sets)
+            crew.start("run")
+            _listen(ports, recorder, crew, lambda: recorder.seen >= {*valves, "GrappleSway"})
+            begin = time.monotonic()
+            crew.start("operator", "--script", script.name, *(["--bypass"] if bypass else []))
+            _listen(
+                ports,
+                recorder,
+                crew,
+                lambda: crew.ended("operator"),
+                lambda: progress(min(time.monotonic() - begin, script.duration_s)),
+            )
+        finally:
+            crew.stop()
+            for port in ports.values():
+                port.close()
+    return BusDrive(recorder.recording(), recorder.missed_deadlines)
+
+
+def _listen(
+    ports: dict[str, Port],
+    recorder: Recorder,
+    crew: "Crew",
+    done: Callable[[], bool],
+    tell: Callable[[], None] | None = None,
+) -> None:
+    """Record what is on the buses until ``done``; without ``tell`` within the start limit."""
+    limit = time.monotonic() + START_LIMIT_S
+    files = [port.fileno() for port in ports.values()]
+    while not done():
+        select.select(files, [], [], LISTEN_STEP_S)
+        for port in ports.values():
+            for frame in port.frames():
+                recorder.receive(frame, time.monotonic())
+        crew.check()
+        if tell:
+            tell()
+        elif time.monotonic() > limit:
+            raise DriveError(f"no frames within {START_LIMIT_S:g} s; heard {recorder.seen}")
+
+
+class Crew:
+    """The child processes of one drive; all are ended, whatever happens."""
+
+    def __init__(self, deployment: Deployment, transport: Transport, logs: Path) -> None:
+        self._file = str(deployment.path)
+        self._options = ["--interface", transport.interface, "--channel", transport.channel]
+        self._logs = logs
+        self._processes: dict[str, subprocess.Popen[bytes]] = {}
+
+    def start(self, verb: str, *options: str) -> None:
+        """Start ``canshaper VERB FILE`` on the transport."""
+        command = [sys.executable, "-m", "canshaper", verb, self._file, *self._options, *options]
+        with (self._logs / verb).open("wb") as log:
+            self._processes[verb] = subprocess.Popen(
+                command, stdin=subprocess.DEVNULL, stdout=log, stderr=log
+            )
+
+    def ended(self, verb: str) -> bool:
+        """Whether this process has ended."""
+        return self._processes[verb].poll() is not None
+
+    def check(self) -> None:
+        """Raise DriveError when a process has failed; the operator may end, the others may not."""
+        for verb, process in self._processes.items():
+            status = process.poll()
+            if status is not None and not (verb == "operator" and status == 0):
+                text = (self._logs / verb).read_text(errors="replace").strip()
+                raise DriveError(f"canshaper {verb} ended with status {status}:\n{text}")
+
+    def stop(self) -> None:
+        """End all processes; the daemon goes first and leaves the valves neutral."""
+        for verb in ("run", "operator", "sim"):
+            if (process := self._processes.get(verb)) is not None:
+                end(process)
+
+
+def end(process: "subprocess.Popen[bytes]") -> None:
+    """End a process: asked first, so that a daemon leaves the valves neutral, then for good."""
+    process.terminate()
+    try:
+        process.wait(STOP_LIMIT_S)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()

@@ -1,0 +1,186 @@
+"""From a tuning to what stands in the deployment file, and what a person should know of it."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+from canshaper.config.filters import GffFilter
+from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, gff
+from canshaper.design.tuning.optimal import FLAT, Tuning
+from canshaper.shaping.gff import denominator_from_poles, poles_from_denominator
+from canshaper.shaping.sway import SwayMode
+
+_DIGITS = 6
+# A tail that ends the run-on early is told from so much more residual sway on.
+_TAIL_MATTERS = 0.01
+_LONGEST_TAIL_S = 5.0
+
+
+@dataclass(frozen=True, slots=True)
+class Setting:
+    """A G_FF as it stands in a file, and its measures.
+
+    Attributes:
+        a1: coefficient of Eq. 13, s.
+        a2: the same, s^2.
+        poles_rad_s: the poles that gives, slowest first.
+        third_pole_rad_s: lag on the command, or None.
+        measures: see ``evaluate``.
+    """
+
+    a1: float
+    a2: float
+    poles_rad_s: tuple[float, float]
+    third_pole_rad_s: float | None
+    measures: Evaluation
+
+    @property
+    def filter(self) -> GffFilter:
+        """The same as the filter of an axis."""
+        third = self.third_pole_rad_s
+        return GffFilter(kind="gff", a1=self.a1, a2=self.a2, third_pole_rad_s=third)
+
+    def values(self) -> dict[str, float | None]:
+        """Keys of the filter section; None for those that have to go."""
+        return {
+            "a1": self.a1,
+            "a2": self.a2,
+            "third_pole_rad_s": self.third_pole_rad_s,
+            "poles_rad_s": None,
+        }
+
+
+def setting(
+    *,
+    a1: float,
+    a2: float,
+    third_pole_rad_s: float | None,
+    mode: SwayMode,
+    tick_s: float,
+    machine: Machine,
+) -> Setting:
+    """Measure a denominator as it stands."""
+    fast, slow = poles_from_denominator(a1, a2)
+    measures = evaluate(mode, tick_s, gff((slow, fast), third_pole_rad_s), machine)
+    return Setting(a1, a2, (slow, fast), third_pole_rad_s, measures)
+
+
+def deployed(tuning: Tuning, mode: SwayMode, tick_s: float, machine: Machine) -> Setting:
+    """The tuning with the digits a file gets, measured with exactly these.
+
+    a2 and a1 are rounded up and the third pole towards zero, so that neither a pole turns complex
+    nor the first jump grows.
+    """
+    a2 = _up(tuning.a2)
+    a1 = _up(max(tuning.a1, 2.0 * math.sqrt(a2)))
+    third = tuning.third_pole_rad_s
+    if third is not None:
+        third = -1.0 / _up(-1.0 / third)
+        third = round(third, _DIGITS - 1 - math.floor(math.log10(-third)))
+    return setting(a1=a1, a2=a2, third_pole_rad_s=third, mode=mode, tick_s=tick_s, machine=machine)
+
+
+def from_parameters(
+    parameters: Mapping[str, Any], mode: SwayMode, tick_s: float, machine: Machine
+) -> Setting:
+    """Measure the gff section of a deployment."""
+    third = parameters.get("third_pole_rad_s")
+    if "poles_rad_s" in parameters:
+        a1, a2 = denominator_from_poles(parameters["poles_rad_s"])
+        a1 = max(a1, 2.0 * math.sqrt(a2))  # rounding of a double pole
+    else:
+        a1, a2 = parameters["a1"], parameters["a2"]
+    return setting(a1=a1, a2=a2, third_pole_rad_s=third, mode=mode, tick_s=tick_s, machine=machine)
+
+
+def tail_needed(
+    found: Setting, mode: SwayMode, tick_s: float, machine: Machine
+) -> tuple[float, float] | None:
+    """Shortest ``tail_s`` that no longer adds to the residual sway, and the residual it leaves.
+
+    None where the tail of the deployment is fine.
+    """
+    shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
+    best = _left(mode, tick_s, shaper, machine, _LONGEST_TAIL_S)
+    if found.measures.worst(0.0) - best < _TAIL_MATTERS:
+        return None
+    tail_s = machine.limits.tail_s
+    while tail_s < _LONGEST_TAIL_S:
+        tail_s = round(tail_s + 0.1, 1)
+        left = _left(mode, tick_s, shaper, machine, tail_s)
+        if left - best < _TAIL_MATTERS:
+            return tail_s, left
+    return None
+
+
+def recommendation(axis: str, found: Setting, tail: tuple[float, float] | None) -> str:
+    """One plain sentence, and one more where the tail ends the run-on early."""
+    m = found.measures
+    third = f", third_pole_rad_s: {found.third_pole_rad_s:g}" if found.third_pole_rad_s else ""
+    text = (
+        f"Use a1: {found.a1:g}, a2: {found.a2:g}{third} for {axis}: {100 * m.worst(0.0):.0f} % of"
+        f" the swing is left at the given length, at most {100 * m.worst(10.0):.0f} % within"
+        f" ±10 % of it, and the crane runs on for {m.run_on_s:.1f} s."
+    )
+    if tail is not None:
+        text += (
+            f" The limits end the run-on early: with tail_s: {tail[0]:g} it would be"
+            f" {100 * tail[1]:.1f} % at the given length."
+        )
+    return text
+
+
+def flatness(tuning: Tuning) -> str:
+    """How far each pole may go for one percent of the cost."""
+    ranges = [f"{slow:.2f} to {fast:.2f}" for slow, fast in tuning.ranges_rad_s]
+    return f"{' and '.join(ranges)} rad/s cost at most {100 * FLAT:.0f} % more"
+
+
+def as_dict(tuning: Tuning, found: Setting) -> dict[str, Any]:
+    """Everything of a tuning, for ``--json``."""
+    m = found.measures
+    return {
+        "method": tuning.method,
+        "a1": found.a1,
+        "a2": found.a2,
+        "poles_rad_s": list(found.poles_rad_s),
+        "third_pole_rad_s": found.third_pole_rad_s,
+        "cost": tuning.cost,
+        "active": list(tuning.active),
+        "ranges_rad_s": [list(r) for r in tuning.ranges_rad_s],
+        "starts": tuning.starts,
+        "converged": tuning.converged,
+        "build_s": tuning.build_s,
+        "solve_s": tuning.solve_s,
+        **measures_dict(m),
+    }
+
+
+def measures_dict(m: Evaluation) -> dict[str, Any]:
+    """Measures of a setting; residuals as fractions."""
+    return {
+        "first_jump": m.first_jump,
+        "peak": m.peak,
+        "rise_s": m.rise_s,
+        "run_on_s": m.run_on_s,
+        "mean_delay_s": m.mean_delay_s,
+        "residuals": [
+            {"length_pct": r.length_pct, "linear": r.linear, "machine": r.machine}
+            for r in m.residuals
+        ],
+    }
+
+
+def _up(value: float) -> float:
+    """Round up to ``_DIGITS`` significant digits."""
+    digits = _DIGITS - 1 - math.floor(math.log10(value))
+    rounded = round(value, digits)
+    return rounded if rounded >= value else round(rounded + 10.0**-digits, digits)
+
+
+def _left(
+    mode: SwayMode, tick_s: float, shaper: ShaperFor, machine: Machine, tail_s: float
+) -> float:
+    longer = replace(machine, limits=replace(machine.limits, tail_s=tail_s))
+    return evaluate(mode, tick_s, shaper, longer, (0,)).worst()

@@ -1,0 +1,258 @@
+"""What a filter setting does: to the lever and to the swing, also when the sway data is wrong.
+
+Pure and for every filter: the running code is asked, tick by tick. Times in s, speeds as fractions
+of full speed, residual sway as a fraction of what the same movement of the lever leaves without
+the filter.
+"""
+
+import cmath
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from canshaper.design.tuning.formulation import SETTLED, at_length
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.gff import Gff
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.states import StickInput
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+ShaperFor = Callable[[SwayModel], Shaper]
+
+LENGTHS_PCT = (-30, -20, -10, 0, 10, 20, 30)
+RISEN = 0.95
+# A response is watched until it stays this close to its end, and no longer than this.
+_AT_END, _LONGEST_S = 1e-9, 120.0
+# Longer than any plateau between two taps (half the longest second mode of 12 s).
+_STILL_S = 8.0
+
+
+@dataclass(frozen=True, slots=True)
+class Machine:
+    """What stands between filter and crane.
+
+    Attributes:
+        limits: output limits of the axis.
+        neutral_band: |stick| that counts as neutral.
+        stop_s: longest shaped stop of the axis.
+        grid_steps: raw steps of the valve frame from zero to full command.
+        lag_s: time constant of valve and actuator.
+    """
+
+    limits: OutputLimits = field(default_factory=OutputLimits)
+    neutral_band: float = 0.02
+    stop_s: float = 2.0
+    grid_steps: int = 125
+    lag_s: float = 0.1
+
+
+@dataclass(frozen=True, slots=True)
+class Residual:
+    """Residual sway at one true pendulum length.
+
+    Attributes:
+        length_pct: how much longer the pendulum is than the sway data says.
+        linear: |H(e^(pT))| at the true sway pole p, nothing but the filter.
+        machine: full press and full release through the axis with its limits and a lagging
+            valve; the worse of the two.
+    """
+
+    length_pct: float
+    linear: float
+    machine: float
+
+
+@dataclass(frozen=True, slots=True)
+class Evaluation:
+    """Measures of one setting.
+
+    Attributes:
+        first_jump: part of a step that comes out in the tick of the step.
+        peak: largest output for a unit step.
+        rise_s: until the output has 95 % of the command for good (a first jump that dips again
+            does not count).
+        run_on_s: until the output stays within 5 % of the command; after a release, how long the
+            crane runs on.
+        mean_delay_s: area between command and output: how much further the crane goes after a
+            release, in seconds of full speed.
+        residuals: residual sway over the length error.
+    """
+
+    first_jump: float
+    peak: float
+    rise_s: float
+    run_on_s: float
+    mean_delay_s: float
+    residuals: tuple[Residual, ...]
+
+    def worst(self, within_pct: float = 30.0) -> float:
+        """Worst residual through the machine for lengths within +- ``within_pct``."""
+        return max(r.machine for r in self.residuals if abs(r.length_pct) <= within_pct)
+
+
+@dataclass(frozen=True, slots=True)
+class Traces:
+    """A full press through the machine, and the swing it makes with and without the filter.
+
+    ``sent`` is one value a tick; ``swing`` and ``swing_raw`` are in s, as ``SwayModel.angle``.
+    """
+
+    t_s: tuple[float, ...]
+    sent: tuple[float, ...]
+    swing: tuple[float, ...]
+    swing_raw: tuple[float, ...]
+
+
+def gff(poles_rad_s: tuple[float, float], third_pole_rad_s: float | None = None) -> ShaperFor:
+    """G_FF of any axis with these poles."""
+    return lambda sway: Gff(sway, poles_rad_s, third_pole_rad_s=third_pole_rad_s)
+
+
+def evaluate(
+    mode: SwayMode,
+    tick_s: float,
+    shaper_for: ShaperFor,
+    machine: Machine | None = None,
+    lengths_pct: Sequence[float] = LENGTHS_PCT,
+) -> Evaluation:
+    """Measure a setting.
+
+    Args:
+        mode: sway mode the filter is made for.
+        tick_s: period of the axis.
+        shaper_for: makes the filter on a sway model, such as ``gff(poles)``.
+        machine: what stands behind the filter.
+        lengths_pct: length errors at which the residual is taken.
+
+    Raises:
+        ValueError: the filter does not suit the tick.
+    """
+    y = step_response(mode, tick_s, shaper_for)
+    end = y[-1]
+    below = [k for k, value in enumerate(y) if value < RISEN * end]
+    outside = [k for k, value in enumerate(y) if abs(value - end) > SETTLED * abs(end)]
+    run_on_s = (outside[-1] + 1) * tick_s if outside else 0.0
+    machine = machine or Machine()
+    hold_s = min(_LONGEST_S, max(4.0, 2.0 * run_on_s + 1.0, machine.limits.tail_s + 1.0))
+    shaped = _press_and_release(mode, tick_s, shaper_for, machine, hold_s)
+    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, hold_s)
+    residuals = []
+    for percent in lengths_pct:
+        true = at_length(mode, 1.0 + percent / 100.0)
+        left, unshaped = (
+            [_swing_left(true, tick_s, machine.lag_s, move) for move in moves]
+            for moves in (shaped, raw)
+        )
+        worst = max(a / b for a, b in zip(left, unshaped, strict=True))
+        residuals.append(Residual(percent, _gain_at(true, tick_s, y), worst))
+    return Evaluation(
+        first_jump=y[0],
+        peak=max(y),
+        rise_s=(below[-1] + 1) * tick_s if below else 0.0,
+        run_on_s=run_on_s,
+        mean_delay_s=sum(1.0 - value / end for value in y) * tick_s,
+        residuals=tuple(residuals),
+    )
+
+
+def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[float]:
+    """Output for a unit step without any limit, one value a tick, until it stands still."""
+    sway = SwayModel(mode, tick_s)
+    shaper = shaper_for(sway)
+    y: list[float] = []
+    still = 0
+    while still < _STILL_S / tick_s and len(y) < _LONGEST_S / tick_s:
+        wanted = shaper.wanted(1.0)
+        sway.step(wanted)
+        still = still + 1 if y and abs(wanted - y[-1]) < _AT_END * tick_s else 0
+        y.append(wanted)
+    return y
+
+
+def press(
+    mode: SwayMode,
+    tick_s: float,
+    shaper_for: ShaperFor,
+    machine: Machine,
+    duration_s: float,
+) -> Traces:
+    """Full press from rest and what it does, for a picture."""
+    sent = _press_and_release(mode, tick_s, shaper_for, machine, duration_s)[0][1]
+    raw = _press_and_release(mode, tick_s, lambda _sway: Off(), machine, duration_s)[0][1]
+    return Traces(
+        tuple(k * tick_s for k in range(len(sent))),
+        tuple(sent),
+        tuple(_swing(mode, tick_s, machine.lag_s, 0.0, sent)),
+        tuple(_swing(mode, tick_s, machine.lag_s, 0.0, raw)),
+    )
+
+
+def _press_and_release(
+    mode: SwayMode, tick_s: float, shaper_for: ShaperFor, machine: Machine, hold_s: float
+) -> list[tuple[float, list[float]]]:
+    """What the axis sends: for the press and for the release, (speed before, sent)."""
+    sway = SwayModel(mode, tick_s)
+    axis = Axis(
+        tick_s,
+        machine.limits,
+        sway=sway,
+        shaper=shaper_for(sway),
+        neutral_band=machine.neutral_band,
+        stop_s=machine.stop_s,
+        grid_steps=machine.grid_steps,
+    )
+    axis.tick(StickInput(0.0))  # seen in neutral: ready
+    count = round(hold_s / tick_s)
+    moves = []
+    for command in (1.0, 0.0):
+        before, sent = axis.sent, []
+        for _ in range(count):
+            axis.tick(StickInput(command))
+            sent.append(axis.sent)
+        moves.append((before, sent))
+    return moves
+
+
+def _swing(
+    mode: SwayMode, tick_s: float, lag_s: float, speed: float, sent: Sequence[float]
+) -> list[float]:
+    """Angle of the true pendulum at each tick; see ``_modal``."""
+    damped = mode.pole.imag
+    return [c.imag / damped for c in _modal(mode, tick_s, lag_s, speed, sent)]
+
+
+def _swing_left(
+    mode: SwayMode, tick_s: float, lag_s: float, move: tuple[float, Sequence[float]]
+) -> float:
+    """Amplitude of the swing at the end of a move that began at rest."""
+    return max(1e-12, abs(_modal(mode, tick_s, lag_s, *move)[-1]))
+
+
+def _modal(
+    mode: SwayMode, tick_s: float, lag_s: float, speed: float, sent: Sequence[float]
+) -> list[complex]:
+    """Swing c = x' - conj(p) x of x'' + 2 zeta w x' + w^2 x = v', lag v' + v = sent, exactly.
+
+    c' = p c + v', and |c| is the amplitude of the free swing; over a tick sent is held, so that
+    v' dies away with the lag.
+    """
+    free, slow = cmath.exp(mode.pole * tick_s), math.exp(-tick_s / lag_s)
+    forced = (free - slow) / (mode.pole + 1.0 / lag_s) / lag_s
+    c, result = 0j, []
+    for held in sent:
+        result.append(c)
+        c = free * c + forced * (held - speed)
+        speed = held + (speed - held) * slow
+    return result
+
+
+def _gain_at(mode: SwayMode, tick_s: float, y: Sequence[float]) -> float:
+    """|H(e^(pT))| from the step response: sum of its increments times e^(-pT k), over its end."""
+    turn, at = cmath.exp(-mode.pole * tick_s), 1.0 + 0j
+    total, before = 0j, 0.0
+    for value in y:
+        total += (value - before) * at
+        before = value
+        at *= turn
+    return abs(total) / abs(y[-1])

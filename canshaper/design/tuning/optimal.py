@@ -1,0 +1,175 @@
+"""The optimal tuner: Eq. 14-15 from several starts, what holds the optimum and how flat it is."""
+
+import itertools
+import math
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from canshaper.design.tuning.conflict import Infeasible, box_conflict, explain, feasible_point
+from canshaper.design.tuning.formulation import Task
+from canshaper.design.tuning.program import Program, Solution, Vector
+from canshaper.shaping.gff import denominator_from_poles
+
+# "As good": what the poles may do within so much of the optimal cost.
+FLAT = 0.01
+# Starts that end within so much of the lowest cost ended in the same optimum.
+_SAME_COST = 1e-5
+
+
+@dataclass(frozen=True, slots=True)
+class Tuning:
+    """A setting of G_FF and how it was found.
+
+    Attributes:
+        poles_rad_s: the two poles of the filter, rad/s, slowest first.
+        third_pole_rad_s: the lag on the command, rad/s, or None.
+        a1: coefficient of Eq. 13 for the two poles, s.
+        a2: the same, s^2.
+        method: "optimal" or "manual".
+        cost: Eq. 15 (mean over the samples), or the worst residual where that was minimised.
+        active: requirements that hold the optimum where it is.
+        ranges_rad_s: per pole, how far it may go, the others following, while the requirements are
+            kept and the cost is at most 1 % higher.
+        starts: number of starts.
+        converged: how many of them ended in this optimum.
+        build_s: time to build the programme.
+        solve_s: time to solve it, the ranges included.
+    """
+
+    poles_rad_s: tuple[float, float]
+    third_pole_rad_s: float | None
+    a1: float
+    a2: float
+    method: str
+    cost: float | None = None
+    active: tuple[str, ...] = ()
+    ranges_rad_s: tuple[tuple[float, float], ...] = ()
+    starts: int = 0
+    converged: int = 0
+    build_s: float = 0.0
+    solve_s: float = 0.0
+
+
+def tune(
+    task: Task,
+    starts: int | Sequence[tuple[float, ...]] = 3,
+    progress: Callable[[str, float], None] | None = None,
+) -> Tuning:
+    """Solve a task.
+
+    Args:
+        task: what is asked.
+        starts: how many starts, or the poles of each in rad/s (negative, slowest first).
+        progress: called with what is being done and the part done, 0 to 1.
+
+    Raises:
+        Infeasible: no poles keep all requirements; says which conflict and what is attainable.
+        ValueError: a value is out of range, or no start converged.
+    """
+    tell = progress or (lambda _what, _done: None)
+    if isinstance(starts, int) and not 1 <= starts <= 1000:
+        raise ValueError(f"starts is {starts}, allowed is 1 to 1000")
+    box_conflict(task)
+    tell("building the programme", 0.0)
+    begin = time.perf_counter()
+    program = Program(task)
+    built = time.perf_counter()
+    points = spread(program, starts) if isinstance(starts, int) else given(program, starts)
+    ranges_at = 0.7
+    found: list[Solution] = []
+    for i, point in enumerate(points):
+        tell(f"start {i + 1} of {len(points)}", ranges_at * i / len(points))
+        found.append(program.solve(point))
+    good = [solution for solution in found if solution.success]
+    if not good:
+        good = [_second_try(program)]
+    best = min(good, key=lambda solution: solution.cost)
+    converged = sum(s.cost <= best.cost * (1.0 + _SAME_COST) + 1e-9 for s in good)
+    tell("range of the poles", ranges_at)
+    ranges = _ranges(program, best)
+    tell("solved", 1.0)
+    q = _settled(program, best)
+    a1, a2 = denominator_from_poles((-q[0], -q[1]))
+    return Tuning(
+        (-q[0], -q[1]),
+        -q[2] if len(q) == 3 else None,
+        a1,
+        a2,
+        "optimal",
+        best.cost,
+        best.active,
+        ranges,
+        len(points),
+        converged,
+        built - begin,
+        time.perf_counter() - built,
+    )
+
+
+def spread(program: Program, count: int) -> list[Vector]:
+    """Starts over the whole box: golden section for the slowest pole, modest ratios for the rest.
+
+    The first one lies at the frequency of the sway, where the optimum usually is.
+    """
+    low, high = program.low[0], program.high[0]
+    swing = math.log(program.task.mode.omega_rad_s)
+    golden = 0.5 * (math.sqrt(5.0) - 1.0)
+    places = [min(max(swing, low), high)]
+    places += [low + (high - low) * (0.2 + golden * i) % 1.0 for i in range(1, count)]
+    ratios = itertools.cycle((0.1, 0.5, 0.3))
+    rest = program.size - 1
+    return [
+        np.array([place, *[min(ratio, (high - place) / rest)] * rest])
+        for place, ratio in zip(places, ratios, strict=False)
+    ]
+
+
+def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]:
+    """Starts from poles."""
+    points = []
+    for poles in starts:
+        if len(poles) != program.size or not all(p < 0.0 for p in poles):
+            text = f"start is {poles}, allowed are {program.size} negative poles"
+            raise ValueError(text)
+        q = np.log(np.sort(-np.array(poles)))
+        points.append(np.array([q[0], *np.diff(q)]))
+    return points
+
+
+def _second_try(program: Program) -> Solution:
+    """From a point that a search over all poles found feasible, or say why there is none."""
+    point = feasible_point(program)
+    if point is None:
+        raise Infeasible(explain(program))
+    solution = program.solve(point)
+    if not solution.success:
+        raise ValueError("the solver did not converge from any start; try more starts")
+    return solution
+
+
+def _ranges(program: Program, best: Solution) -> tuple[tuple[float, float], ...]:
+    """Smallest and largest |pole| within ``FLAT`` of the cost, as poles, slowest first."""
+    limit = best.cost * (1.0 + FLAT)
+    result = []
+    for i in range(program.size):
+        ends = []
+        for sign in (1.0, -1.0):
+            direction = tuple(sign if j == i else 0.0 for j in range(program.size))
+            end = program.solve(best.z, direction=direction, cost_limit=limit)
+            z = end.z if end.success else best.z
+            ends.append(-float(np.exp(np.sum(z[: i + 1]))))
+        result.append((ends[0], ends[1]))
+    return tuple(result)
+
+
+def _settled(program: Program, best: Solution) -> list[float]:
+    """Poles q_i; ones that the interior-point method left a hair apart are put together."""
+    q = [float(x) for x in np.exp(np.cumsum(best.z))]
+    for together in range(len(q), 1, -1):
+        group = q[:together]
+        if group[-1] / group[0] < 1.01:
+            return [math.prod(group) ** (1.0 / together)] * together + q[together:]
+    return q

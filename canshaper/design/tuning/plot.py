@@ -1,0 +1,179 @@
+"""The picture of a tuning: the answer to a full press, and the swing left when the length is wrong.
+
+Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
+"""
+
+import math
+from pathlib import Path
+from typing import Any
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from canshaper.design.tuning.deploy import Setting
+from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
+from canshaper.report.style import (
+    MINUS,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    plain,
+)
+from canshaper.report.table import axis_title
+from canshaper.shaping.sway import SwayMode
+
+SIZE_PX, DPI = (1500, 720), 100
+_LABEL: dict[str, Any] = {"fontsize": 11, "color": TEXT_COLOUR}
+
+
+def draw(
+    path: Path,
+    *,
+    axis: str,
+    found: Setting,
+    mode: SwayMode,
+    tick_s: float,
+    machine: Machine,
+    full_speed_m_s: float,
+    before: Setting | None = None,
+) -> None:
+    """Draw a setting and write the picture (PNG of ``SIZE_PX``) to ``path``.
+
+    Args:
+        path: file to write.
+        axis: name of the axis.
+        found: the setting.
+        mode: sway mode of the axis.
+        tick_s: period of the axis.
+        machine: what stands behind the filter.
+        full_speed_m_s: speed of the tip at full command, for the swing in degrees.
+        before: the setting in the file, to compare with.
+    """
+    duration_s = max(3.0, 1.5 * found.measures.run_on_s, 1.5 * mode.period_s)
+    shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
+    traces = press(mode, tick_s, shaper, machine, duration_s)
+    fig = Figure(figsize=(SIZE_PX[0] / DPI, SIZE_PX[1] / DPI), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(fig)
+    fig.text(0.052, 0.955, finding(axis, found), fontsize=17, weight="bold", color=TEXT_COLOUR)
+    fig.text(0.052, 0.912, _poles(found), fontsize=12, color=TEXT_COLOUR)
+    halves = fig.add_gridspec(
+        1, 2, left=0.052, right=0.985, top=0.865, bottom=0.085, wspace=0.13, width_ratios=[1.25, 1]
+    )
+    left = halves[0].subgridspec(2, 1, hspace=0.12)
+    command = fig.add_subplot(left[0])
+    swing = fig.add_subplot(left[1], sharex=command)
+    length = fig.add_subplot(halves[1])
+    for panel in (command, swing, length):
+        plain(panel)
+    _draw_command(command, traces, found.measures)
+    to_deg = math.degrees(mode.angle_per_speed_rad * full_speed_m_s)
+    _draw_swing(swing, traces, to_deg)
+    _draw_length(length, found.measures, before.measures if before else None)
+    fig.savefig(path, dpi=DPI, format="png")
+
+
+def finding(axis: str, found: Setting) -> str:
+    """Say what the setting does: "Slew: 4 % of the swing is left, ...".
+
+    Shares are of what the same movement of the lever leaves without the filter.
+    """
+    m = found.measures
+    return (
+        f"{axis_title(axis)}: {100 * m.worst(0.0):.0f} % of the swing is left,"
+        f" at most {100 * m.worst(10.0):.0f} % within ±10 % length;"
+        f" run-on {m.run_on_s:.1f} s"
+    )
+
+
+def _poles(found: Setting) -> str:
+    poles = [*found.poles_rad_s, *([found.third_pole_rad_s] if found.third_pole_rad_s else [])]
+    text = ", ".join(f"{p:.2f}".replace("-", MINUS) for p in poles)
+    return f"G_FF with poles {text} rad/s (a1 = {found.a1:g} s, a2 = {found.a2:g} s²)"
+
+
+def _draw_command(panel: Axes, traces: Traces, measures: Evaluation) -> None:
+    lead = 0.06 * traces.t_s[-1]
+    time = [-lead, 0.0, *traces.t_s]
+    sent = [0.0, 0.0, *traces.sent]
+    panel.fill_between([0.0, traces.t_s[-1]], [100.0, 100.0], color=STICK_COLOUR, linewidth=0)
+    panel.plot(
+        time, [100.0 * v for v in sent], color=SHAPED_COLOUR, linewidth=2.2, drawstyle="steps-post"
+    )
+    panel.set_ylim(min(-5.0, 110.0 * min(sent)), max(118.0, 112.0 * max(sent)))
+    panel.set_xlim(-lead, traces.t_s[-1])
+    panel.set_ylabel("speed, % of full", **_LABEL)
+    panel.tick_params(labelbottom=False)
+    panel.text(traces.t_s[-1], 102.0, "stick", ha="right", va="bottom", color="#666666")
+    panel.text(
+        measures.run_on_s,
+        55.0,
+        " sent to the valve,\n limits included",
+        color=SHAPED_COLOUR,
+        fontsize=12,
+        weight="bold",
+    )
+    panel.axvline(measures.run_on_s, color="#888888", linewidth=1.0, linestyle=":")
+    panel.text(
+        measures.run_on_s,
+        10.0,
+        f" filter within 5 %\n after {measures.run_on_s:.2f} s",
+        fontsize=10,
+        color="#666666",
+    )
+
+
+def _draw_swing(panel: Axes, traces: Traces, to_deg: float) -> None:
+    rows = (
+        (traces.swing_raw, "without filter", RAW_COLOUR, 1.4),
+        (traces.swing, "with filter, predicted", SHAPED_COLOUR, 2.2),
+    )
+    largest = max(abs(v) * to_deg for v in traces.swing_raw)
+    panel.axhline(0.0, color="#AAAAAA", linewidth=0.8)
+    for values, text, colour, width in rows:
+        degrees = [to_deg * v for v in values]
+        panel.plot(traces.t_s, degrees, color=colour, linewidth=width)
+        at = max(range(len(degrees)), key=lambda k: degrees[k])
+        panel.annotate(
+            f"{text}: {degrees[at]:.1f}°",
+            xy=(traces.t_s[at], degrees[at]),
+            xytext=(10, 4),
+            textcoords="offset points",
+            color=colour,
+            fontsize=12,
+            weight="bold",
+            bbox={"facecolor": "white", "edgecolor": "none", "alpha": 0.8, "pad": 1.0},
+        )
+    panel.set_ylim(-1.15 * largest, 1.3 * largest)
+    panel.set_ylabel("swing of the grapple, degrees", **_LABEL)
+    panel.set_xlabel("time after a full press, s", **_LABEL)
+
+
+def _draw_length(panel: Axes, measures: Evaluation, before: Evaluation | None) -> None:
+    """Residual over the length error; the names stand at the ends of the curves."""
+    errors = [r.length_pct for r in measures.residuals]
+    curves = [
+        ([r.machine for r in measures.residuals], "through limits and valve", SHAPED_COLOUR, "-"),
+        ([r.linear for r in measures.residuals], "filter alone", "#56A0D3", "--"),
+    ]
+    if before is not None:
+        was = [r.machine for r in before.residuals]
+        curves.append((was, "in the file now", RAW_COLOUR, ":"))
+    top = 100.0 * max(max(values) for values, *_ in curves)
+    for i, (values, text, colour, style) in enumerate(curves):
+        percent = [100.0 * v for v in values]
+        panel.plot(errors, percent, style, color=colour, linewidth=2.2, marker="o", markersize=4)
+        panel.text(
+            errors[-1],
+            top * (1.18 - 0.075 * i),
+            text,
+            color=colour,
+            fontsize=12,
+            weight="bold",
+            ha="right",
+        )
+    panel.set_ylim(0.0, 1.28 * top)
+    panel.set_xticks(errors, [f"{e:+g}".replace("-", MINUS) if e else "0" for e in errors])
+    panel.set_xlabel("true pendulum length against the sway data, %", **_LABEL)
+    panel.set_ylabel("swing left, % of that without filter", **_LABEL)

@@ -1,0 +1,41 @@
+"""A setting as a table for the terminal, beside the one in the file."""
+
+from collections.abc import Callable
+
+from rich.box import SIMPLE_HEAD
+from rich.table import Table
+
+from canshaper.design.tuning.deploy import Setting
+
+
+def table(found: Setting, before: Setting | None, method: str) -> Table:
+    """The setting beside the one in the file; residuals through the machine, filter alone."""
+    result = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
+    columns = [found] if before is None else [before, found]
+    result.add_column("", no_wrap=True)
+    for title in ([] if before is None else ["in the file"]) + [method]:
+        result.add_column(title, justify="right", no_wrap=True)
+
+    def row(title: str, cell: Callable[[Setting], str]) -> None:
+        result.add_row(title, *(cell(column) for column in columns))
+
+    row("poles, rad/s", lambda c: f"{c.poles_rad_s[0]:.3f}  {c.poles_rad_s[1]:.3f}")
+    if any(c.third_pole_rad_s for c in columns):
+        row("third pole", lambda c: f"{c.third_pole_rad_s:.3f}" if c.third_pole_rad_s else "-")
+    row("a1, s", lambda c: f"{c.a1:g}")
+    row("a2, s²", lambda c: f"{c.a2:g}")
+    row("first jump, %", lambda c: f"{100 * c.measures.first_jump:.0f}")
+    row("largest output, %", lambda c: f"{100 * c.measures.peak:.0f}")
+    row("rise to 95 %, s", lambda c: f"{c.measures.rise_s:.2f}")
+    row("run-on, s", lambda c: f"{c.measures.run_on_s:.2f}")
+    row("mean delay, s", lambda c: f"{c.measures.mean_delay_s:.2f}")
+    result.add_row("swing left, %: machine | filter alone")
+    for i, residual in enumerate(found.measures.residuals):
+        row(
+            f"  length {residual.length_pct:+.0f} %" if residual.length_pct else "  length right",
+            lambda c, i=i: (  # type: ignore[misc]
+                f"{100 * c.measures.residuals[i].machine:.1f} |"
+                f" {100 * c.measures.residuals[i].linear:4.1f}"
+            ),
+        )
+    return result

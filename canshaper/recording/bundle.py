@@ -1,0 +1,125 @@
+"""A recording in one file to attach to a report: log, deployment, DBC files, versions, history."""
+
+import json
+import os
+import platform
+import zipfile
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+from canshaper import __version__
+from canshaper.can.deployment import Deployment
+from canshaper.recording.frames import LogError
+from canshaper.recording.history import History
+
+ABOUT, HISTORY, LOG = "about.json", "history.txt", "recording.log"
+FOLDER = "deployment"
+OUTSIDE = "outside"
+PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
+
+
+def pack(
+    path: Path, log: Path, deployment: Deployment, history: History, facts: dict[str, object]
+) -> None:
+    """Make a bundle.
+
+    Args:
+        path: the bundle, which is replaced where it is there.
+        log: the recorded log.
+        deployment: whose buses were recorded; its file and DBC files go in, so that the paths in
+            the file hold when it is unpacked.
+        history: what the status messages told.
+        facts: anything else about the recording.
+
+    Raises:
+        OSError: a file cannot be read or written.
+    """
+    file = deployment.path.resolve()
+    text = file.read_text(encoding="utf-8")
+    sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
+    inside = [source for name, source in sources if not Path(name).is_absolute()]
+    root = Path(os.path.commonpath([file.parent, *(source.parent for source in inside)]))
+    here = file.parent.relative_to(root)
+    about = {
+        "deployment": str(Path(FOLDER) / here / file.name),
+        "log": LOG,
+        "made": datetime.now(UTC).isoformat(timespec="seconds"),
+        "buses": {n: f"{b.interface} {b.channel}" for n, b in deployment.config.buses.items()},
+        "versions": versions(),
+        "identity": deployment.identity.lines(),
+        **facts,
+    }
+    part = path.with_name(path.name + ".part")
+    with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
+        bundle.write(log, LOG)
+        for name, source in sources:
+            if Path(name).is_absolute():
+                bundle.write(source, str(Path(FOLDER) / OUTSIDE / source.name))
+                text = text.replace(
+                    name, os.path.relpath(root / OUTSIDE / source.name, file.parent)
+                )
+            else:
+                bundle.write(source, str(Path(FOLDER) / source.relative_to(root)))
+        bundle.writestr(str(Path(FOLDER) / here / file.name), text)
+        bundle.writestr(ABOUT, json.dumps(about, indent=2) + "\n")
+        bundle.writestr(HISTORY, "".join(f"{line}\n" for line in history_lines(history)))
+    part.replace(path)
+
+
+def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
+    """Unpack a bundle into a folder.
+
+    Returns:
+        (log, deployment file).
+
+    Raises:
+        LogError: it is no bundle, or a damaged one; tells the member.
+    """
+    where = f"{path}"
+    try:
+        with zipfile.ZipFile(path) as bundle:
+            for member in (ABOUT, *bundle.namelist()):
+                where = f"{path}: {member}"
+                bundle.extract(member, folder)
+        where = f"{path}: {ABOUT}"
+        about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
+        log, file = ((folder / about[key]).resolve() for key in ("log", "deployment"))
+    except Exception as error:  # of many kinds, where the file is damaged
+        text = f"found {type(error).__name__} {error}, allowed is one of canshaper record"
+        raise LogError(f"{where}: not a bundle: {text}") from None
+    for one in (log, file):
+        if folder.resolve() not in one.parents:
+            raise LogError(f"{path}: not a bundle: a path leads out of it")
+        if not one.is_file():
+            text = f"found no {one.relative_to(folder.resolve())}, allowed is one that has it"
+            raise LogError(f"{path}: not a bundle: {text}")
+    return log, file
+
+
+def versions() -> dict[str, str]:
+    """What ran here: program, interpreter, packages, kernel."""
+    found = {"canshaper": __version__, "python": platform.python_version()}
+    for name in PACKAGES:
+        try:
+            found[name] = version(name)
+        except PackageNotFoundError:
+            found[name] = "not installed"
+    found["kernel"] = f"{platform.system()} {platform.release()} {platform.version()}"
+    found["machine"] = platform.machine()
+    return found
+
+
+def history_lines(history: History) -> list[str]:
+    """Every change with its time, then the counters as they were last."""
+    lines = [f"{time_text(told.time_ns)} {told.text}" for told in history.changes]
+    if history.counted_ns is not None:
+        counters = " ".join(f"{name}={count}" for name, count in history.counters.items())
+        last = time_text(history.counted_ns)
+        lines.append(f"{last} counters {counters} last_fault={history.last_fault}")
+    return lines
+
+
+def time_text(time_ns: int) -> str:
+    """Time of the day with its date, in UTC, to the millisecond."""
+    return datetime.fromtimestamp(time_ns / 1e9, UTC).isoformat(timespec="milliseconds")

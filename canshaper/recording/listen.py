@@ -1,0 +1,167 @@
+"""The buses of a deployment, only listened to: nothing here can send."""
+
+import select
+import socket
+import time
+from collections.abc import Iterable
+from contextlib import suppress
+from typing import Any, NamedTuple
+
+import can
+
+from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
+from canshaper.can.bus import BusError, open_python_can
+from canshaper.can.raw import CAN_FRAME
+from canshaper.can.socketcan import dropped_frames, open_sockets
+from canshaper.config.bus import Bus
+from canshaper.recording.text import ERROR_FLAG
+
+# Frames taken from one bus before the next one has its turn.
+MOST_AT_ONCE = 2000
+# Of every signal that asks us to end, the next one must not wait for a frame.
+LOOK_S = 0.2
+# How often an interface is asked that has no file to wait for.
+UNTOLD_S = 0.01
+
+
+class Heard(NamedTuple):
+    """One frame, as it was heard.
+
+    Attributes:
+        time_ns: wall clock, by the kernel where it tells.
+        bus: name in the deployment.
+        channel: its channel.
+        can_id: with the error flag of SocketCAN where it is an error frame.
+        extended: whether the id has 29 bits, or is an error class.
+        data: its bytes.
+        kind: empty for a classical data frame, else what it is.
+    """
+
+    time_ns: int
+    bus: str
+    channel: str
+    can_id: int
+    extended: bool
+    data: bytes
+    kind: str
+
+    def line(self) -> str:
+        """As ``candump -L`` writes it."""
+        seconds, ns = divmod(self.time_ns, 10**9)
+        can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
+        data = "R" if self.kind == "remote" else self.data.hex().upper()
+        if self.kind == "CAN FD":
+            data = f"#0{data}"
+        return f"({seconds}.{ns // 1000:06d}) {self.channel} {can_id}#{data}\n"
+
+
+class Listener:
+    """Listens to buses.
+
+    Args:
+        buses: by name.
+
+    Attributes:
+        lost: frames that the kernel could not keep for us.
+
+    Raises:
+        BusError: a bus cannot be opened.
+    """
+
+    def __init__(self, buses: Iterable[tuple[str, Bus]]) -> None:
+        self.lost = 0
+        self._sockets: dict[Any, tuple[str, str]] = {}
+        self._files: list[Any] = []
+        for name, bus in buses:
+            try:
+                self._open(name, bus)
+            except Exception as error:  # each interface raises its own kinds
+                self.close()
+                where = f"{bus.interface} channel {bus.channel}"
+                text = (error.strerror if isinstance(error, OSError) else None) or str(error)
+                text = text or type(error).__name__
+                raise BusError(f"bus {name}: cannot open {where}: {text}") from error
+
+    def _open(self, name: str, bus: Bus) -> None:
+        if bus.interface == "socketcan":
+            (one,) = open_sockets(bus, None)
+            one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+            self._sockets[one] = name, bus.channel
+            self._files.append(one)
+            return
+        opened = open_python_can(bus)
+        self._sockets[opened] = name, bus.channel
+        with suppress(Exception):  # not every interface has one
+            if opened.fileno() >= 0:
+                self._files.append(opened)
+
+    def frames(self, timeout_s: float = LOOK_S) -> list[Heard]:
+        """All frames that wait, by time; after the timeout perhaps none.
+
+        Raises:
+            BusError: a bus cannot be read any more.
+        """
+        all_told = len(self._files) == len(self._sockets)
+        try:
+            select.select(self._files, [], [], timeout_s if all_told else UNTOLD_S)
+        except (OSError, ValueError) as error:
+            raise BusError(f"cannot read: {error}") from error
+        heard: list[Heard] = []
+        for one, (name, channel) in self._sockets.items():
+            try:
+                take = _raw if isinstance(one, socket.socket) else _python_can
+                for _ in range(MOST_AT_ONCE):
+                    found = take(one, name, channel)
+                    if found is None:
+                        break
+                    heard.append(found)
+            except (OSError, can.CanError) as error:
+                text = getattr(error, "strerror", None) or str(error)
+                raise BusError(f"bus {name}: cannot read {channel}: {text}") from error
+        raw = [one for one in self._sockets if isinstance(one, socket.socket)]
+        self.lost = dropped_frames(raw)
+        heard.sort(key=lambda frame: frame.time_ns)
+        return heard
+
+    def close(self) -> None:
+        """Close the buses."""
+        for one in self._sockets:
+            with suppress(can.CanError, OSError):
+                one.close() if isinstance(one, socket.socket) else one.shutdown()
+        self._sockets.clear()
+        self._files.clear()
+
+
+def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
+    """The next frame of SocketCAN; None when none waits."""
+    try:
+        data, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
+    except BlockingIOError:
+        return None
+    stamp = stamp_ns(ancillary)
+    time_ns = time.time_ns() if stamp is None else stamp
+    word, length, payload = CAN_FRAME.unpack(data)
+    payload = payload[: min(length, 8)]
+    if word & socket.CAN_ERR_FLAG:
+        can_id = ERROR_FLAG | word & socket.CAN_EFF_MASK
+        return Heard(time_ns, bus, channel, can_id, True, payload, "error")
+    extended = bool(word & socket.CAN_EFF_FLAG)
+    can_id = word & (socket.CAN_EFF_MASK if extended else socket.CAN_SFF_MASK)
+    remote = "remote" if word & socket.CAN_RTR_FLAG else ""
+    return Heard(time_ns, bus, channel, can_id, extended, payload, remote)
+
+
+def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
+    """The next frame of python-can; None when none waits."""
+    message = one.recv(0)
+    if message is None:
+        return None
+    time_ns = round(message.timestamp * 1e6) * 1000
+    can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
+    if message.is_error_frame:
+        can_id, extended, kind = ERROR_FLAG | can_id, True, "error"
+    elif message.is_remote_frame:
+        kind = "remote"
+    elif message.is_fd:
+        kind = "CAN FD"
+    return Heard(time_ns, bus, channel, can_id, extended, bytes(message.data), kind)

@@ -1,0 +1,160 @@
+"""A log of CAN frames, one frame at a time: candump, ASC, BLF, MF4, CSV, also packed with gzip.
+
+A million lines take no more memory than a hundred.
+"""
+
+import gzip
+import zlib
+from collections import Counter
+from collections.abc import Callable, Iterator
+from io import BufferedReader, RawIOBase
+from pathlib import Path
+from typing import Any, BinaryIO
+
+from canshaper.recording import binary, text
+from canshaper.recording.frames import LATEST_S, CutOffError, LogError, Place, TimedFrame
+
+__all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
+
+READERS: dict[str, Callable[[BinaryIO, Place], Iterator[TimedFrame]]] = {
+    ".log": text.candump,
+    ".asc": text.asc,
+    ".blf": binary.blf,
+    ".csv": text.csv,
+    ".mf4": binary.mf4,
+}
+BINARY = frozenset((".blf", ".mf4"))
+# Two sockets of one logger are not read in the order in which their frames came.
+OUT_OF_ORDER_NS = 20_000_000
+# Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
+LONGEST_GAP_NS = 12 * 3600 * 1_000_000_000
+LATEST_NS = LATEST_S * 1_000_000_000
+TELL_EVERY = 8192
+BUFFER_BYTES = 1 << 17
+
+
+class LogFile:
+    """One log; each iteration reads it from its beginning.
+
+    Args:
+        path: the log; its suffix tells the format, ``.gz`` behind it that it is packed.
+        progress: called now and then with the part that is read, 0 to 1.
+
+    Attributes:
+        left_out: frames that are no classical data frames, by kind; of the last iteration.
+        disordered: frames that stand behind a later one, by up to ``OUT_OF_ORDER_NS``; they are
+            handed out in the order of the file, with the time of that later one.
+    """
+
+    def __init__(self, path: Path, progress: Callable[[float], None] | None = None) -> None:
+        self.left_out: Counter[str] = Counter()
+        self.disordered = 0
+        self._path = path
+        self._progress = progress
+
+    def __iter__(self) -> Iterator[TimedFrame]:
+        """Every frame in the order of the file.
+
+        Raises:
+            CutOffError: the log is cut off; every whole frame was handed out before.
+            LogError: the log cannot be used.
+        """
+        place = Place(self._path)
+        self.left_out, self.disordered = place.left_out, 0
+        try:
+            yield from self._frames(place)
+        except EOFError:
+            raise place.cut_off("its packing has no end") from None
+        except OSError as error:
+            raise place.error(error.strerror or str(error), "a log that can be read") from None
+        except zlib.error as error:
+            raise place.error(f"damaged packing ({error})", "a log that is whole") from None
+
+    def _frames(self, place: Place) -> Iterator[TimedFrame]:
+        """Its frames, whose times never go back."""
+        packed, suffix = _format(place)
+        place.unit = "frame" if suffix in BINARY else "line"
+        tell = 1
+        with self._path.open("rb", buffering=0) as raw:
+            size = raw.seek(0, 2)
+            raw.seek(0)
+            file: BinaryIO = BufferedReader(raw, BUFFER_BYTES)
+            if packed:
+                file = BufferedReader(_Unpacked(file), BUFFER_BYTES)
+            last_ns: int | None = None
+            latest_ns = 0
+            for frame in READERS[suffix](file, place):
+                time_ns = frame[0]
+                if last_ns is not None and last_ns <= time_ns <= latest_ns:
+                    last_ns = time_ns
+                    yield frame
+                else:
+                    last_ns = self._first_or_out_of_order(time_ns, last_ns, place)
+                    yield frame._replace(time_ns=last_ns)
+                latest_ns = last_ns + LONGEST_GAP_NS
+                tell -= 1
+                if not tell:
+                    tell = TELL_EVERY
+                    if self._progress and not raw.closed:
+                        self._progress(raw.tell() / size)
+        if last_ns is None:
+            raise place.error("no data frame", "a log with frames, its suffix that of its format")
+        if self._progress:
+            self._progress(1.0)
+
+    def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
+        """The time of a frame that does not follow that of the one before."""
+        if abs(time_ns) > LATEST_NS:
+            found = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
+            raise place.error(found, "a date before 2286, or a time from the start of the log")
+        if last_ns is None:
+            return time_ns
+        step_ns = time_ns - last_ns
+        if -OUT_OF_ORDER_NS <= step_ns < 0:
+            self.disordered += 1
+            return last_ns
+        found = f"a time {abs(step_ns) / 1e9:.3f} s {'after' if step_ns > 0 else 'before'}"
+        allowed = "one clock for the whole log; split it here"
+        raise place.error(f"mixed clocks: {found} that of the frame before", allowed)
+
+
+class _Unpacked(RawIOBase):
+    """What gzip has packed; of a file that is cut off, all that there is before the error."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self._file = gzip.GzipFile(fileobj=file)
+
+    def readable(self) -> bool:
+        return True
+
+    def seekable(self) -> bool:
+        return True
+
+    def readinto(self, buffer: Any) -> int:
+        data = self._file.read1(len(buffer))
+        buffer[: len(data)] = data
+        return len(data)
+
+    def seek(self, offset: int, whence: int = 0) -> int:
+        return self._file.seek(offset, whence)
+
+    def tell(self) -> int:
+        return self._file.tell()
+
+
+def read_log(path: Path, progress: Callable[[float], None] | None = None) -> Iterator[TimedFrame]:
+    """Frames of a log, see ``LogFile``."""
+    return iter(LogFile(path, progress))
+
+
+def _format(place: Place) -> tuple[bool, str]:
+    """Whether a log is packed, and the suffix of its format."""
+    suffixes = [s.lower() for s in place.path.suffixes]
+    packed = suffixes[-1:] == [".gz"]
+    suffix = "".join(suffixes[:-1] if packed else suffixes)
+    suffix = f".{suffix.rpartition('.')[2]}"
+    if suffix not in READERS:
+        known = ", ".join(READERS)
+        found = f"found the suffix {suffix!r}" if suffix != "." else "found no suffix"
+        raise LogError(f"{place.path}: {found}, allowed are {known}, each also with .gz behind")
+    return packed, suffix

@@ -1,0 +1,93 @@
+"""The picture of a replay: stick and command above predicted sway, each deployment in a colour.
+
+The only module here that needs matplotlib; it draws through the object API, so no display and no
+global state is involved.
+"""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from canshaper.recording.report import Replayed
+from canshaper.report.style import (
+    MINUS,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    coloured_words,
+    plain,
+)
+from canshaper.report.table import axis_title
+
+# The first deployment, the second; all others. Of Okabe and Ito, as in the other pictures.
+COLOURS = (SHAPED_COLOUR, RAW_COLOUR, "#009E73", "#CC79A7")
+STRAIGHT_COLOUR = "#888888"
+WIDTH_IN, BLOCK_IN, DPI = 16, 4.2, 100
+
+
+def draw(replays: Sequence[Replayed], path: Path) -> None:
+    """Draw all axes of all replays (PNG).
+
+    Args:
+        replays: at least one, with rows.
+        path: file to write.
+    """
+    recordings = [one.trace.recording() for one in replays]
+    straight = replays[0].trace.straight()
+    names = list(dict.fromkeys(name for recording in recordings for name in recording.axes))
+    swinging = {n for r in recordings for n, trace in r.axes.items() if trace.sway_deg is not None}
+    heights = [h for n in names for h in ((1.0, 1.6) if n in swinging else (1.0,))]
+    inches = 0.7 + BLOCK_IN * sum(heights) / 2.6
+    fig = Figure(figsize=(WIDTH_IN, inches), dpi=DPI, facecolor="white")
+    FigureCanvasAgg(fig)
+    words = [("stick straight to the valve", STRAIGHT_COLOUR)]
+    words += [(one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(replays)]
+    coloured_words(fig, words, (0.052, 1.0 - 0.08 / inches), size=15, sep=14)
+    grid = fig.add_gridspec(
+        len(heights), 1, left=0.052, right=0.988, top=1.0 - 0.7 / inches, bottom=0.5 / inches,
+        height_ratios=heights, hspace=0.28,
+    )  # fmt: skip
+    panels: list[Axes] = []
+    row = 0
+    for name in names:
+        panel = fig.add_subplot(grid[row], sharex=panels[0] if panels else None)
+        row += 1
+        panels.append(panel)
+        title = axis_title(name)
+        panel.set_title(title, loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
+        stick = straight.axes.get(name)
+        if stick is not None:
+            panel.fill_between(
+                straight.t_s, stick.stick, step="post", color=STICK_COLOUR, linewidth=0
+            )
+        panel.set_ylim(-1.1, 1.1)
+        panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
+        panel.set_ylabel("command, %", color=TEXT_COLOUR)
+        for i, recording in enumerate(recordings):
+            if name in recording.axes:
+                colour = COLOURS[i % len(COLOURS)]
+                sent = recording.axes[name].sent
+                panel.plot(recording.t_s, sent, color=colour, linewidth=1.4, drawstyle="steps-post")
+        if name not in swinging:
+            continue
+        panel = fig.add_subplot(grid[row], sharex=panels[0])
+        row += 1
+        panels.append(panel)
+        panel.set_ylabel("predicted sway, degrees", color=TEXT_COLOUR)
+        if stick is not None and stick.sway_deg is not None:
+            panel.plot(straight.t_s, stick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
+        for i, recording in enumerate(recordings):
+            if name in recording.axes and (sway := recording.axes[name].sway_deg) is not None:
+                panel.plot(recording.t_s, sway, color=COLOURS[i % len(COLOURS)], linewidth=1.8)
+    for panel in panels:
+        plain(panel)
+        panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
+    for panel in panels[:-1]:
+        panel.tick_params(labelbottom=False)
+    panels[-1].set_xlabel("time since the first tick, s", color=TEXT_COLOUR)
+    panels[0].set_xlim(straight.t_s[0], straight.t_s[-1])
+    fig.savefig(path, dpi=DPI, format="png")

@@ -1,0 +1,66 @@
+"""Recording: every frame of the buses into a log, and what the status messages told meanwhile."""
+
+import time
+from collections import Counter
+from collections.abc import Callable
+from pathlib import Path
+
+from canshaper.can.deployment import Deployment
+from canshaper.recording.history import History
+from canshaper.recording.listen import Listener
+
+# What a computer that is switched off may lose.
+FLUSH_S = 1.0
+
+
+class Recording:
+    """A recording under way, or done.
+
+    Attributes:
+        frames: by kind, the empty one for classical data frames.
+        lost: frames that the kernel could not keep for us.
+        history: what the status messages told.
+        seconds: how long.
+    """
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.frames: Counter[str] = Counter()
+        self.lost = 0
+        self.seconds = 0.0
+        self.history = History(deployment)
+        self._deployment = deployment
+
+    def run(
+        self,
+        path: Path,
+        seconds: float | None,
+        tell: Callable[["Recording"], bool],
+    ) -> None:
+        """Record until the time is over, or ``tell`` says that it is enough.
+
+        Args:
+            path: the log; one that is there is replaced.
+            seconds: how long; None without end.
+            tell: called some times a second; False ends the recording.
+
+        Raises:
+            BusError: a bus cannot be opened, or not be read any more.
+            OSError: the log cannot be written; what was written stays.
+        """
+        listener = Listener(self._deployment.config.buses.items())
+        try:
+            with path.open("w", encoding="ascii", newline="\n") as log:
+                begin = flushed = time.monotonic()
+                while tell(self) and (seconds is None or self.seconds < seconds):
+                    for frame in listener.frames():
+                        log.write(frame.line())
+                        self.frames[frame.kind] += 1
+                        if not frame.kind:
+                            self.history.take(frame)
+                    now = time.monotonic()
+                    self.seconds, self.lost = now - begin, listener.lost
+                    if now - flushed >= FLUSH_S:
+                        flushed = now
+                        log.flush()
+        finally:
+            listener.close()

@@ -1,0 +1,87 @@
+"""Which bus a channel of a log is, and what a frame is to a deployment."""
+
+from collections.abc import Collection, Mapping
+from enum import Enum
+
+from canshaper.can.deployment import Deployment
+from canshaper.can.j1939 import group_of
+from canshaper.recording.frames import LogError
+
+Key = tuple[str, int, bool]
+
+
+class Kind(Enum):
+    """What a frame is to the daemon of a deployment."""
+
+    TAKEN = "taken"
+    """It waits in the first socket, and is read before the valves are told."""
+    OTHER = "other"
+    """It is seen too, after the valves were told."""
+    SENT = "sent"
+    """The daemon sends such frames."""
+    IGNORED = "ignored"
+    """The daemon does not see it."""
+
+
+def bus_of_channel(
+    deployment: Deployment, found: Collection[str], given: Mapping[str, str]
+) -> dict[str, str]:
+    """Names of the buses by the channels of a log.
+
+    Args:
+        deployment: the machine.
+        found: channels of the log.
+        given: channels by bus, as the command line says; else the deployment's own channel counts,
+            then the name of the bus, then the only one that there is.
+
+    Raises:
+        LogError: a bus has no channel in the log, or two have the same.
+    """
+    buses = deployment.config.buses
+    chosen: dict[str, str] = {}
+    for name, bus in buses.items():
+        wanted = given.get(name)
+        tries = [wanted] if wanted is not None else [bus.channel, name]
+        if wanted is None and len(found) == 1 and len(buses) == 1:
+            tries += found
+        channel = next((c for c in tries if c in found), None)
+        names = ", ".join(repr(c) for c in sorted(found)) or "none"
+        if channel is None:
+            text = f"bus {name}: found the channels {names} in the log, none is {tries[0]!r}"
+            raise LogError(f"{text}; allowed is --channel {name}=CHANNEL with one of them")
+        if channel in chosen:
+            text = f"bus {name}: found channel {channel!r}, which is that of bus {chosen[channel]}"
+            raise LogError(f"{text}; allowed is --channel {name}=CHANNEL with one of its own")
+        chosen[channel] = name
+    return chosen
+
+
+class Sorter:
+    """Tells what frames are to a deployment; each kind of frame is looked at once."""
+
+    def __init__(self, deployment: Deployment) -> None:
+        self._ids = {bus: deployment.ids(bus) for bus in deployment.config.buses}
+        # Other interfaces hand out all there is before the valves are told.
+        self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
+        # It carries the digest of the program that ran, which need not be this one.
+        identity = deployment.identity_status
+        self._kinds = {identity.sender.key: Kind.IGNORED} if identity else {}
+
+    def kind(self, key: Key) -> Kind:
+        """What a frame is, by bus, id and whether that is extended."""
+        kind = self._kinds.get(key)
+        if kind is None:
+            kind = self._kinds[key] = self._judge(key)
+        return kind
+
+    def _judge(self, key: Key) -> Kind:
+        bus, message = key[0], key[1:]
+        ids = self._ids[bus]
+        if message in ids.sent or message in ids.claims:
+            return Kind.SENT
+        group = group_of(message[0]) if message[1] else -1
+        if message in ids.taken or group in ids.taken_groups:
+            return Kind.TAKEN
+        if group not in ids.sent_groups and (message in ids.known or (message[1] and ids.j1939)):
+            return Kind.IGNORED
+        return Kind.OTHER if self._raw[bus] else Kind.TAKEN

@@ -1,0 +1,1 @@
+"""Research beside the product, not in the package."""
