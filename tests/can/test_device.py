@@ -146,6 +146,12 @@ def test_a_device_against_the_deployment(here: FakeDevices, asked: Bus, fault: s
     assert bool(device_fault(asked, read_device(asked.channel))) is bool(fault)
 
 
+def test_what_is_no_interface_does_not_matter(here: FakeDevices) -> None:
+    """Bonding puts a file among the interfaces."""
+    (here.root / "sys/class/net/bonding_masters").write_text("\n")
+    assert whereabouts(bus("can9", serial="0B99")) == "; the device of the file is can2"
+
+
 class Bound:
     """A socket, as far as it is asked where it is bound to; names as they are, one call each."""
 

@@ -23,13 +23,14 @@ from tests.hil.machine import (
     message_name,
     open_bus,
     service,
+    wait_for,
 )
 from tests.hil.test_daemon import drive
 
 OTHER_CRANE = "vcan1"
 LEVERS = {"LeverLeft", "LeverRight"}
-# Frames of each joystick of the other crane: fifteen looks at the name, one every 0.2 s.
-FRAMES = 150
+# Frames of each joystick of the other crane: ten looks at the name, one every 0.2 s.
+FRAMES = 100
 DRIVER = Path("/sys/bus/pci/drivers/kvaser_pci")
 
 
@@ -80,10 +81,10 @@ def witness(folder: Path, channel: str) -> set[str | None]:
     log = folder / "other.log"
     until = time.monotonic() + ANSWER_S
     with candump(log, channel), levers_on(channel) as levers:
-        while frames_of(log, "LeverLeft") < FRAMES:
+        while (count := frames_of(log, "LeverLeft")) < FRAMES:
             assert time.monotonic() < until, "the other crane's joysticks are silent"
-            levers.values["Slew"] = 100.0 if frames_of(log, "LeverLeft") > 50 else 0.0
-            time.sleep(0.1)
+            levers.values["Slew"] = 100.0 if count > FRAMES / 2 else 0.0
+            time.sleep(0.2)
     return {message_name(message) for message in logged(log)}
 
 
@@ -106,8 +107,11 @@ def daemon(tmp_path: Path, ours: str) -> Iterator[Service]:
 
 
 def drive_from(far: str) -> None:
-    """Joysticks that begin in neutral; full motion."""
+    """Joysticks that begin in neutral and press reset where something is latched; full motion."""
     with open_bus(far) as bus, levers_on(far) as levers:
+        while str(wait_for(bus, "SlewStatus", lambda _: True)["State"]) != "READY":
+            levers.switches["Reset"] ^= 1
+        levers.switches["Reset"] = 0
         drive(bus, levers)
 
 
