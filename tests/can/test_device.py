@@ -22,8 +22,10 @@ from canshaper.can.device import (
     read_device,
     whereabouts,
 )
+from canshaper.can.socketcan import Ids, open_sockets
 from canshaper.config.bus import Bus, Match
 from tests.can.fake_devices import HUB, PCI, SPI, USB, FakeDevices
+from tests.can.raw_line import IDS
 
 
 @pytest.fixture
@@ -314,3 +316,52 @@ def test_an_interface_that_is_missing_may_have_another_name(
     assert str(fail(bus("can-x", serial="0B99"))) == f"{text}; the device of the file is can2"
     assert str(fail(bus("can-x", driver="peak_usb"))) == text
     assert str(fail(bus("can-x"))) == text
+
+
+class Opened(Bound):
+    """A socket that is opened and bound."""
+
+    made: list["Opened"]
+
+    def __init__(self, *_kind: int) -> None:
+        super().__init__("")
+        self.closed = False
+        self.made.append(self)
+
+    def setblocking(self, _flag: bool) -> None:
+        pass
+
+    def setsockopt(self, *_option: Any) -> None:
+        pass
+
+    def bind(self, address: tuple[str]) -> None:
+        self._names = [address[0]]
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.mark.parametrize("ids", [None, IDS])
+def test_sockets_of_another_device_are_closed_at_once(
+    here: FakeDevices, monkeypatch: pytest.MonkeyPatch, ids: Ids | None
+) -> None:
+    made: list[Opened] = []
+    monkeypatch.setattr(Opened, "made", made, raising=False)
+    monkeypatch.setattr("canshaper.can.socketcan.socket.socket", Opened)
+    right = open_sockets(bus("can0", serial="0A17", port=0), ids)
+    assert [one.closed for one in made] == [False] * len(right)
+    made.clear()
+    with pytest.raises(WrongDeviceError, match="expected serial number 0A17, but can2 has"):
+        open_sockets(bus("can2", serial="0A17"), ids)
+    assert [one.closed for one in made] == [True] * (3 if ids else 1)
+    assert open_sockets(bus("can2"), ids)  # without match
+
+
+@pytest.mark.parametrize(("asked", "matched"), [(bus("can0"), False), (bus(serial="1"), True)])
+def test_a_port_knows_whether_its_device_is_named(
+    monkeypatch: pytest.MonkeyPatch, asked: Bus, matched: bool
+) -> None:
+    options: dict[str, Any] = {}
+    monkeypatch.setattr("canshaper.can.bus.RawPort", lambda *_, **given: options.update(given))
+    open_port("crane", asked, lambda _fault: None)
+    assert options == {"confirms": False, "matched": matched}
