@@ -7,7 +7,7 @@ somebody may set between the stamp and the read.
 import socket
 import struct
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from canshaper.can.clock import boottime_ns
 
@@ -54,12 +54,20 @@ class Arrivals:
         self._offset_ns = min(self._now_offset_ns, self._empty_offset_ns)
         return self._empty_ns
 
-    def of(self, ancillary: Iterable[tuple[int, int, bytes]]) -> int:
-        """Arrival of a frame that this read has found; the earliest where it has no stamp."""
-        stamp = stamp_ns(ancillary)
-        if stamp is None:
+    def of(self, ancillary: Sequence[tuple[int, int, bytes]]) -> int:
+        """Arrival of a frame that this read has found; the earliest where it has no stamp.
+
+        Args:
+            ancillary: what ``recvmsg`` returned, of a socket that carries nothing but stamps.
+        """
+        try:
+            seconds, ns = _STAMP.unpack(ancillary[0][2])
+        except (IndexError, struct.error):
             return self._empty_ns
-        return max(self._empty_ns, min(stamp + self._offset_ns, self._now_ns))
+        arrived_ns: int = seconds * 1_000_000_000 + ns + self._offset_ns
+        if arrived_ns > self._now_ns:
+            return self._now_ns
+        return arrived_ns if arrived_ns > self._empty_ns else self._empty_ns
 
     def emptied(self) -> None:
         """Nothing waits in the port: what comes later arrived after this read began."""

@@ -6,6 +6,7 @@ import struct
 import time
 from collections.abc import Iterator
 from types import SimpleNamespace
+from typing import Any
 
 import can
 import pytest
@@ -92,6 +93,8 @@ def test_a_steady_wall_clock_gives_the_arrival_to_the_nanosecond(clocks: Clocks)
     for after_ns in (0, 1, 7 * MS, TICK_NS):
         assert arrivals.of(ancillary(WALL_NS + START_NS + after_ns)) == START_NS + after_ns
     assert arrivals.of([]) == START_NS
+    ((level, kind, value),) = ancillary(WALL_NS + START_NS + 1)
+    assert arrivals.of([(level, kind, value[:-1])]) == START_NS
 
 
 def test_a_stamp_outside_of_the_time_between_two_reads_is_none(clocks: Clocks) -> None:
@@ -151,10 +154,18 @@ def line(clocks: Clocks, monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
     made.end()
 
 
-def stamped(monkeypatch: pytest.MonkeyPatch, *stamps: int | None) -> None:
+def stamped(line: Line, *stamps: int | None) -> None:
     """Let the kernel stamp the next frames so."""
     waiting = list(stamps)
-    monkeypatch.setattr(arrival, "stamp_ns", lambda _ancillary: waiting.pop(0))
+    near, receive = line.near[TAKEN], line.port._receive
+    assert receive == near.recvmsg
+
+    def recvmsg(*sizes: int) -> Any:
+        data, _, flags, sender = receive(*sizes)
+        stamp = waiting.pop(0)
+        return data, [] if stamp is None else ancillary(stamp), flags, sender
+
+    line.port._receive = recvmsg
 
 
 def arrivals_of(port: Port) -> list[int]:
@@ -162,10 +173,8 @@ def arrivals_of(port: Port) -> list[int]:
     return [port.arrived_ns - START_NS for _ in port.frames()]
 
 
-def test_each_frame_has_its_own_arrival(
-    line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stamped(monkeypatch, *(WALL_NS + START_NS + after * MS for after in (3, 5, 9)))
+def test_each_frame_has_its_own_arrival(line: Line, clocks: Clocks) -> None:
+    stamped(line, *(WALL_NS + START_NS + after * MS for after in (3, 5, 9)))
     for number in range(3):
         line.put(message(0x100 + number))
     clocks.now_ns += TICK_NS
@@ -173,9 +182,9 @@ def test_each_frame_has_its_own_arrival(
 
 
 def test_without_a_stamp_it_is_the_last_time_that_the_port_was_empty(
-    line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
+    line: Line, clocks: Clocks
 ) -> None:
-    stamped(monkeypatch, None, None)
+    stamped(line, None, None)
     line.put(message(0x100))
     clocks.now_ns += 2 * TICK_NS
     assert arrivals_of(line.port) == [0]
@@ -188,7 +197,7 @@ def test_a_port_that_was_not_read_to_its_end_was_not_empty(
     line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(raw, "_EACH_FRAME", range(2))
-    stamped(monkeypatch, *[None] * 5)
+    stamped(line, *[None] * 5)
     for _ in range(5):
         line.put(message(0x100))
     for after, most in ((0, 2), (0, 2), (0, 1)):
@@ -196,10 +205,8 @@ def test_a_port_that_was_not_read_to_its_end_was_not_empty(
         assert arrivals_of(line.port) == [after] * most
 
 
-def test_a_port_that_failed_was_not_empty(
-    line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stamped(monkeypatch, None)
+def test_a_port_that_failed_was_not_empty(line: Line, clocks: Clocks) -> None:
+    stamped(line, None)
     line.put(message(0x100))
     line.near[TAKEN].fail = OSError(errno.ENETDOWN, "down")
     clocks.now_ns += TICK_NS
@@ -209,24 +216,20 @@ def test_a_port_that_failed_was_not_empty(
     assert arrivals_of(line.port) == [0]
 
 
-def test_an_interface_that_comes_back_was_empty_before(
-    line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stamped(monkeypatch, None)
+def test_an_interface_that_comes_back_was_empty_before(line: Line, clocks: Clocks) -> None:
     line.put(message(0x100))
     line.near[TAKEN].fail = OSError(errno.ENODEV, "gone")
     assert arrivals_of(line.port) == []
     clocks.now_ns += REOPEN_NS
     assert arrivals_of(line.port) == []
+    stamped(line, None)
     line.put(message(0x100))
     clocks.now_ns += TICK_NS
     assert arrivals_of(line.port) == [REOPEN_NS]
 
 
-def test_a_port_that_listens_hands_the_arrival_through(
-    line: Line, clocks: Clocks, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    stamped(monkeypatch, WALL_NS + START_NS + 4 * MS)
+def test_a_port_that_listens_hands_the_arrival_through(line: Line, clocks: Clocks) -> None:
+    stamped(line, WALL_NS + START_NS + 4 * MS)
     line.put(message(0x100))
     clocks.now_ns += TICK_NS
     assert arrivals_of(ListeningPort(line.port, IDS)) == [4 * MS]
