@@ -87,9 +87,9 @@ def log_of(
         deadline += missed * tick_ns
         if standstill.over(now):
             controller.stalled()
-        standstill.last_ns = now
-        for arrived_ns, frame in _read(waiting, now):
+        for frame, arrived_ns in _read(deployment, waiting, now, standstill.last_ns):
             controller.receive(frame, arrived_ns)
+        standstill.last_ns = now
         at_ns = now + chance.randrange(20_000, 20_001 + hardness.think_ns)
         for frame in controller.tick(now, missed):
             logged(at_ns, frame)
@@ -114,10 +114,14 @@ def log_of(
     return [line for _, _, line in sorted(lines)]
 
 
-def _read(waiting: list[tuple[int, Frame]], now_ns: int) -> Iterator[tuple[int, Frame]]:
-    """What a tick reads of what waits."""
+def _read(
+    deployment: Deployment, waiting: list[tuple[int, Frame]], now_ns: int, before_ns: int
+) -> Iterator[tuple[Frame, int]]:
+    """What a tick reads of what waits, with its arrival: stamped, or at the read before."""
     while waiting and waiting[0][0] <= now_ns:
-        yield waiting.pop(0)
+        at_ns, frame = waiting.pop(0)
+        stamped = deployment.config.buses[frame.bus].interface == "socketcan"
+        yield frame, at_ns if stamped else min(before_ns, now_ns)
 
 
 def _levers(

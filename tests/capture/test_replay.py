@@ -16,6 +16,7 @@ from canshaper.recording.replay import Replay, look
 from tests.capture.daemon import Hardness, log_of
 
 DATA = Path(__file__).parent / "data"
+ROOT = Path(__file__).parents[2]
 Load = Callable[[], Deployment]
 VALVE, STATUS = "200", "300"
 
@@ -65,6 +66,22 @@ def test_every_frame_is_the_same(tmp_path: Path, name: str, case: str) -> None:
     replay = same(load, written(tmp_path, log_of(load, 1, CASES[case], seconds=8.0)))
     assert replay.verdict.starts == 1
     assert not replay.verdict.ran_before
+
+
+@pytest.mark.parametrize("phase_ns", [7_000_000, 16_000_000])
+@pytest.mark.parametrize("interface", ["socketcan", "slcan"])
+def test_a_lever_is_lost_in_the_same_tick_wherever_its_frames_lie(
+    tmp_path: Path, interface: str, phase_ns: int
+) -> None:
+    """By the stamp of its last frame; without stamps by the tick before the one that read it."""
+    shipped = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+    text = shipped.replace("interface: socketcan", f"interface: {interface}")
+    text = text.replace("timeout_ms: 100", "timeout_ms: 110")  # an age of whole ticks is no tie
+    (tmp_path / "machine.yaml").write_text(text.replace("../dbc", str(ROOT / "dbc")))
+    load = loader(str(tmp_path / "machine.yaml"))
+    hard = Hardness(lever_phase_ns=phase_ns, silent=(4.0, 4.5))
+    replay = same(load, written(tmp_path, log_of(load, 1, hard, seconds=6.0)))
+    assert replay.verdict.settled == 0
 
 
 @pytest.mark.parametrize("name", ["forwarder-joints.yaml", "canopen-forwarder.yaml"])
