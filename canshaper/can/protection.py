@@ -95,6 +95,10 @@ class Protector:
                 raw[self._counter] = self._count
         return self._encode(raw)
 
+    def take_back(self) -> None:
+        """The last frame did not leave: the next one has its count."""
+        self._count = (self._count - 1) % self._counts if self._counts else 0
+
     def seal(self, data: bytes) -> bytes:
         """The same frame with the check of the count it has come to."""
         return data if self._check is None else self._check.seal(data, self._count)

@@ -43,7 +43,7 @@ class Controller:
         counters: what went wrong so far.
         levers: the levers by name.
         events: changes of state since the owner last emptied the list.
-        moves: whether the frame that was handed out last may move a valve.
+        moves: whether the frame that was handed out last is one of a valve, and any moves.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -318,6 +318,17 @@ class Controller:
         for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
             if not runner.axis.neutral:
                 runner.trip = Reason.SEND_FAILED
+
+    def withhold(self, frame: Frame) -> bool:
+        """A valve frame comes too late: whether it moves one, and so must not leave.
+
+        Its receiver will see no gap in the counter.
+        """
+        runners = self._by_message[frame[:3]]
+        if not any(runner.axis.raw for runner in runners):
+            return False
+        runners[-1].bound.valve.message.sender.protector.take_back()
+        return True
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve: the last thing sent."""

@@ -17,7 +17,7 @@ class Reckons(Protocol):
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last may move a valve."""
+        """Whether the frame that was handed out last is one of a valve, and any moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
@@ -30,6 +30,9 @@ class Reckons(Protocol):
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus."""
+
+    def withhold(self, frame: Frame) -> bool:
+        """A valve frame comes too late: whether it moves one, and so must not leave."""
 
 
 def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: Standstill) -> int:
@@ -50,7 +53,9 @@ def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: S
             count += 1
             arrived_ns = port.arrived_ns
             passed = reckons.receive(frame, arrived_ns if arrived_ns < now_ns else now_ns)
-            if passed is None or (reckons.moves and standstill.clock() > standstill.until_ns):
+            if passed is None:
+                continue
+            if reckons.moves and standstill.late() and reckons.withhold(passed):
                 continue
             if not ports[passed.bus].send(passed):
                 reckons.send_failed(passed)
@@ -85,7 +90,7 @@ def exchange(
         take(reckons, ports, now_ns, standstill)
     made_ns = now_ns
     for frame in reckons.tick(now_ns, missed):
-        if reckons.moves and standstill.clock() > standstill.until_ns:
+        if reckons.moves and standstill.late() and reckons.withhold(frame):
             made_ns = standstill.last_ns
         elif not ports[frame.bus].send(frame):
             reckons.send_failed(frame)

@@ -50,6 +50,10 @@ class Standstill:
         self.until_ns = 0
         self._leave_ns = max(deployment.config.tick_ms * 1_000_000, LEAST_LEAVE_NS)
 
+    def late(self) -> bool:
+        """Whether it is too late for what was computed in this tick to leave."""
+        return self.clock() > self.until_ns
+
     def over(self, now_ns: int) -> bool:
         """Whether the loop stood still for too long until now; a tick begins, or is made up."""
         latest_ns = self.last_ns + self.limit_ns

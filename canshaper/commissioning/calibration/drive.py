@@ -122,7 +122,7 @@ class CalibrationDrive:
 
     @property
     def moves(self) -> bool:
-        """Whether the frame that was handed out last may move a valve."""
+        """Whether the frame that was handed out last is one of a valve, and any moves."""
         return self._controller.moves
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
@@ -158,6 +158,10 @@ class CalibrationDrive:
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus; the axes of a valve frame trip."""
         self._controller.send_failed(frame)
+
+    def withhold(self, frame: Frame) -> bool:
+        """A valve frame comes too late: whether it must not leave."""
+        return self._controller.withhold(frame)
 
     def stalled(self) -> None:
         """The loop stood still: what moves goes to neutral."""
