@@ -28,7 +28,7 @@ def ids_of(name: str, *messages: str) -> set[int]:
 
 
 def test_of_the_plain_machine_only_status_is_sent() -> None:
-    names = ("SlewStatus", "NearFarStatus", "LiftStatus", "ShaperStatus")
+    names = ("SlewStatus", "NearFarStatus", "LiftStatus", "ShaperStatus", "ShaperIdentity")
     assert sent("forwarder.yaml") == ids_of("forwarder.yaml", *names)
 
 
@@ -47,7 +47,8 @@ def test_j1939_keeps_its_address_for_the_status_and_for_nothing_else(tmp_path: P
     assert listening.sent_groups("crane") == set()
     lines = machine.read_text().replace("../dbc", str(ROOT / "dbc")).splitlines()
     silent = tmp_path / "silent.yaml"
-    silent.write_text("\n".join(line for line in lines if not line.strip().startswith("status:")))
+    status = ("status:", "identity:")
+    silent.write_text("\n".join(line for line in lines if not line.strip().startswith(status)))
     without = load_deployment(silent).listening()
     assert without.ids("crane").sent | without.ids("crane").claims == frozenset()
     assert without.config.buses["crane"].j1939 is None
