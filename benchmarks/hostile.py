@@ -6,7 +6,7 @@ shipped deployment, which is good. ``.venv/bin/python benchmarks/hostile.py``.
 
 import argparse
 
-from tests.hostile.inputs import DBC, FILES, with_dbc
+from tests.hostile.inputs import DBC, FILES, LOGS, with_dbc
 from tests.hostile.run import run
 
 
@@ -15,7 +15,7 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--only", default="", help="rows whose name has this in it")
     only = parser.parse_args().only
-    rows = {"a good deployment": with_dbc("a.dbc", DBC), **FILES}
+    rows = {"a good deployment": with_dbc("a.dbc", DBC), **FILES, **LOGS}
     worst_s = worst_mb = 0.0
     for name, make in rows.items():
         if only not in name:

@@ -24,24 +24,28 @@ from canshaper.config.sets import Feel
 from canshaper.config.source import DeploymentError, Place
 
 
-def load_deployment(path: Path) -> Deployment:
+def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     """Load a deployment file with its DBC files.
+
+    Args:
+        path: the deployment file.
+        inside: read no DBC file outside of this directory, where somebody else made the file.
 
     Raises:
         DeploymentError: with every problem of all files.
     """
     config, source = load_config(path)
-    return _Binder(config, source).deployment(path)
+    return _Binder(config, source).deployment(path, inside)
 
 
 class _Binder(FilterBinder):
     """Binds part by part; with any problem there is no deployment."""
 
-    def deployment(self, path: Path) -> Deployment:
+    def deployment(self, path: Path, inside: Path | None) -> Deployment:
         config = self.config
         self._check_buses()
         self._check_node_ids()
-        messages = self.load(path.parent)
+        messages = self.load(path.parent, inside)
         if messages is None:
             raise DeploymentError(self.problems)
         levers = {n: self.lever(n, lever) for n, lever in config.levers.items()}

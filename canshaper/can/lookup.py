@@ -31,9 +31,18 @@ class Lookup:
         """Note a problem at a place of the deployment file."""
         self.problems.append(self.source.problem(place, text))
 
-    def load(self, directory: Path) -> Messages | None:
-        """Load the DBC files; None when one is none, so that its messages are not missed too."""
+    def load(self, directory: Path, inside: Path | None = None) -> Messages | None:
+        """Load the DBC files; None when one is none, so that its messages are not missed too.
+
+        Args:
+            directory: what their names are relative to.
+            inside: read none outside of this directory, whatever the deployment file says.
+        """
         files = []
+        for i, name in enumerate(self.config.dbc if inside else ()):
+            if inside and not _is_inside(directory / name, inside):
+                self.add(("dbc", i), f"found {name!r}, allowed is a file of the bundle")
+                return None
         if (size := sum(_size(directory / name) for name in self.config.dbc)) > MOST_BYTES:
             self.add(("dbc",), f"found {size} bytes in all, allowed are {MOST_BYTES} at most")
             return None
@@ -199,3 +208,10 @@ def _size(path: Path) -> int:
         return path.stat().st_size
     except (OSError, ValueError):
         return 0
+
+
+def _is_inside(path: Path, directory: Path) -> bool:
+    try:
+        return path.resolve().is_relative_to(directory.resolve())
+    except (OSError, RuntimeError, ValueError):  # a loop of links, no name of a file
+        return False

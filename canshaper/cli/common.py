@@ -64,12 +64,16 @@ def loader(
     channels: list[str] | None = None,
     *,
     network: bool = False,
+    inside: Path | None = None,
 ) -> Callable[[], Deployment]:
-    """A function that loads the deployment with the bus options of the command line put in."""
+    """A function that loads the deployment with the bus options of the command line put in.
+
+    With ``inside`` it reads no DBC file outside of that directory.
+    """
     path = deployment_path(file)
 
     def load() -> Deployment:
-        deployment = load_deployment(path)
+        deployment = load_deployment(path, inside)
         if not interface and not channels and not network:
             return deployment
         buses = dict(deployment.config.buses)

@@ -73,12 +73,16 @@ def replay(
     console = Console()
     with tempfile.TemporaryDirectory() as folder:
         try:
+            inside = None
             if log.suffix.lower() == ".zip":
                 log, own = unpack(log, Path(folder))
-                configs = configs or [str(own)]
+                if not configs:  # somebody else's, and so is what it says of files
+                    configs, inside = [str(own)], Path(folder)
             if not configs:
                 raise typer.BadParameter("--config is missing: which deployment?")
-            replays = _run(log, configs, _channels(channel or []), ticks, (begin_s, end_s), out)
+            replays = _run(
+                log, configs, _channels(channel or []), ticks, (begin_s, end_s), out, inside
+            )
             for one in replays:
                 one.measure()
         except (LogError, DeploymentError) as error:
@@ -101,13 +105,14 @@ def _run(
     ticks: str | None,
     window: tuple[float, float | None],
     out: Path,
+    inside: Path | None,
 ) -> "list[Replayed]":
     """Replay every deployment, one after the other."""
     from canshaper.recording.frames import LogError
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
 
-    loads = [loader(config) for config in configs]
+    loads = [loader(config, inside=inside) for config in configs]
     names = _names([deployment_path(config) for config in configs])
     deployments = [load() for load in loads]
     for deployment in deployments:

@@ -3,10 +3,12 @@
 import json
 import os
 import platform
+import shutil
+import stat
 import zipfile
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from pathlib import Path
+from pathlib import Path, PurePosixPath
 
 from canshaper import __version__
 from canshaper.can.deployment import Deployment
@@ -16,6 +18,12 @@ from canshaper.recording.history import History
 ABOUT, HISTORY, LOG = "about.json", "history.txt", "recording.log"
 FOLDER = "deployment"
 OUTSIDE = "outside"
+# A bundle that somebody sends may be made to fill the disk. A log of candump packs 5 to 30 times,
+# and an hour of a full bus at 1 Mbit/s has 2 GB.
+MOST_MEMBERS = 100
+MOST_LOG_BYTES = 4_000_000_000
+MOST_FILE_BYTES = 10_000_000
+MOST_RATIO, RATIO_FROM_BYTES = 100, 1_000_000
 PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
 
 
@@ -68,20 +76,25 @@ def pack(
 
 
 def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
-    """Unpack a bundle into a folder.
+    """Unpack a bundle into a folder; whoever made it, nothing is written or read elsewhere.
 
     Returns:
         (log, deployment file).
 
     Raises:
-        LogError: it is no bundle, or a damaged one; tells the member.
+        LogError: it is no bundle, a damaged one, or too large; tells the member.
     """
     where = f"{path}"
     try:
         with zipfile.ZipFile(path) as bundle:
-            for member in (ABOUT, *bundle.namelist()):
-                where = f"{path}: {member}"
-                bundle.extract(member, folder)
+            where = f"{path}: {ABOUT}"
+            bundle.getinfo(ABOUT)
+            members = bundle.infolist()
+            if len(members) > MOST_MEMBERS:
+                raise ValueError(f"{len(members)} files, allowed are {MOST_MEMBERS} at most")
+            for member in members:
+                where = f"{path}: {member.filename}"
+                _extract(bundle, member, folder)
         where = f"{path}: {ABOUT}"
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
         log, file = ((folder / about[key]).resolve() for key in ("log", "deployment"))
@@ -95,6 +108,31 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
             text = f"found no {one.relative_to(folder.resolve())}, allowed is one that has it"
             raise LogError(f"{path}: not a bundle: {text}")
     return log, file
+
+
+def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> None:
+    """Write one member as a regular file, whatever it says it is.
+
+    Raises:
+        ValueError: a name that leads elsewhere, a link, or more bytes than there may be.
+    """
+    parts = PurePosixPath(member.filename).parts
+    kind = stat.S_IFMT(member.external_attr >> 16)
+    if not parts or ".." in parts or parts[0] == "/" or "\\" in member.filename:
+        raise ValueError("a name that leads out of it")
+    if kind not in (0, stat.S_IFREG):
+        raise ValueError("a link or another special file")
+    most = MOST_LOG_BYTES if member.filename == LOG else MOST_FILE_BYTES
+    if member.file_size > most:
+        raise ValueError(f"{member.file_size} bytes, allowed are {most} at most")
+    if member.file_size > max(RATIO_FROM_BYTES, MOST_RATIO * member.compress_size):
+        ratio = member.file_size // max(1, member.compress_size)
+        raise ValueError(f"{ratio} bytes for each that is packed, allowed are {MOST_RATIO}")
+    target = folder.joinpath(*parts)
+    target.parent.mkdir(parents=True, exist_ok=True)
+    # zipfile hands out no more than file_size, whatever is packed.
+    with bundle.open(member) as source, target.open("xb") as file:
+        shutil.copyfileobj(source, file)
 
 
 def versions() -> dict[str, str]:

@@ -31,6 +31,8 @@ LONGEST_GAP_NS = 12 * 3600 * 1_000_000_000
 LATEST_NS = LATEST_S * 1_000_000_000
 TELL_EVERY = 8192
 BUFFER_BYTES = 1 << 17
+# A log of candump packs 5 to 30 times; one that unpacks without end must not keep us.
+MOST_RATIO, RATIO_FROM_BYTES = 100, 16_000_000
 
 
 class LogFile:
@@ -67,6 +69,9 @@ class LogFile:
             raise place.cut_off("its packing has no end") from None
         except OSError as error:
             raise place.error(error.strerror or str(error), "a log that can be read") from None
+        except _UnpackedWithoutEndError:
+            found = f"more than {MOST_RATIO} bytes for each that is packed"
+            raise place.error(found, "a log of a bus") from None
         except zlib.error as error:
             raise place.error(f"damaged packing ({error})", "a log that is whole") from None
 
@@ -118,11 +123,17 @@ class LogFile:
         raise place.error(f"mixed clocks: {found} that of the frame before", allowed)
 
 
+class _UnpackedWithoutEndError(Exception):
+    """No log is packed so well."""
+
+
 class _Unpacked(RawIOBase):
     """What gzip has packed; of a file that is cut off, all that there is before the error."""
 
     def __init__(self, file: BinaryIO) -> None:
+        self._packed = file
         self._file = gzip.GzipFile(fileobj=file)
+        self._count = 0
 
     def readable(self) -> bool:
         return True
@@ -133,6 +144,9 @@ class _Unpacked(RawIOBase):
     def readinto(self, buffer: Any) -> int:
         data = self._file.read1(len(buffer))
         buffer[: len(data)] = data
+        self._count += len(data)
+        if self._count > max(RATIO_FROM_BYTES, MOST_RATIO * self._packed.tell()):
+            raise _UnpackedWithoutEndError
         return len(data)
 
     def seek(self, offset: int, whence: int = 0) -> int:

@@ -1,6 +1,9 @@
 """Files that nobody means well with, each with the command that reads it."""
 
+import gzip
+import json
 import os
+import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
@@ -67,6 +70,68 @@ def aliases() -> str:
     rows = ["a0: &a0 [x, x, x, x]"]
     rows += [f"a{i}: &a{i} [*a{i - 1}, *a{i - 1}, *a{i - 1}, *a{i - 1}]" for i in range(1, 30)]
     return "\n".join(rows)
+
+
+def bundle(members: dict[str, str | bytes], link: str = "") -> Make:
+    """``canshaper replay`` of a bundle with these members; one of them a link."""
+
+    def make(folder: Path) -> list[str]:
+        (folder / "secret").write_text(SECRET)
+        path = folder / "bundle.zip"
+        about = {"log": "recording.log", "deployment": "deployment/machine.yaml"}
+        given = {
+            "about.json": json.dumps(about),
+            "recording.log": "(1.0) can0 110#00\n",
+            "deployment/forwarder.dbc": DBC,
+            "deployment/machine.yaml": SHIPPED.replace("../dbc/forwarder.dbc", "forwarder.dbc"),
+        } | members
+        with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED) as file:
+            for name, content in given.items():
+                info = zipfile.ZipInfo(name)
+                info.compress_type = zipfile.ZIP_DEFLATED
+                info.external_attr = (0o120777 if name == link else 0o100644) << 16
+                file.writestr(info, content)
+        return ["replay", str(path), "--out", str(folder / "out")]
+
+    return make
+
+
+def machine(dbc: str) -> dict[str, str | bytes]:
+    """The deployment of a bundle, with another DBC file."""
+    return {"deployment/machine.yaml": SHIPPED.replace("../dbc/forwarder.dbc", dbc)}
+
+
+def packed_log(folder: Path) -> list[str]:
+    """``canshaper replay`` of a log of a gigabyte of empty lines, packed a thousand times."""
+    path = folder / "drive.log.gz"
+    with gzip.open(path, "wb") as packed:
+        for _ in range(100):
+            packed.write(b"\n" * 10_000_000)
+    return ["replay", str(path), "--config", "forwarder.yaml", "--out", str(folder / "out")]
+
+
+LOGS: dict[str, Make] = {
+    "bundle: dbc is /etc/passwd": bundle(machine("/etc/passwd")),
+    "bundle: dbc is outside of it": bundle(machine("../../secret")),
+    "bundle: dbc is a link": bundle(
+        {**machine("x.dbc"), "deployment/x.dbc": "/etc/passwd"}, "deployment/x.dbc"
+    ),
+    "bundle: deployment is a link": bundle(
+        {"deployment/machine.yaml": "/etc/passwd"}, "deployment/machine.yaml"
+    ),
+    "bundle: a name leads out": bundle({"../../evil": "x"}),
+    "bundle: a name from the root": bundle({"/tmp/evil": "x"}),
+    "bundle: a name of another system": bundle({"..\\evil": "x"}),
+    "bundle: many members": bundle({f"deployment/{i}": "" for i in range(200)}),
+    "bundle: log packed a thousand times": bundle({"recording.log": b"\n" * 200_000_000}),
+    "bundle: large file": bundle({"deployment/x": os.urandom(11_000_000)}),
+    "bundle: about.json nested": bundle({"about.json": "[" * 500_000}),
+    "bundle: about.json points out": bundle(
+        {"about.json": json.dumps({"log": "../secret", "deployment": "deployment/machine.yaml"})}
+    ),
+    "log packed a thousand times": packed_log,
+}
+"""By name; each is refused by ``canshaper replay``."""
 
 
 FILES: dict[str, Make] = {
