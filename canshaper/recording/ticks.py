@@ -26,6 +26,12 @@ WAITED_NS = 2_000_000_000
 LEAST_HELD = 50
 # A node of J1939 waits a quarter of a second for its address.
 SETTLED_NS = 500_000_000
+# Every axis is in neutral, and nothing changes any more, when no frame has come for so long: the
+# longest timeout and the longest stop are over.
+PAUSE_NS = 12_000_000_000
+LEAD_NS = 1_000_000_000
+# Where the periods of all messages fall together; those of a machine do after some hundred ticks.
+MOST_BASES = 10_000
 
 
 @dataclass(slots=True)
@@ -62,7 +68,8 @@ class Tick:
 def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
     """Ticks of a clock, from half a tick after the first frame that is taken to the last frame.
 
-    What a daemon has sent is left out: it is another daemon's.
+    What a daemon has sent is left out: it is another daemon's. Of a pause that is longer than
+    ``PAUSE_NS`` the ticks after that are left out, but for the last ones before the next frame.
     """
     tick: Tick | None = None
     for time_ns, frame, kind in frames:
@@ -70,9 +77,13 @@ def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
             if kind is not Kind.TAKEN:
                 continue
             tick = Tick(0, time_ns + tick_ns // 2, starts=True)
+        quiet_ns = tick.now_ns
         while time_ns > tick.now_ns:
             yield tick
-            tick = Tick(tick.number + 1, tick.now_ns + tick_ns)
+            now_ns = tick.now_ns + tick_ns
+            if now_ns - quiet_ns > PAUSE_NS and time_ns - now_ns > LEAD_NS:
+                now_ns += (time_ns - LEAD_NS - now_ns) // tick_ns * tick_ns
+            tick = Tick(tick.number + 1, now_ns)
         if kind is Kind.TAKEN:
             tick.taken.append((time_ns, frame))
         elif kind is Kind.OTHER:
@@ -294,7 +305,7 @@ class Recovery:
 
     def _base(self, ticks: Sequence[Tick]) -> int:
         """Number of the first tick of a daemon that ran before, by what it sends less often."""
-        longest = lcm(self._marker_ticks, *self._periods.values())
+        longest = min(lcm(self._marker_ticks, *self._periods.values()), MOST_BASES)
         seen = [
             (tick.number, period)
             for tick in ticks

@@ -1,10 +1,13 @@
 """Channels of a log and buses of a deployment."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import pytest
 
 from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked
 from canshaper.cli.common import loader
 from canshaper.recording.frames import LogError
 from canshaper.recording.sorting import Kind, Sorter, bus_of_channel
@@ -67,3 +70,23 @@ def test_other_interfaces_than_socketcan_have_one_queue(one: Deployment) -> None
     bus = one.config.buses["crane"].model_copy(update={"interface": "udp_multicast"})
     config = one.config.model_copy(update={"buses": {"crane": bus}})
     assert Sorter(replace(one, config=config)).kind(("crane", 0x123, False)) is Kind.TAKEN
+
+
+def test_a_pause_costs_no_tick_for_each_of_its_deadlines() -> None:
+    """Its first seconds do, in which what moves stops, and the last one before the next frame."""
+    tick_ns, day_ns = 20_000_000, 24 * 3600 * 10**9
+    frame = Frame("crane", 0x110, False, b"\0" * 8)
+    times = [0, 5_000_000, day_ns, day_ns + 100_000_000, 400 * day_ns]
+    ticks = list(clocked([(at, frame, Kind.TAKEN) for at in times], tick_ns))
+    assert [tick.number for tick in ticks] == list(range(len(ticks)))
+    assert len(ticks) < 3 * (PAUSE_NS + LEAD_NS) // tick_ns
+    assert {(tick.now_ns - ticks[0].now_ns) % tick_ns for tick in ticks} == {0}
+    taken = [(at, tick.now_ns) for tick in ticks for at, _ in tick.taken]
+    assert [at for at, _ in taken] == times
+    assert all(0 <= now_ns - at < tick_ns for at, now_ns in taken)
+    steps = [after.now_ns - before.now_ns for before, after in pairwise(ticks)]
+    assert sum(step > tick_ns for step in steps) == 2
+    before = [tick.now_ns for tick in ticks if tick.now_ns < day_ns - 2 * LEAD_NS]
+    assert before[-1] >= PAUSE_NS
+    begin_again = next(t.now_ns for t in ticks if t.now_ns > before[-1])
+    assert LEAD_NS - tick_ns <= day_ns - begin_again <= LEAD_NS + tick_ns
