@@ -5,6 +5,7 @@ from typing import TypeVar
 
 import typer
 
+from canshaper.cli.console import echo
 from canshaper.config.first import plain
 
 _T = TypeVar("_T")
@@ -17,7 +18,7 @@ def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
         try:
             return parse(str(typer.prompt(text, default=default)).strip())
         except ValueError as error:
-            typer.echo(f"  {error}", err=True)
+            echo(f"  {error}", err=True)
 
 
 def name(taken: Collection[str]) -> Callable[[str], str]:

@@ -3,7 +3,6 @@
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from canshaper.cli.common import (
@@ -16,6 +15,7 @@ from canshaper.cli.common import (
     loader,
     refuse_shipped,
 )
+from canshaper.cli.console import SafeConsole, echo
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
@@ -114,7 +114,7 @@ def calibrate(
         _write(deployment, axis, result)
     _told(deployment, axis, result, top_pct)
     if write:
-        typer.echo(f"written: {deployment.path}")
+        echo(f"written: {deployment.path}")
 
 
 def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str, str]:
@@ -136,7 +136,7 @@ def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str,
 
 def _progress(axis: str) -> Progress:
     columns = (TextColumn(f"{axis}"), BarColumn(), TextColumn("{task.fields[text]}"))
-    return Progress(*columns, console=Console(stderr=True), transient=True)
+    return Progress(*columns, console=SafeConsole(stderr=True), transient=True)
 
 
 def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: float) -> None:
@@ -147,18 +147,18 @@ def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: f
         pairs = zip(limits.curve_command_pct, limits.curve_speed_pct, strict=True)
         ends = [f"{command:g}" for command, speed in pairs if speed == 0.0]
         now = f"a curve with the dead band at {' to '.join(ends)} %"
-    typer.echo(f"axis {axis}: the file has {now}")
+    echo(f"axis {axis}: the file has {now}")
     full = max(result.positive.full, result.negative.full)
     for name, one in (("positive", result.positive), ("negative", result.negative)):
-        typer.echo(
+        echo(
             f"  {name}: opens at {100 * one.opens:.1f} % of the command, full speed"
             f" {one.full:.4g} ({100 * one.full / full:.0f} %), delay of the valve worth"
             f" {100 * one.delay:.1f} %"
         )
     commands, speeds = result.curve()
-    typer.echo(f"  curve_command_pct: {commands}\n  curve_speed_pct: {speeds}")
+    echo(f"  curve_command_pct: {commands}\n  curve_speed_pct: {speeds}")
     if top_pct < 100:
-        typer.echo(f"  above {top_pct:g} % of the command this is a straight line, not measured")
+        echo(f"  above {top_pct:g} % of the command this is a straight line, not measured")
 
 
 def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:

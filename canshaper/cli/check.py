@@ -6,6 +6,7 @@ from canshaper.can.deployment import Deployment
 from canshaper.can.device import match_fault, whereabouts
 from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
+from canshaper.cli.console import SafeConsole, echo
 from canshaper.config.bus import Bus
 
 # What joysticks do while the daemon is away.
@@ -31,7 +32,6 @@ def check(file: str = FILE) -> None:
 
       canshaper check config/forwarder.yaml
     """
-    from rich.console import Console
 
     from canshaper.can.stopping import unstated
     from canshaper.cli.stopping import print_stopping
@@ -40,33 +40,33 @@ def check(file: str = FILE) -> None:
     try:
         deployment = loader(file)()
     except DeploymentError as error:
-        typer.echo(str(error), err=True)
+        echo(str(error), err=True)
         count = len(error.problems)
-        typer.echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
+        echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
         raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None
     config = deployment.config
-    typer.echo(f"{deployment.path}: good")
+    echo(f"{deployment.path}: good")
     for name, bus in config.buses.items():
-        typer.echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
+        echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
         if bus.match:
-            typer.echo(f"    match {_match(bus)}")
+            echo(f"    match {_match(bus)}")
     if gateway := config.gateway:
         ends, away = " and ".join(gateway.between), FALLBACKS[gateway.fallback]
-        typer.echo(f"  gateway between {ends}: others pass by the {gateway.passing}, {away}")
+        echo(f"  gateway between {ends}: others pass by the {gateway.passing}, {away}")
     for name, axis in deployment.axes.items():
         valve, stick = axis.config.valve, axis.config.stick
         period_ms = axis.period_ticks * config.tick_ms
-        typer.echo(
+        echo(
             f"  axis {name}: {config.levers[stick.lever].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
     identity = deployment.identity
-    typer.echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
+    echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
-        typer.echo(f"    {line}")
-    print_stopping(deployment, Console())
+        echo(f"    {line}")
+    print_stopping(deployment, SafeConsole())
     for place, text in unstated(deployment):
-        typer.echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
+        echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
 
 
 def _match(bus: Bus) -> str:

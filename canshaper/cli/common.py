@@ -8,6 +8,7 @@ import typer
 
 from canshaper.can.binding import load_deployment
 from canshaper.can.deployment import Deployment
+from canshaper.cli.console import echo
 from canshaper.config.source import DeploymentError, Problem
 
 EXIT_BAD_DEPLOYMENT = 2
@@ -103,5 +104,5 @@ def loader(
 
 def fail(error: Exception, code: int = EXIT_BAD_DEPLOYMENT) -> typer.Exit:
     """Print an error as it is and give the exit, that of a bad deployment unless told."""
-    typer.echo(str(error), err=True)
+    echo(str(error), err=True)
     return typer.Exit(code)

@@ -12,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 from canshaper.cli.common import INSTALL_TOOLS, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.design.comparison.summary import Row
@@ -49,7 +50,7 @@ def compare(
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
 
-    console = Console(stderr=as_json)
+    console = SafeConsole(stderr=as_json)
     try:
         load = loader(file)
         deployment = load()
@@ -70,7 +71,7 @@ def compare(
                 deployment.path, axis, found, tasks, progress=tell, processes=processes
             )
     except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
+        echo("interrupted", err=True)
         raise typer.Exit(130) from None
     table = rows(found, outcomes)
     advice = recommendations(table, nominal_mode(deployment, axis).period_s)
@@ -83,7 +84,7 @@ def compare(
     text = json.dumps({**data, "outcomes": [asdict(o) for o in outcomes]}, indent=2)
     (out / f"compare-{axis}.json").write_text(text + "\n", encoding="utf-8")
     if as_json:
-        typer.echo(json.dumps(data, indent=2))
+        echo(json.dumps(data, indent=2))
     else:
         _tell(table, [why for _, why in advice.values()], console, slew=axis == "slew")
     try:

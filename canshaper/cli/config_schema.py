@@ -2,7 +2,7 @@
 
 import json
 
-import typer
+from canshaper.cli.console import echo
 
 
 def config_schema() -> None:
@@ -21,4 +21,4 @@ def config_schema() -> None:
     schema = DeploymentConfig.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "canshaper deployment"
-    typer.echo(json.dumps(schema, indent=2))
+    echo(json.dumps(schema, indent=2))

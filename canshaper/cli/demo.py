@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from canshaper.cli.common import INSTALL_TOOLS, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
@@ -52,7 +53,7 @@ def demo(
     from canshaper_sim.operator import script_named
     from canshaper_sim.parameters import changed_parameters
 
-    console = Console()
+    console = SafeConsole()
     try:
         played = script_named(script)
         crane = changed_parameters(changes or [])
@@ -61,7 +62,7 @@ def demo(
         way = None if lockstep else choose_transport(transport, deployment)
     except (DeploymentError, DriveError, ValueError) as error:
         raise fail(error) from None
-    console.print(f"Operator script [b]{played.name}[/b], {played.duration_s:g} s, driven twice.")
+    console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     console.print(f"Transport: {way.description if way else LOCKSTEP}", highlight=False)
 
     recordings: dict[str, Recording] = {}
@@ -88,10 +89,10 @@ def demo(
                     missed += run.missed_deadlines
                 tell(played.duration_s)
     except DriveError as error:
-        typer.echo(str(error), err=True)
+        echo(str(error), err=True)
         raise typer.Exit(1) from None
     except KeyboardInterrupt:
-        typer.echo("interrupted; every process was stopped, valves neutral", err=True)
+        echo("interrupted; every process was stopped, valves neutral", err=True)
         raise typer.Exit(130) from None
 
     raw, shaped = recordings["anti-sway off"], recordings["anti-sway on"]

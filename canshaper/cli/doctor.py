@@ -7,10 +7,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -79,9 +79,9 @@ def doctor(
     except (DeploymentError, MeasureError, OSError) as error:
         raise fail(error) from None
     except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
+        echo("interrupted", err=True)
         raise typer.Exit(130) from None
-    print_report(deployment, seconds, runs, findings, Console())
+    print_report(deployment, seconds, runs, findings, SafeConsole())
     if not fit(findings):
         raise typer.Exit(EXIT_NOT_FIT)
 
@@ -104,7 +104,7 @@ def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
 @contextmanager
 def _progress(what: str, seconds: float) -> Iterator[Callable[[float], None]]:
     """A bar on the terminal, beside the output; gone when done. Drawn seldom: it is load too."""
-    console = Console(stderr=True)
+    console = SafeConsole(stderr=True)
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),

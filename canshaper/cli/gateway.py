@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Literal
 import typer
 
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
+from canshaper.cli.console import echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -56,9 +57,9 @@ def gateway(
         if state == "show":
             found = between(ends, rules())
             states = [name for name, those in wanted.items() if sorted(found) == sorted(those)]
-            typer.echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
+            echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
             for rule in found:
-                typer.echo(f"  {rule}")
+                echo(f"  {rule}")
             if not {"running", "away"} & {*states}:
                 raise typer.Exit(EXIT_OTHER_RULES)
             return
@@ -68,9 +69,9 @@ def gateway(
         removed, added = make(ends, wanted[state])
     except (GatewayError, BusError) as error:
         raise fail(error, EXIT_NO_BUS) from None
-    typer.echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
+    echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
     for rule in (rule for rule in removed if rule not in passing + fallback):
-        typer.echo(f"  removed {rule}")
+        echo(f"  removed {rule}")
 
 
 def _look_at_devices(deployment: "Deployment") -> None:

@@ -6,9 +6,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 
 from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -190,29 +190,29 @@ def _tell(
     if as_json:
         result = as_dict(findings, advice)
         result |= {"picture": str(picture) if picture else None, "written": list(written)}
-        typer.echo(json.dumps(result, indent=2))
+        echo(json.dumps(result, indent=2))
         return
     for finding in findings:
-        typer.echo("\n".join(lines(finding)))
-    console = Console(soft_wrap=True)
+        echo("\n".join(lines(finding)))
+    console = SafeConsole(soft_wrap=True)
     for one in advice:
-        console.print(f"\n[b]{one.text}[/b]", highlight=False)
+        console.print(f"\n{one.text}", style="bold", highlight=False)
         if one.sets:
-            typer.echo("\n".join(set_lines(one)))
+            echo("\n".join(set_lines(one)))
     if picture:
-        typer.echo(f"Picture: {picture}")
+        echo(f"Picture: {picture}")
     if not deployment:
         return
     if written:
-        typer.echo(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+        echo(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     for one in advice:
         axis = deployment.axes[one.axis].config
         if one.axis in written and axis.sets:
-            typer.echo(f"{one.axis} has sets, which stay as they are: change them by hand.")
+            echo(f"{one.axis} has sets, which stay as they are: change them by hand.")
         if one.sway and axis.filter.kind in ("gff", "robust"):
             command = "tune" if axis.filter.kind == "gff" else "robust"
             if one.cover_pct:
                 command = "robust"
             command += f" {deployment.path} --axis {one.axis}"
             command += f" --range {one.cover_pct}" if one.cover_pct else ""
-            typer.echo(f"Then fit the filter: canshaper {command}")
+            echo(f"Then fit the filter: canshaper {command}")

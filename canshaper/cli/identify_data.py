@@ -5,10 +5,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from canshaper.cli.common import data_directory
+from canshaper.cli.console import SafeConsole
 
 if TYPE_CHECKING:
     from canshaper.can.database import Messages
@@ -159,7 +159,7 @@ def _simulated(
 @contextmanager
 def _progress() -> Iterator[Callable[[str], Callable[[float], None]]]:
     """A bar on the terminal, beside the output; gone when done."""
-    console = Console(stderr=True)
+    console = SafeConsole(stderr=True)
     columns = (TextColumn("{task.description}"), BarColumn())
     with Progress(
         *columns, console=console, transient=True, disable=not console.is_terminal

@@ -10,6 +10,7 @@ import typer
 
 from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
 from canshaper.cli.common import data_directory, fail
+from canshaper.cli.console import echo
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
@@ -58,14 +59,12 @@ def init(
         raise fail(error) from None
     except OSError as error:
         raise fail(ValueError(f"{error.filename or file}: {error.strerror}")) from None
-    typer.echo(
-        f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed. What comes next:"
-    )
+    echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed. What comes next:")
     swinging = next((axis.name for axis in machine.axes if axis.swing), machine.axes[0].name)
-    typer.echo(f"  canshaper check {file}")
+    echo(f"  canshaper check {file}")
     if any(axis.swing for axis in machine.axes):
-        typer.echo(f"  canshaper robust {file} --axis {swinging} --write   (each axis that swings)")
-    typer.echo(f"  canshaper run {file} --listen-only")
+        echo(f"  canshaper robust {file} --axis {swinging} --write   (each axis that swings)")
+    echo(f"  canshaper run {file} --listen-only")
 
 
 def _messages(files: Sequence[Path]) -> "list[Message]":
@@ -88,7 +87,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     from canshaper.config.first import FirstMachine
     from canshaper.config.load import limits
 
-    typer.echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
+    echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
     possible = suggest.levers(messages)
     if not possible:
         raise fail(
@@ -182,7 +181,7 @@ def _axes(
         ]
         commands = [f"{m.name}.{s.name}" for m in possible for s in suggest.commands(m)]
         if not commands:
-            typer.echo("  no message is left that can command its valve; axis left out")
+            echo("  no message is left that can command its valve; axis left out")
             continue
         offered = ", ".join(commands[:MOST_OFFERED])
         alike = suggest.likeness(possible[0].name, stick.name) >= suggest.LIKELY

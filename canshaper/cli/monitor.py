@@ -4,9 +4,9 @@ import signal
 from types import FrameType
 
 import typer
-from rich.console import Console
 
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 
 def monitor(
@@ -44,7 +44,7 @@ def monitor(
     from canshaper.config.source import DeploymentError
 
     stop = _Stop()
-    console = Console()
+    console = SafeConsole()
     try:
         deployment = loader(file, interface, channel, network=network)()
         if plain or not console.is_terminal:
@@ -60,7 +60,7 @@ def monitor(
 
 
 def _write(line: str) -> None:
-    print(line, flush=True)
+    echo(line)
 
 
 class _Stop:

@@ -8,10 +8,10 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 from rich.live import Live
 
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -61,7 +61,7 @@ def record(
         deployment = loader(file, interface, channel, network=network)()
     except DeploymentError as error:
         raise fail(error) from None
-    console = Console(stderr=True)
+    console = SafeConsole(stderr=True)
     recording = Recording(deployment)
     failure: Exception | None = None
     code = EXIT_NO_BUS
@@ -89,8 +89,8 @@ def record(
         raise fail(failure, code)
     if not recording.frames:
         text = f"nothing was heard, {out} is without frames: is the bus up, and the machine on?"
-        typer.echo(text, err=True)
-    typer.echo(f"{out}: {_text(recording)}")
+        echo(text, err=True)
+    echo(f"{out}: {_text(recording)}")
 
 
 def _beside(out: Path) -> Path:

@@ -13,6 +13,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
 from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -70,7 +71,7 @@ def replay(
 
     if ticks not in (None, DAEMON, CLOCK):
         raise typer.BadParameter(f"found {ticks}, allowed are {DAEMON} and {CLOCK}")
-    console = Console()
+    console = SafeConsole()
     with tempfile.TemporaryDirectory() as folder:
         try:
             inside = None
@@ -91,7 +92,7 @@ def replay(
             text = f"{error.filename or out}: {error.strerror or error}"
             raise fail(ValueError(text)) from None
         except KeyboardInterrupt:
-            typer.echo("interrupted; what was written so far stays", err=True)
+            echo("interrupted; what was written so far stays", err=True)
             raise typer.Exit(130) from None
     different = _show(replays, out, console)
     if verify and different:
@@ -231,7 +232,7 @@ def _channels(given: list[str]) -> dict[str, str]:
 
 @contextmanager
 def _progress(name: str) -> Iterator[Callable[[float], None]]:
-    console = Console(stderr=True)
+    console = SafeConsole(stderr=True)
     columns = (TextColumn(name), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
     with Progress(*columns, console=console, transient=True) as progress:
         task = progress.add_task("", total=1.0)

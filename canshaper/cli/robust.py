@@ -8,6 +8,7 @@ from rich.console import Console
 from rich.table import Table
 
 from canshaper.cli.common import FILE, fail, loader, refuse_shipped
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -50,7 +51,7 @@ def robust(
     from canshaper.design.tuning.robust import least_residual, shortest
     from canshaper.shaping.registry import build_shaper
 
-    console = Console()
+    console = SafeConsole()
     try:
         deployment = loader(file)()
         if write:
@@ -114,7 +115,7 @@ def robust(
         console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     else:
         text = ", ".join(f"{tap:g}" for tap in taps)
-        typer.echo(f"filter: {{ kind: robust, tick_ms: {tick_ms}, taps: [{text}] }}")
+        echo(f"filter: {{ kind: robust, tick_ms: {tick_ms}, taps: [{text}] }}")
 
 
 def _tell_stop(

@@ -5,10 +5,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
 from rich.table import Table
 
 from canshaper.cli.common import FILE, fail, loader, refuse_shipped
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import Deployment
@@ -66,15 +66,15 @@ def set_(
     except client.ControlError as error:
         raise fail(error, EXIT_REFUSED) from None
     if as_json:
-        typer.echo(json.dumps(table, indent=2))
+        echo(json.dumps(table, indent=2))
         return
     if not values:
-        Console().print(_table(table))
+        SafeConsole().print(_table(table))
         return
     for key, number in values.items():
-        typer.echo(f"{key}: {before[key]['now']:g} -> {number:g}")
+        echo(f"{key}: {before[key]['now']:g} -> {number:g}")
     lost = "lost when the daemon ends or reads its file again; --write keeps them"
-    typer.echo(f"Written to {deployment.path}." if write else f"Not written: {lost}.")
+    echo(f"Written to {deployment.path}." if write else f"Not written: {lost}.")
 
 
 def _socket(deployment: "Deployment") -> Path:

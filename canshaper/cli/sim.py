@@ -3,6 +3,7 @@
 import typer
 
 from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, fail, loader
+from canshaper.cli.console import echo
 
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
@@ -57,7 +58,7 @@ def sim(
         parameters = changed_parameters(changes or [])
         if show:
             for name, value in parameter_names(parameters).items():
-                typer.echo(f"{name}={value:g}")
+                echo(f"{name}={value:g}")
             return
         deployment = loader(file, interface, channel, network=network)()
         driven = one_crane(deployment, crane) if crane else deployment
@@ -97,8 +98,8 @@ def operator(
 
     if show:
         for item in SCRIPTS.values():
-            typer.echo(f"{item.name:19} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
-        typer.echo("random-<seed>        30.0 s  any number, always the same strokes")
+            echo(f"{item.name:19} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
+        echo("random-<seed>        30.0 s  any number, always the same strokes")
         return
     try:
         deployment = loader(file, interface, channel, network=network)()

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from canshaper.cli.common import CHANNEL, INTERFACE, deployment_path, fail, loader
+from canshaper.cli.console import echo
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
@@ -96,9 +97,9 @@ def studio(
 
         stack.callback(stage.stop)
         stage.start(end)
-        typer.echo(f"open {address(host, port, token)} in a browser; Ctrl-C ends")
+        echo(f"open {address(host, port, token)} in a browser; Ctrl-C ends")
         if token:
-            typer.echo("anybody on the network path can read the token: plain HTTP")
+            echo("anybody on the network path can read the token: plain HTTP")
         # The threads hold each other up: one that waits for the processor has Python's lock.
         before_the_rest()
         web.run(sockets=[one])

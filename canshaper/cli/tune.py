@@ -11,6 +11,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn
 
 from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader, refuse_shipped
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from canshaper.can.deployment import BoundAxis, Deployment
@@ -84,7 +85,7 @@ def tune(
     """
     from canshaper.config.source import DeploymentError
 
-    console = Console()
+    console = SafeConsole()
     try:
         deployment = loader(file)()
         bound = _axis(deployment, axis)
@@ -183,7 +184,7 @@ def _solve(
 @contextmanager
 def _progress(axis: str) -> Iterator[Callable[[str, float], None]]:
     """A bar on the terminal, beside the output; gone when done."""
-    console = Console(stderr=True)
+    console = SafeConsole(stderr=True)
     with Progress(
         TextColumn("{task.description}"),
         BarColumn(),
@@ -238,7 +239,7 @@ def _report(
             "picture": str(picture) if picture else None,
             "written": str(deployment.path) if write else None,
         }
-        typer.echo(json.dumps(result, indent=2))
+        echo(json.dumps(result, indent=2))
         return
     console.print(table(found, before, tuning.method))
     if tuning.method == "optimal":
@@ -251,7 +252,8 @@ def _report(
             highlight=False,
         )
     stop = consequences(deployment, bound.name, found.filter, tail[0] if tail else None)
-    console.print(f"\n[b]{sentence}[/b]\n{stop}", highlight=False)
+    console.print(f"\n{sentence}", style="bold", highlight=False)
+    console.print(stop, highlight=False)
     none = f"none, matplotlib is missing: {INSTALL_TOOLS}"
     console.print(f"Picture: {picture or none}", highlight=False, markup=False)
     if write:

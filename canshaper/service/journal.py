@@ -8,6 +8,8 @@ import os
 import select
 from collections import deque
 
+from canshaper.config.printable import printable
+
 STANDARD_ERROR = 2
 # Lines kept for a reader that is slow for a moment; more are dropped and counted.
 MOST_LINES = 200
@@ -69,7 +71,8 @@ class JournalHandler(logging.Handler):
         if len(self._lines) >= MOST_LINES:
             self._dropped += 1
             return
-        text = text.replace("\n", " | ")
+        # What others wrote, a peer's name or a piece of a file, must not look like a line of ours.
+        text = printable(text.replace("\n", " | "))
         if self._journal:
             text = PRIORITY.get(level, "<3>") + text
         self._lines.append(text.encode(errors="replace")[: MOST_BYTES - 1] + b"\n")

@@ -9,6 +9,7 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
 from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
+from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -47,11 +48,11 @@ def reproduce(
 
       python -m studies.paper --out paper-figures
     """
-    console = Console()
+    console = SafeConsole()
     try:
         _reproduce(out, figure or [], console)
     except KeyboardInterrupt:
-        typer.echo("interrupted", err=True)
+        echo("interrupted", err=True)
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 

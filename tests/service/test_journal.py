@@ -103,7 +103,7 @@ def test_an_event_is_one_line_whatever_it_holds(pipe: Pipe) -> None:
         handler.handle(record)
     first, second, third = pipe.lines()
     assert first == "<6>one | two | "
-    assert second == "<6>µ ?"
+    assert second == "<6>µ \\udcff"
     assert third.startswith("<3>failed | Traceback")
     assert third.endswith("ValueError: broken")
 
