@@ -20,6 +20,7 @@ from canshaper.studio.access import Access
 from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
 from canshaper.studio.sliders import RANGES
 from canshaper.studio.stage import MACHINE, Stage
+from canshaper.studio.unfinished import MOST_CONNECTIONS, MOST_HEAD_BYTES, BoundedHttp
 from canshaper.studio.view import SWAY_OF
 from canshaper_sim.crane import CraneParameters
 
@@ -163,6 +164,9 @@ def server(app: ASGIApp) -> uvicorn.Server:
     config = uvicorn.Config(
         app,
         log_level="error",
+        http=BoundedHttp,
+        h11_max_incomplete_event_size=MOST_HEAD_BYTES,
+        limit_concurrency=MOST_CONNECTIONS,
         ws="websockets-sansio",
         ws_max_size=MOST_BYTES,
         lifespan="off",
