@@ -7,10 +7,10 @@ import pytest
 
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
-from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked
 from canshaper.cli.common import loader
 from canshaper.recording.frames import LogError
 from canshaper.recording.sorting import Kind, Sorter, bus_of_channel
+from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked
 
 
 @pytest.fixture(scope="module")
