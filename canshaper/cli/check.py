@@ -8,6 +8,7 @@ from canshaper.can.load import BUSY
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 from canshaper.cli.console import SafeConsole, echo
 from canshaper.config.bus import Bus
+from canshaper.config.schema import RadialConfig
 
 # What joysticks do while the daemon is away.
 FALLBACKS = {
@@ -60,6 +61,8 @@ def check(file: str = FILE) -> None:
             f"  axis {name}: {config.levers[stick.lever].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
+        if radial := axis.config.radial_compensation:
+            typer.echo(f"  {_compensation(deployment, name, radial)}")
     identity = deployment.identity
     echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
@@ -76,6 +79,17 @@ def _match(bus: Bus) -> str:
     except OSError as error:
         return f"not looked at: {bus.channel}: {error.strerror}{whereabouts(bus)}"
     return f"WARNING: {fault}" if fault else "holds now"
+
+
+def _compensation(deployment: Deployment, slew: str, radial: RadialConfig) -> str:
+    """How far an axis moves for another one, in words."""
+    sway = deployment.axes[radial.axis].config.sway
+    assert sway is not None  # checked with the deployment
+    speed_m_s = radial.max_pct / 100.0 * sway.full_speed_m_s
+    return (
+        f"NOTE: while {slew} moves, {radial.axis} moves too without its joystick: by up to"
+        f" {speed_m_s:.2g} m/s, {radial.max_path_m:g} m in or out, {radial.max_s:g} s in one slew"
+    )
 
 
 def _load(deployment: Deployment, bus: str) -> str:

@@ -151,6 +151,12 @@ class RadialConfig(Section):
     max_pct: Annotated[float, number(1, 50, "% of full near-far speed", "fastest compensation")] = (
         25.0
     )
+    max_path_m: Annotated[
+        float, number(0.02, 2, "m", "farthest that it moves the tip in or out in one slew")
+    ] = 0.3
+    max_s: Annotated[
+        float, number(0.5, 60, "s", "longest time for which it moves the tip in one slew")
+    ] = 6.0
 
     @model_validator(mode="after")
     def _one_radius(self) -> Self:

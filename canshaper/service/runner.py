@@ -13,6 +13,7 @@ from canshaper.service.feedback import Feedback
 from canshaper.service.input import EmergencyStopInput
 from canshaper.service.radius import RadiusInput
 from canshaper.service.sets import SetChooser
+from canshaper.shaping.added import AddedBounds
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.radial import RadialCompensation
 from canshaper.shaping.registry import build_shaper
@@ -230,6 +231,13 @@ class Compensator:
         self._near_far = near_far
         self._radius = radius
         self._share = 1.0
+        near_far.axis.bounds = self._bounds = AddedBounds(
+            near_far.period_s,
+            largest=radial.max_pct / 100.0,
+            path_s=math.inf,
+            time_s=radial.max_s,
+            least=0.5 / near_far.bound.valve.steps,
+        )
         self.adjust()
 
     def adjust(self) -> None:
@@ -242,6 +250,7 @@ class Compensator:
             sway.full_speed_m_s,
             radial.max_pct / 100.0,
         )
+        self._bounds.path_s = radial.max_path_m / sway.full_speed_m_s
 
     def before_slew(self) -> float:
         """What the slew axis is to add in this tick."""
@@ -259,6 +268,10 @@ class Compensator:
             if circle_m is not None:
                 added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
                 self._near_far.added = added
+        elif self._slew.state is State.TRIPPED:
+            self._near_far.axis.drop_added()
+        if not self._slew.asked:
+            self._bounds.begin()
 
     def _sway(self) -> SwayModel:
         """Sway model of the slew axis now; a change of its sway data makes another one."""
@@ -267,5 +280,8 @@ class Compensator:
         return sway
 
     def _moving(self) -> bool:
-        """Not for ever after a swing that nobody damps: nothing may move without an operator."""
-        return self._slew.asked and self._slew.state in (State.ACTIVE, State.STOPPING)
+        """While the slew joystick is valid and enabled, and at most for the tail after release.
+
+        Not for ever after a swing that nobody damps: nothing may move without an operator.
+        """
+        return self._slew.asked and self._slew.state is State.ACTIVE

@@ -8,6 +8,7 @@ from READY, which takes a fresh, valid, enabled stick seen in neutral.
 import math
 from collections.abc import Callable
 
+from canshaper.shaping.added import AddedBounds
 from canshaper.shaping.limit_aware import carry_over
 from canshaper.shaping.limits import (
     OutputLimits,
@@ -53,6 +54,7 @@ class Axis:
         sent: the velocity that gives, [-1, 1].
         told: what the sway model was told: ``sent`` without what another axis asked.
         command: the operator's command that was in force at the last tick, [-1, 1].
+        bounds: bounds of what another axis adds, where one does.
     """
 
     def __init__(
@@ -73,6 +75,7 @@ class Axis:
         self.told = 0.0
         self.command = 0.0
         self.sway = sway
+        self.bounds: AddedBounds | None = None
         self._shaper = shaper
         self._tick_s = tick_s
         self._limits = limits
@@ -87,6 +90,8 @@ class Axis:
         self._rebump = False
         self._bypassed = False
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
+        self._own = 0.0  # the same without what another axis adds
+        self._added = 0.0  # what is added, as far as bounds and joystick allow
         self._owed = 0.0  # of a velocity added by another axis, not yet sent
         self._stopping = 0
         self._was_enabled = True
@@ -114,16 +119,19 @@ class Axis:
         Args:
             stick: the checked input.
             added: velocity that another moving axis asks of this one, [-1, 1] of full speed. Its
-                operator answers for it; it is carried out while this axis is enabled, its stick
-                valid, and anti-sway on. The sway model is not told of it: it is there to cause no
-                swing. One that is no velocity trips the axis.
+                operator answers for it; it is carried out within ``bounds``, while this axis is
+                enabled, its stick valid, and anti-sway on, and never against a joystick that is
+                held: what would go against it is left out at once. The sway model is not told of
+                it: it is there to cause no swing. One that is no velocity trips the axis.
 
         Returns:
             The change of state of this tick, or None.
         """
-        old = self.state
+        old, bounds = self.state, self.bounds
         if stick.bypass:
             added = 0.0
+        elif bounds is not None and abs(added) <= 1.0:
+            added = bounds.wanted(added, self._limits.fall_per_s)
         self._decide(stick, added)
         state = self.state
         if state is not ACTIVE:
@@ -145,7 +153,9 @@ class Axis:
                 self._rest()
         except (ValueError, ArithmeticError):
             self._output_invalid()
-        self.told = self.sent - added if self.state is ACTIVE else self.sent
+        self.told = self.sent - self._added
+        if bounds is not None:
+            bounds.applied(self.sent - self._own if self._own != self._limited else 0.0)
         return None if self.state is old else Transition(old, self.state, self.reason)
 
     def advance(self) -> None:
@@ -161,6 +171,8 @@ class Axis:
         """
         self._recent.age(ticks)
         self._stopping += ticks
+        if self.bounds is not None:
+            self.bounds.held(ticks)
         maximum = self._limits.maximum
         command = within(self.command, -maximum, maximum, 0.0)
         try:
@@ -189,6 +201,11 @@ class Axis:
         self._shaper = shaper
         self.sway = sway
         self._rebump = True
+
+    def drop_added(self) -> None:
+        """Who added has lost the right to: nothing of it is in the next output."""
+        self._limited = self._own
+        self._owed = 0.0
 
     def limit(self, limits: OutputLimits) -> None:
         """Change maximum and rates; of what the run-on remembers nothing changes.
@@ -313,11 +330,12 @@ class Axis:
         recent.add(command)
         low, high = allowed_range(command, recent.low, recent.high, limits)
         target = within(wanted, low, high, limits.minimum)
-        if added:
-            self._drive_both(target, added)
+        self._added = added
+        if added or self._own != self._limited:
+            self._drive_both(command, target, low, high)
             return
         limited = rate_limited(target, self._limited, self._rise, self._fall)
-        self._limited = limited
+        self._limited = self._own = limited
         if limited < low:  # on its way back in
             low = limited
         elif limited > high:
@@ -326,35 +344,58 @@ class Axis:
             limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
 
-    def _drive_both(self, target: float, added: float) -> None:
-        """Send the operator's part and the added one.
+    def _drive_both(self, command: float, target: float, low: float, high: float) -> None:
+        """Send the operator's part and the added one, or what is left of that.
 
         The added part is a path to be run, slow and with few steps of the grid: what rounding and
         rates leave out is owed and paid while the axis moves anyway, never by a twitch: by one step
         of the grid in a tick.
         """
-        if not abs(added) <= 1.0:
-            raise ValueError(f"added velocity is {added}")
-        limits = self._limits
-        least = max(limits.minimum, 0.5 / self._grid_steps)
-        wish = within(target + added, -limits.maximum, limits.maximum, least)
-        step = 1.0 / self._grid_steps
-        paid = within(self._owed, -step, step, 0.0) if wish else 0.0
-        aim = within(wish + paid, -limits.maximum, limits.maximum, least)
-        self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
+        limits, aim = self._limits, target
+        own = self._own = rate_limited(target, self._own, self._rise, self._fall)
+        if adding := self._added != 0.0:
+            low, high = -limits.maximum, limits.maximum
+            aim = self._aim(command, target)
+        limited = rate_limited(aim, self._limited, self._rise, self._fall)
+        # Never against a joystick that is held, but as far as the operator's own part still is.
+        if (command > 0.0 and limited < own and limited < 0.0) or (
+            command < 0.0 and limited > own and limited > 0.0
+        ):
+            limited = own if own * command < 0.0 else 0.0
+        if self.bounds is not None and (kept := self.bounds.kept(limited - own)) != limited - own:
+            limited = own + kept
+        self._limited = limited
         self.raw, self.sent = on_grid(
-            self._limited,
-            -limits.maximum,
-            limits.maximum,
+            limited,
+            min(low, limited),
+            max(high, limited),
             limits.deadband,
             self._grid_steps,
             curve=limits.curve,
         )
-        self._owed = within(self._owed + target + added - self.sent, -MOST_OWED, MOST_OWED, 0.0)
+        if adding:
+            owed = self._owed + own + self._added - self.sent
+            self._owed = within(owed, -MOST_OWED, MOST_OWED, 0.0)
+
+    def _aim(self, command: float, target: float) -> float:
+        """Both parts together; of the added one is left out what goes against a held joystick."""
+        added = self._added
+        if not abs(added) <= 1.0:
+            raise ValueError(f"added velocity is {added}")
+        if command > 0.0:
+            added = max(added, min(0.0, target) - target)
+        elif command < 0.0:
+            added = min(added, max(0.0, target) - target)
+        self._added = added
+        maximum, step = self._limits.maximum, 1.0 / self._grid_steps
+        least = max(self._limits.minimum, 0.5 * step)
+        wish = within(target + added, -maximum, maximum, least)
+        paid = within(self._owed, -step, step, 0.0) if wish else 0.0
+        return within(wish + paid, -maximum, maximum, least)
 
     def _rest(self) -> None:
         self._recent.clear()
-        self._bump = self._limited = self._owed = self.sent = 0.0
+        self._bump = self._limited = self._own = self._added = self._owed = self.sent = 0.0
         self.raw = 0
 
     def _output_invalid(self) -> None:

@@ -21,7 +21,7 @@ REASONS = {
     Reason.BYPASS_RELEASED: "anti-sway is on again",
     Reason.STOP_DONE: "stopped",
     Reason.RESET: "reset",
-    Reason.COMPENSATING: "another axis asks for compensation",
+    Reason.COMPENSATING: "moves for slewing, without its own stick",
     Reason.STICK_NOT_NEUTRAL: "let go of the stick",
     Reason.ENABLE_OFF: "enable is off",
     Reason.STICK_TIMEOUT: "no joystick message",

@@ -26,11 +26,16 @@ def compensated(make: Make, text: str = FIXED, **changes: dict[str, str]) -> Rig
     return make({SLEW_SWAY: section, **changes.get("yaml", {})}, changes.get("dbc"))
 
 
+# Near-far on the lever that the slew stick is not on, in place of lift.
+LIFT_OF_RIGHT = {
+    "signal: Lift,": "signal: Rotate,",
+    NEAR_STICK: NEAR_STICK.replace("left", "right").replace("NearFar", "Lift"),
+}
+
+
 def by_two_levers(make: Make) -> Rig:
-    """Near-far on the lever that the slew stick is not on, in place of lift."""
-    lift = {"signal: Lift,": "signal: Rotate,", NEAR_STICK: NEAR_STICK}
-    lift[NEAR_STICK] = NEAR_STICK.replace("left", "right").replace("NearFar", "Lift")
-    return compensated(make, yaml=lift)
+    """With compensation, and the two sticks on two levers."""
+    return compensated(make, yaml=LIFT_OF_RIGHT)
 
 
 def near_far(rig: Rig, ticks: int, **raw: int) -> list[float]:
@@ -187,21 +192,97 @@ def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make)
     assert set(near_far(rig, 100, Slew=1000)) == {0.0}  # and it takes a neutral stick to go on
 
 
-def test_a_trip_of_slew_alone_lets_near_far_fall_to_rest(changed_rig: Make) -> None:
+def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: Make) -> None:
     rig = by_two_levers(changed_rig)
     rig.run(3)
-    before = near_far(rig, 40, Slew=1000)[-1]
-    assert before < -0.05
-    after = []
+    assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     for _ in range(20):
         rig.receive(rig.lever("LeverLeft", Slew=1000, Enable=0), rig.lever("LeverRight"))
+        assert rig.tick()["NearFarCommand"]["Velocity"] == 0
+        assert rig.state() is State.TRIPPED
+    assert rig.state("near_far") is State.READY
+
+
+def test_a_released_enable_of_slew_leaves_the_operators_own_part(changed_rig: Make) -> None:
+    rig, plain = by_two_levers(changed_rig), changed_rig(LIFT_OF_RIGHT)
+    for one in (rig, plain):
+        for tick in range(60):
+            slew = 1000 if tick > 2 and one is rig else 0
+            one.receive(one.lever("LeverLeft", Slew=slew))
+            one.receive(one.lever("LeverRight", Lift=400 if tick > 2 else 0))
+            one.tick()
+    for one in (rig, plain):
+        one.receive(one.lever("LeverLeft", Enable=0), one.lever("LeverRight", Lift=400))
+        one.tick()
+    sent = [one.controller.axes["near_far"].axis.sent for one in (rig, plain)]
+    assert sent[0] == pytest.approx(sent[1], abs=0.02)
+    assert sent[1] > 0.2
+
+
+def test_a_lost_lever_of_slew_ends_it_by_the_rate(changed_rig: Make) -> None:
+    """The shaped stop of slew goes on; near-far has an operator who did not ask for it."""
+    rig = by_two_levers(changed_rig)
+    rig.run(3)
+    assert near_far(rig, 40, Slew=1000)[-1] < -0.05
+    after = []
+    for _ in range(30):
+        rig.receive(rig.lever("LeverRight"))
         rig.tick()
         after.append(rig.controller.axes["near_far"].axis.sent)
-    assert rig.state() is State.TRIPPED
-    # from the same tick on at the fall rate: slew goes first
-    assert abs(after[0]) <= max(0.0, abs(before) - 0.1) + 1 / 125
-    assert not any(after[math.ceil(0.25 / 0.1) :])
+    assert rig.state() is State.STOPPING
+    assert not any(after[5 + math.ceil(0.25 / 0.1) :])
     assert rig.state("near_far") is State.READY
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_it_never_runs_against_a_joystick_that_is_held(changed_rig: Make, sign: int) -> None:
+    """Slewing to and fro; the near-far joystick is held out a little, then pulled in."""
+    rig = compensated(changed_rig)
+    rig.run(3)
+    for tick in range(400):
+        held = sign * (40 if tick < 200 else -40)
+        slew = 1000 if tick // 60 % 2 else -1000
+        before = rig.controller.axes["near_far"].axis.sent
+        sent = near_far(rig, 1, Slew=slew, NearFar=held)[0]
+        if tick in range(200, 210) and before * held < 0:
+            continue  # the reversal itself, by the rate
+        assert sent * held >= 0.0
+
+
+@pytest.mark.parametrize("path_m", [0.03, 0.06])
+def test_its_way_is_bounded_as_configured(changed_rig: Make, path_m: float) -> None:
+    rig = compensated(changed_rig, FIXED + f", max_path_m: {path_m}")
+    rig.run(3)
+    way_m, ways_m = 0.0, []
+    for sent in near_far(rig, 260, Slew=1000) + near_far(rig, 260):
+        way_m += sent * TICK_S
+        ways_m.append(way_m)
+    assert min(ways_m) == pytest.approx(-path_m, abs=0.008)
+    assert min(ways_m) >= -path_m - 0.002  # what rounding owes
+    assert abs(ways_m[-1]) <= 0.02  # and back: of the way that was refused nothing comes out
+    # In metres, whatever the full speed is: half of it, and the way is as long.
+    slower = compensated(
+        changed_rig,
+        FIXED + f", max_path_m: {path_m}",
+        yaml={"full_speed_m_s: 1.0": "full_speed_m_s: 0.5"},
+    )
+    slower.run(3)
+    assert sum(near_far(slower, 200, Slew=1000)) * TICK_S * 0.5 == pytest.approx(-path_m, abs=0.01)
+
+
+def test_its_time_is_bounded_and_counted_anew_after_the_run_on(changed_rig: Make) -> None:
+    rig = compensated(changed_rig, FIXED + ", max_s: 0.8")
+
+    def moving_s() -> float:
+        # to and fro: something is to be compensated all the time
+        moved = [near_far(rig, 1, Slew=1000 if i // 50 % 2 else -1000)[0] for i in range(250)]
+        return sum(map(bool, moved)) * TICK_S
+
+    rig.run(3)
+    assert moving_s() == pytest.approx(0.8, abs=0.05)
+    near_far(rig, 150)
+    assert rig.state() is State.READY
+    assert moving_s() == pytest.approx(0.8, abs=0.05)
 
 
 def test_a_stalled_loop_trips_both(changed_rig: Make) -> None:
