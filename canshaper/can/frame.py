@@ -44,6 +44,7 @@ class FrameFault(IntEnum):
     HEARTBEAT_LOST = 21
     NODE_EMERGENCY = 22
     BUS_WRONG_DEVICE = 23
+    OUTPUT_REFUSED = 24
 
 
 class BusState(Enum):

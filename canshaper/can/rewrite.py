@@ -62,6 +62,11 @@ class RewrittenMessage(ValveMessage):
         sealed = self._protector.seal(word.to_bytes(self._length, "little"))
         return new_frame(Frame, (self.bus, self._id, self._extended, sealed))
 
+    def instead(self, frame: Frame) -> Frame:
+        """The same frame with what the axes have put in now, and with the same count."""
+        self._protector.take_back()
+        return self.onto(frame.data)
+
     def own(self, *, enabled: bool) -> Frame:
         """The next frame without one of the lever: nothing in it is older than the axes."""
         self.raw[self._enable] = 1 if enabled else self._start

@@ -32,6 +32,11 @@ class ValveMessage:
         """The next frame, protected, with what its axes have put in."""
         return new_frame(Frame, (self.bus, self._id, self._extended, self._next(self.raw)))
 
+    def instead(self, frame: Frame) -> Frame:
+        """What takes the place of the last frame, which was not sent: with the same count."""
+        self.sender.protector.take_back()
+        return self.frame()
+
 
 class Direction(Protocol):
     """What tells the direction of a magnitude."""

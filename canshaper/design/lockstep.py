@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 from canshaper.can.deployment import Deployment
 from canshaper.service.controller import Controller
+from canshaper.service.guarded import Guarded
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Sway
@@ -56,6 +57,7 @@ def drive(
     controller = Controller(deployment)
     if prepare:
         prepare(controller)
+    guarded = Guarded(controller)
     try:
         driven = one_crane(deployment, crane) if crane else deployment
         plant = PlantNode(driven, parameters, machine, sway)
@@ -74,16 +76,16 @@ def drive(
         now_ns = time_ms * 1_000_000
         for frame in (f for hand in hands for f in hand.frames_of_tick(time_ms, tick_ms)):
             recorder.receive(frame, time_s)
-            if (passed := controller.receive(frame, now_ns)) is not None:  # by a gateway
+            if (passed := guarded.receive(frame, now_ns)) is not None:  # by a gateway
                 plant.receive(passed)
                 recorder.receive(passed, time_s)
-        for frame in controller.tick(now_ns):
+        for frame in guarded.tick(now_ns):
             plant.receive(frame)
             recorder.receive(frame, time_s)
         controller.events.clear()
         plant.advance(step_s)
         for frame in plant.feedback():
-            controller.receive(frame, now_ns + tick_ms * 1_000_000)
+            guarded.receive(frame, now_ns + tick_ms * 1_000_000)
             recorder.receive(frame, time_s + step_s)
         if progress and time_ms % 1000 == 0:
             progress(time_s)

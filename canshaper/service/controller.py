@@ -173,7 +173,8 @@ class Controller:
         """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
         for line in self._lines.values():
             if line.news():
-                passed = line.pass_on(frame.data, arrived_ns)
+                stopped = self._stop is not None and self._stop.stops(arrived_ns)
+                passed = line.pass_on(frame.data, arrived_ns, stopped=stopped)
                 self.moves = line.moved
                 return passed
         return None
@@ -329,6 +330,19 @@ class Controller:
             return False
         runners[-1].bound.valve.message.sender.protector.take_back()
         return True
+
+    def refused(self, frame: Frame) -> Frame:
+        """The output guard has refused a valve frame: its axes trip.
+
+        Returns:
+            The same frame with neutral commands, to be sent in its place.
+        """
+        self.counters.add(FrameFault.OUTPUT_REFUSED)
+        runners = self._by_message[frame[:3]]
+        for runner in runners:
+            runner.trip = Reason.OUTPUT_REFUSED
+            runner.bound.valve.put(0)
+        return runners[0].bound.valve.message.instead(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve: the last thing sent."""

@@ -16,6 +16,7 @@ from canshaper.service.adjust import Adjuster
 from canshaper.service.controller import Controller
 from canshaper.service.exchange import exchange
 from canshaper.service.gateway import InLine
+from canshaper.service.guarded import Guarded
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
 from canshaper.service.ports import close_ports, new_ports, open_ports, pass_over
@@ -112,7 +113,7 @@ class Daemon:
         A reload, refused or not, has taken its time as all else has: the next tick sees it.
         """
         controller = self._controller
-        exchange(controller, self._ports, now_ns, missed, self._standstill)
+        exchange(self._guarded, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._latest_ns = max(self._latest_ns, late_ns)
@@ -125,7 +126,7 @@ class Daemon:
     def _wait(self, seconds: float) -> None:
         """In a gateway: pass frames on until the next deadline."""
         assert self._line is not None  # asked of a gateway only
-        self._line.wait(seconds, self._controller, self._ports, self._standstill)
+        self._line.wait(seconds, self._guarded, self._ports, self._standstill)
 
     def _housekeeping(self, now_ns: int) -> None:
         """Tell what changed; everything that may take time comes after the frames are out."""
@@ -193,6 +194,7 @@ class Daemon:
         self._controller = Controller(deployment)
         if before:
             self._controller.follow(before)
+        self._guarded = Guarded(self._controller)
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -294,7 +296,7 @@ class Daemon:
 
     def _send_neutral(self) -> None:
         """Send every valve neutral, for a while again where a queue is full."""
-        waiting: list[Frame] = self._controller.neutral_frames()
+        waiting: list[Frame] = self._guarded.neutral_frames()
         until = time.monotonic() + NEUTRAL_TRIES_S
         while waiting:
             waiting = [f for f in waiting if not self._ports[f.bus].send(f)]

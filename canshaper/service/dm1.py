@@ -48,6 +48,7 @@ FMI_OF = {
     Reason.SECOND_SENDER: SPECIAL,
     Reason.NODE_FAULT: ABNORMAL_RATE,
     Reason.VALVE_FAULT: BAD_DEVICE,
+    Reason.OUTPUT_REFUSED: BAD_DEVICE,
 }
 """Failure mode of an axis by its reason; what the operator does is no fault."""
 

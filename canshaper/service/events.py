@@ -3,6 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
+from canshaper.can.frame import Frame
 from canshaper.service.feedback import Following
 from canshaper.shaping.states import Transition
 
@@ -43,3 +44,17 @@ class FeedbackEvent:
         """For the log."""
         found = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
         return f"axis={self.axis} valve={self.following.value} {found}"
+
+
+@dataclass(frozen=True, slots=True)
+class RefusalEvent:
+    """The output guard has refused a valve frame."""
+
+    frame: Frame
+    why: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        bus, can_id, _, data = self.frame
+        return f"output=refused bus={bus} id={can_id:#x} data={data.hex()} {self.why}"

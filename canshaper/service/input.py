@@ -127,6 +127,10 @@ class EmergencyStopInput(Input):
             self.receive(frame.data, arrived_ns)
             self.forget()
 
+    def stops(self, now_ns: int) -> bool:
+        """Whether nothing may move now: it is pressed, or not heard."""
+        return self._pressed or self.lost(now_ns) is not None
+
     def stop(self, now_ns: int, presses: int) -> Reason | None:
         """Why nothing may move now, or None.
 

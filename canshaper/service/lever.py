@@ -30,6 +30,11 @@ class LeverInput(Input):
         self._released = False
         self._doubted = 0  # number of the last release in a frame that does not count
 
+    @property
+    def released(self) -> bool:
+        """Whether enable is released, by the last frame that says so or says otherwise."""
+        return self._released
+
     def heard(
         self,
         raw: dict[str, Any],

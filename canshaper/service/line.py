@@ -47,13 +47,20 @@ class Line:
         before, self._seen = self._seen, self._lever.raw
         return self._seen is not before
 
-    def pass_on(self, data: bytes, arrived_ns: int) -> Frame:
-        """A frame of the lever as it leaves; nothing else in it is changed."""
+    def pass_on(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
+        """A frame of the lever as it leaves; nothing else in it is changed.
+
+        Args:
+            data: the frame.
+            arrived_ns: when it arrived.
+            stopped: the emergency stop is pressed, or not heard.
+        """
         self._passed_ns = arrived_ns
+        stopped = stopped or self._lever.released  # the axes trip with the next tick only
         for runner in self._runners:
-            if runner.trip is not None:  # the loop stood still, or the like: this is old
+            if stopped or runner.trip is not None:  # the loop stood still, or the like: this is old
                 runner.bound.valve.put(0)
-        self.moved = self._moves()
+        self.moved = self._moves() and not stopped
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:

@@ -68,6 +68,7 @@ class Reason(IntEnum):
     SECOND_SENDER = 70
     ADDRESS_LOST = 71
     VALVE_FAULT = 72
+    OUTPUT_REFUSED = 73
 
 
 class StickInput(NamedTuple):

@@ -46,6 +46,7 @@ REASONS = {
     Reason.SECOND_SENDER: "somebody else commands this valve",
     Reason.ADDRESS_LOST: "another node has our address",
     Reason.VALVE_FAULT: "the valve tells a fault",
+    Reason.OUTPUT_REFUSED: "the output guard refused a command",
 }
 
 FAULTS = {

@@ -24,6 +24,7 @@ from canshaper.service import gateway as gateway_module
 from canshaper.service import loop as loop_module
 from canshaper.service import ports as ports_module
 from canshaper.service import standstill as standstill_module
+from tests.faults.guarded import Unrefused
 from tests.faults.machine import Key
 from tests.faults.rules import Rules
 from tests.faults.world import World
@@ -228,6 +229,7 @@ class Bench:
         yield module.signal, "signal", self._handlers.__setitem__
         yield ports_module, "open_port", self._open
         yield module, "Reading", self._read
+        yield module, "Controller", Unrefused
         yield module, "Collector", Uncollected
         yield module, "ControlServer", self._control
         yield gateway_module, "select", self

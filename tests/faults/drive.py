@@ -9,8 +9,8 @@ from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
 from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
 from tests.faults import inject
+from tests.faults.guarded import guarded
 from tests.faults.hand import path
 from tests.faults.inject import Fault
 from tests.faults.inputs import Lever
@@ -31,7 +31,7 @@ OVERRUN_TICKS = 55
 class Driven(Protocol):
     """What a drive needs of a controller."""
 
-    def receive(self, frame: Frame, now_ns: int) -> None: ...
+    def receive(self, frame: Frame, now_ns: int) -> object: ...
     def tick(self, now_ns: int, missed: int = 0) -> Iterable[Frame]: ...
     def stalled(self) -> None: ...
     def send_failed(self, frame: Frame) -> None: ...
@@ -50,7 +50,7 @@ class Drive:
     def __init__(
         self,
         seed: int,
-        controller_of: Callable[[Any], Driven] = Controller,
+        controller_of: Callable[[Any], Driven] = guarded,
         trace: Callable[[str], None] | None = None,
     ) -> None:
         self.seed = seed

@@ -11,6 +11,7 @@ from canshaper.can.binding import load_deployment
 from canshaper.can.frame import Frame
 from canshaper.can.signals import FieldSet
 from canshaper.service.controller import Controller
+from canshaper.service.guarded import Guarded
 from canshaper.shaping import axis
 from canshaper.shaping.limits import with_deadband
 
@@ -70,7 +71,7 @@ def golden(name: str) -> Path:
 
 def replay(name: str, drive: list[str]) -> list[str]:
     """What a deployment sends at the ticks, in order."""
-    controller = Controller(load_deployment(CONFIG / f"{name}.yaml"))
+    controller = Guarded(Controller(load_deployment(CONFIG / f"{name}.yaml")))
     waiting = [parsed(row) for row in drive]
     waiting.reverse()
     sent = []

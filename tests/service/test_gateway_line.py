@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from canshaper.can.e2e import Profile2
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.shaping.states import Reason
+from tests.service.emergency import DBC, STOP, STOP_ID
 from tests.service.gateway_rig import TICK_NS, GatewayRig
 
 VELOCITIES = 0xFFFFFFFF  # Slew and NearFar: the first four bytes
@@ -153,9 +154,10 @@ def test_a_joystick_that_comes_back_is_passed_on_in_the_stop(rig: GatewayRig) ->
     assert rig.state() == ("NEUTRAL_WAIT", "STICK_NOT_NEUTRAL")
 
 
-def test_enable_off_leaves_with_its_frame_and_neutral_with_the_next(rig: GatewayRig) -> None:
+def test_enable_off_leaves_with_its_frame_and_neutral_in_the_same(rig: GatewayRig) -> None:
     rig.moving()
-    assert rig.run(1, Slew=1000, Enable=0)["Enable"] == 0
+    left = rig.run(1, Slew=1000, Enable=0)
+    assert (left["Enable"], left["Slew"]) == (0, 0)
     assert rig.run(1, Slew=1000, Enable=0)["Slew"] == 0
     assert rig.state() == ("TRIPPED", "ENABLE_LOST")
 
@@ -292,3 +294,20 @@ def test_ten_late_frames_in_one_tick_leave_in_their_order(rig: GatewayRig) -> No
         rig.receive(rig.lever(Reset=stick % 2))
     assert [rig.decoded(f)["Reset"] for f in rig.left[-10:]] == [0, 1] * 5
     assert rig.now_ns == 3 * TICK_NS
+
+
+def test_a_pressed_emergency_stop_makes_the_next_frame_neutral(tmp_path: Path) -> None:
+    """It leaves before the tick in which the axes trip."""
+    stop = STOP.replace("bus: crane", "bus: levers").replace("60", "1000")
+    last = "status: { bus: machine, message: ShaperStatus }"
+    rig = GatewayRig(tmp_path, yaml=((last, stop + last),), dbc=tuple(DBC.items()))
+    free, pressed = (Frame("levers", STOP_ID, False, bytes((n, n, 0))) for n in (0, 1))
+    rig.receive(free)
+    rig.run(3)
+    assert rig.run(30, Slew=1000)["Slew"] > 300
+    rig.receive(pressed)
+    passed = rig.receive(rig.lever(Slew=1000))
+    assert passed is not None
+    assert (rig.decoded(passed)["Slew"], rig.decoded(passed)["Enable"]) == (0, 1)
+    rig.tick()
+    assert rig.state() == ("TRIPPED", "EMERGENCY_STOP")

@@ -17,6 +17,7 @@ from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, s
 from canshaper.service.controller import Controller
 from canshaper.service.events import Event
 from canshaper.service.exchange import exchange
+from canshaper.service.guarded import Guarded
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.service.standstill import Standstill
@@ -73,6 +74,7 @@ class Loop:
         self, deployment: Deployment, sockets: dict[str, socket.socket], seconds: float
     ) -> None:
         self._controller = Controller(deployment)
+        self._guarded = Guarded(self._controller)
         faults = self._controller.counters.add
         self._ports = {
             name: WatchedPort(name, one, faults, self._note) for name, one in sockets.items()
@@ -103,7 +105,7 @@ class Loop:
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        exchange(self._controller, self._ports, now_ns, missed, self._standstill)
+        exchange(self._guarded, self._ports, now_ns, missed, self._standstill)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)

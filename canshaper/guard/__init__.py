@@ -1,0 +1,1 @@
+"""The output guard: independent of what computes the frames that it looks at."""

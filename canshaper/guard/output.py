@@ -1,0 +1,134 @@
+"""The output guard: the last look at a valve frame before the socket, by its bytes alone.
+
+It knows the limits of the deployment file, the bytes that came from joysticks and emergency stop,
+and the bytes that are about to leave; nothing of how the one was made from the other. A frame that
+moves a valve passes only if
+
+- no emergency stop is pressed or missing, and the joystick's enable was not seen released,
+- the joystick is not silent for longer than its timeout and the longest stop,
+- it is a command: no signal in it contradicts another,
+- its velocity is not beyond the maximum, nor beyond what a joystick frame within the tail asked in
+  that direction, but for what falls at the valve's rate since then,
+- the valve's rates lead from the last frame to this one.
+
+Neutral always passes. All bounds err on the side of the controller by what it is entitled to: the
+age of an input, the standstill that a loop may have, the rounding of the frame.
+"""
+
+from collections.abc import Sequence
+
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame
+from canshaper.can.inputs import BoundInput
+from canshaper.can.j1939 import group_of
+from canshaper.guard.axis import GuardedAxis
+from canshaper.guard.inputs import GuardedInput, GuardedJoystick, GuardedStop
+
+Key = tuple[str, int, bool]
+
+
+class GuardedAxes:
+    """Several axes with their commands in one valve message: each frame is looked at anew."""
+
+    span = slice(0, 0)
+    part = None
+    good_ns = 0
+
+    def __init__(self, axes: Sequence[GuardedAxis]) -> None:
+        self._axes = axes
+        self.at = -1, -1
+
+    def moves(self, data: bytes) -> bool:
+        """Whether a frame is anything but neutral."""
+        return any(axis.moves(data) for axis in self._axes)
+
+    def refusal(self, data: bytes, now_ns: int, at: tuple[int, int]) -> str:
+        """Why a frame may not leave; empty where it may: see ``GuardedAxis``."""
+        for axis in self._axes:
+            if why := axis.refusal(data, now_ns, at):
+                return why
+        return ""
+
+
+class OutputGuard:
+    """All valves of a deployment.
+
+    Attributes:
+        valves: by id alone, where no two buses have a valve with the same; else see ``valve``.
+        at: number of this deadline, and of this tick, which does not count those missed.
+    """
+
+    def __init__(self, deployment: Deployment) -> None:
+        config, levers = deployment.config, deployment.levers
+        joysticks = {n: GuardedJoystick(lever, lever.config.enable) for n, lever in levers.items()}
+        inputs: list[tuple[BoundInput, GuardedInput]] = []
+        inputs += [(levers[name], joystick) for name, joystick in joysticks.items()]
+        stop = None
+        if bound := deployment.emergency_stop:
+            stop = GuardedStop(bound, bound.config.signal)
+            inputs.append((bound, stop))
+        self.at = -1, -1
+        self._stood_still = False
+        self._joysticks = list(joysticks.values())
+        self._inputs: dict[Key, GuardedInput] = {}
+        self._groups: dict[tuple[str, int], GuardedInput] = {}
+        for one, entry in inputs:
+            if one.any_source:
+                self._groups[one.key[0], group_of(one.key[1])] = entry
+            else:
+                self._inputs |= dict.fromkeys(one.keys, entry)
+        self._own = {name: bus.j1939.address for name, bus in config.buses.items() if bus.j1939}
+        self._valves = _valves(deployment, joysticks, stop)
+        self.valves = {key[1]: valve for key, valve in self._valves.items()}
+        if len(self.valves) < len(self._valves):
+            self.valves = dict.fromkeys(self.valves, GuardedAxes([]))
+
+    def note(self, frame: Frame, now_ns: int) -> None:
+        """Take a frame that has come in."""
+        entry = self._inputs.get(frame[:3])
+        if entry is not None:
+            entry.note(frame[3], now_ns)
+        elif self._groups and frame[2]:
+            group = self._groups.get((frame.bus, group_of(frame.can_id)))
+            source = frame.can_id & 0xFF
+            if group is None or source == self._own.get(frame.bus):
+                return
+            if not group.from_other(source, now_ns):
+                group.note(frame.data, now_ns)
+
+    def valve(self, frame: Frame) -> GuardedAxis | GuardedAxes | None:
+        """What looks at a frame; None where it is not one of a valve."""
+        return self._valves.get(frame[:3])
+
+    def stalled(self) -> None:
+        """The loop stood still: nothing that was asked before its next tick holds."""
+        self._stood_still = True
+
+    def begin(self, missed: int) -> None:
+        """A tick begins; so many deadlines were missed before it."""
+        number, tick = self.at
+        self.at = number + 1 + missed, tick + 1
+        if self._stood_still:
+            self._stood_still = False
+            for joystick in self._joysticks:
+                joystick.clear()
+
+
+def _valves(
+    deployment: Deployment, joysticks: dict[str, GuardedJoystick], stop: GuardedStop | None
+) -> dict[Key, GuardedAxis | GuardedAxes]:
+    axes: dict[str, GuardedAxis] = {}
+    by_message: dict[Key, list[GuardedAxis]] = {}
+    for name, bound in deployment.axes.items():
+        joystick = joysticks[bound.config.stick.lever]
+        axes[name] = GuardedAxis(deployment, bound, joystick, stop)
+        by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
+    for name, bound in deployment.axes.items():
+        if bound.radial is not None:
+            most = bound.radial.config.max_pct / 100.0
+            for axis in (axes[name], axes[bound.radial.config.axis]):
+                axis.compensates(axes[name], most)
+    return {
+        key: GuardedAxes(several) if len(several) > 1 else several[0]
+        for key, several in by_message.items()
+    }

@@ -1,0 +1,262 @@
+"""One wrong command reaches no valve: planted in sound drives of every shipped deployment."""
+
+import functools
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.can.codecs import Sender
+from canshaper.can.deployment import Deployment
+from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.signals import raw_limits
+from canshaper.service.controller import Controller
+from canshaper.service.guarded import Guarded
+from canshaper.service.runner import AxisRunner
+from canshaper.shaping.states import Reason, State
+from canshaper_sim.hand import Hand, Held
+from canshaper_sim.plant import PlantNode
+from tests.faults import shipped, variants
+
+MOMENTS = 6  # of each kind, on each deployment
+BEGIN_S, MOVE_S, REST_S = 5.0, 8.0, 7.0
+
+
+@dataclass
+class Drive:
+    """What comes in, tick by tick, and where its sticks are.
+
+    Attributes:
+        frames: what comes in before each tick; ``released`` and ``pressed`` are the same frames
+            with enable released, and with the emergency stop pressed.
+        steps: commands to the valves that a sound controller makes, in steps.
+    """
+
+    deployment: Deployment
+    frames: list[list[Frame]] = field(default_factory=list)
+    released: list[list[Frame]] = field(default_factory=list)
+    pressed: list[list[Frame]] = field(default_factory=list)
+    steps: list[dict[str, int]] = field(default_factory=list)
+
+    @property
+    def tick_ns(self) -> int:
+        return self.deployment.config.tick_ms * 1_000_000
+
+
+@functools.cache
+def drive(name: str) -> Drive:
+    """A drive of random strokes, and a long rest behind it."""
+    if name in shipped.NAMES:
+        deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
+    else:
+        deployment = variants.machine(name)[1]
+    made, rng = Drive(deployment), random.Random(name)
+    hands = Hand(deployment), Hand(deployment)
+    plant = None if name == "two-cranes" else PlantNode(deployment)
+    controller = Controller(deployment)
+    sticks, until = dict.fromkeys(deployment.axes, 0.0), dict.fromkeys(deployment.axes, BEGIN_S)
+    stop = deployment.emergency_stop
+    presses = Sender(stop.config.bus, stop.message, None, stop.protection) if stop else None
+    feedback: list[Frame] = []
+    tick_ms = deployment.config.tick_ms
+    for number in range(round((BEGIN_S + MOVE_S + REST_S) * 1000) // tick_ms):
+        time_ms, now_ns = number * tick_ms, number * made.tick_ns
+        for axis in sticks:
+            if time_ms >= 1000 * until[axis]:
+                sticks[axis] = rng.choice((0.0, rng.uniform(-1, 1), 1.0, -1.0))
+                until[axis] += rng.uniform(0.3, 1.5)
+            if time_ms >= 1000 * (BEGIN_S + MOVE_S):
+                sticks[axis] = 0.0
+        frames = [*hands[0].frames(time_ms, Held(sticks, enable=True)), *feedback]
+        made.frames.append(frames)
+        made.released.append([*hands[1].frames(time_ms, Held(sticks, enable=False)), *feedback])
+        others = [f for f in frames if not stop or f.can_id != stop.message.frame_id]
+        if presses and stop and len(others) < len(frames):
+            others.insert(0, presses.frame({stop.config.signal: 1}))
+        made.pressed.append(others)
+        left = [f for f in (controller.receive(f, now_ns) for f in frames) if f]
+        left += controller.tick(now_ns)
+        made.steps.append({n: runner.axis.raw for n, runner in controller.axes.items()})
+        feedback = []
+        if plant:
+            for frame in left:
+                plant.receive(frame)
+            plant.advance(tick_ms / 1000.0)
+            feedback = plant.feedback()
+    return made
+
+
+Wrong = Callable[[dict[str, Any], AxisRunner], None]
+
+
+class Planted:
+    """A drive up to a moment, with one wrong command from then on."""
+
+    def __init__(self, made: Drive, axis: str, at: int, frames: list[list[Frame]]) -> None:
+        self.made, self.at, self.frames = made, at, frames
+        for bound in made.deployment.axes.values():  # its messages keep what was put last
+            bound.valve.put(0)
+        self.controller = Controller(made.deployment)
+        self.runner = self.controller.axes[axis]
+        self.guarded = Guarded(self.controller)
+        self.left: list[Frame] = []
+
+    def run(self, wrong: Wrong) -> list[Frame]:
+        """Plant it with the next command; frames of this valve that leave with it and behind it."""
+        codec = self.runner.bound.valve
+        sound, key = codec.put, codec.message.sender.key
+
+        def put(steps: int) -> None:
+            codec.put = sound  # type: ignore[method-assign]
+            sound(steps)
+            wrong(codec.message.raw, self.runner)
+
+        try:
+            for number in range(self.at + 3):
+                now_ns = number * self.made.tick_ns
+                if number == self.at:
+                    self.left.clear()
+                frames = self.frames if number >= self.at else self.made.frames
+                passed = [self.guarded.receive(f, now_ns) for f in frames[number]]
+                if number == self.at:
+                    codec.put = put  # type: ignore[method-assign]
+                    passed = []
+                self.left += [f for f in passed if f]
+                self.left += self.guarded.tick(now_ns)
+        finally:
+            codec.put = sound  # type: ignore[method-assign]
+        return [frame for frame in self.left if frame[:3] == key]
+
+    def caught(self, wrong: Wrong) -> bool:
+        """Whether no frame has moved the axis, and it tripped for that."""
+        codec = self.runner.bound.valve
+        layout = codec.message.sender.fields.layout
+        for frame in self.run(wrong):
+            assert codec.read(layout.decode(frame.data)) == 0
+        assert self.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
+        assert sum("output=refused" in event.text for event in self.controller.events) == 1
+        axis = self.runner.axis
+        return axis.state is State.TRIPPED and axis.reason in (
+            Reason.OUTPUT_REFUSED,
+            Reason.ENABLE_LOST,
+            Reason.EMERGENCY_STOP,
+        )
+
+
+def _put(steps: int) -> Wrong:
+    return lambda _raw, runner: runner.bound.valve.put(steps)
+
+
+def _signal(runner: AxisRunner) -> Any:
+    name = runner.bound.config.valve.signal
+    return next(s for s in runner.bound.valve_message.signals if s.name == name)
+
+
+def _full(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """Full speed in one step, from rest or nearly so."""
+    full = made.deployment.axes[axis].valve.steps
+    return _put(rng.choice((-full, full))) if abs(made.steps[at][axis]) < 0.3 * full else None
+
+
+def _beyond(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """Beyond the range of the DBC, where the bits of the signal reach farther."""
+    valve = made.deployment.axes[axis].valve
+
+    def wrong(raw: dict[str, Any], runner: AxisRunner) -> None:
+        signal = _signal(runner)
+        valve.put(valve.steps)
+        room = raw_limits(signal)[1] - raw[signal.name]
+        if room > 0:
+            raw[signal.name] += rng.randint(1, min(room, valve.steps))
+
+    return wrong
+
+
+def _against(_rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """The sign the other way round."""
+    steps = made.steps[at][axis]
+    fast = abs(steps) > 0.4 * made.deployment.axes[axis].valve.steps
+    return _put(-steps) if fast else None
+
+
+def _stale(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """A command, however small, when nobody has asked for anything within the tail."""
+    full = made.deployment.axes[axis].valve.steps
+    rests = at * made.tick_ns > (BEGIN_S + MOVE_S + 3.5) * 1e9
+    return _put(rng.choice((-1, 1)) * rng.randint(1, full)) if rests else None
+
+
+def _goes_on(_rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """What moves goes on, with enable released or the emergency stop pressed."""
+    steps = made.steps[at - 1][axis]
+    due = made.frames[at] != made.pressed[at] or not made.deployment.emergency_stop
+    return _put(steps) if due and steps and made.steps[at][axis] else None
+
+
+def _flip(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
+    """A bit of the command is wrong, and it means far more or less speed, or the other way."""
+    valve = made.deployment.axes[axis].valve
+
+    def wrong(raw: dict[str, Any], runner: AxisRunner) -> None:
+        signal, before = _signal(runner), valve.read(raw)
+        bits = [1 << n for n in range(signal.length)]
+        rng.shuffle(bits)
+        low, high = raw_limits(signal)
+        for bit in bits:
+            flipped = {**raw, signal.name: raw[signal.name] ^ bit}
+            if not low <= flipped[signal.name] <= high:  # the highest of one with a sign
+                flipped[signal.name] += -2 * bit if flipped[signal.name] > high else 2 * bit
+            after = valve.read(flipped)
+            if after is None or (
+                before is not None and abs(after) > abs(before) + 0.3 * valve.steps
+            ):
+                raw.update(flipped)
+                return
+        valve.put(valve.steps)  # all bits together
+
+    return wrong if abs(made.steps[at][axis]) < 0.3 * valve.steps else None
+
+
+KINDS = {f.__name__[1:]: f for f in (_full, _beyond, _against, _stale, _flip)}
+CASES = [(name, kind) for name in (*shipped.NAMES, "protected") for kind in KINDS]
+# In a gateway a frame with enable released is neutral whatever the axes have put.
+CASES += [(name, "released") for name in (*shipped.NAMES, "protected") if "gateway" not in name]
+CASES += [("protected", "pressed")]
+
+
+@pytest.mark.parametrize(("name", "kind"), CASES)
+def test_a_wrong_command_is_caught(name: str, kind: str) -> None:
+    made, rng = drive(name), random.Random(f"{name} {kind}")
+    choose = KINDS.get(kind, _goes_on)
+    frames = {"released": made.released, "pressed": made.pressed}.get(kind, made.frames)
+    planted = 0
+    for _ in range(5000):
+        if planted == MOMENTS:
+            break
+        axis = rng.choice(list(made.deployment.axes))
+        at = rng.randrange(round(BEGIN_S * 1e9) // made.tick_ns, len(made.frames) - 3)
+        if (at + 1) % made.deployment.axes[axis].period_ticks:
+            continue
+        if wrong := choose(rng, made, axis, at):
+            planted += 1
+            assert Planted(made, axis, at, frames).caught(wrong), (axis, at)
+    assert planted == MOMENTS
+
+
+@pytest.mark.parametrize("name", [*shipped.NAMES, "protected"])
+def test_what_a_sound_controller_sends_passes(name: str) -> None:
+    made = drive(name)
+    controller = Controller(made.deployment)
+    guarded = Guarded(controller)
+    for number, frames in enumerate(made.frames):
+        now_ns = number * made.tick_ns
+        for frame in frames:
+            guarded.receive(frame, now_ns)
+        for _ in guarded.tick(now_ns):
+            pass
+    assert controller.counters.last_fault is not FrameFault.OUTPUT_REFUSED
+    moved = {n for steps in made.steps for n, s in steps.items() if s}
+    assert moved == made.deployment.axes.keys()
