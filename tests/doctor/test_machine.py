@@ -183,6 +183,32 @@ def test_clock_source(
     assert says in found.remedy
 
 
+def test_suspend(tmp_path: Path) -> None:
+    assert machine.suspend(tmp_path).level is Level.OK
+    write(tmp_path, **{"sys/power/state": "\n"})
+    assert machine.suspend(tmp_path) == Finding("suspend", Level.OK, "the kernel offers none")
+    write(tmp_path, **{"sys/power/state": "freeze mem\n"})
+    found = machine.suspend(tmp_path)
+    assert (found.level, found.remedy) == (Level.WARNING, "sudo systemctl mask sleep.target")
+    assert found.found == "possible (freeze mem); logind as it comes: the lid suspends"
+    write(
+        tmp_path,
+        **{
+            "etc/systemd/logind.conf": "[Login]\n#IdleAction=ignore\nHandleLidSwitch=ignore\n",
+            "etc/systemd/logind.conf.d/idle.conf": "[Login]\nIdleAction=suspend\n",
+        },
+    )
+    found = machine.suspend(tmp_path)
+    assert found.found == "possible (freeze mem); HandleLidSwitch=ignore, IdleAction=suspend"
+    masked = tmp_path / "etc/systemd/system/sleep.target"
+    masked.parent.mkdir(parents=True)
+    masked.write_text("[Unit]\n")
+    assert machine.suspend(tmp_path).level is Level.WARNING
+    masked.unlink()
+    masked.symlink_to("/dev/null")
+    assert machine.suspend(tmp_path) == Finding("suspend", Level.OK, "sleep.target is masked")
+
+
 @pytest.mark.parametrize(
     ("told", "level"), [("qemu", Level.WARNING), ("kvm", Level.WARNING), ("none", Level.OK)]
 )
@@ -225,6 +251,7 @@ def test_all_checks_work_on_this_machine() -> None:
         "governor",
         "idle states",
         "clock source",
+        "suspend",
         "virtual machine",
         "processors",
         "other programs",

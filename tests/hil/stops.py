@@ -169,7 +169,7 @@ class Bench:
         """The joystick falls silent in motion, perhaps with a stop that is over in time.
 
         Returns:
-            None where that stop was not over in time.
+            None where that stop was not over in time, or the filter let the command fall before.
         """
         self.moving()
         time.sleep(self._rng.uniform(0.0, CYCLE_S))
@@ -183,9 +183,9 @@ class Bench:
         last_s = max(m.timestamp for m in seen if m.arbitration_id == LEFT)
         valve = [m for m in seen if m.arbitration_id == SLEW]
         fallen = next(b for a, b in pairwise(valve) if b.data[0] < a.data[0] - 1)
-        if stopped and (ended_s - last_s) * 1000 > T_MS + TICK_MS:
-            return None
-        return Silence((fallen.timestamp - last_s) * 1000, stopped)
+        falls_ms = (fallen.timestamp - last_s) * 1000
+        late = stopped and (ended_s - last_s) * 1000 > T_MS + TICK_MS
+        return None if late or falls_ms < T_MS else Silence(falls_ms, stopped)
 
 
 @contextmanager

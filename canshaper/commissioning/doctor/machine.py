@@ -17,6 +17,8 @@ from canshaper.commissioning.doctor.finding import Finding, Level
 QUICK_CLOCKS = frozenset(
     ("tsc", "arch_sys_counter", "kvm-clock", "hyperv_clocksource_tsc_page", "timebase")
 )
+# Of systemd: all ways into a suspend need sleep.target.
+MASK_SLEEP = "sudo systemctl mask sleep.target"
 # A processor that takes longer than this part of the tick to wake up is late by itself.
 WAKE_SHARE = 0.1
 
@@ -41,6 +43,7 @@ def machine_findings(tick_ms: int) -> list[Finding]:
         governor(root),
         idle_states(root, tick_ms),
         clock_source(root),
+        suspend(root),
         virtual(_virtualisation(), root),
         processors(root, number),
         others(os.getloadavg()[0], number),
@@ -177,6 +180,22 @@ def clock_source(root: Path) -> Finding:
         remedy = f"boot with clocksource={better[0]}, unless the kernel's log calls it unstable"
         return Finding("clock source", Level.WARNING, f"{name}, which is slow to read", remedy)
     return Finding("clock source", Level.NOTE, name)
+
+
+def suspend(root: Path) -> Finding:
+    """Whether the machine can be suspended: by its lid, a key, a desktop that finds it idle."""
+    states = _read(root / "sys/power/state")
+    if not states:
+        return Finding("suspend", Level.OK, "the kernel offers none")
+    target = root / "etc/systemd/system/sleep.target"
+    if target.is_symlink() and target.readlink() == Path("/dev/null"):
+        return Finding("suspend", Level.OK, "sleep.target is masked")
+    files = [root / "etc/systemd/logind.conf"]
+    files += sorted((root / "etc/systemd/logind.conf.d").glob("*.conf"))
+    text = "\n".join(_read(file) or "" for file in files)
+    lines = re.findall(r"^\s*((?:HandleLidSwitch|IdleAction)=\S+)", text, re.MULTILINE)
+    set_to = ", ".join(lines) or "logind as it comes: the lid suspends"
+    return Finding("suspend", Level.WARNING, f"possible ({states}); {set_to}", MASK_SLEEP)
 
 
 def virtual(told: str | None, root: Path) -> Finding:
