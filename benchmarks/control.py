@@ -24,7 +24,7 @@ RANGES = {
     "axes.slew.filter.a1": (0.6, 0.75),
     "axes.slew.limits.max_pct": (50.0, 100.0),
     "axes.near_far.sway.length_m": (1.0, 1.5),
-    "axes.near_far.filter.a1": (0.6, 0.75),
+    "axes.near_far.filter.a1": (0.7, 0.75),
     "axes.near_far.limits.max_pct": (50.0, 100.0),
     "axes.lift.limits.max_pct": (50.0, 100.0),
 }

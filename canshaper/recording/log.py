@@ -32,7 +32,7 @@ LATEST_NS = LATEST_S * 1_000_000_000
 TELL_EVERY = 8192
 BUFFER_BYTES = 1 << 17
 # A log of candump packs 5 to 30 times; one that unpacks without end must not keep us.
-MOST_RATIO, RATIO_FROM_BYTES = 100, 16_000_000
+MOST_RATIO, RATIO_FROM_BYTES = 100, 2_000_000
 
 
 class LogFile:
