@@ -6,7 +6,7 @@ from pathlib import Path
 from cantools.database.can import Message
 
 from canshaper.can.canopen import EMERGENCY, HEARTBEAT, NMT
-from canshaper.can.codecs import AxisStatusCodec, IdentityCodec, ServiceStatusCodec
+from canshaper.can.codecs import AxisStatusCodec, IdentityCodec, Sender, ServiceStatusCodec
 from canshaper.can.database import Messages
 from canshaper.can.identity import Identity
 from canshaper.can.inputs import (
@@ -155,6 +155,12 @@ class Deployment:
         told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         others = (self.emergency_stop, self.grapple, self.feel, *told)
         return [*self.levers.values(), *(i for i in others if i)]
+
+    def senders(self) -> list[Sender]:
+        """Every message of the DBC files that we send, each once."""
+        valves = [axis.valve.message.sender for axis in self.axes.values()]
+        statuses = [status.sender for status in self._statuses()]
+        return list({sender.key: sender for sender in (*valves, *statuses)}.values())
 
     def sent_groups(self, bus: str) -> set[int]:
         """Groups of J1939 that command a valve of ours, from whatever address they come.

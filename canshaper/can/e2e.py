@@ -27,6 +27,13 @@ class E2e:
     counts: int
     bits = 12
 
+    def __eq__(self, other: object) -> bool:
+        """Whether that is the same profile with the same data ID."""
+        return type(other) is type(self) and vars(other) == vars(self)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
     def right(self, data: bytes) -> bool:
         """Whether a frame of two bytes or more has the header that it should."""
         count = data[1] & COUNTER

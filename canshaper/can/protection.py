@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import reduce
 from operator import xor
-from typing import Any
+from typing import Any, Self
 
 from canshaper.can.crc8 import AUTOSAR, SAE_J1850
 from canshaper.can.e2e import COUNTER, E2e
@@ -76,6 +76,11 @@ class Protector:
         self._encode = layout.encode
         self._count = 0
 
+    def copy_state(self, before: Self) -> None:
+        """Continue the counter of the same message, where it is the same counter."""
+        if (self._counter, self._counts) == (before._counter, before._counts):
+            self._count = before._count
+
     def protect(self, raw: dict[str, Any]) -> bytes:
         """The next frame.
 
@@ -117,6 +122,7 @@ class Guard:
     """
 
     def __init__(self, protection: Protection, max_step: int, qualify: int) -> None:
+        self._protection = protection
         self._range = protection.counts
         self._max_step = max_step
         self._check = protection.check
@@ -126,6 +132,12 @@ class Guard:
         self._anew = True
         self._good = 0
         self.qualified = False
+
+    def copy_state(self, before: Self) -> None:
+        """Continue the sequence of the same message, where its protection is the same."""
+        if self._protection == before._protection:
+            self._last, self._anew, self._good = before._last, before._anew, before._good
+            self.qualified = self._good >= self._qualify
 
     def begin_anew(self) -> None:
         """The sender was silent: its next counter may be any but the last one."""

@@ -14,7 +14,7 @@ from canshaper.can.j1939 import group_of
 from canshaper.recording.frames import CutOffError, LogError, TimedFrame
 from canshaper.recording.log import LogFile
 from canshaper.recording.sorting import Key, Kind, Sorter, bus_of_channel
-from canshaper.recording.stepper import Difference, Result, Stepper, count_of, senders
+from canshaper.recording.stepper import Difference, Result, Stepper, count_of
 from canshaper.recording.ticks import Recovery, Sorted, Tick, clocked
 from canshaper.recording.verify import Verifier
 from canshaper.service.controller import Controller
@@ -132,7 +132,7 @@ def _recovery(deployment: Deployment) -> Callable[[], Recovery]:
     if deployment.status:
         periods[deployment.status.sender.key] = deployment.status_ticks
     neutral = Controller(deployment).neutral_frames()
-    sender = next(one for one in senders(deployment) if one.key == marker)
+    sender = next(one for one in deployment.senders() if one.key == marker)
     return partial(
         Recovery,
         deployment.config.tick_ms * 1_000_000,

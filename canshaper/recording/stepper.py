@@ -157,7 +157,7 @@ class Stepper:
             raw = status.sender.fields.layout.decode(data)
             counters.values = {name: int(raw[name]) for name in counters.values}
             counters.last_fault = FrameFault(raw["LastFault"])
-        for sender in senders(self.deployment):
+        for sender in self.deployment.senders():
             if data := first.get(sender.key):
                 _count_to(sender, data)
 
@@ -259,18 +259,6 @@ class Stepper:
     def align(self) -> None:
         """After a difference that stays: begin to compare anew with the next tick."""
         self._waiting = {}
-
-
-def senders(deployment: Deployment) -> list[Sender]:
-    """Every message with its own counter that a daemon sends, each once."""
-    found: dict[Key, Sender] = {}
-    for axis in deployment.axes.values():
-        for one in (axis.valve.message, axis.status):
-            if one is not None:
-                found[one.sender.key] = one.sender
-    if deployment.status:
-        found[deployment.status.sender.key] = deployment.status.sender
-    return list(found.values())
 
 
 def _row_of(controller: Controller, runner: AxisRunner) -> Callable[[], Row]:

@@ -117,6 +117,8 @@ class Recovery:
         self._neutral = neutral
         self._count = count
         self._periods = periods
+        # Those that are not in every tick.
+        self._statuses = {key for key, period in periods.items() if period > 1}
         self._kept = max(LEAST_HELD, *(4 * period for period in periods.values()), 0)
         self._held: list[Tick] | None = None  # the first of a daemon, until its grid is known
         self._last: Tick | None = None
@@ -142,7 +144,7 @@ class Recovery:
                 yield from self._end()
                 head = burst
                 continue
-            if self._extra is not None and self._begins_to_count(burst):
+            if self._extra is not None and self._loop_begins(burst):
                 yield from self._end()  # its files were read again
                 burst.starts = burst.reloaded = True
             before = burst
@@ -204,10 +206,13 @@ class Recovery:
         ended = self._extra is not None and not reloaded
         return ended or passed_ns > RESTART_NS
 
-    def _begins_to_count(self, burst: Tick) -> bool:
-        if self._count is None:
-            return False  # cannot be told from going on
-        return self._count(self._marker_data(burst)) == self._count(self._neutral)
+    def _loop_begins(self, burst: Tick) -> bool:
+        """Whether a daemon that goes on counting has a new loop: its first tick sends all status.
+
+        Without a counter its neutral frames look like those of a start, see ``_is_first``.
+        """
+        sent = {frame[:3] for _, frame in burst.sent}
+        return bool(self._statuses) and self._statuses <= sent
 
     # -- numbers -------------------------------------------------------------------------------
 

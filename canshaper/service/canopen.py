@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from typing import Self
 
 from canshaper.can.canopen import (
     EMERGENCY,
@@ -45,7 +46,7 @@ class RemoteNode:
     Attributes:
         state: what it said last; None when nothing was heard of it, or for too long.
         emergency: its error code, 0 for none.
-        stops: how often it said another state than OPERATIONAL.
+        stops: how often it said another state than OPERATIONAL, or fell silent.
         alarms: how often it told an error.
     """
 
@@ -62,6 +63,8 @@ class RemoteNode:
         """Take a heartbeat; a node that boots has no emergency any more."""
         if len(data) != 1:
             return FrameFault.WRONG_LENGTH
+        if self.state is not None and arrived_ns - self._heard_ns > self._timeout_ns:
+            self.stops += 1  # it was lost, though no tick has seen that
         self.state = data[0] & STATE_MASK
         self._heard_ns = arrived_ns
         if self.state != NodeState.OPERATIONAL:
@@ -93,7 +96,17 @@ class RemoteNode:
         if self.state is None or now_ns - self._heard_ns <= self._timeout_ns:
             return False
         self.state = None
+        self.stops += 1  # an axis with a slow valve may not be asked before it is back
         return True
+
+    def forget(self) -> None:
+        """Its state counts no more; an error that it reported does until it reports its end."""
+        self.state = None
+
+    def copy_state(self, before: Self) -> None:
+        """What the same node said last, and when."""
+        self.state, self.emergency = before.state, before.emergency
+        self._heard_ns, self._start_ns = before._heard_ns, before._start_ns
 
     def to_start(self, now_ns: int) -> bool:
         """Whether it is to be started now."""
@@ -140,24 +153,31 @@ class NodeGate:
 class _Heard:
     """One kind of message of another node."""
 
-    def __init__(self, take: Callable[[bytes, int], FrameFault]) -> None:
+    def __init__(self, node: RemoteNode, take: Callable[[bytes, int], FrameFault]) -> None:
+        self._node = node
         self.receive = take
 
     def forget(self) -> None:
-        """A heartbeat that is old is lost by its own time."""
+        """Nothing good received so far counts any more."""
+        self._node.forget()
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with what the same node said."""
+        self._node.copy_state(before._node)
 
 
 class CanopenBus:
     """All that CANopen asks of us on one bus.
 
     Attributes:
+        own: our node id.
         nodes: the other nodes, by name.
         inputs: what takes their messages, by id.
     """
 
     def __init__(self, bus: str, config: Canopen) -> None:
         self._bus = bus
-        self._own = config.node
+        self.own = config.node
         self._cycle_ns = config.heartbeat_ms * 1_000_000
         self._due_ns = 0
         self._booted = False
@@ -166,18 +186,22 @@ class CanopenBus:
         self._told: dict[str, str] = {}
         self.inputs: dict[int, _Heard] = {}
         for node in self.nodes.values():
-            self.inputs[HEARTBEAT + node.id] = _Heard(node.heartbeat)
-            self.inputs[EMERGENCY + node.id] = _Heard(node.alarm)
+            self.inputs[HEARTBEAT + node.id] = _Heard(node, node.heartbeat)
+            self.inputs[EMERGENCY + node.id] = _Heard(node, node.alarm)
+
+    def copy_state(self, before: Self) -> None:
+        """Continue our heartbeat: a reload is no start of our node."""
+        self._booted, self._due_ns = before._booted, before._due_ns
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
         """What is due now: our boot-up message or heartbeat, and commands to start."""
         if not self._booted:
             self._booted, self._due_ns = True, now_ns + self._cycle_ns
-            yield Frame(self._bus, HEARTBEAT + self._own, False, BOOT_UP)
+            yield Frame(self._bus, HEARTBEAT + self.own, False, BOOT_UP)
         elif now_ns >= self._due_ns:
             # From the time it was due, so that lateness does not add up; but never in a burst.
             self._due_ns = max(self._due_ns + self._cycle_ns, now_ns)
-            yield Frame(self._bus, HEARTBEAT + self._own, False, OPERATIONAL)
+            yield Frame(self._bus, HEARTBEAT + self.own, False, OPERATIONAL)
         if self._master:
             for node in self.nodes.values():
                 if node.to_start(now_ns):

@@ -6,6 +6,7 @@ begins; the lower NAME wins. Who has lost says so once, and sends nothing more.
 
 from collections.abc import Iterator
 from enum import Enum
+from typing import Self
 
 from canshaper.can.frame import Frame
 from canshaper.can.j1939 import (
@@ -84,6 +85,15 @@ class AddressClaim:
     def sends(self) -> bool:
         """Whether messages may be sent under our address."""
         return self.state is ClaimState.CLAIMED
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with the same address and NAME; of a lost one a reload is the way back."""
+        if before.state is ClaimState.LOST:
+            return
+        self.state, self.requested = before.state, set(before.requested)
+        self._asking, self._ask = before._asking, before._ask
+        self._due_ns, self._until_ns = before._due_ns, before._until_ns
+        self._again_ns, self._refused = before._again_ns, list(before._refused)
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         """Take a claim or a request of another node; never one of ours, seen back."""

@@ -11,19 +11,21 @@ from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.inputs import BoundInput
 from canshaper.can.valve import ValveMessage
 from canshaper.service.canopen import canopen_buses
+from canshaper.service.carry_over import Key, Part, carry_over
 from canshaper.service.counters import Counters
 from canshaper.service.events import Event, FeedbackEvent, Told
 from canshaper.service.feedback import Feedback, Following
-from canshaper.service.groups import Taken
+from canshaper.service.groups import Received
 from canshaper.service.input import EmergencyStopInput, Input
 from canshaper.service.lever import LeverInput
 from canshaper.service.line import Line
 from canshaper.service.network import Network
+from canshaper.service.parts import parts
 from canshaper.service.radius import RadiusInput
 from canshaper.service.runner import AxisRunner, Compensator
 from canshaper.service.sets import SetChooser
 from canshaper.service.value import ValueInput
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import Reason
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
 # than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
@@ -52,7 +54,7 @@ class Controller:
         self.events: list[Told] = []
         levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
         self.levers = levers
-        taken: list[tuple[BoundInput, Taken]] = [
+        taken: list[tuple[BoundInput, Received]] = [
             (lever, levers[name]) for name, lever in deployment.levers.items()
         ]
         self._stop: EmergencyStopInput | None = None
@@ -75,7 +77,7 @@ class Controller:
             for runner in self.axes.values()
             if runner.bound.status_word and runner.control
         ]
-        self._inputs: dict[tuple[str, int, bool], Taken] = {
+        self._inputs: dict[tuple[str, int, bool], Received] = {
             key: one for bound, one in taken if not bound.any_source for key in bound.keys
         }
         self._sent = {
@@ -117,14 +119,24 @@ class Controller:
         self.moves = False
 
     def follow(self, before: "Controller") -> None:
-        """Keep latched what was latched in the controller that ran before: a reload is no reset.
+        """Continue where the controller that ran before a reload has ended.
 
-        Of a lost address it is the way back.
+        What is latched, what other nodes reported and every alive counter stay as they are. A bus
+        that was opened again was not listened to: nothing good that is known of it counts.
         """
-        for name in self.axes.keys() & before.axes.keys():
-            old, axis = before.axes[name].axis, self.axes[name].axis
-            if old.state is State.TRIPPED and old.reason is not Reason.ADDRESS_LOST:
-                axis.state, axis.reason = old.state, old.reason
+        self._late, self._overrun = before._late, before._overrun
+        if before._stop is not None:
+            for runner in before.axes.values():
+                runner.see(before._stop)
+        carry_over(before._parts(), self._parts())
+        open_before = before.deployment.config.buses.values()
+        for name, bus in self.deployment.config.buses.items():
+            if bus not in open_before:
+                self._forget(name)
+                self._network.unheard(name)
+
+    def _parts(self) -> dict[Key, Part]:
+        return parts(self.deployment, self._inputs, self.axes, self._canopen, self._network)
 
     @property
     def neutral(self) -> bool:
@@ -147,10 +159,6 @@ class Controller:
         Returns:
             What it leaves as on the other bus of a gateway, to be sent at once.
         """
-        if self._stood_still:
-            if self._stop is not None:
-                self._stop.waited(frame, arrived_ns)
-            return None
         key = frame[:3]
         entry = self._inputs.get(key)
         if entry is not None:
@@ -173,6 +181,8 @@ class Controller:
         """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
         for line in self._lines.values():
             if line.news():
+                if self._stood_still:  # what has waited is not passed on later either
+                    return None
                 stopped = self._stop is not None and self._stop.stops(arrived_ns)
                 passed = line.pass_on(frame.data, arrived_ns, stopped=stopped)
                 self.moves = line.moved
@@ -203,9 +213,10 @@ class Controller:
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
-        self._stood_still = self.moves = False
-        if missed:
-            self.counters.add(FrameFault.MISSED_DEADLINE, missed)
+        self.moves = False
+        if self._stood_still:
+            self._stood_still = False
+            self._forget()
         overrun = self._overruns(missed) if missed or self._late else False
         changed = []
         silent = self.silent_buses
@@ -286,6 +297,7 @@ class Controller:
         Asked while that is not paid back, and when a tick was late.
         """
         if missed:
+            self.counters.add(FrameFault.MISSED_DEADLINE, missed)
             self._late = min(self._late + LATE_WEIGHT, LATE_LIMIT)
             self._overrun |= self._late == LATE_LIMIT
         else:
@@ -294,19 +306,24 @@ class Controller:
         return self._overrun
 
     def stalled(self) -> None:
-        """The loop stood still for longer than any input may be old: nothing known still holds.
+        """The loop stood still for longer than any input may be old: nothing good still holds.
 
-        Nor does what comes before the next tick, which has waited in the sockets; of that only an
-        emergency stop counts.
+        Nor does what comes before the next tick, which has waited in the sockets: that tick forgets
+        it. Bad news among it counts like any other, though it may be over by now.
         """
         self._stood_still = True
-        for entry in self._inputs.values():
-            entry.forget()
         self._network.stalled()
         for runner in self.axes.values():
             runner.lost = True
             if not runner.axis.neutral:
                 runner.trip = Reason.LOOP_STALLED
+
+    def _forget(self, bus: str | None = None) -> None:
+        """Every input has to come again before it counts: those of one bus, or all."""
+        for (where, _, _), entry in self._inputs.items():
+            if bus in (None, where):
+                entry.forget()
+        self._network.forget(bus)
 
     def unheard(self, bus: str) -> None:
         """We are not on a bus now: what was said there about addresses we have not heard."""

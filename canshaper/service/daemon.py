@@ -3,7 +3,7 @@
 import logging
 import signal
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from types import FrameType
 from typing import Any
 
@@ -19,7 +19,13 @@ from canshaper.service.gateway import InLine
 from canshaper.service.guarded import Guarded
 from canshaper.service.loop import run_at_deadlines
 from canshaper.service.notify import ServiceManager
-from canshaper.service.ports import close_ports, new_ports, open_ports, pass_over
+from canshaper.service.ports import (
+    close_ports,
+    new_ports,
+    open_ports,
+    received_at_first,
+    waiting,
+)
 from canshaper.service.reading import Reading
 from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.service.standstill import Standstill
@@ -263,9 +269,12 @@ class Daemon:
             self._refuse(str(error))
             return False
         self._send_neutral()
-        close_ports(port for port in opened.values() if port not in ports.values())
-        if new := new_ports(ports, opened):
-            pass_over(new)
+        closed = [port for port in opened.values() if port not in ports.values()]
+        if closed:
+            self._read(waiting(closed))
+            close_ports(closed)
+        new = new_ports(ports, opened)
+        waited = received_at_first(new, deployment) if new else []
         for name, port in ports.items():
             port.watch(name, deployment.ids(name))
         self._ports = ports
@@ -275,6 +284,8 @@ class Daemon:
         if self._control:
             self._control.close()
         self._use(deployment, before=self._controller)
+        if new:
+            self._read(waited)
         self._standstill = Standstill(deployment, before=self._standstill)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
@@ -283,6 +294,13 @@ class Daemon:
         self._told_ns = boottime_ns() + SECOND_NS
         self._collector.freeze()
         return True
+
+    def _read(self, waited: Iterable[Frame]) -> None:
+        """Frames of a bus that is opened again: old by now, but bad news among them counts."""
+        self._controller.stalled()
+        now_ns = boottime_ns()
+        for frame in waited:
+            self._controller.receive(frame, now_ns)
 
     def _refuse(self, why: str) -> None:
         """Tell why a reload changes nothing."""

@@ -4,7 +4,7 @@ One fault fits into one frame, more of them are sent by the broadcast of SAE J19
 """
 
 from collections.abc import Iterator, Sequence
-from typing import NamedTuple
+from typing import NamedTuple, Self
 
 from canshaper.can.frame import Frame
 from canshaper.can.j1939 import (
@@ -94,6 +94,13 @@ class ActiveFaults:
         self._change_ns = 0
         self._packets: list[bytes] = []
         self._packet_ns = 0
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with the same faults: how often they came, and a broadcast under way."""
+        self._active, self._told = set(before._active), set(before._told)
+        self._count, self._packets = dict(before._count), list(before._packets)
+        self._next_ns, self._change_ns = before._next_ns, before._change_ns
+        self._packet_ns = before._packet_ns
 
     def frames(
         self, active: Sequence[tuple[int, int]], now_ns: int, *, requested: bool = False

@@ -3,6 +3,7 @@
 import math
 from collections import deque
 from enum import Enum
+from typing import Self
 
 from canshaper.can.inputs import BoundFeedback
 from canshaper.can.signals import find_signal
@@ -67,6 +68,11 @@ class Feedback(ValueInput):
             high = max(self._commands) + self._tolerance
             self.following = Following.YES if low <= self.part <= high else Following.NO
         return self.following is not before
+
+    def copy_state(self, before: Self) -> None:
+        """A valve that does not follow is still reported until its feedback says otherwise."""
+        super().copy_state(before)
+        self.following = before.following
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""

@@ -2,10 +2,11 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Protocol, Self
 
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.j1939 import GLOBAL
+from canshaper.service.carry_over import Part
 from canshaper.service.runner import AxisRunner
 
 
@@ -17,6 +18,10 @@ class Taken(Protocol):
 
     def forget(self) -> None:
         """Nothing received so far counts any more."""
+
+
+class Received(Taken, Part, Protocol):
+    """An input of a controller."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +91,11 @@ class AnySource:
     def forget(self) -> None:
         """Nothing received so far counts any more."""
         self._input.forget()
+
+    def copy_state(self, before: Self) -> None:
+        """The address that counted still does; another one has to wait for its silence."""
+        self._source, self._heard_ns = before._source, before._heard_ns
+        self._ignored = set(before._ignored)
 
     def _other(self, source: int, taken: int) -> FrameFault:
         if source not in self._ignored:

@@ -1,10 +1,10 @@
 """A message that is taken: is it whole, right, in sequence, and still fresh?"""
 
 from abc import ABC, abstractmethod
-from typing import Any
+from typing import Any, Self
 
 from canshaper.can.codecs import WrongLengthError
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
@@ -80,6 +80,11 @@ class Input(ABC):
         """Nothing received so far counts any more."""
         self._received_ns = self._heard_ns = None
 
+    def copy_state(self, before: Self) -> None:
+        """Continue the sequence of the same message; its values have to come again to count."""
+        self._guard.copy_state(before._guard)
+        self._heard_ns, self._refused_ns = before._heard_ns, before._refused_ns
+
     def lost(self, now_ns: int) -> Reason | None:
         """Why nothing is known now; None while the last good frame is fresh."""
         if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
@@ -99,7 +104,6 @@ class EmergencyStopInput(Input):
     def __init__(self, bound: BoundInput, signal: str) -> None:
         super().__init__(bound)
         self._signal = signal
-        self._keys = frozenset(bound.keys)
         self.presses = 0
         self._pressed = False
 
@@ -118,14 +122,10 @@ class EmergencyStopInput(Input):
             self._pressed = False
         return GOOD
 
-    def waited(self, frame: Frame, arrived_ns: int) -> None:
-        """Look at any frame that waited while the loop stood still.
-
-        Only a press counts of it, for that one has to be reset though it may be over by now.
-        """
-        if frame[:3] in self._keys:
-            self.receive(frame.data, arrived_ns)
-            self.forget()
+    def copy_state(self, before: Self) -> None:
+        """A stop that is pressed stays so until a frame that counts says otherwise."""
+        super().copy_state(before)
+        self._pressed = before._pressed
 
     def stops(self, now_ns: int) -> bool:
         """Whether nothing may move now: it is pressed, or not heard."""

@@ -1,6 +1,6 @@
 """What is known of one lever now: its last good frame, and what an axis may use of it."""
 
-from typing import Any
+from typing import Any, Self
 
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundLever
@@ -64,6 +64,11 @@ class LeverInput(Input):
             if type(command) is Reason:
                 valid = False
         return GOOD if valid else FrameFault.INVALID_SIGNAL
+
+    def copy_state(self, before: Self) -> None:
+        """An enable that is released stays so until a frame that counts says otherwise."""
+        super().copy_state(before)
+        self._released = before._released
 
     def stick(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float

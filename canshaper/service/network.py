@@ -6,16 +6,17 @@ from dataclasses import dataclass
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import Frame
 from canshaper.can.inputs import BoundInput, BoundLever
-from canshaper.can.j1939 import CLAIMED, group_of, pgn_of
+from canshaper.can.j1939 import CLAIMED, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
+from canshaper.service.carry_over import Key, Part
 from canshaper.service.claim import ClaimState
 from canshaper.service.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.service.feedback import Following
 from canshaper.service.groups import (
     AnySource,
     CommandedByOthers,
+    Received,
     SourceEvent,
-    Taken,
     TakenGroup,
 )
 from canshaper.service.node import GROUPS, Node
@@ -52,7 +53,7 @@ class Network:
         self,
         deployment: Deployment,
         axes: Mapping[str, AxisRunner],
-        taken: Sequence[tuple[BoundInput, Taken]],
+        taken: Sequence[tuple[BoundInput, Received]],
     ) -> None:
         buses = deployment.config.buses
         self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
@@ -65,7 +66,7 @@ class Network:
         }
         self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
         self._groups: dict[tuple[str, int], Node | TakenGroup | CommandedByOthers] = {}
-        self._any: list[AnySource] = []
+        self._any: dict[tuple[str, int], tuple[AnySource, Part]] = {}
         for bus, node in self.nodes.items():
             self._groups |= {(bus, group): node for group in GROUPS}
             there = [
@@ -83,7 +84,7 @@ class Network:
             if bound.by_group:
                 self._take(bound, one)
 
-    def _take(self, bound: BoundInput, one: Taken) -> None:
+    def _take(self, bound: BoundInput, one: Received) -> None:
         bus, can_id = bound.config.bus, bound.key[1]
         entry = self._groups.get((bus, group_of(can_id)))
         if not isinstance(entry, TakenGroup):
@@ -97,7 +98,7 @@ class Network:
         moved = [r for r in self._axes.values() if r.bound.config.stick.lever == name]
         timeout_ns = bound.config.timeout_ms * 1_000_000
         entry.rest = AnySource(bus, bound.message.name, one, timeout_ns, moved)
-        self._any.append(entry.rest)
+        self._any[bus, group_of(can_id)] = entry.rest, one
 
     def entry(self, bus: str, can_id: int) -> Node | TakenGroup | CommandedByOthers | None:
         """Who takes a message, by its group."""
@@ -120,7 +121,7 @@ class Network:
             if node.state is not self._told[bus]:
                 self._told[bus] = node.state
                 yield AddressEvent(bus, self._configs[bus].address, node.state)
-        for one in self._any:
+        for one, _ in self._any.values():
             yield from one.events
             one.events.clear()
 
@@ -135,11 +136,28 @@ class Network:
             node.unheard()
 
     def stalled(self) -> None:
-        """Nothing that was received so far counts any more, and claims were missed on all buses."""
+        """Claims were missed on all buses."""
         for node in self.nodes.values():
             node.unheard()
-        for one in self._any:
-            one.forget()
+
+    def forget(self, bus: str | None = None) -> None:
+        """Of inputs from any address nothing received so far counts; of one bus, or of all."""
+        for (where, _), (one, _) in self._any.items():
+            if bus in (None, where):
+                one.forget()
+
+    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+        """What a reload carries over, see ``parts``; ``places`` is what the buses are, by name."""
+        for (bus, group), (source, received) in self._any.items():
+            yield ("source", *places[bus], group), source
+            yield ("input", *places[bus], group), received
+        for bus, node in self.nodes.items():
+            config = self._configs[bus]
+            key = (*places[bus], config.address, name_bytes(config.name))
+            yield ("node", *key), node
+            axes = [n for n, r in self._axes.items() if r.bound.config.valve.bus == bus]
+            # By their place among the axes; with others a number would be that of another fault.
+            yield ("faults", *key, config.first_spn, *self._axes, *axes), node.faults
 
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
         """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""

@@ -1,6 +1,7 @@
 """Our node on a bus of J1939: what it takes, and what it sends besides commands and status."""
 
 from collections.abc import Iterator, Sequence
+from typing import Self
 
 from canshaper.can.frame import Frame, FrameFault
 from canshaper.can.j1939 import CLAIMED, DM1, REQUEST
@@ -24,6 +25,7 @@ class Node:
 
     Attributes:
         state: of our address.
+        faults: sends our active faults.
     """
 
     def __init__(
@@ -37,7 +39,7 @@ class Node:
         answered = frozenset(() if guest else (DM1,))
         self._claim = AddressClaim(bus, config, answered, cyclic, guest=guest)
         self._guest = guest
-        self._faults = ActiveFaults(bus, config.address)
+        self.faults = ActiveFaults(bus, config.address)
 
     @property
     def state(self) -> ClaimState:
@@ -67,9 +69,9 @@ class Node:
         if self._claim.sends:
             requested = DM1 in self._claim.requested
             self._claim.requested.clear()
-            yield from self._faults.frames(active, now_ns, requested=requested)
+            yield from self.faults.frames(active, now_ns, requested=requested)
         else:
-            self._faults.interrupt()
+            self.faults.interrupt()
 
     def send_failed(self, *, claim: bool) -> None:
         """A frame did not reach the bus; one that was a claim is no claim."""
@@ -77,6 +79,10 @@ class Node:
             self._claim.not_sent()
         else:
             self._claim.repeat()
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with the same address and NAME."""
+        self._claim.copy_state(before._claim)
 
     def unheard(self) -> None:
         """Claims of others were missed."""

@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 
 from canshaper.can.bus import BusError, ListeningPort, Port, WrongBusError, open_port
 from canshaper.can.deployment import Deployment
-from canshaper.can.frame import FrameFault
+from canshaper.can.frame import Frame, FrameFault
 from canshaper.config.bus import Bus
 
 # Until what was sent last has left a queue of some frames, also on a bus with other traffic.
@@ -46,15 +46,24 @@ def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Por
     return [port for port in ports.values() if port not in opened.values()]
 
 
-def pass_over(new: Iterable[Port]) -> None:
-    """Throw away what new ports hear at first: what we have sent last from those before them.
+def waiting(ports: Iterable[Port]) -> list[Frame]:
+    """What waits in ports that are about to be closed."""
+    return [frame for port in ports for frame in (*port.frames(), *port.others())]
+
+
+def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame]:
+    """What new ports receive at first, without what we send: that is our own from the ports before.
 
     They cannot know it for ours, and it would look like a second sender of every valve's id.
     """
     time.sleep(ON_THE_BUS_S)
-    for port in new:
-        for _ in (*port.frames(), *port.others()):
-            pass
+    ours = {port.name: deployment.ids(port.name) for port in new}
+    return [
+        frame
+        for port in new
+        for frame in (*port.frames(), *port.others())
+        if frame[1:3] not in ours[port.name].sent | ours[port.name].claims
+    ]
 
 
 def close_ports(ports: Iterable[Port]) -> None:

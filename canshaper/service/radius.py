@@ -1,5 +1,7 @@
 """Radius of the tip for the radial compensation: fixed, or measured by a CAN signal."""
 
+from typing import Self
+
 from canshaper.can.deployment import BoundRadial
 from canshaper.can.frame import FrameFault
 from canshaper.can.inputs import BoundRadius
@@ -24,6 +26,12 @@ class RadiusInput:
         """Nothing received so far counts any more."""
         if self._measured is not None:
             self._measured.forget()
+
+    def copy_state(self, before: Self) -> None:
+        """Continue the sequence of the same message."""
+        assert self._measured is not None  # only a measured one is received
+        assert before._measured is not None
+        self._measured.copy_state(before._measured)
 
     def circle_m(self, now_ns: int, tip_share: float) -> float | None:
         """Radius on which the grapple runs, m; None while a measured radius is lost.

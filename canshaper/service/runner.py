@@ -3,7 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Protocol
+from typing import Protocol, Self
 
 from canshaper.can.deployment import BoundAxis
 from canshaper.can.frame import Frame
@@ -103,6 +103,22 @@ class AxisRunner:
         """Another sender has sent the id of this valve: neutral at once, however long ago."""
         self.trip = self.trip or Reason.SECOND_SENDER
         self.contested_ns = arrived_ns
+
+    def see(self, emergency: EmergencyStopInput) -> None:
+        """Trip for a press that came since the last tick, though it may be over by now."""
+        if emergency.presses != self._presses:
+            self.trip = self.trip or Reason.EMERGENCY_STOP
+
+    def copy_state(self, before: Self) -> None:
+        """Stay latched, and trip for what the same axis has not acted on: a reload is no reset.
+
+        Of a lost address it is the way back.
+        """
+        latched = before.axis
+        if latched.state is State.TRIPPED and latched.reason is not Reason.ADDRESS_LOST:
+            self.axis.state, self.axis.reason = latched.state, latched.reason
+        self.trip = before.trip or self.trip
+        self.contested_ns = before.contested_ns or self.contested_ns
 
     def replace_lever(self, lever: StickSource) -> None:
         """Take the stick from somewhere else."""

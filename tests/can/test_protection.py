@@ -7,8 +7,9 @@ from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.can.e2e import Profile1, Profile2
 from canshaper.can.frame import FrameFault
-from canshaper.can.protection import CHECKSUMS, Checksum, Guard, Protection
+from canshaper.can.protection import CHECKSUMS, Checksum, Guard, Protection, Protector
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
@@ -245,3 +246,85 @@ def test_what_is_used_is_always_the_end_of_a_row(
         row = [*row, count] if follows else []
         assert judge.qualified is (len(row) >= qualify)
         last, rested = count, False
+
+
+# -- from one deployment to the next ---------------------------------------------------------------
+
+SAME = Protection("C", 16, Checksum("xor", 0))
+
+
+@pytest.mark.parametrize(
+    ("after", "good"),
+    [
+        (SAME, False),
+        (Protection("D", 16, Checksum("xor", 0)), True),
+        (Protection("C", 32, Checksum("xor", 0)), True),
+        (Protection("C", 16, Checksum("sum", 0)), True),
+    ],
+)
+def test_a_sequence_goes_on_where_its_protection_is_the_same(after: Protection, good: bool) -> None:
+    """After counter 5 comes 5 again: with another protection that is a first frame."""
+    before, judge = Guard(SAME, 3, 1), Guard(after, 3, 1)
+    assert before.judge(b"\0\0", 5) is FrameFault.NONE
+    judge.copy_state(before)
+    assert judge.qualified is not good
+    found = judge.judge(b"\0\0", 5)
+    assert found is (FrameFault.NONE if good else FrameFault.COUNTER_REPEATED)
+
+
+def test_a_jump_from_one_deployment_to_the_next_is_one() -> None:
+    before, judge = Guard(SAME, 3, 1), Guard(SAME, 3, 1)
+    before.judge(b"\0\0", 5)
+    judge.copy_state(before)
+    assert judge.judge(b"\0\0", 9) is FrameFault.COUNTER_JUMP
+
+
+def test_frames_in_a_row_count_on_up_to_the_number_that_is_asked_for_now() -> None:
+    before = Guard(SAME, 3, 2)
+    for count in (1, 2):
+        before.judge(b"\0\0", count)
+    assert before.qualified
+    judge = Guard(SAME, 3, 3)
+    judge.copy_state(before)
+    assert not judge.qualified
+    assert judge.judge(b"\0\0", 3) is FrameFault.NONE
+    assert judge.qualified
+
+
+@pytest.mark.parametrize(
+    ("after", "next_count"),
+    [
+        (SAME, 4),
+        (Protection("C", 16, Checksum("sum", 0)), 4),  # receivers look at the counter alone
+        (Protection("D", 16, Checksum("xor", 0)), 1),
+        (Protection("C", 4, Checksum("xor", 0)), 1),
+    ],
+)
+def test_a_counter_that_we_send_goes_on_where_it_is_the_same(
+    after: Protection, next_count: int
+) -> None:
+    raw = {"C": 0, "D": 0}
+    first, second = (Protector(p, Encoded()) for p in (SAME, after))  # type: ignore[arg-type]
+    for _ in range(3):
+        first.unsealed(raw)
+    second.copy_state(first)
+    raw = {"C": 0, "D": 0}
+    second.unsealed(raw)
+    assert max(raw.values()) == next_count
+
+
+class Encoded:
+    """A layout that nobody looks at."""
+
+    def encode(self, _raw: dict[str, Any]) -> bytes:
+        return b""
+
+
+def test_two_profiles_are_the_same_with_the_same_data_id_only() -> None:
+    same = Profile1(0x123, "both"), Profile1(0x123, "both")
+    assert same[0] == same[1]
+    assert hash(same[0]) == hash(same[1])
+    ids = tuple(range(16))
+    others = Profile1(0x124, "both"), Profile1(0x123, "low"), Profile2(ids)
+    assert all(same[0] != other for other in others)
+    assert Profile2(ids) == Profile2(ids) != Profile2(ids[::-1])

@@ -277,6 +277,7 @@ class Judge:
             self._inputs[self.stop.source.key] = self.stop
         self._presses = 0
         self._stood_still = False
+        self._before: dict[str, tuple[int, dict[str, int]]] = {}
         self.axes = {n: AxisJudge(a, self.heard[a.lever.name]) for n, a in machine.axes.items()}
         self._by_valve = {a.axis.valve_key: a for a in self.axes.values()}
         self._by_status = {a.axis.status_key: a for a in self.axes.values() if a.axis.status_key}
@@ -298,11 +299,6 @@ class Judge:
         """A frame is on a bus."""
         key = frame[:3]
         machine = self.machine
-        if self._stood_still:  # it has waited: only a press of the emergency stop still counts
-            if self.stop and key == self.stop.source.key:
-                self.stop.hear(frame.data, now_ns)
-                self.stop.forget()
-            return
         if entry := self._inputs.get(key):
             fault = entry.hear(frame.data, now_ns)
         elif machine.radius and key == machine.radius[0]:
@@ -326,8 +322,7 @@ class Judge:
     def stalled(self) -> None:
         """The loop tells that it stood still."""
         self._stood_still = True
-        for entry in self._inputs.values():
-            entry.forget()
+        self._before = {n: (h.resets, dict(h.presses)) for n, h in self.heard.items()}
         for axis in self.axes.values():
             axis.causes.add(heard.LOOP_STALLED)
         self.stats["stalls"] += 1
@@ -348,7 +343,8 @@ class Judge:
         """
         last, now = self._last, self._last + 1 + missed
         self._last = now
-        self._stood_still = False
+        if self._stood_still:
+            self._forget()
         self.counts["MissedDeadlines"] += missed
         self.counts["SendFailures"] += len(failed)
         if missed:
@@ -381,6 +377,17 @@ class Judge:
         for frame in failed:
             if axis := self._by_valve.get(frame[:3]):
                 axis.causes.add(heard.SEND_FAILED)
+
+    def _forget(self) -> None:
+        """Of what waited while the loop stood still only a stop, a release or another sender count.
+
+        A press that came back with it does not: it may be over by now.
+        """
+        self._stood_still = False
+        for entry in self._inputs.values():
+            entry.forget()
+        for name, lever in self.heard.items():
+            lever.resets, lever.presses = self._before[name]
 
     def words(self) -> str:
         """What is allowed now, for a reader."""

@@ -1,6 +1,7 @@
 """The daemon on CANopen: joysticks, valves and their faults are those of the library canopen."""
 
 import shutil
+import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
@@ -30,7 +31,10 @@ PATIENCE = (
     ("heartbeat_ms: 500", "heartbeat_ms: 1500"),
 )
 DBC = cantools.database.load_file(ROOT / "dbc" / "canopen-cia401-cia408.dbc")
-SLEW_STATUS, SLEW_COMMAND, PROBE = 0x6A0, 0x220, 0x7FE
+SLEW_STATUS, LIFT_STATUS, SLEW_COMMAND, PROBE = 0x6A0, 0x6A2, 0x220, 0x7FE
+LEFT_STICK = 0x190
+# Frames of a joystick while the daemon is stopped: 1.2 s, twice as long as any input may be old.
+STOOD_FRAMES = 60
 
 
 @pytest.fixture
@@ -66,16 +70,16 @@ def until(accept: Callable[[], bool], what: str) -> None:
         time.sleep(0.01)
 
 
-def wait_state(state: str, reason: str | None = None) -> None:
-    """Until the status of slew says so."""
+def wait_state(state: str, reason: str | None = None, status: int = SLEW_STATUS) -> None:
+    """Until the status of an axis says so."""
     with open_bus("vcan0") as bus:
         last = None
         end = time.monotonic() + ANSWER_S
         while time.monotonic() < end:
             message = bus.recv(1.0)
-            if message is None or message.arbitration_id != SLEW_STATUS:
+            if message is None or message.arbitration_id != status:
                 continue
-            last = DBC.decode_message(SLEW_STATUS, message.data)
+            last = DBC.decode_message(status, message.data)
             if str(last["State"]) == state and reason in (None, str(last["Reason"])):
                 return
     raise AssertionError(f"no {state} {reason}, the last was {last}")
@@ -180,6 +184,44 @@ def test_an_emergency_in_motion_is_neutral_named_reset_and_on_again(
     assert all(point == 0 for _, _, point in after[1:again])
     assert FAULT_HOLD in [word for _, word, _ in after[:again]]
     assert machine.valves["slew"].words[-3:] == [FAULT_HOLD, HOLD, ACTIVE]
+
+
+def stand_still(daemon: Service, meanwhile: Callable[[], None]) -> None:
+    """Stop the daemon for longer than any input may be old; what is sent waits in its sockets."""
+    with open_bus("vcan0") as bus:
+        daemon.process.send_signal(signal.SIGSTOP)
+        meanwhile()
+        end, frames = time.monotonic() + ANSWER_S, 0
+        while frames < STOOD_FRAMES:
+            assert time.monotonic() < end, "the joystick sends"
+            message = bus.recv(1.0)
+            frames += message is not None and message.arbitration_id == LEFT_STICK
+        daemon.process.send_signal(signal.SIGCONT)
+
+
+def test_an_emergency_of_a_standstill_counts_until_it_is_over(
+    machine: Machine, daemon: Service
+) -> None:
+    """Though the valve follows: only its emergency message says that something is wrong."""
+    valve = machine.valves["slew"]
+    wait_state("READY")
+    stand_still(daemon, lambda: valve.node.emcy.send(FLOW_COMMAND_LATE, 0x81))
+    wait_state("NEUTRAL_WAIT", "NODE_FAULT")
+    wait_state("READY", status=LIFT_STATUS)
+    machine.levers["left"].x = 32767
+    wait_state("NEUTRAL_WAIT", "NODE_FAULT")
+    assert valve.spool == 0
+    machine.levers["left"].x = 0
+    valve.node.emcy.reset()
+    drive(machine)
+
+    def over() -> None:
+        valve.node.emcy.send(FLOW_COMMAND_LATE, 0x81)
+        valve.node.emcy.reset()
+
+    stand_still(daemon, over)
+    wait_state("TRIPPED", "LOOP_STALLED")
+    reset(machine)
 
 
 def test_a_lost_heartbeat_in_motion(machine: Machine, daemon: Service, tmp_path: Path) -> None:

@@ -66,6 +66,7 @@ class CanopenRig:
         self.deployment = load_deployment(path)
         self.controller = Controller(self.deployment)
         self.dbc: Any = cantools.database.load_file(ROOT / "dbc" / DBC_FILE)
+        self.bus = "crane"
         self.now_ns = 0
         self.valves = {axis: ValveNode() for axis in VALVES}
         self.states = dict.fromkeys(NODES, OPERATIONAL)
@@ -73,7 +74,7 @@ class CanopenRig:
         self.texts: list[str] = []
 
     def receive(self, can_id: int, data: bytes) -> None:
-        self.controller.receive(Frame("crane", can_id, False, data), self.now_ns)
+        self.controller.receive(Frame(self.bus, can_id, False, data), self.now_ns)
 
     def heartbeat(self, node: str, state: int) -> None:
         self.receive(0x700 + NODES[node], bytes((state,)))

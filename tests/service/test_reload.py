@@ -1,6 +1,7 @@
 """What a reload must not do: set anything going, forget a trip, or take ourselves for another."""
 
 import gc
+import logging
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -282,6 +283,41 @@ def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
     assert bench.told() == ("TRIPPED", "SECOND_SENDER")
 
 
+@pytest.mark.parametrize("late", [False, True])
+def test_what_waits_on_a_bus_that_is_opened_again_is_read(
+    bench: Bench, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, late: bool
+) -> None:
+    """An emergency message comes once: before the old port closes, or while the new one is new."""
+    caplog.set_level(logging.INFO, "canshaper")
+    text = (ROOT / "config" / "canopen-forwarder.yaml").read_text(encoding="utf-8")
+    bench.text = text.replace("../dbc", str(ROOT / "dbc"))
+    bench.file.write_text(bench.text, encoding="utf-8")
+    emergency = Frame("crane", 0xA0, False, bytes.fromhex("0380810000000000"))
+    sleep = bench.sleep
+
+    def opening(_channel: str) -> None:
+        if not late:
+            bench.put(emergency)
+
+    def sleeping(seconds: float) -> None:
+        sleep(seconds)
+        if late and seconds == service_ports.ON_THE_BUS_S:
+            bench.put(emergency)
+
+    def script(tick: int) -> None:
+        if tick == 9:
+            bench.opening = opening
+            bench.reload("bitrate: 250000", "bitrate: 500000")
+        if tick == 30:
+            bench.stop()
+
+    monkeypatch.setattr(bench, "sleep", sleeping)
+    bench.run(script)
+    assert len(bench.ports) == 2
+    (told,) = [text for text in caplog.messages if "emergency=0x8003" in text]
+    assert told == "bus=crane node=slew state=lost emergency=0x8003"
+
+
 # -- what was latched ------------------------------------------------------------------------------
 
 
@@ -343,6 +379,11 @@ def test_nothing_is_left_of_the_controller_before(kind: str) -> None:
     """Without the collector, which never looks through what was there at the start again."""
     deployment = load_deployment(ROOT / "config" / f"{kind}.yaml")
     controller = Controller(deployment)
+    for now_ns in range(0, 400_000_000, 20_000_000):
+        for _ in controller.tick(now_ns):
+            pass
+    after = Controller(load_deployment(deployment.path))
+    after.follow(controller)
     adjuster = Adjuster(controller)
     parts = [controller, deployment, *controller.axes.values()]
     gone = [weakref.ref(part) for part in parts]
@@ -350,6 +391,7 @@ def test_nothing_is_left_of_the_controller_before(kind: str) -> None:
     try:
         del controller, adjuster, deployment, parts
         assert [one() for one in gone] == [None] * len(gone)
+        assert after.neutral
     finally:
         gc.enable()
 
