@@ -2,7 +2,8 @@
 
 Both take the same two joystick frames from a bus and send four valve frames to it; the bus is
 python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,
-decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status.
+decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status; it
+is timed with the output guard in front of the bus, and without.
 Each is timed tick by tick, in turn, in one run; the ratio is the figure that counts.
 
     python benchmarks/tick.py [--ticks 5000]
@@ -24,6 +25,7 @@ from canshaper.can.frame import Frame
 from canshaper.cli.common import data_directory
 from canshaper.config.bus import Bus
 from canshaper.service.controller import Controller
+from canshaper.service.guarded import Guarded
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script
 
@@ -81,13 +83,14 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
     return body
 
 
-def daemon(controller: Controller, port: Port) -> Callable[[int], None]:
+def daemon(controller: Controller, port: Port, *, guard: bool) -> Callable[[int], None]:
     """What the daemon does in a tick."""
+    driven = Guarded(controller) if guard else controller
 
     def body(now_ns: int) -> None:
         for frame in port.frames():
-            controller.receive(frame, now_ns)
-        for frame in controller.tick(now_ns):
+            driven.receive(frame, now_ns)
+        for frame in driven.tick(now_ns):
             port.send(frame)
         controller.events.clear()
 
@@ -100,13 +103,18 @@ def main() -> None:
     parser.add_argument("--ticks", type=int, default=5000)
     ticks = parser.parse_args().ticks
     with tempfile.TemporaryDirectory() as directory:
-        deployment = four_axes(Path(directory))
+        deployment, other = (four_axes(Path(directory)) for _ in range(2))
     controller = Controller(deployment)
     levers = LeverNode(deployment, random_script(1, ticks * 0.02 + 1.0))
-    hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "bare")}
+    hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "open", "bare")}
     port = open_port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
+    unguarded = open_port("crane", Bus(interface="virtual", channel="open"), lambda _fault: None)
     bare = can.Bus(interface="virtual", channel="bare")
-    bodies = {"ours": daemon(controller, port), "bare": gateway(deployment, bare)}
+    bodies = {
+        "ours": daemon(controller, port, guard=True),
+        "open": daemon(Controller(other), unguarded, guard=False),
+        "bare": gateway(deployment, bare),
+    }
     spent: dict[str, list[int]] = {n: [] for n in bodies}
     pure: list[int] = []
     for i in range(ticks):
@@ -132,12 +140,14 @@ def main() -> None:
     for bus in (*hands.values(), bare):
         bus.shutdown()
     port.close()
+    unguarded.close()
 
     print(f"{ticks} ticks, 2 joystick frames in, 4 axes (3 with G_FF, 1 off), us per tick")
     print(f"{'':34}{'median':>9}{'p99':>9}{'max':>9}")
     rows = (
         ("controller tick (no bus)", pure),
         ("daemon body (bus, checks, status)", spent["ours"]),
+        ("the same without the output guard", spent["open"]),
         ("bare python-can + cantools loop", spent["bare"]),
     )
     for title, row in rows:
@@ -145,6 +155,8 @@ def main() -> None:
         print(f"{title:34}{statistics.median(row) / 1e3:9.1f}{p99 / 1e3:9.1f}{max(row) / 1e3:9.1f}")
     ratio = statistics.median(spent["ours"]) / statistics.median(spent["bare"])
     print(f"daemon body / bare loop: {ratio:.2f}")
+    guard = statistics.median(spent["ours"]) / statistics.median(spent["open"])
+    print(f"with / without the output guard: {guard:.2f}")
 
 
 if __name__ == "__main__":
