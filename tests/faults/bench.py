@@ -58,7 +58,7 @@ class BenchPort:
             frame, arrived_ns = waiting.popleft()
             self._bench.tell(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
             self._bench.rules.hear(frame, arrived_ns)
-            self.arrived_ns = arrived_ns
+            self.arrived_ns = BEGIN_NS + arrived_ns  # by the clock of the daemon
             yield frame
 
     def send(self, frame: Frame) -> bool:
