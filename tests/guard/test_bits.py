@@ -1,0 +1,59 @@
+"""The guard reads the same as the codecs, by masks of its own: any bytes, every shipped machine."""
+
+import random
+
+import pytest
+
+from canshaper.can.binding import load_deployment
+from canshaper.config.schema import Limits
+from canshaper.guard.axis import openings
+from canshaper.guard.bits import CommandBits, StickBits
+from canshaper.shaping.limits import without_deadband
+from tests.faults import shipped
+
+
+@pytest.mark.parametrize("name", shipped.NAMES)
+def test_sticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
+    deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
+    for axis in deployment.axes.values():
+        stick = axis.config.stick
+        lever = deployment.levers[stick.lever]
+        bits = StickBits(lever.message, stick)
+        for _ in range(300):
+            data = rng.randbytes(lever.message.length)
+            command = lever.codec.decode(data)[1][stick.signal]
+            if isinstance(command, float) and abs(command) > stick.neutral_pct / 100.0:
+                assert bits.ask(data) == command
+
+
+@pytest.mark.parametrize("name", shipped.NAMES)
+def test_commands_are_read_as_the_valve_codec_reads_them(name: str) -> None:
+    deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
+    for axis in deployment.axes.values():
+        stick = axis.config.stick if axis.rewrites else None
+        bits, codec = CommandBits(axis.valve_message, axis.config.valve, stick), axis.valve
+        layout = codec.message.sender.fields.layout
+        for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):
+            codec.put(steps)
+            assert bits.steps(layout.encode(codec.message.raw)) == steps
+        for _ in range(300):
+            data = rng.randbytes(axis.valve_message.length)
+            steps = bits.steps(data)
+            if steps is not None and abs(steps) <= codec.steps:
+                assert steps == codec.read(layout.decode(data))
+        codec.put(0)
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_velocity_is_that_behind_dead_band_or_curve(sign: int) -> None:
+    plain = Limits(deadband_pct=5)
+    points = {"curve_command_pct": [-100, -50, -6, 4, 60, 100]}
+    curved = Limits(**points, curve_speed_pct=[-90, -40, 0, 0, 50, 100])  # type: ignore[arg-type]
+    curve = curved.curve()
+    assert curve is not None
+    for steps in range(126):
+        by_band = openings(plain, 125)[sign < 0].velocity(steps)
+        assert by_band == pytest.approx(without_deadband(steps / 125, 0.05), abs=1e-12)
+        by_curve = openings(curved, 125)[sign < 0].velocity(steps)
+        assert by_curve == pytest.approx(abs(curve.velocity(sign * steps / 125)), abs=1e-12)
+    assert openings(plain, 125)[sign < 0].velocity(127) > 1.0
