@@ -193,7 +193,8 @@ def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make)
 
 
 def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: Make) -> None:
-    rig = by_two_levers(changed_rig)
+    slow = LIFT_OF_RIGHT | {"fall_per_s: 5": "fall_per_s: 1"}  # by the rate it would take longer
+    rig = compensated(changed_rig, yaml=slow)
     rig.run(3)
     assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     for _ in range(20):
