@@ -32,6 +32,8 @@ OUT_PCT = 90.0
 CYCLE_S = 0.02
 # A command that has not changed by more than its rounding for so many frames.
 STEADY_FRAMES = 5
+# Of the filter itself, from frame to frame; the stop begins with ten steps and more.
+MOST_RIPPLE = 5
 STEPS_MS = range(60, 181, 5)
 
 
@@ -182,7 +184,7 @@ class Bench:
         seen = self._seen(0.25)
         last_s = max(m.timestamp for m in seen if m.arbitration_id == LEFT)
         valve = [m for m in seen if m.arbitration_id == SLEW]
-        fallen = next(b for a, b in pairwise(valve) if b.data[0] < a.data[0] - 1)
+        fallen = next(b for a, b in pairwise(valve) if b.data[0] < a.data[0] - MOST_RIPPLE)
         falls_ms = (fallen.timestamp - last_s) * 1000
         late = stopped and (ended_s - last_s) * 1000 > T_MS + TICK_MS
         return None if late or falls_ms < T_MS else Silence(falls_ms, stopped)
