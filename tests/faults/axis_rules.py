@@ -60,22 +60,23 @@ class AxisRules:
         stick = lever.sticks[axis.name][0]
         healthy = not causes and not faults
         centred = healthy and abs(stick) <= axis.band and lever.enable() == 1
+        if self.armed and (
+            faults or lever.faults(axis, now_ns)
+        ):  # the loop may take it for silent already
+            self.may_stop(now_ns)
         if causes:
             self.latched |= self.velocity != 0.0 or "another sender" in causes
             self.armed, self._stop_until_ns = False, None
         elif self.latched:
             self.latched = not (pressed and centred)
         elif faults:
-            if self.armed:
-                self.may_stop(now_ns)
             self.armed = False
         elif centred and (self._stop_until_ns is None or not self.velocity):
             self.armed = True  # a stop that is not at rest goes on, whatever the stick does
         self._why = ", ".join(sorted(causes))
         usable = healthy and self.armed and not self.latched and abs(stick) > axis.band
         self._ask(now_ns, stick if usable else 0.0)
-        # In a stop the stick does not count, and the loop may take it for silent already.
-        if self._stop_until_ns is not None or lever.faults(axis, now_ns):
+        if self._stop_until_ns is not None:  # in a stop the stick does not count
             self._command = 0.0
 
     def may_stop(self, now_ns: int) -> None:
@@ -94,6 +95,11 @@ class AxisRules:
             asks.popleft()
         commands = [c for _, c in asks]
         self._low, self._high = min(0.0, *commands), max(0.0, *commands)
+
+    def silenced(self) -> None:
+        """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
+        self.velocity, self.armed, self.latched = 0.0, False, False
+        self._stop_until_ns = None
 
     def stood_still(self, why: str) -> None:
         """The loop did: neutral from now on."""

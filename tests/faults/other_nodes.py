@@ -51,6 +51,10 @@ class NodeRules:
 
     causes = seen
 
+    def may_be_lost(self, now_ns: int) -> bool:
+        """Whether the daemon may already take it for silent."""
+        return now_ns - self._heard_ns > self.node.timeout_ns
+
     def looked_at(self) -> None:
         """Every axis knows of it."""
         self._since.clear()
