@@ -22,7 +22,6 @@ class AxisRules:
         self.causes: set[str] = set()  # of neutral at once, since it was decided last
         self.contested_ns = LONG_AGO
         self.armed = self.latched = False
-        self.moved_ns = LONG_AGO
         self._tick_ns = tick_ns
         self._stop_until_ns: int | None = None
         self._asks: deque[tuple[int, float]] = deque()
@@ -31,6 +30,7 @@ class AxisRules:
         self._releases = 0
         self._presses = 0
         self._pressed_again = False
+        self._skipped = False
         self._count: int | None = None
 
     # -- before a frame ---------------------------------------------------------------------------
@@ -101,40 +101,40 @@ class AxisRules:
         self.velocity, self.armed, self.latched = 0.0, False, False
         self._stop_until_ns = None
 
-    def stood_still(self, why: str) -> None:
-        """The loop did: neutral from now on."""
-        self.causes.add(why)
-        self._why = self._why or why
+    def after(self, gap_ns: int, now_ns: int, *, longest_ns: int) -> None:
+        """So much time has passed since the last tick."""
+        self._skipped = gap_ns > self._tick_ns + SLACK_NS  # what was late has not left
+        if gap_ns > longest_ns:
+            self.causes.add(f"stood still for {gap_ns / 1e6:.1f} ms")
+        elif gap_ns > longest_ns - 3 * self._tick_ns:  # the last frames before it may be too old
+            self.may_stop(now_ns)
 
     # -- a frame ----------------------------------------------------------------------------------
 
-    def check(self, frame: Frame, now_ns: int, ticks: int) -> str:
+    def check(self, frame: Frame, ticks: int) -> str:
         """What is wrong with a frame of the valve; nothing when it is allowed.
 
         Args:
             frame: the frame.
-            now_ns: when it is sent.
             ticks: how often the axis may have moved since its last frame.
         """
         raw, _ = self.axis.sent(frame.data)
         before, self.velocity = self.velocity, self.axis.velocity(raw)
         self.raw = raw
-        if raw:
-            self.moved_ns = now_ns
-        wrong = self._wrong(before, self.velocity, now_ns, ticks) if raw else ""
+        wrong = self._wrong(before, self.velocity, ticks) if raw else ""
         return f"sent {raw}: {wrong}" if wrong else ""
 
-    def count(self, frame: Frame) -> str:
+    def count(self, frame: Frame, *, late: bool) -> str:
         """What is wrong with the alive counter of a frame."""
         field = self.axis.valve_counter
         if field is None or self.axis.valve_key[1] == self.axis.lever.key[1]:  # the lever's own
             return ""
         last, self._count = self._count, self.axis.sent(frame.data)[1]
-        if last is None or self._count == (last + 1) & field.mask:
+        if last is None or (self._count - last) & field.mask in (1, 1 + (late or self._skipped)):
             return ""
         return f"alive counter {self._count} after {last}"
 
-    def _wrong(self, before: float, now: float, now_ns: int, ticks: int) -> str:
+    def _wrong(self, before: float, now: float, ticks: int) -> str:
         if self._why:
             return f"allowed is neutral: {self._why}"
         if self.latched:

@@ -189,7 +189,6 @@ class Bench:
                 self.holds.remove(hold)
                 self.tell(f"stands still {where} for {hold[2] / 1e6:.1f} ms")
                 self.world.advance(hold[2])
-                self.rules.held(hold[2], self.world.now_ns)
                 return
 
     # -- from outside -----------------------------------------------------------------------------

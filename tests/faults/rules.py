@@ -16,7 +16,7 @@ A reload, a change of a number: nothing of this ends with them, so the rules do 
 """
 
 from canshaper.can.frame import Frame
-from tests.faults.axis_rules import AxisRules
+from tests.faults.axis_rules import SLACK_NS, AxisRules
 from tests.faults.heard import HeardLever
 from tests.faults.judge import Violation
 from tests.faults.machine import Key, Machine
@@ -44,13 +44,15 @@ class Rules:
             if axis.words
         }
         self.addresses = {bus: AddressRules(bus, own) for bus, own in machine.addresses.items()}
-        # A standstill of the loop that it must not go on after; it counts whole ticks.
+        # Longest time between two ticks after which a motion may go on; and how old what is sent
+        # may be: a tick; in a gateway as long as that, because frames leave before the next tick.
         waits = [
             a.valve_timeout_ns - (a.period_ticks - 1) * machine.tick_ns
             for a in machine.axes.values()
         ]
         shortest_ns = min(machine.shortest_timeout_ns, *waits)
-        self._longest_hold_ns = shortest_ns + 2 * machine.tick_ns
+        self._longest_gap_ns = shortest_ns
+        self._oldest_ns = (shortest_ns if machine.gateway else machine.tick_ns) + SLACK_NS
         self._pending_ns: int | None = None
         self._ticked_ns = -1
         self._ticks: dict[Key, int] = dict.fromkeys(self._by_valve, 0)
@@ -89,18 +91,10 @@ class Rules:
         for address in self.addresses.values():
             address.hear(frame, arrived_ns)
 
-    def held(self, held_ns: int, now_ns: int) -> None:
-        """The daemon stood still for so long: what it sends next was reckoned before."""
-        for one in self.axes.values():
-            if held_ns > self._longest_hold_ns:
-                one.stood_still(f"stood still for {held_ns // 1_000_000} ms")
-            elif held_ns > self._longest_hold_ns - 4 * self.machine.tick_ns:
-                one.may_stop(now_ns)
-
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""
         for one in self._by_valve.get(frame[:3], ()):
-            one.count(frame)
+            one.count(frame, late=False)
             one.causes.add("the last frame was not sent")
 
     def decide(self) -> None:
@@ -109,9 +103,12 @@ class Rules:
         if now_ns is None:
             return
         if now_ns != self._ticked_ns:  # what waited behind a standstill is read in many rounds
+            gap_ns = now_ns - self._ticked_ns if self._ticked_ns >= 0 else 0
             self._ticked_ns = now_ns
             for key in self._ticks:
                 self._ticks[key] += 1
+            for one in self.axes.values():
+                one.after(gap_ns, now_ns, longest_ns=self._longest_gap_ns)
         for name, one in self.axes.items():
             if words := self._words.get(name):
                 one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
@@ -145,11 +142,14 @@ class Rules:
         self.frames += 1
         self._last[frame[:3]] = frame, now_ns
         ticks, self._ticks[frame[:3]] = self._ticks[frame[:3]], 0
-        if wrong := found[0].count(frame):
+        old_ns = now_ns - self._ticked_ns
+        if wrong := found[0].count(frame, late=old_ns > self._oldest_ns):
             raise Violation(f"{found[0].axis.name}: {wrong}")
         for one in found:
-            if wrong := one.check(frame, now_ns, ticks):
+            if wrong := one.check(frame, ticks):
                 raise Violation(f"{one.axis.name}: {wrong}")
+            if one.raw and old_ns > self._oldest_ns:
+                raise Violation(f"{one.axis.name}: sent {one.raw} of {old_ns / 1e6:.0f} ms ago")
             self.moves += one.raw != 0
 
     def words(self) -> str:
@@ -167,6 +167,7 @@ class Rules:
         """
         for key, (frame, sent_ns) in self._last.items():
             for one in self._by_valve[key]:
-                silent = key[0] in self.addresses and now_ns - sent_ns > one.axis.valve_timeout_ns
+                # No frame from an address that is not ours: the valve's own timeout acts.
+                silent = key[0] in self.addresses and now_ns - sent_ns > 2 * self.machine.tick_ns
                 if one.axis.sent(frame.data)[0] and not silent:
                     raise Violation(f"{one.axis.name}: the last frame is not neutral")
