@@ -1,0 +1,82 @@
+"""Sequences of faults on every deployment as it is shipped: nothing that the rules forbid.
+
+More, and one again: ``python -m tests.faults SEED --deployment NAME``.
+"""
+
+import random
+from collections import Counter
+from collections.abc import Callable
+from unittest.mock import patch
+
+import pytest
+
+from canshaper.service.controller import Controller
+from tests.faults.judge import Violation
+from tests.faults.lies import LIES
+from tests.faults.sequence import ACTS, SENDING, Sequence, kinds_for
+from tests.faults.shipped import CONFIG, NAMES, shipped
+
+SAMPLE = 15
+# So many sequences may a lie stay unseen.
+MOST = 200
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_sequence_makes_a_wrong_move(name: str) -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(SAMPLE):
+        seen += Sequence(name, seed).run()
+    # They were sequences: things moved, and worked again behind the faults.
+    assert seen["moves"] > 0.1 * seen["frames"]
+    assert seen["ways back"] > 2
+
+
+def test_every_shipped_deployment_is_among_them() -> None:
+    files = {file.stem for file in CONFIG.glob("*.yaml")}
+    assert {*NAMES} == files - {"crane-forwarder"}  # measures of a crane, and no deployment
+
+
+def test_every_fault_is_among_them_often() -> None:
+    kinds: Counter[str] = Counter()
+    for seed in range(700):
+        sequence = Sequence(NAMES[seed % len(NAMES)], seed)
+        kinds.update(fault.kind for fault in sequence.faults)
+    possible = {kind for name in NAMES for kind in kinds_for(shipped(name).machine)}
+    assert {*ACTS, SENDING} <= possible
+    assert kinds.keys() == possible
+    assert min(kinds[kind] for kind in ACTS) >= 3, kinds
+
+
+@pytest.mark.parametrize("lie", LIES)
+def test_the_rules_catch(lie: str) -> None:
+    """Each is one thing wrong; in the same sequence without it nothing is."""
+    name, tell = LIES[lie]
+    seed = _caught(name, tell)
+    Sequence(name, seed).run()
+
+
+def _caught(name: str, tell: Callable[[Sequence], None]) -> int:
+    """The first sequence in which it is seen."""
+    for seed in range(MOST):
+        sequence = Sequence(name, seed)
+        tell(sequence)
+        try:
+            sequence.run()
+        except Violation:
+            return seed
+    raise AssertionError("not caught")
+
+
+@pytest.mark.parametrize("method", ["follow", "stalled", "send_failed"])
+def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
+    """A reload that forgets; a standstill, or a frame that was not sent, that does not matter."""
+    with patch.object(Controller, method, lambda *_: None):
+        seed = _caught("forwarder", lambda _: None)
+    Sequence("forwarder", seed).run()
+
+
+def test_a_seed_is_the_same_sequence_every_time() -> None:
+    random.seed(1)
+    first = Sequence("forwarder", 3)
+    second = Sequence("forwarder", 3)
+    assert list(map(str, first.faults)) == list(map(str, second.faults))
