@@ -30,7 +30,7 @@ class AxisRules:
         self._releases = 0
         self._presses = 0
         self._pressed_again = False
-        self._skipped = False
+        self._skipped = 0
         self._count: int | None = None
 
     # -- before a frame ---------------------------------------------------------------------------
@@ -60,9 +60,7 @@ class AxisRules:
         stick = lever.sticks[axis.name][0]
         healthy = not causes and not faults
         centred = healthy and abs(stick) <= axis.band and lever.enable() == 1
-        if self.armed and (
-            faults or lever.faults(axis, now_ns)
-        ):  # the loop may take it for silent already
+        if faults or lever.faults(axis, now_ns):  # the loop may take it for silent already
             self.may_stop(now_ns)
         if causes:
             self.latched |= self.velocity != 0.0 or "another sender" in causes
@@ -81,7 +79,7 @@ class AxisRules:
 
     def may_stop(self, now_ns: int) -> None:
         """The axis stops, or may: until then it runs out, wherever the stick is."""
-        if self._stop_until_ns is None:
+        if self.armed:  # else there is nothing to stop, or it stops already
             stop_ns = (self.axis.stop * self.axis.period_ticks + 1) * self._tick_ns
             self._stop_until_ns = now_ns + stop_ns + SLACK_NS
 
@@ -103,7 +101,8 @@ class AxisRules:
 
     def after(self, gap_ns: int, now_ns: int, *, longest_ns: int) -> None:
         """So much time has passed since the last tick."""
-        self._skipped = gap_ns > self._tick_ns + SLACK_NS  # what was late has not left
+        # What was late has not left, perhaps of several ticks.
+        self._skipped = self._skipped + 1 if gap_ns > self._tick_ns + SLACK_NS else 0
         if gap_ns > longest_ns:
             self.causes.add(f"stood still for {gap_ns / 1e6:.1f} ms")
         elif gap_ns > longest_ns - 3 * self._tick_ns:  # the last frames before it may be too old
@@ -130,7 +129,7 @@ class AxisRules:
         if field is None or self.axis.valve_key[1] == self.axis.lever.key[1]:  # the lever's own
             return ""
         last, self._count = self._count, self.axis.sent(frame.data)[1]
-        if last is None or (self._count - last) & field.mask in (1, 1 + (late or self._skipped)):
+        if last is None or 1 <= (self._count - last) & field.mask <= 1 + late + self._skipped:
             return ""
         return f"alive counter {self._count} after {last}"
 

@@ -114,7 +114,7 @@ class Rules:
                 one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
             node = self.machine.lever_nodes.get(one.axis.lever.name)
             works = node is None or not self._nodes[node].seen(now_ns)
-            if node and one.armed and self._nodes[node].may_be_lost(now_ns):
+            if node and self._nodes[node].may_be_lost(now_ns):
                 one.may_stop(now_ns)
             one.decide(now_ns, lever_works=works)
             address = self.addresses.get(one.axis.valve_key[0])
