@@ -266,3 +266,17 @@ def test_a_closed_port_does_nothing_more(line: Line) -> None:
     assert not line.port.send(VALVE)
     assert line.port.fileno() == -1
     assert len(line.asked) == 1
+
+
+def test_an_interface_that_goes_while_another_deployment_begins_is_a_fault(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def gone(*_: object) -> None:
+        raise OSError(errno.ENODEV, "No such device")
+
+    monkeypatch.setattr("canshaper.can.raw.set_filters", gone)
+    line.port.watch("second", IDS)
+    assert line.port.name == "second"
+    assert line.port.state is BusState.GONE
+    line.port.watch("third", IDS)  # without a socket there is nothing to set
+    assert line.port.name == "third"

@@ -224,3 +224,16 @@ def test_whatever_valve_and_stick_say_float_is_never_sent(
                 assert told["ControlWord"] == ACTIVE
             if state not in (None, ACTIVE) or node not in (None, OPERATIONAL):
                 assert told["SetPoint"] == 0
+
+
+def test_a_status_word_that_does_not_count_stops_and_does_not_start() -> None:
+    """It may be out of sequence: that the valve has left its state takes no trust."""
+    rig = CanopenRig().moving()
+    control = rig.controller.axes["slew"].control
+    assert control is not None
+    control.heard({"StatusWord": HOLD}, {}, rig.now_ns, False)
+    assert control.gate(False, rig.now_ns).name == "VALVE_FAULT"  # type: ignore[union-attr]
+    assert control.gate(False, rig.now_ns) is None  # what counted last still says active
+    control.forget()
+    control.heard({"StatusWord": ACTIVE}, {}, rig.now_ns, False)
+    assert control.gate(True, rig.now_ns).name == "VALVE_NOT_READY"  # type: ignore[union-attr]

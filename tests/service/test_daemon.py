@@ -364,3 +364,29 @@ def test_signals_are_those_of_a_service(bench: Bench) -> None:
     at(bench, {})
     assert {signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGCHLD} == bench._handlers.keys()
     assert bench._handlers[signal.SIGCHLD] == signal.SIG_DFL
+
+
+def test_the_digest_that_does_not_go_out_is_counted(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = load_deployment(bench.file).identity_status
+    assert status is not None
+    failed: list[Frame] = []
+    monkeypatch.setattr(module.Controller, "send_failed", lambda _, frame: failed.append(frame))
+    send = FakePort.send
+    monkeypatch.setattr(
+        FakePort, "send", lambda port, f: f[:3] != status.sender.key and send(port, f)
+    )
+    at(bench, {}, last=60)
+    assert [frame[:3] for frame in failed] == [status.sender.key] * 2
+
+
+def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = load_deployment(bench.file).identity_status
+    assert status is not None
+    silent = property(lambda _: frozenset({"crane"}))
+    monkeypatch.setattr(module.Controller, "silent_buses", silent)
+    at(bench, {}, last=60)
+    assert not [frame for frame in bench.sent if frame[:3] == status.sender.key]

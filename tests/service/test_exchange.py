@@ -176,3 +176,19 @@ def test_an_axis_with_a_slow_valve_has_seen_the_standstill_too(
     rig.controller.stalled()
     rig.run(40, Slew=1000)
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
+
+
+def test_a_frame_that_does_not_go_out_is_a_trip(rig: Rig) -> None:
+    class Full(Waiting):
+        def send(self, frame: Frame) -> bool:
+            super().send(frame)
+            return frame.can_id != 0x200
+
+    rig.moving()
+    port = Full()
+    port.queue = [rig.lever(Slew=1000)]
+    tick(rig, port)
+    assert (rig.state(), rig.controller.counters.values["SendFailures"]) == (State.ACTIVE, 1)
+    port.queue = [rig.lever(Slew=1000)]
+    tick(rig, port)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")

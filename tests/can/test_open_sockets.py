@@ -1,0 +1,339 @@
+"""The sockets of an interface as they are opened, and a port that only listens: without CAN."""
+
+import errno
+import socket
+from collections.abc import Iterator
+from typing import Any
+
+import can
+import pytest
+
+from canshaper.can import bus as bus_module
+from canshaper.can import socketcan
+from canshaper.can.bus import BusError, ListeningPort, open_port
+from canshaper.can.device import WrongDeviceError
+from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.can.socketcan import Ids, open_sockets, set_filters
+from canshaper.config.bus import Bus
+
+BUS = Bus(interface="socketcan", channel="can0", bitrate=250000)
+IDS = Ids(
+    taken=frozenset({(0x110, False)}),
+    sent=frozenset({(0x200, False), (0x300, False)}),
+    valves=frozenset({(0x200, False)}),
+    known=frozenset({(0x110, False), (0x200, False), (0x300, False), (0x400, False)}),
+)
+RAW, SOL = socket.SOL_CAN_RAW, socket.SOL_SOCKET
+
+
+class Made:
+    """A socket that keeps what it is asked for."""
+
+    def __init__(self, *arguments: int) -> None:
+        self.arguments = arguments
+        self.options: list[tuple[int, int, Any]] = []
+        self.bound: tuple[str, ...] = ()
+        self.blocking = True
+        self.closed = False
+
+    def setblocking(self, blocking: bool) -> None:
+        self.blocking = blocking
+
+    def setsockopt(self, *option: Any) -> None:
+        self.options.append(option)
+
+    def bind(self, address: tuple[str, ...]) -> None:
+        if address == ("none",):
+            raise OSError(errno.ENODEV, "No such device")
+        self.bound = address
+
+    def close(self) -> None:
+        self.closed = True
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Made]:
+    opened: list[Made] = []
+
+    def make(*arguments: int) -> Made:
+        opened.append(Made(*arguments))
+        return opened[-1]
+
+    monkeypatch.setattr(socket, "socket", make)
+    monkeypatch.setattr(socketcan, "check_device", lambda *_: None)
+    return opened
+
+
+def options(one: Made, level: int) -> dict[int, Any]:
+    return {name: value for where, name, value in one.options if where == level}
+
+
+def test_one_socket_takes_everything(made: list[Made]) -> None:
+    open_sockets(BUS, None)
+    (one,) = made
+    assert one.arguments == (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
+    assert not one.blocking
+    assert one.bound == ("can0",)
+    assert options(one, SOL) == {socket.SO_RCVBUF: 1 << 20}
+    assert options(one, RAW) == {socketcan.CAN_RAW_ERR_FILTER: 0x1FFFFFFD}
+
+
+def test_three_sockets_each_for_its_frames(made: list[Made]) -> None:
+    """Those that are taken; our own back, other senders and errors; those that nobody knows."""
+    open_sockets(BUS, IDS)
+    taken, sent, unknown = made
+    assert [one.bound for one in made] == [("can0",)] * 3
+    assert not any(one.blocking or one.closed for one in made)
+    assert options(taken, SOL) == {socket.SO_RCVBUF: 1 << 20}
+    assert options(sent, SOL) == options(unknown, SOL) == {}
+    assert options(taken, RAW).keys() == {socket.CAN_RAW_FILTER}
+    sent_back = options(sent, RAW)
+    assert sent_back.pop(socketcan.CAN_RAW_ERR_FILTER) == 0x1FFFFFFD
+    assert sent_back.pop(socket.CAN_RAW_RECV_OWN_MSGS) == 1
+    assert sent_back.keys() == {socket.CAN_RAW_FILTER}
+    others = options(unknown, RAW)
+    assert others.pop(socket.CAN_RAW_JOIN_FILTERS) == 1
+    assert others.keys() == {socket.CAN_RAW_FILTER}
+
+
+def filters(one: Made) -> set[tuple[int, int]]:
+    data = options(one, RAW)[socket.CAN_RAW_FILTER]
+    words = [int.from_bytes(data[i : i + 4], "little") for i in range(0, len(data), 4)]
+    return set(zip(words[::2], words[1::2], strict=True))
+
+
+MASK = 0x7FF | 0x80000000
+NOT = 0x20000000
+
+
+def filtered(ids: Ids) -> list[set[tuple[int, int]]]:
+    made = [Made(), Made(), Made()]
+    set_filters(made, ids)  # type: ignore[arg-type]
+    return [filters(one) for one in made]
+
+
+def test_filters_name_ids_in_their_own_width() -> None:
+    assert filtered(IDS) == [
+        {(0x110, MASK)},
+        {(0x200, MASK), (0x300, MASK)},
+        {(i | NOT, MASK) for i in (0x110, 0x200, 0x300, 0x400)},
+    ]
+
+
+def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() -> None:
+    ids = Ids(
+        taken=frozenset({(0x0CFDD633, True)}),
+        sent=frozenset(),
+        valves=frozenset(),
+        known=frozenset({(0x0CFDD633, True), (0x110, False)}),
+        taken_groups=frozenset({0xEE00 << 8}),
+        sent_groups=frozenset({0xFE30 << 8}),
+        j1939=True,
+    )
+    eff = 0x80000000
+    taken, sent, unknown = filtered(ids)
+    assert (0x0CFDD633 | eff, 0x1FFFFFFF | eff) in taken
+    assert {word for word, _ in taken} == {0x0CFDD633 | eff, 0xEE00 << 8 | eff}
+    assert {word for word, _ in sent} == {0xFE30 << 8 | eff}
+    assert unknown == {(0x110 | NOT, MASK), (eff | NOT, eff)}
+
+
+def test_services_of_canopen_are_not_unknown() -> None:
+    unknown = filtered(Ids(frozenset(), frozenset(), frozenset(), frozenset(), canopen=True))[2]
+    assert unknown == {(base | NOT, mask | 0x80000000) for base, mask, _ in socketcan.SERVICES}
+
+
+def test_in_the_line_nothing_is_unknown() -> None:
+    ids = Ids(IDS.taken, IDS.sent, IDS.valves, IDS.known, in_line=True)
+    assert filtered(ids)[2] == set()
+
+
+def many(count: int) -> Ids:
+    known = frozenset((i, False) for i in range(count))
+    return Ids(frozenset({(0, False)}), frozenset({(1, False)}), frozenset(), known)
+
+
+def test_more_filters_than_the_kernel_takes_are_left_to_the_reader() -> None:
+    assert len(filtered(many(512))[2]) == 512
+    assert filtered(many(513))[2] == {(0 | NOT, MASK), (1 | NOT, MASK)}
+
+
+def test_what_was_opened_is_closed_when_the_interface_is_not_there(made: list[Made]) -> None:
+    with pytest.raises(OSError, match="No such device"):
+        open_sockets(Bus(interface="socketcan", channel="none"), IDS)
+    assert [one.closed for one in made] == [True] * 3
+
+
+def test_what_was_opened_is_closed_when_the_device_is_another(
+    made: list[Made], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrong(*_: object) -> None:
+        raise WrongDeviceError("another one")
+
+    monkeypatch.setattr(socketcan, "check_device", wrong)
+    with pytest.raises(WrongDeviceError):
+        open_sockets(BUS, None)
+    assert made[0].closed
+
+
+def test_a_kernel_without_can_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: int) -> None:
+        raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
+
+    monkeypatch.setattr(socket, "socket", none)
+    with pytest.raises(BusError) as error:
+        open_port("crane", BUS, lambda _: None, IDS)
+    assert str(error.value) == (
+        "bus crane: cannot open socketcan channel can0: this kernel has no CAN, or its module"
+        " can_raw is not loaded"
+    )
+
+
+def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+    def none(*_: object) -> None:
+        raise ValueError
+
+    monkeypatch.setattr(bus_module, "open_python_can", none)
+    with pytest.raises(BusError, match="cannot open slcan channel ttyS0: ValueError"):
+        open_port("crane", Bus(interface="slcan", channel="ttyS0"), lambda _: None)
+
+
+# -- a port that only listens ----------------------------------------------------------------------
+
+
+class Below:
+    """The port below it."""
+
+    name, state, arrived_ns = "crane", BusState.PASSIVE, 17
+
+    def __init__(self) -> None:
+        self.sent: list[Frame] = []
+        self.watched: list[tuple[str, Ids]] = []
+        self.closed = False
+
+    def frames(self) -> Iterator[Frame]:
+        yield Frame("crane", 1, False, b"")
+
+    def others(self) -> Iterator[Frame]:
+        yield Frame("crane", 2, False, b"")
+
+    def send(self, frame: Frame) -> bool:
+        self.sent.append(frame)
+        return frame.data != b"full"
+
+    def watch(self, name: str, ids: Ids) -> None:
+        self.watched.append((name, ids))
+
+    def fileno(self) -> int:
+        return 5
+
+    def close(self) -> None:
+        self.closed = True
+
+
+LISTENS = Ids(frozenset(), frozenset({(0x300, False)}), frozenset(), frozenset())
+
+
+def test_a_port_that_listens_is_the_port_below_it() -> None:
+    below = Below()
+    port = ListeningPort(below, LISTENS)
+    assert (port.name, port.state, port.arrived_ns, port.fileno()) == (
+        "crane",
+        BusState.PASSIVE,
+        17,
+        5,
+    )
+    assert [f.can_id for f in port.frames()] == [1]
+    assert [f.can_id for f in port.others()] == [2]
+    port.close()
+    assert below.closed
+
+
+def test_a_port_that_listens_sends_only_what_it_may() -> None:
+    below = Below()
+    claims = Ids(
+        frozenset(), frozenset(), frozenset(), frozenset(), claims=frozenset({(0x18EEFF9C, True)})
+    )
+    port = ListeningPort(below, LISTENS)
+    status, valve = Frame("crane", 0x300, False, b"x"), Frame("crane", 0x200, False, b"x")
+    claim = Frame("crane", 0x18EEFF9C, True, bytes(8))
+    assert port.send(status)
+    assert port.send(valve)  # as if it were sent: nothing may stop for that
+    assert not port.send(status._replace(data=b"full"))
+    assert [f.can_id for f in below.sent] == [0x300, 0x300]
+    port.watch("second", claims)
+    assert port.name == "second"
+    assert below.watched == [("second", claims)]
+    below.sent.clear()
+    assert port.send(status)
+    assert port.send(claim)
+    assert below.sent == [claim]
+
+
+# -- python-can ------------------------------------------------------------------------------------
+
+
+class Adapter:
+    """An interface of python-can that hands out these messages."""
+
+    def __init__(self, messages: list[can.Message]) -> None:
+        self.messages = messages
+        self.sent: list[can.Message] = []
+
+    def recv(self, _timeout: float) -> can.Message | None:
+        return self.messages.pop(0) if self.messages else None
+
+    def send(self, message: can.Message) -> None:
+        self.sent.append(message)
+
+    def fileno(self) -> int:
+        return 9
+
+
+def test_what_is_no_data_frame_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
+    messages = [
+        can.Message(is_error_frame=True),
+        can.Message(is_remote_frame=True),
+        can.Message(is_fd=True, data=bytes(12)),
+    ]
+    monkeypatch.setattr(can, "Bus", lambda **_: Adapter(messages))
+    faults: list[FrameFault] = []
+    port = open_port("crane", Bus(interface="slcan", channel="ttyS0"), faults.append)
+    assert list(port.frames()) == []
+    wrong = FrameFault.WRONG_LENGTH
+    assert faults == [FrameFault.ERROR_FRAME, wrong, wrong]
+    assert list(port.others()) == []
+    port.watch("second", IDS)
+    assert (port.name, port.fileno()) == ("second", 9)
+
+
+def test_multicast_beyond_this_machine_hears_one_group_and_nothing_old(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """What another group sent before does not count; what we send comes back and is ours."""
+    old = can.Message(arbitration_id=1, is_extended_id=False)
+    adapter = Adapter([old, old])
+    opened: list[dict[str, Any]] = []
+    groups: list[int] = []
+
+    def bus(**options: Any) -> Adapter:
+        opened.append(options)
+        return adapter
+
+    monkeypatch.setattr(can, "Bus", bus)
+    monkeypatch.setattr(bus_module, "receive_one_group", groups.append)
+    config = Bus(interface="udp_multicast", channel="239.1.2.3", network=True)
+    port = open_port("crane", config, lambda _: None)
+    assert groups == [9]
+    assert opened == [
+        {
+            "interface": "udp_multicast",
+            "channel": "239.1.2.3",
+            "ignore_config": True,
+            "receive_own_messages": False,
+        }
+    ]
+    ours = Frame("crane", 0x200, False, b"\1")
+    assert port.send(ours)
+    adapter.messages += [adapter.sent[0], can.Message(arbitration_id=5, is_extended_id=False)]
+    assert [f.can_id for f in port.frames()] == [5]
