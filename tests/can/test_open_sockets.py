@@ -10,7 +10,7 @@ import pytest
 
 from canshaper.can import bus as bus_module
 from canshaper.can import socketcan
-from canshaper.can.bus import BusError, ListeningPort, open_port
+from canshaper.can.bus import BusError, ListeningPort, WrongBusError, open_port
 from canshaper.can.device import WrongDeviceError
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.can.socketcan import Ids, open_sockets, set_filters
@@ -187,6 +187,18 @@ def test_a_kernel_without_can_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
         "bus crane: cannot open socketcan channel can0: this kernel has no CAN, or its module"
         " can_raw is not loaded"
     )
+
+
+def test_a_port_of_another_device_says_which_bus_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
+    def wrong(*_: object) -> None:
+        raise WrongDeviceError("expected serial number 1, found 2")
+
+    monkeypatch.setattr(bus_module, "open_sockets", wrong)
+    with pytest.raises(WrongBusError) as error:
+        open_port("crane", BUS, lambda _: None, IDS)
+    assert error.value.bus == "crane"
+    assert error.value.why.startswith("expected serial number 1, found 2")
+    assert str(error.value) == f"bus crane: {error.value.why}"
 
 
 def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:

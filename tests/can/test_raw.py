@@ -295,3 +295,38 @@ def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
             assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
             assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
             assert not third.hears(0x110, join=True)
+
+
+CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
+NODE = Ids(
+    taken=frozenset(),
+    sent=IDS.sent,
+    valves=IDS.valves,
+    known=frozenset(),
+    claims=frozenset({(CLAIM.can_id, True)}),
+)
+
+
+def claimed(line: Line, frame: Frame = CLAIM) -> None:
+    """It comes to the socket of what is taken, as every frame of its group does."""
+    line.put(can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data), TAKEN)
+
+
+def test_a_claim_of_ours_that_comes_back_is_no_claim_of_another(
+    make_line: Callable[..., Line],
+) -> None:
+    line = make_line(NODE)
+    assert line.port.send(CLAIM)
+    claimed(line)
+    assert line.heard() == []
+    claimed(line)  # ours came back once; this is of one that has our NAME
+    assert line.heard() == [CLAIM]
+
+
+def test_a_claim_of_another_that_comes_before_ours_is_one(make_line: Callable[..., Line]) -> None:
+    line = make_line(NODE)
+    other = CLAIM._replace(data=bytes(8))
+    assert line.port.send(CLAIM)
+    claimed(line, other)
+    claimed(line)
+    assert line.heard() == [other]

@@ -12,6 +12,7 @@ from typing import Any
 import pytest
 
 from canshaper.can.binding import load_deployment
+from canshaper.can.bus import BusError, WrongBusError
 from canshaper.can.deployment import Deployment
 from canshaper.can.frame import BusState, Frame, FrameFault
 from canshaper.service import daemon as module
@@ -390,3 +391,20 @@ def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
     monkeypatch.setattr(module.Controller, "silent_buses", silent)
     at(bench, {}, last=60)
     assert not [frame for frame in bench.sent if frame[:3] == status.sender.key]
+
+
+# -- a bus that is another device ------------------------------------------------------------------
+
+
+def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrong(*_: object) -> None:
+        raise WrongBusError("crane", "expected serial number 1, found 2")
+
+    monkeypatch.setattr("canshaper.service.ports.open_port", wrong)
+    with pytest.raises(BusError) as error:
+        Daemon(lambda: load_deployment(bench.file))
+    assert str(error.value).startswith(f"{bench.file}:")
+    assert "buses.crane" in str(error.value)
+    assert str(error.value).endswith("expected serial number 1, found 2")
