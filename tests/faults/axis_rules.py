@@ -163,6 +163,8 @@ class AxisRules:
         if not low <= now <= high:
             return f"{now:.4f} after {before:.4f}, allowed is {low:.4f} to {high:.4f}"
         most = ticks * max(axis.rise, axis.fall) + slack
+        if axis.largest_added and abs(now) < abs(before):  # an added part may end at once
+            most += axis.largest_added + OWED
         if abs(now - before) > most:
             return f"{now:.4f} after {before:.4f}, a jump: rates allow {most:.4f}"
         return ""
