@@ -52,6 +52,7 @@ lint: .venv/test-ready
 	.venv/bin/ruff check
 	.venv/bin/ruff format --check
 	.venv/bin/mypy
+	.venv/bin/lint-imports
 
 # Tests that take seconds of pure reckoning add no line, nor do those of the daemon around the
 # controller, which start processes and threads; few examples will do.

@@ -15,9 +15,14 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 from canshaper.cli.common import data_directory, loader
-from canshaper.control.server import LEAST_BETWEEN_NS, MOST_BYTES, MOST_REQUEST, ControlServer
-from canshaper.service.adjust import Adjuster
-from canshaper.service.controller import Controller
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.daemon.control_server import (
+    LEAST_BETWEEN_NS,
+    MOST_BYTES,
+    MOST_REQUEST,
+    ControlServer,
+)
 
 RANGES = {
     "axes.slew.sway.period_s": (2.0, 2.6),

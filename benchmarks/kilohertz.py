@@ -42,10 +42,10 @@ from rig import (
     wait_for_text,
 )
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import Port, open_port
-from canshaper.can.frame import Frame
+from canshaper.bus.port import Port, open_port
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
+from canshaper.machine.binding import load_deployment
 
 JOYSTICK_MS = 20
 LEVER, VALVE = 0x110, 0x200

@@ -37,10 +37,10 @@ from rig import (
     wait_for_text,
 )
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import Port, open_port
-from canshaper.can.frame import Frame
+from canshaper.bus.port import Port, open_port
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script
 

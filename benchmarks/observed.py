@@ -16,7 +16,7 @@ from array import array
 from collections.abc import Callable
 from pathlib import Path
 
-import canshaper.service.daemon as daemon_module
+import canshaper.daemon.daemon as daemon_module
 from canshaper.cli.app import main as canshaper
 
 Body = Callable[[int, int, int], bool]

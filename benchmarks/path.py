@@ -21,12 +21,12 @@ from typing import Any
 
 from rig import Row, print_table, slew_only
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.can.raw import CAN_FRAME, RawPort
-from canshaper.service.controller import Controller
-from canshaper.service.exchange import exchange
-from canshaper.service.standstill import Standstill
+from canshaper.bus.raw import CAN_FRAME, RawPort
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
 
 TICKS = 400  # enough for the axis to move and for the input to be trusted

@@ -18,12 +18,12 @@ from pathlib import Path
 
 import can
 
-from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
 from canshaper.cli.replay import _without_collector
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
 from canshaper.recording.log import read_log
 from canshaper.recording.replay import Replay, look
-from canshaper.service.controller import Controller
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import script_named
 from canshaper_sim.plant import PlantNode

@@ -15,13 +15,13 @@ import subprocess
 import sys
 import time
 
-from canshaper.can.bus import Port, open_port
+from canshaper.bus.port import Port, open_port
 from canshaper.cli.common import data_directory
 from canshaper.config.bus import Bus
 
 PEER = """
 import sys, can, cantools
-from canshaper.can.multicast import LocalMulticastBus
+from canshaper.bus.multicast import LocalMulticastBus
 database = cantools.database.load_file(sys.argv[1])
 message = database.get_message_by_name("SlewCommand")
 data = message.encode({"Velocity": 0, "AliveCounter": 0})

@@ -18,14 +18,14 @@ from pathlib import Path
 
 import can
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import Port, open_port
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.bus.port import Port, open_port
 from canshaper.cli.common import data_directory
+from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
-from canshaper.service.controller import Controller
-from canshaper.service.guarded import Guarded
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script
 

@@ -19,9 +19,9 @@ from canshaper.cli.console import SafeConsole, echo
 from canshaper.cli.sim import SET
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
     from canshaper.commissioning.calibration.drive import CalibrationDrive
     from canshaper.commissioning.calibration.fit import Calibration
+    from canshaper.machine.deployment import Deployment
 
 # Speed of each axis as `canshaper sim` tells it.
 SIMULATED = {
@@ -69,7 +69,7 @@ def calibrate(
 
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.commissioning.calibration.drive import CalibrationDrive
     from canshaper.commissioning.calibration.fit import CalibrationError
     from canshaper.commissioning.calibration.ramp import Ramp

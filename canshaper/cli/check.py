@@ -2,13 +2,13 @@
 
 import typer
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.device import match_fault, whereabouts
-from canshaper.can.load import BUSY
+from canshaper.bus.device import match_fault, whereabouts
 from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 from canshaper.cli.console import SafeConsole, echo
 from canshaper.config.bus import Bus
 from canshaper.config.schema import RadialConfig
+from canshaper.machine.bus_load import BUSY
+from canshaper.machine.deployment import Deployment
 
 # What joysticks do while the daemon is away.
 FALLBACKS = {
@@ -34,9 +34,9 @@ def check(file: str = FILE) -> None:
       canshaper check config/forwarder.yaml
     """
 
-    from canshaper.can.stopping import unstated
     from canshaper.cli.stopping import print_stopping
     from canshaper.config.source import DeploymentError, Source
+    from canshaper.machine.stopping import unstated
 
     try:
         deployment = loader(file)()

@@ -6,10 +6,10 @@ from pathlib import Path
 
 import typer
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.cli.console import echo
 from canshaper.config.source import DeploymentError, Problem
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 
 EXIT_BAD_DEPLOYMENT = 2
 EXIT_WITHOUT_TOOLS = 2

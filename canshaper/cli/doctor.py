@@ -13,8 +13,8 @@ from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
     from canshaper.commissioning.doctor.finding import Finding
+    from canshaper.machine.deployment import Deployment
 
 EXIT_NOT_FIT = 1
 
@@ -87,7 +87,7 @@ def doctor(
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
-    from canshaper.can.device import WrongDeviceError
+    from canshaper.bus.device import WrongDeviceError
     from canshaper.commissioning.doctor.finding import Finding, Level
     from canshaper.commissioning.doctor.listen import heard_findings, listen
 

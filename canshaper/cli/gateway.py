@@ -8,7 +8,7 @@ from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, lo
 from canshaper.cli.console import echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
+    from canshaper.machine.deployment import Deployment
 
 EXIT_OTHER_RULES = 1
 
@@ -37,10 +37,10 @@ def gateway(
 
       sudo canshaper gateway config/gateway-forwarder.yaml running
     """
-    from canshaper.can.bus import BusError
-    from canshaper.can.cangw import GatewayError, between, load_module, make, rules
-    from canshaper.can.gateway import channels, fallback_rules, passing_rules
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
+    from canshaper.protocols.gateway.cangw import GatewayError, between, load_module, make, rules
+    from canshaper.protocols.gateway.rules import channels, fallback_rules, passing_rules
 
     try:
         deployment = loader(file, interface, channel)()
@@ -80,8 +80,8 @@ def _look_at_devices(deployment: "Deployment") -> None:
     Raises:
         BusError: it is another one than the deployment names, or cannot be looked at.
     """
-    from canshaper.can.bus import BusError
-    from canshaper.can.device import match_fault
+    from canshaper.bus.device import match_fault
+    from canshaper.bus.port import BusError
 
     assert deployment.config.gateway is not None  # only such deployments have rules
     for name in deployment.config.gateway.between:

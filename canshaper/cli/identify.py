@@ -11,9 +11,9 @@ from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
     from canshaper.commissioning.identification.judge import Finding
     from canshaper.commissioning.identification.recommend import Advice
+    from canshaper.machine.deployment import Deployment
 
 EXIT_TOO_POOR = 1
 
@@ -149,10 +149,10 @@ def _write(
     deployment: "Deployment", findings: Sequence["Finding"], advice: Sequence["Advice"]
 ) -> list[str]:
     """Write what is known of each axis; the axes that were written."""
-    from canshaper.can.stopping import stop_fault
     from canshaper.commissioning.identification.recommend import flow
     from canshaper.config.edit import Value, set_values
     from canshaper.config.sway import Sway
+    from canshaper.machine.stopping import stop_fault
 
     usable = [a for a in advice if all(f.usable for f in findings if f.axis == a.axis)]
     for one in usable:

@@ -11,10 +11,10 @@ from canshaper.cli.common import data_directory
 from canshaper.cli.console import SafeConsole
 
 if TYPE_CHECKING:
-    from canshaper.can.database import Messages
-    from canshaper.can.deployment import Deployment
     from canshaper.commissioning.identification.judge import Finding
     from canshaper.commissioning.identification.series import Series
+    from canshaper.machine.database import Messages
+    from canshaper.machine.deployment import Deployment
 
 # Swing of each axis as `canshaper sim` tells it.
 SIMULATED = {
@@ -63,8 +63,8 @@ def signals_named(pairs: Sequence[str], deployment: "Deployment | None") -> dict
 
 def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
     """Messages that name the signals."""
-    from canshaper.can.database import Messages, load_dbc
     from canshaper.config.source import DeploymentError
+    from canshaper.machine.database import Messages, load_dbc
 
     if not files and deployment:
         return deployment.messages

@@ -68,8 +68,8 @@ def init(
 
 
 def _messages(files: Sequence[Path]) -> "list[Message]":
-    from canshaper.can.database import load_dbc
     from canshaper.config.source import DeploymentError
+    from canshaper.machine.database import load_dbc
 
     found, problems = [], []
     for path in files:
@@ -82,10 +82,10 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
 
 
 def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> "FirstMachine":
-    from canshaper.can import suggest
     from canshaper.config.bus import Bus
     from canshaper.config.first import FirstMachine
     from canshaper.config.load import limits
+    from canshaper.machine import suggest
 
     echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
     possible = suggest.levers(messages)
@@ -123,10 +123,10 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
 
 
 def _lever(message: "Message") -> "FirstLever":
-    from canshaper.can import suggest
     from canshaper.config.first import FirstLever
     from canshaper.config.load import limits
     from canshaper.config.schema import Lever
+    from canshaper.machine import suggest
 
     left = suggest.switches(message)  # a switch has one meaning
 
@@ -158,11 +158,11 @@ def _axes(
     lever: "FirstLever", message: "Message", others: "list[Message]", taken: list[str]
 ) -> "list[FirstAxis]":
     """Axes of a lever; ``others`` are messages that are left, ``taken`` names that are not."""
-    from canshaper.can import suggest
-    from canshaper.can.valves import FRAMES_PER_TIMEOUT
     from canshaper.config.first import FirstAxis
     from canshaper.config.load import limits
     from canshaper.config.schema import Valve
+    from canshaper.machine import suggest
+    from canshaper.machine.valves import FRAMES_PER_TIMEOUT
 
     least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
     found: list[FirstAxis] = []
@@ -232,9 +232,9 @@ def _swing(axis: str, period_s: float) -> "Stopwatch | None":
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
     """Shortest and longest time of ten swings with which the filter can run at a valve's period."""
-    from canshaper.can.filters import filter_fault
     from canshaper.config.first import Stopwatch, ten_swings_s
     from canshaper.config.schema import Limits
+    from canshaper.machine.filters import filter_fault
 
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
@@ -247,8 +247,8 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 def _write(file: Path, draft: Path, text: str) -> None:
     """Write it when it is a good deployment: read like every other first. Else it stays a draft."""
-    from canshaper.can.binding import load_deployment
     from canshaper.config.source import DeploymentError
+    from canshaper.machine.binding import load_deployment
 
     draft.write_text(text, encoding="utf-8")
     try:

@@ -39,7 +39,7 @@ def monitor(
 
       canshaper monitor machine.yaml --plain | tee monitor.txt
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.commissioning.monitor.run import run_live, run_plain
     from canshaper.config.source import DeploymentError
 

@@ -14,7 +14,7 @@ from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK,
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
+    from canshaper.machine.deployment import Deployment
     from canshaper.recording.record import Recording
 
 EXIT_NOT_WRITTEN = 1
@@ -50,7 +50,7 @@ def record(
 
       canshaper record machine.yaml --out drive.log
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
     from canshaper.recording.record import Recording
 

@@ -16,7 +16,7 @@ from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
+    from canshaper.machine.deployment import Deployment
     from canshaper.recording.replay import Drive
     from canshaper.recording.report import Replayed
 

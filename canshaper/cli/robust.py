@@ -11,9 +11,9 @@ from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
     from canshaper.config.filters import Filter
     from canshaper.design.tuning.evaluate import Evaluation
+    from canshaper.machine.deployment import Deployment
 
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7

@@ -9,7 +9,7 @@ import typer
 from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
+    from canshaper.machine.deployment import Deployment
 
 
 def run(
@@ -45,10 +45,10 @@ def run(
 
       canshaper run machine.yaml --listen-only
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
-    from canshaper.service import journal
-    from canshaper.service.daemon import Daemon
+    from canshaper.daemon import journal
+    from canshaper.daemon.daemon import Daemon
 
     journal.set_up()
     try:
@@ -65,8 +65,8 @@ def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, control: str | None
 ) -> "Callable[[], Deployment]":
     """The same with these options put in."""
-    from canshaper.can.stopping import unstated
     from canshaper.config.source import DeploymentError, Problem, Source
+    from canshaper.machine.stopping import unstated
 
     def changed() -> "Deployment":
         deployment = load()

@@ -11,7 +11,7 @@ from canshaper.cli.common import FILE, fail, loader, refuse_shipped
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import Deployment
+    from canshaper.machine.deployment import Deployment
 
 EXIT_REFUSED = 1
 
@@ -47,7 +47,7 @@ def set_(
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
     from canshaper.config.source import DeploymentError
-    from canshaper.control import client
+    from canshaper.daemon import control_client as client
 
     try:
         deployment = loader(file)()

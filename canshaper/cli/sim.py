@@ -48,7 +48,7 @@ def sim(
 
       canshaper sim config/forwarder.yaml --show
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
     from canshaper_sim.cranes import one_crane
     from canshaper_sim.parameters import changed_parameters, parameter_names
@@ -89,7 +89,7 @@ def operator(
 
       canshaper operator config/forwarder.yaml --list
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
     from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import one_crane

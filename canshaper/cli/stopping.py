@@ -10,13 +10,13 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.can.deployment import BoundAxis, Deployment
-from canshaper.can.stopping import FullSpeed, full_speed, stop_fault
 from canshaper.config.filters import Filter
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel
-from canshaper.service.lever import LeverInput
-from canshaper.service.runner import AxisRunner
+from canshaper.controller.runner import AxisRunner
+from canshaper.inputs.lever import LeverInput
+from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
 from canshaper.shaping.stopping import Travel, allowed_s, travel
 
 # Of a proportional valve with a first-order lag: that of the simulated crane, typical of pilot

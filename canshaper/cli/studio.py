@@ -55,7 +55,7 @@ def studio(
 
       canshaper studio machine.yaml --shadow --host 0.0.0.0
     """
-    from canshaper.can.bus import BusError
+    from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
     from canshaper.studio.access import Access
     from canshaper.studio.crane import copied

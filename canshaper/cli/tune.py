@@ -14,11 +14,11 @@ from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader, refuse_shipp
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.can.deployment import BoundAxis, Deployment
     from canshaper.design.tuning.deploy import Setting
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task
     from canshaper.design.tuning.optimal import Tuning
+    from canshaper.machine.deployment import BoundAxis, Deployment
 
 
 def tune(

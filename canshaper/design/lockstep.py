@@ -5,9 +5,9 @@ The controller is the daemon's own, and everything passes through the same frame
 
 from collections.abc import Callable
 
-from canshaper.can.deployment import Deployment
-from canshaper.service.controller import Controller
-from canshaper.service.guarded import Guarded
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Sway

@@ -10,9 +10,9 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from canshaper.can.bus import BusError, Port
-from canshaper.can.deployment import Deployment
+from canshaper.bus.port import BusError, Port
 from canshaper.design.lockstep import DriveError
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import Script
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.realtime import open_ports

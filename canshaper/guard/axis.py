@@ -4,10 +4,10 @@ import math
 from bisect import bisect_right
 from itertools import pairwise
 
-from canshaper.can.deployment import BoundAxis, Deployment
 from canshaper.config.schema import Limits
 from canshaper.guard.bits import CommandBits, StickBits
 from canshaper.guard.inputs import Asked, GuardedJoystick, GuardedStop, largest
+from canshaper.machine.deployment import BoundAxis, Deployment
 
 # Part of full speed; less than any step, more than the rounding of floats.
 EPSILON = 1e-6

@@ -14,7 +14,7 @@ from typing import Literal
 
 from cantools.database.can import Message, Signal
 
-from canshaper.can.signals import find_signal, special_codes
+from canshaper.codec.signals import find_signal, special_codes
 from canshaper.config.schema import Stick, Valve
 
 # Part of full scale; more than the rounding of scale and offset, less than any resolution.

@@ -7,8 +7,8 @@ raise what the guard allows, never what the controller does.
 
 from collections import deque
 
-from canshaper.can.inputs import BoundInput
 from canshaper.guard.bits import Field, StickBits, span_of
+from canshaper.machine.inputs import BoundInput
 
 NEVER = -(10**18)  # ns
 Sizes = deque[tuple[float, int]]

@@ -17,12 +17,12 @@ age of an input, the standstill that a loop may have, the rounding of the frame.
 
 from collections.abc import Sequence
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput
-from canshaper.can.j1939 import group_of
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import group_of
 from canshaper.guard.axis import GuardedAxis
 from canshaper.guard.inputs import GuardedInput, GuardedJoystick, GuardedStop
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
 
 Key = tuple[str, int, bool]
 

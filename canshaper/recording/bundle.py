@@ -11,7 +11,7 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePosixPath
 
 from canshaper import __version__
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import LogError
 from canshaper.recording.history import History
 

@@ -3,9 +3,9 @@
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.can.codecs import ACTIVE_SET, ServiceStatusCodec
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import FrameFault
+from canshaper.codec.codecs import ACTIVE_SET, ServiceStatusCodec
+from canshaper.codec.frame import FrameFault
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Heard
 from canshaper.recording.sorting import Key
 from canshaper.shaping.states import Reason, State

@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 
 import can
 
-from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.can.bus import BusError, open_python_can
-from canshaper.can.raw import CAN_FRAME
-from canshaper.can.socketcan import dropped_frames, open_sockets
+from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
+from canshaper.bus.port import BusError, open_python_can
+from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.socketcan import dropped_frames, open_sockets
 from canshaper.config.bus import Bus
 from canshaper.recording.text import ERROR_FLAG
 

@@ -5,7 +5,7 @@ from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.history import History
 from canshaper.recording.listen import Listener
 

@@ -8,16 +8,16 @@ from functools import partial
 from itertools import islice, pairwise
 from pathlib import Path
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame, new_frame
-from canshaper.can.j1939 import group_of
+from canshaper.codec.frame import Frame, new_frame
+from canshaper.codec.j1939 import group_of
+from canshaper.controller.controller import Controller
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import CutOffError, LogError, TimedFrame
 from canshaper.recording.log import LogFile
 from canshaper.recording.sorting import Key, Kind, Sorter, bus_of_channel
 from canshaper.recording.stepper import Difference, Result, Stepper, count_of
 from canshaper.recording.ticks import Recovery, Sorted, Tick, clocked
 from canshaper.recording.verify import Verifier
-from canshaper.service.controller import Controller
 
 # What is looked at before a replay, to know the channels and whether a daemon sent there.
 LOOKED_AT = 20_000

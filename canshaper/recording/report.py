@@ -9,7 +9,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.replay import Replay
 from canshaper.recording.stepper import Difference
 from canshaper.recording.trace import Trace

@@ -10,11 +10,14 @@ from functools import partial
 from types import BuiltinMethodType, FunctionType, MethodType
 from typing import Any
 
+from canshaper.codec import e2e, flags, layout, signals
+from canshaper.machine import database, inputs
+
 OURS = "canshaper."
 # Made with a deployment, and never changed.
 FIXED = (
     "canshaper.config.",
-    *(f"canshaper.can.{n}" for n in ("database", "e2e", "flags", "inputs", "layout", "signals")),
+    *(module.__name__ for module in (database, e2e, flags, inputs, layout, signals)),
 )
 
 

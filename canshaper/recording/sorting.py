@@ -3,8 +3,8 @@
 from collections.abc import Collection, Mapping
 from enum import Enum
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.j1939 import group_of
+from canshaper.codec.j1939 import group_of
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import LogError
 
 Key = tuple[str, int, bool]

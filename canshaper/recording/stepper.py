@@ -6,16 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
-from canshaper.can.codecs import Sender
-from canshaper.can.deployment import Deployment
-from canshaper.can.e2e import COUNTER, E2e
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.codecs import Sender
+from canshaper.codec.e2e import COUNTER, E2e
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
+from canshaper.controller.counters import Counters
+from canshaper.controller.runner import AxisRunner
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.sorting import Key
 from canshaper.recording.ticks import Tick, Timed
-from canshaper.service.controller import Controller
-from canshaper.service.counters import Counters
-from canshaper.service.runner import AxisRunner
-from canshaper.service.standstill import Standstill
 from canshaper.shaping.states import Reason, State
 
 # A status waits for its turn on the bus; a valve frame of the next tick may be seen before it.

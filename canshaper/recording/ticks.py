@@ -9,7 +9,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from math import lcm
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.recording.sorting import Key, Kind
 
 Timed = tuple[int, Frame]

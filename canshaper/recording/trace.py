@@ -3,7 +3,7 @@
 import math
 from array import array
 
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.stepper import Result
 from canshaper.recording.ticks import Tick
 from canshaper.shaping.sway import SwayModel

@@ -9,8 +9,8 @@ before are gone through again with the other ways to read the log, the nearest f
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput, BoundLever
+from canshaper.codec.frame import Frame
+from canshaper.machine.inputs import BoundInput, BoundLever
 from canshaper.recording.snapshot import Snapshot
 from canshaper.recording.sorting import Key
 from canshaper.recording.stepper import Choice, Result, Stepper

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import TextIO
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.recording.stepper import Result
 from canshaper.recording.ticks import Tick
 

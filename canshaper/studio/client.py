@@ -8,7 +8,7 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from canshaper.control.client import ControlError
+from canshaper.daemon.control_client import ControlError
 from canshaper.studio.cab import Cab, NonsenseError, is_number
 from canshaper.studio.stage import Stage
 

@@ -11,11 +11,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
 from canshaper.design.processes import Transport, end
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.studio.sliders import adjustable, sliders
 from canshaper.studio.view import Tell
 

@@ -9,13 +9,13 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.bus import Port
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.bus.port import Port
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY
-from canshaper.control import client
+from canshaper.daemon import control_client as client
+from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.processes import Transport, on_transport
-from canshaper.service.loop import run_at_deadlines
+from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.events import Events

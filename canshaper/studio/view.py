@@ -8,11 +8,11 @@ from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundLever
-from canshaper.can.j1939 import NULL, with_source
-from canshaper.service.finder import InputFinder
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import NULL, with_source
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundLever
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import MOVING, Reason, State
 from canshaper.studio.words import fault_words, reason_words, state_words

@@ -1,6 +1,6 @@
 """States, reasons and faults in words for people; docs/states.md says more of each."""
 
-from canshaper.can.frame import FrameFault
+from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason, State
 
 STATES = {

@@ -3,10 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.can.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
-from canshaper.can.codecs import Sender
-from canshaper.can.deployment import BoundAxis, Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame
+from canshaper.machine.deployment import BoundAxis, Deployment
 
 # Heartbeats are sent three times as often as they are asked for.
 HEARTBEATS_IN_TIME = 3

@@ -4,10 +4,10 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-from canshaper.can.codecs import Sender
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput, BoundLever, BoundStop
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput, BoundLever, BoundStop
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
 JOYSTICK_ADDRESS = 0x33

@@ -1,7 +1,7 @@
 """The operator's levers as a node on CAN: a script in, joystick frames out."""
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import JOINT_AXES, SLEW
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.strokes import Script

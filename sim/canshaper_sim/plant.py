@@ -4,14 +4,14 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from canshaper.can.codecs import Sender
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import USUAL_MAX_STEP, BoundFeedback
-from canshaper.can.protection import UNPROTECTED, Guard
-from canshaper.can.signals import find_signal
-from canshaper.can.valve import ValveCodec
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame
+from canshaper.codec.protection import UNPROTECTED, Guard
+from canshaper.codec.signals import find_signal
+from canshaper.codec.valve import ValveCodec
 from canshaper.config.source import DeploymentError, Problem
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import USUAL_MAX_STEP, BoundFeedback
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
 from canshaper_sim.crane import Crane, CraneParameters

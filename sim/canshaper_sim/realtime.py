@@ -3,10 +3,10 @@
 import signal
 from types import FrameType
 
-from canshaper.can.bus import Port, open_port
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import FrameFault
-from canshaper.service.loop import run_at_deadlines
+from canshaper.bus.port import Port, open_port
+from canshaper.codec.frame import FrameFault
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import Script

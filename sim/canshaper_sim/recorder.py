@@ -7,10 +7,10 @@ none. With joint commands the three boom joints thus show the same sway, each wi
 
 from typing import Any
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundLever
-from canshaper.can.j1939 import NULL, with_source
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import NULL, with_source
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundLever
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW

@@ -14,9 +14,9 @@ from dataclasses import replace
 from functools import cache
 from typing import Final
 
-from canshaper.can.deployment import Deployment
 from canshaper.config.filters import GffFilter
 from canshaper.design.lockstep import drive
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper_sim.actuator import Actuator

@@ -4,7 +4,7 @@ from collections.abc import Callable
 from dataclasses import asdict
 from typing import Any, Final
 
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import NEAR_FAR, SLEW
 from canshaper_sim.grapple import Grapple
 from studies.paper import bode, controller, reductions

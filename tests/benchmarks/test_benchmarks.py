@@ -7,8 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.config.bus import Bus
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 PROGRAMS = sorted(

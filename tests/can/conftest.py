@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 
 ROOT = Path(__file__).parents[2]
 

@@ -15,10 +15,10 @@ from pathlib import Path
 from can import Message
 from can.interfaces.udp_multicast.utils import pack_message
 
-from canshaper.can.bus import Port, open_port
-from canshaper.can.frame import Frame
-from canshaper.can.multicast import PORT
+from canshaper.bus.multicast import PORT
+from canshaper.bus.port import Port, open_port
 from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.design.processes import choose_transport, drive_on_bus
 from canshaper_sim.operator import script_named

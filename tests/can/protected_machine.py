@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 
 IDS = list(range(0x10, 0x20))
 

@@ -11,10 +11,10 @@ from typing import Any
 import can
 from can.interfaces.socketcan.socketcan import build_can_frame
 
-from canshaper.can.device import WrongDeviceError
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.raw import SIZE, RawPort
-from canshaper.can.socketcan import Ids
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.raw import SIZE, RawPort
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.machine.ids import Ids
 
 TICK_NS = 20_000_000
 MARK_AT = 5  # a byte of the structure that is padding

@@ -13,12 +13,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can import arrival, raw
-from canshaper.can.arrival import SO_TIMESTAMPNS, Arrivals, stamp_ns
-from canshaper.can.bus import MOST_FAILURES, ListeningPort, Port, PythonCanPort, open_port
-from canshaper.can.clock import boottime_ns
-from canshaper.can.frame import Frame
-from canshaper.can.raw import MOST_FRAMES, REOPEN_NS
+from canshaper.bus import arrival, raw
+from canshaper.bus.arrival import SO_TIMESTAMPNS, Arrivals, stamp_ns
+from canshaper.bus.clock import boottime_ns
+from canshaper.bus.port import MOST_FAILURES, ListeningPort, Port, PythonCanPort, open_port
+from canshaper.bus.raw import MOST_FRAMES, REOPEN_NS
+from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
 from tests.can.raw_line import IDS, TAKEN, TICK_NS, Line, message
 

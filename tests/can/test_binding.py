@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
 from tests.can.conftest import Machine
 
 VALVE = """VERSION ""

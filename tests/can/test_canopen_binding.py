@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
 from tests.service.canopen_rig import DBC_FILE, ROOT, write_variant
 
 LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"

@@ -10,17 +10,17 @@ from cantools.database.can import Message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.codecs import (
+from canshaper.codec.codecs import (
     AxisStatusCodec,
     LeverCodec,
     Sender,
     ServiceStatusCodec,
     WrongLengthError,
 )
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.protection import UNPROTECTED, Protection
-from canshaper.can.signals import VelocitySignal
-from canshaper.can.valve import ValveCodec, ValveMessage
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.protection import UNPROTECTED, Protection
+from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.valve import ValveCodec, ValveMessage
 from canshaper.shaping.states import Reason, State
 
 SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"

@@ -9,10 +9,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.can import device as module
-from canshaper.can import netlink
-from canshaper.can.bus import BusError, WrongBusError, open_port
-from canshaper.can.device import (
+from canshaper.bus import device as module
+from canshaper.bus import netlink
+from canshaper.bus.device import (
     Device,
     WrongDeviceError,
     check_device,
@@ -22,8 +21,10 @@ from canshaper.can.device import (
     read_device,
     whereabouts,
 )
-from canshaper.can.socketcan import Ids, open_sockets
+from canshaper.bus.port import BusError, WrongBusError, open_port
+from canshaper.bus.socketcan import open_sockets
 from canshaper.config.bus import Bus, Match
+from canshaper.machine.ids import Ids
 from tests.can.fake_devices import HUB, PCI, SPI, USB, FakeDevices
 from tests.can.raw_line import IDS
 
@@ -289,7 +290,7 @@ def opened_by(monkeypatch: pytest.MonkeyPatch, error: Exception) -> Callable[[Bu
     def refuse(*_arguments: Any) -> Any:
         raise error
 
-    monkeypatch.setattr("canshaper.can.bus.open_sockets", refuse)
+    monkeypatch.setattr("canshaper.bus.port.open_sockets", refuse)
 
     def fail(config: Bus) -> BusError:
         with pytest.raises(BusError) as caught:
@@ -347,7 +348,7 @@ def test_sockets_of_another_device_are_closed_at_once(
 ) -> None:
     made: list[Opened] = []
     monkeypatch.setattr(Opened, "made", made, raising=False)
-    monkeypatch.setattr("canshaper.can.socketcan.socket.socket", Opened)
+    monkeypatch.setattr("canshaper.bus.socketcan.socket.socket", Opened)
     right = open_sockets(bus("can0", serial="0A17", port=0), ids)
     assert [one.closed for one in made] == [False] * len(right)
     made.clear()
@@ -362,6 +363,6 @@ def test_a_port_knows_whether_its_device_is_named(
     monkeypatch: pytest.MonkeyPatch, asked: Bus, matched: bool
 ) -> None:
     options: dict[str, Any] = {}
-    monkeypatch.setattr("canshaper.can.bus.RawPort", lambda *_, **given: options.update(given))
+    monkeypatch.setattr("canshaper.bus.port.RawPort", lambda *_, **given: options.update(given))
     open_port("crane", asked, lambda _fault: None)
     assert options == {"confirms": False, "matched": matched}

@@ -10,9 +10,9 @@ from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from canshaper.can.e2e import E2e, Profile1, Profile2
-from canshaper.can.frame import FrameFault
-from canshaper.can.protection import Guard, Protection
+from canshaper.codec.e2e import E2e, Profile1, Profile2
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.protection import Guard, Protection
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP

@@ -7,9 +7,9 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.can.codecs import LeverCodec
-from canshaper.can.flags import FlaggedVelocity
-from canshaper.can.signals import VelocitySignal
+from canshaper.codec.codecs import LeverCodec
+from canshaper.codec.flags import FlaggedVelocity
+from canshaper.codec.signals import VelocitySignal
 from canshaper.shaping.states import Reason
 from tests.can.conftest import Machine
 

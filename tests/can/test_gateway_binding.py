@@ -5,15 +5,15 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.cangw import AND, CS_CRC8, CS_XOR, OR
-from canshaper.can.deployment import Deployment
-from canshaper.can.gateway import excluded, fallback_rules, passing_rules
-from canshaper.can.kernel_check import neutral_fault
-from canshaper.can.passing import EFF
-from canshaper.can.protection import Checksum, Protection
-from canshaper.can.rewrite import RewrittenMessage
+from canshaper.codec.kernel_check import neutral_fault
+from canshaper.codec.protection import Checksum, Protection
+from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
+from canshaper.protocols.gateway.passing import EFF
+from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
 
 ROOT = Path(__file__).parents[2]
 SLEW = "bus: machine, message: LeverLeft, signal: Slew, timeout_ms: 200,"

@@ -6,12 +6,12 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can import identity as module
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.monitor.state import Monitor
+from canshaper.machine import identity as module
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Heard
 
 ROOT = Path(__file__).parents[2]

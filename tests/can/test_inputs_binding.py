@@ -2,9 +2,9 @@
 
 import pytest
 
-from canshaper.can.frame import FrameFault
-from canshaper.can.protection import UNPROTECTED, Checksum, Protection
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.protection import UNPROTECTED, Checksum, Protection
+from canshaper.controller.controller import Controller
 from tests.can.conftest import Machine
 
 COUNTER = "alive_counter: AliveCounter"

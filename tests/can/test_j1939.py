@@ -9,10 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import BusState, Frame
-from canshaper.can.j1939 import (
+from canshaper.bus.socketcan import MOST_FILTERS, set_filters
+from canshaper.codec.frame import BusState, Frame
+from canshaper.codec.j1939 import (
     CLAIMED,
     DM1,
     claims_of,
@@ -23,8 +22,10 @@ from canshaper.can.j1939 import (
     pgn_of,
     with_source,
 )
-from canshaper.can.socketcan import MOST_FILTERS, Ids, set_filters
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.ids import Ids
 from tests.can.raw_line import IDS, VALVE, Line, message
 
 ROOT = Path(__file__).parents[2]
@@ -226,7 +227,7 @@ CLAIMING = Ids(
 @pytest.fixture
 def line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
     opened = Line(CLAIMING)
-    monkeypatch.setattr("canshaper.can.raw.time.monotonic_ns", opened.monotonic_ns)
+    monkeypatch.setattr("canshaper.bus.raw.time.monotonic_ns", opened.monotonic_ns)
     yield opened
     opened.end()
     opened.port.close()

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.cangw import CS_CRC8, CS_XOR, changed_bytes
-from canshaper.can.e2e import COUNTER, E2e, Profile1, Profile2
-from canshaper.can.kernel_check import kernel_check, neutral_fault
-from canshaper.can.protection import CHECKSUMS, Checksum, Protection
+from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2
+from canshaper.codec.kernel_check import kernel_check, neutral_fault
+from canshaper.codec.protection import CHECKSUMS, Checksum, Protection
+from canshaper.protocols.gateway.cangw import CS_CRC8, CS_XOR, changed_bytes
 
 LENGTH = 8
 

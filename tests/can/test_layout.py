@@ -11,10 +11,10 @@ from cantools.database.conversion import BaseConversion
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can import layout
-from canshaper.can.codecs import Sender
-from canshaper.can.layout import Layout, layout_fault
-from canshaper.can.signals import raw_limits
+from canshaper.codec import layout
+from canshaper.codec.codecs import Sender
+from canshaper.codec.layout import Layout, layout_fault
+from canshaper.codec.signals import raw_limits
 from tests.can.conftest import Machine
 
 SHIPPED: Any = cantools.database.load_file(Path(__file__).parents[2] / "dbc" / "forwarder.dbc")

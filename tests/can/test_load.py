@@ -3,8 +3,8 @@
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.load import longest_frame_bits
 from canshaper.cli.app import app
+from canshaper.machine.bus_load import longest_frame_bits
 from tests.can.conftest import Machine
 
 

@@ -6,14 +6,14 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can import bus as module
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import BusError
-from canshaper.can.device import WrongDeviceError, read_device, whereabouts
+from canshaper.bus import port as module
+from canshaper.bus.device import WrongDeviceError, read_device, whereabouts
+from canshaper.bus.port import BusError
 from canshaper.cli.app import app
 from canshaper.config.bus import Match
 from canshaper.config.source import DeploymentError
-from canshaper.service.ports import open_ports
+from canshaper.daemon.ports import open_ports
+from canshaper.machine.binding import load_deployment
 from tests.can.fake_devices import FakeDevices
 
 ROOT = Path(__file__).parents[2]

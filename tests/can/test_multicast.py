@@ -9,9 +9,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can import multicast
-from canshaper.can.bus import BusError, Port, open_port
-from canshaper.can.frame import Frame
+from canshaper.bus import multicast
+from canshaper.bus.port import BusError, Port, open_port
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from tests.can.neighbour import CANNOT
 

@@ -8,13 +8,14 @@ from typing import Any
 import can
 import pytest
 
-from canshaper.can import bus as bus_module
-from canshaper.can import socketcan
-from canshaper.can.bus import BusError, ListeningPort, WrongBusError, open_port
-from canshaper.can.device import WrongDeviceError
-from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.can.socketcan import Ids, open_sockets, set_filters
+from canshaper.bus import port as bus_module
+from canshaper.bus import socketcan
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.port import BusError, ListeningPort, WrongBusError, open_port
+from canshaper.bus.socketcan import open_sockets, set_filters
+from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.machine.ids import Ids
 
 BUS = Bus(interface="socketcan", channel="can0", bitrate=250000)
 IDS = Ids(

@@ -5,7 +5,7 @@ import socket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.passing import EFF, EVERYTHING, Pattern, all_but, exactly
+from canshaper.protocols.gateway.passing import EFF, EVERYTHING, Pattern, all_but, exactly
 
 narrow = st.integers(0, 0x7FF)
 wide = st.integers(0, 0x1FFFFFFF).map(lambda i: i | EFF)

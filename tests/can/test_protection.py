@@ -7,9 +7,9 @@ from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.e2e import Profile1, Profile2
-from canshaper.can.frame import FrameFault
-from canshaper.can.protection import CHECKSUMS, Checksum, Guard, Protection, Protector
+from canshaper.codec.e2e import Profile1, Profile2
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.protection import CHECKSUMS, Checksum, Guard, Protection, Protector
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP

@@ -6,8 +6,8 @@ from typing import Any
 import can
 import pytest
 
-from canshaper.can.bus import MOST_FAILURES, Port, open_port
-from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.bus.port import MOST_FAILURES, Port, open_port
+from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 
 KINDS = (can.CanOperationError("lost"), OSError("gone"), ValueError("t1"), IndexError("t12"))

@@ -6,8 +6,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.frame import FrameFault
-from canshaper.service.radius import RadiusInput
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.radius import RadiusInput
 from tests.can.conftest import Machine
 
 SWAY = "    sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"

@@ -12,10 +12,11 @@ from can.interfaces.socketcan.socketcan import build_can_frame, dissect_can_fram
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can import raw
-from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.can.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
-from canshaper.can.socketcan import CAN_INV_FILTER, MOST_FILTERS, Ids, set_filters
+from canshaper.bus import raw
+from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
+from canshaper.bus.socketcan import CAN_INV_FILTER, MOST_FILTERS, set_filters
+from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.machine.ids import Ids
 from tests.can.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
 
 

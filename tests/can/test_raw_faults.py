@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.can import raw
-from canshaper.can.frame import BusState, FrameFault
-from canshaper.can.raw import PROBE_NS, SIZE
+from canshaper.bus import raw
+from canshaper.bus.raw import PROBE_NS, SIZE
+from canshaper.codec.frame import BusState, FrameFault
 from tests.can.raw_line import (
     IDS,
     MARK_AT,

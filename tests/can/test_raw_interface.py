@@ -7,11 +7,11 @@ from typing import Any
 
 import pytest
 
-from canshaper.can import raw
-from canshaper.can.device import WrongDeviceError
-from canshaper.can.frame import BusState, FrameFault
-from canshaper.can.raw import PROBE_NS, REOPEN_NS, RawPort
-from canshaper.can.socketcan import Ids
+from canshaper.bus import raw
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
+from canshaper.codec.frame import BusState, FrameFault
+from canshaper.machine.ids import Ids
 from tests.can.raw_line import (
     IDS,
     SENT_BACK,
@@ -274,7 +274,7 @@ def test_an_interface_that_goes_while_another_deployment_begins_is_a_fault(
     def gone(*_: object) -> None:
         raise OSError(errno.ENODEV, "No such device")
 
-    monkeypatch.setattr("canshaper.can.raw.set_filters", gone)
+    monkeypatch.setattr("canshaper.bus.raw.set_filters", gone)
     line.port.watch("second", IDS)
     assert line.port.name == "second"
     assert line.port.state is BusState.GONE

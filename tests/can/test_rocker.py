@@ -8,12 +8,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.codecs import Sender
-from canshaper.can.flags import RockerVelocity
-from canshaper.can.signals import VelocitySignal
-from canshaper.can.valve import FlagsCodec, ValveCodec, ValveMessage
+from canshaper.codec.codecs import Sender
+from canshaper.codec.flags import RockerVelocity
+from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.valve import FlagsCodec, ValveCodec, ValveMessage
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 
 ROOT = Path(__file__).parents[2]

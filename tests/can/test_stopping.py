@@ -2,8 +2,8 @@
 
 import pytest
 
-from canshaper.can.stopping import FullSpeed, allowed_m, full_speed, unstated
 from canshaper.config.schema import AxisConfig
+from canshaper.machine.stopping import FullSpeed, allowed_m, full_speed, unstated
 from tests.can.conftest import Machine
 
 SLEWING = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.codecs import Sender
-from canshaper.can.frame import Frame
-from canshaper.can.valve import DirectionCodec, ValveCodec, ValveMessage
-from canshaper.service.controller import Controller
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame
+from canshaper.codec.valve import DirectionCodec, ValveCodec, ValveMessage
+from canshaper.controller.controller import Controller
 from tests.can.conftest import Machine
 
 # ISO 11783-7 auxiliary valve command 0; the reserved bits and bytes 6 to 8 have no signals.

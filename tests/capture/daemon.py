@@ -9,10 +9,10 @@ import random
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
-from canshaper.service.standstill import Standstill
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import script_named
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
+from canshaper.machine.binding import load_deployment
 from canshaper.recording.bundle import history_lines, pack, unpack
 from canshaper.recording.frames import LogError
 from canshaper.recording.history import History, Told

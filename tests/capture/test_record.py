@@ -16,7 +16,7 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.multicast import LocalMulticastBus
+from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.recording.bundle import unpack

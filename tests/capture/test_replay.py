@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.deployment import Deployment
 from canshaper.cli.common import loader
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.bundle import unpack
 from canshaper.recording.frames import LogError
 from canshaper.recording.replay import Replay, look

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
 from canshaper.recording.snapshot import Snapshot
-from canshaper.service.controller import Controller
 
 FILES = (Path(__file__).parents[2] / "config").glob("*.yaml")
 CONFIGS = sorted(p.name for p in FILES if "buses:" in p.read_text(encoding="utf-8"))

@@ -5,9 +5,9 @@ from itertools import pairwise
 
 import pytest
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import LogError
 from canshaper.recording.sorting import Kind, Sorter, bus_of_channel
 from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked

@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.design.lockstep import drive
+from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import compare
 from canshaper_sim.operator import SCRIPTS
 

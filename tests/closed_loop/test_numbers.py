@@ -7,11 +7,11 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
+from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import compare
-from canshaper.service.controller import Controller
 from canshaper.shaping.gff import poles_from_denominator
 from canshaper.shaping.sway import SwayMode
 from canshaper_sim.operator import SCRIPTS, Script, Stroke

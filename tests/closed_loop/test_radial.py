@@ -4,10 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.design.lockstep import drive
 from canshaper.design.tuning.robust import least_residual
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.recording import Recording
 

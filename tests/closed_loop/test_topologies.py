@@ -5,8 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.design.lockstep import DriveError, drive
+from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import compare
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.operator import SCRIPTS

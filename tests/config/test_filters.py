@@ -10,10 +10,10 @@ import yaml
 from jsonschema import Draft202012Validator
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.fir import Fir, residual_left
 from canshaper.shaping.gff import Gff
 from canshaper.shaping.limit_aware import LimitAware

@@ -12,8 +12,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.control import client
-from canshaper.control.server import (
+from canshaper.daemon import control_client as client
+from canshaper.daemon.control_server import (
     LEAST_BETWEEN_NS,
     MOST_BYTES,
     MOST_CLIENTS,
@@ -189,7 +189,7 @@ def test_only_its_owner_may_write(tmp_path: Path) -> None:
 def test_the_socket_of_a_daemon_that_was_killed_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "control.sock"
     code = "import sys, os; from pathlib import Path\n"
-    code += "from canshaper.control.server import ControlServer\n"
+    code += "from canshaper.daemon.control_server import ControlServer\n"
     code += "server = ControlServer(Path(sys.argv[1]), 0o600); os._exit(0)"
     subprocess.run([sys.executable, "-c", code, str(path)], check=True)
     assert path.is_socket()

@@ -81,5 +81,5 @@ def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
 
 
 def test_the_daemon_does_not_load_casadi() -> None:
-    code = "import sys, canshaper.service.daemon; sys.exit('casadi' in sys.modules)"
+    code = "import sys, canshaper.daemon.daemon; sys.exit('casadi' in sys.modules)"
     assert subprocess.run([sys.executable, "-c", code], check=False).returncode == 0

@@ -7,8 +7,8 @@ from typing import Any
 import pytest
 import typer
 
-from canshaper.can.frame import FrameFault
 from canshaper.cli.app import app
+from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason, State
 
 ROOT = Path(__file__).parents[2]

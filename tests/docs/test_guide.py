@@ -11,10 +11,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.app import app
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import script_named
 from canshaper_sim.parameters import changed_parameters

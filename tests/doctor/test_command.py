@@ -160,7 +160,7 @@ def test_nothing_stays_however_it_ends(
 
 def test_the_daemon_does_not_import_it() -> None:
     code = (
-        "import sys, canshaper.cli.app, canshaper.service.daemon, canshaper.cli.common;"
+        "import sys, canshaper.cli.app, canshaper.daemon.daemon, canshaper.cli.common;"
         "print([m for m in sys.modules if m.startswith('canshaper.commissioning.doctor')])"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.commissioning.doctor.finding import Finding, Level, fit
 from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
 from canshaper.commissioning.doctor.measure import Run
+from canshaper.machine.binding import load_deployment
 from tests.doctor.conftest import SHIPPED, TICK_NS
 
 Make = Callable[..., Run]

@@ -11,15 +11,15 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.arrival import SO_TIMESTAMPNS
-from canshaper.can.binding import load_deployment
-from canshaper.can.device import WrongDeviceError
-from canshaper.can.frame import Frame
-from canshaper.can.raw import CAN_FRAME
+from canshaper.bus.arrival import SO_TIMESTAMPNS
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.raw import CAN_FRAME
 from canshaper.cli.doctor import _listened
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.listen import heard_findings
+from canshaper.machine.binding import load_deployment
 from tests.doctor.conftest import ROOT, SHIPPED
 from tests.service.j1939_rig import bjm
 

@@ -11,11 +11,11 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.commissioning.doctor.levers import LARGEST, NEUTRAL_S, STROKE_S, Waving
 from canshaper.commissioning.doctor.measure import measure, run_of
 from canshaper.commissioning.doctor.processes import Children, MeasureError, ready
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.levers import LeverNode
 from tests.doctor.conftest import ROOT, SHIPPED
 

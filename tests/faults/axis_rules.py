@@ -2,7 +2,7 @@
 
 from collections import deque
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.heard import LONG_AGO, HeardLever
 from tests.faults.judge import CONTESTED_NS, OWED, ROUNDING
 from tests.faults.machine import Axis

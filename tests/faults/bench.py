@@ -13,17 +13,17 @@ from pathlib import Path
 from typing import Any, ClassVar
 from unittest.mock import patch
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.cangw import GatewayError
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import BusState, Frame
+from canshaper.codec.frame import BusState, Frame
 from canshaper.config.bus import Bus
 from canshaper.config.source import DeploymentError
-from canshaper.service import daemon as module
-from canshaper.service import gateway as gateway_module
-from canshaper.service import loop as loop_module
-from canshaper.service import ports as ports_module
-from canshaper.service import standstill as standstill_module
+from canshaper.daemon import daemon as module
+from canshaper.daemon import gateway as gateway_module
+from canshaper.daemon import loop as loop_module
+from canshaper.daemon import ports as ports_module
+from canshaper.daemon import standstill as standstill_module
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.gateway.cangw import GatewayError
 from tests.faults.guarded import Unrefused
 from tests.faults.machine import Key
 from tests.faults.rules import Rules

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable
 from typing import Any, Protocol
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults import inject
 from tests.faults.guarded import guarded
 from tests.faults.hand import path

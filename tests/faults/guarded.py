@@ -1,9 +1,9 @@
 """The controller behind the output guard, which must let pass whatever a sound one computes."""
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
-from canshaper.service.guarded import Guarded
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.deployment import Deployment
 from tests.faults.judge import Violation
 
 

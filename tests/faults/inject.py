@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.inputs import Input, Lever
 from tests.faults.machine import Axis, Machine
 

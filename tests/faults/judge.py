@@ -16,7 +16,7 @@ never quicker than the valve's rates, all on the grid of the valve's frame.
 from collections import Counter, deque
 from typing import Any
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults import heard
 from tests.faults.heard import LONG_AGO, Heard, HeardLever, HeardStop
 from tests.faults.machine import Axis, Machine

@@ -6,9 +6,9 @@ They change what goes in or comes out, so they stay what they are however the co
 from collections.abc import Iterable
 from typing import Any
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.deployment import Deployment
 from tests.faults.inputs import Lever
 from tests.faults.machine import Machine
 

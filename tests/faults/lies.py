@@ -5,7 +5,7 @@ They stand between the daemon and its buses, so they stay what they are however 
 
 from collections.abc import Callable
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.inputs import Lever
 from tests.faults.machine import Axis, Machine
 from tests.faults.sequence import Sequence

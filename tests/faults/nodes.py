@@ -3,7 +3,7 @@
 import random
 from typing import TYPE_CHECKING
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.machine import Machine, Node
 from tests.service.canopen_rig import (
     ACTIVE,

@@ -1,6 +1,6 @@
 """What other nodes have said, by CiA 301, CiA 408 and SAE J1939-81, and what follows from it."""
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.heard import LONG_AGO
 from tests.faults.machine import Node, Words
 

@@ -15,7 +15,7 @@ the daemon's states nor what they are called. For every axis, in every frame of 
 A reload, a change of a number: nothing of this ends with them, so the rules do not know them.
 """
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.axis_rules import SLACK_NS, AxisRules
 from tests.faults.heard import HeardLever
 from tests.faults.judge import Violation

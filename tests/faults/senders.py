@@ -3,7 +3,7 @@
 import random
 from collections.abc import Iterable
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults.inject import Fault
 from tests.faults.inputs import Input
 from tests.faults.machine import Machine

@@ -10,7 +10,7 @@ from unittest.mock import patch
 
 import pytest
 
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
 from tests.faults.judge import Violation
 from tests.faults.lies import LIES
 from tests.faults.sequence import ACTS, SENDING, Sequence, kinds_for

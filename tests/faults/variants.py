@@ -8,8 +8,8 @@ import tempfile
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from tests.faults.machine import Machine
 
 ROOT = Path(__file__).parents[2]

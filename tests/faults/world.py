@@ -8,7 +8,7 @@ import itertools
 import random
 from collections.abc import Callable, Iterator
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from tests.faults import inject
 from tests.faults.hand import path
 from tests.faults.inject import Fault

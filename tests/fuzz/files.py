@@ -3,11 +3,11 @@
 import re
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ("forwarder", "forwarder-robust", "forwarder-joints")

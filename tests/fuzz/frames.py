@@ -1,7 +1,7 @@
 """Any frames at any time: bytes to a script for the controller, under the eyes of the judge."""
 
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
 from tests.faults.inputs import Input
 from tests.faults.judge import Judge
 from tests.faults.variants import NAMES, machine

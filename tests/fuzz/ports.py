@@ -6,8 +6,8 @@ Unix sockets carry them; the kernel's own never hand over a structure of another
 import errno
 from unittest.mock import patch
 
-from canshaper.can import raw
-from canshaper.can.frame import BusState, Frame
+from canshaper.bus import raw
+from canshaper.codec.frame import BusState, Frame
 from tests.can.raw_line import IDS, OTHER, STATUS, VALVE, Line
 from tests.fuzz.frames import Bytes
 

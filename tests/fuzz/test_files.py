@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, event, given, settings
 from hypothesis import strategies as st
 
-from canshaper.can.deployment import Deployment
+from canshaper.machine.deployment import Deployment
 from tests.fuzz.files import SHIPPED, SMALL, Files, texts
 from tests.fuzz.mutate import DBC_WORDS, YAML_WORDS, changed
 
@@ -49,7 +49,7 @@ import resource, sys
 from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, ({0}, {0}))
 resource.setrlimit(resource.RLIMIT_CPU, ({1}, {1}))
-from canshaper.can.binding import load_deployment
+from canshaper.machine.binding import load_deployment
 from canshaper.config.source import DeploymentError
 try:
     load_deployment(Path(sys.argv[1]))

@@ -5,7 +5,7 @@ import struct
 from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
-from canshaper.can.frame import BusState
+from canshaper.codec.frame import BusState
 from tests.can.raw_line import MARK_AT, SENT_BACK
 from tests.fuzz import ports
 

@@ -4,9 +4,9 @@ The enable switch is released in motion, the levers fall silent for longer than 
 anti-sway switch is used, a stick tells an error, and a node sends what nobody knows.
 """
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.plant import PlantNode

@@ -7,11 +7,11 @@ from math import floor
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.can.signals import FieldSet
-from canshaper.service.controller import Controller
-from canshaper.service.guarded import Guarded
+from canshaper.codec.frame import Frame
+from canshaper.codec.signals import FieldSet
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping import axis
 from canshaper.shaping.limits import with_deadband
 

@@ -4,10 +4,10 @@ import random
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.config.schema import Limits
 from canshaper.guard.axis import openings
 from canshaper.guard.bits import CommandBits, StickBits
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import without_deadband
 from tests.faults import shipped
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.can.binding import load_deployment
+from canshaper.machine.binding import load_deployment
 from tests.hil.machine import (
     DBC,
     FILE,

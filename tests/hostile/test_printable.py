@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from canshaper.cli.console import SafeConsole
 from canshaper.config.printable import printable
-from canshaper.service.journal import JournalHandler
+from canshaper.daemon.journal import JournalHandler
 from tests.hostile.inputs import DBC, SHIPPED
 
 CLEAR = "\x1b[2J"

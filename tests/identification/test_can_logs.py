@@ -8,12 +8,12 @@ import can
 import numpy as np
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.database import Messages, load_dbc
-from canshaper.can.deployment import Deployment
 from canshaper.commissioning.identification.canlog import bind, read_can
 from canshaper.commissioning.identification.series import IdentificationError, Kind
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.database import Messages, load_dbc
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogError
 from tests.identification.machine import FILE, ROOT, Push, candump, driven
 

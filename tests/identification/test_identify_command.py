@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner, Result
 
-from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
 from canshaper_sim.grapple import Sway
 from tests.identification.machine import (
     EMPTY,

@@ -18,7 +18,7 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.multicast import LocalMulticastBus
+from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 
 GROUP = f"239.75.{os.getpid() // 256 % 256}.{os.getpid() % 256}"

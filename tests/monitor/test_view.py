@@ -7,11 +7,11 @@ from pathlib import Path
 import pytest
 from rich.console import Console
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import bar, screen, status_line
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Heard
 from canshaper.shaping.states import Reason, State
 from tests.service.j1939_rig import bjm

@@ -6,9 +6,9 @@ from typing import Any
 
 import cantools
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 FILE, DBC_FILE = "canopen-forwarder.yaml", "canopen-cia401-cia408.dbc"

@@ -7,9 +7,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
 
 ROOT = Path(__file__).parents[2]

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Any
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.shaping.states import State
 from tests.service.conftest import Rig
 

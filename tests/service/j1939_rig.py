@@ -6,10 +6,10 @@ from typing import Any
 
 import cantools
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.can.j1939 import GLOBAL, name_bytes
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import GLOBAL, name_bytes
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
 
 ROOT = Path(__file__).parents[2]

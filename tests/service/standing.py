@@ -2,9 +2,9 @@
 
 from collections.abc import Callable
 
-from canshaper.can.frame import Frame
-from canshaper.service.exchange import exchange
-from canshaper.service.standstill import Standstill
+from canshaper.codec.frame import Frame
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.standstill import Standstill
 from tests.service.conftest import Rig
 from tests.service.test_exchange import Waiting
 

@@ -8,8 +8,8 @@ from typing import Protocol
 
 import pytest
 
-from canshaper.can.frame import Frame
-from canshaper.service.adjust import Adjuster
+from canshaper.codec.frame import Frame
+from canshaper.controller.adjust import Adjuster
 from canshaper.shaping.registry import Shaper, build_shaper
 from canshaper.shaping.sway import SwayModel
 from tests.service.conftest import Rig
@@ -173,7 +173,7 @@ def test_the_new_filter_is_made_as_the_file_makes_it(
         made.append(((kind, tick_s), others))
         return build_shaper(kind, tick_s, sway, **others)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("canshaper.service.runner.build_shaper", noted)
+    monkeypatch.setattr("canshaper.controller.runner.build_shaper", noted)
     rig = make(
         {
             f"{SLEW}\n    {FILTER}": f"{SLEW}\n    filter: {{ kind: {kind} }}\n",

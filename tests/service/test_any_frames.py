@@ -11,9 +11,9 @@ from pathlib import Path
 from hypothesis import event, given, settings
 from hypothesis import strategies as st
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 
 DEPLOYMENT = load_deployment(Path(__file__).parents[2] / "config" / "forwarder.yaml")
 TICK_NS = 20_000_000

@@ -8,12 +8,12 @@ from collections.abc import Callable, Iterator
 
 import pytest
 
-from canshaper.can.frame import BusState, Frame, FrameFault
+from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import CanopenNode
-from canshaper.service.canopen import RemoteNode
-from canshaper.service.exchange import exchange
-from canshaper.service.runner import CONTESTED_NS
-from canshaper.service.standstill import Standstill
+from canshaper.controller.runner import CONTESTED_NS
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.standstill import Standstill
+from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import State
 from tests.service.canopen_rig import OPERATIONAL
 from tests.service.conftest import SLOW_VALVE, TICK_NS, Rig

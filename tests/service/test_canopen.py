@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.daemon import Daemon
-from canshaper.service.ports import close_ports
+from canshaper.codec.frame import Frame
+from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.ports import close_ports
+from canshaper.machine.binding import load_deployment
 from tests.service.canopen_rig import (
     NODES,
     OPERATIONAL,

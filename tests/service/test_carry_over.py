@@ -6,12 +6,12 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
+from canshaper.inputs.feedback import Following
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.stepper import count_of
-from canshaper.service.controller import Controller
-from canshaper.service.feedback import Following
 from canshaper.shaping.states import State
 from tests.can.protected_machine import load
 from tests.service.canopen_rig import (

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.service.conftest import Rig
 

@@ -6,10 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.frame import Frame
-from canshaper.can.j1939 import CLAIMED, name_bytes
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import CLAIMED, name_bytes
 from canshaper.config.bus import J1939, J1939Name
-from canshaper.service.claim import LEAST_BETWEEN_NS, AddressClaim, ClaimState
+from canshaper.protocols.j1939.claim import LEAST_BETWEEN_NS, AddressClaim, ClaimState
 from canshaper.shaping.states import State
 from tests.service.j1939_rig import (
     AVC,

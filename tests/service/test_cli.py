@@ -12,10 +12,10 @@ import typer
 from typer.testing import CliRunner
 
 from canshaper import __version__
-from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
@@ -297,9 +297,9 @@ def test_the_daemon_imports_nothing_heavy() -> None:
     code = f"""
 import sys
 from pathlib import Path
-import canshaper.cli.app, canshaper.can.bus, canshaper.service.daemon
+import canshaper.cli.app, canshaper.bus.port, canshaper.daemon.daemon
 from canshaper.cli.common import loader
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
 controller = Controller(loader({str(SHIPPED)!r})())
 for i in range(100):
     list(controller.tick(i * 20_000_000))

@@ -6,10 +6,10 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can import cangw
-from canshaper.can.cangw import GatewayError, Rule, difference
-from canshaper.can.passing import Pattern
 from canshaper.cli.app import app
+from canshaper.protocols.gateway import cangw
+from canshaper.protocols.gateway.cangw import GatewayError, Rule, difference
+from canshaper.protocols.gateway.passing import Pattern
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "config" / "gateway-forwarder.yaml"

@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.service.conftest import Rig
 

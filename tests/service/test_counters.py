@@ -2,8 +2,8 @@
 
 import pytest
 
-from canshaper.can.frame import FrameFault
-from canshaper.service.counters import Counters
+from canshaper.codec.frame import FrameFault
+from canshaper.controller.counters import Counters
 
 COUNTED = {
     "WrongLength": {"WRONG_LENGTH"},

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import BusError, WrongBusError
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.service import daemon as module
-from canshaper.service.daemon import Daemon
+from canshaper.bus.port import BusError, WrongBusError
+from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.daemon import daemon as module
+from canshaper.daemon.daemon import Daemon
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from tests.service.conftest import ROOT
 from tests.service.test_reload import Bench, FakePort, Read
 
@@ -91,7 +91,7 @@ def test_a_fault_of_a_bus_is_counted(bench: Bench, log: Callable[[], list[str]])
         return opened(name, bus, fault, ids)
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("canshaper.service.ports.open_port", opens)
+        patch.setattr("canshaper.daemon.ports.open_port", opens)
         at(bench, {5: lambda: faults[0](FrameFault.ERROR_FRAME)})
     assert any("fault=ERROR_FRAME" in line and "'ErrorFrames': 1" in line for line in log())
 
@@ -402,7 +402,7 @@ def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
     def wrong(*_: object) -> None:
         raise WrongBusError("crane", "expected serial number 1, found 2")
 
-    monkeypatch.setattr("canshaper.service.ports.open_port", wrong)
+    monkeypatch.setattr("canshaper.daemon.ports.open_port", wrong)
     with pytest.raises(BusError) as error:
         Daemon(lambda: load_deployment(bench.file))
     assert str(error.value).startswith(f"{bench.file}:")

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.service.dm1 import FMI_OF, ActiveFaults, Fault, dm1_data
+from canshaper.protocols.j1939.dm1 import FMI_OF, ActiveFaults, Fault, dm1_data
 from canshaper.shaping.states import Reason
 from tests.service.j1939_rig import BROADCAST, DM1, OWN, PACKET, Rig, bjm, ids, request
 

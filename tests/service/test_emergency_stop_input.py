@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.frame import FrameFault
-from canshaper.service.input import EmergencyStopInput
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.input import EmergencyStopInput
 from canshaper.shaping.states import Reason
 from tests.service.emergency import Machine
 

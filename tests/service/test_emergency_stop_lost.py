@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.service.emergency import DBC, FRESH_TICKS, READY, STOP, Machine, Make, still
 

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.frame import BusState, Frame
-from canshaper.service.exchange import exchange
-from canshaper.service.standstill import Standstill
+from canshaper.codec.frame import BusState, Frame
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.standstill import Standstill
 from canshaper.shaping.states import State
 from tests.service.conftest import ROOT, SLOW_VALVE, TICK_NS, Rig
 from tests.service.emergency import PRESSED, READY, Machine

@@ -4,12 +4,12 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.identification.commands import Commands
-from canshaper.service.finder import InputFinder
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
 from tests.service.j1939_rig import JOYSTICK, OTHER, OWN, ROOT, bjm
 
 MS = 1_000_000

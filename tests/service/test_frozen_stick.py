@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.service.lever import LeverInput
+from canshaper.inputs.lever import LeverInput
 from canshaper.shaping.states import Reason, State
 from tests.service.conftest import Rig
 

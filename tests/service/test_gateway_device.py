@@ -8,15 +8,15 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can import cangw
-from canshaper.can.bus import BusError
-from canshaper.can.device import WrongDeviceError
-from canshaper.can.frame import FrameFault
-from canshaper.can.raw import REOPEN_NS
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.port import BusError
+from canshaper.bus.raw import REOPEN_NS
 from canshaper.cli.app import app
+from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus, Match
-from canshaper.service import gateway
-from canshaper.service.gateway import Bridge
+from canshaper.daemon import gateway
+from canshaper.daemon.gateway import Bridge
+from canshaper.protocols.gateway import cangw
 from tests.service.gateway_rig import ROOT
 
 FILE = ROOT / "config" / "gateway-forwarder.yaml"
@@ -179,7 +179,7 @@ def test_no_rule_leads_to_the_wrong_device(
             raise fault
         return fault
 
-    monkeypatch.setattr("canshaper.can.device.match_fault", look)
+    monkeypatch.setattr("canshaper.bus.device.match_fault", look)
     monkeypatch.setattr(cangw, "load_module", lambda: changed.append("module"))
     monkeypatch.setattr(cangw, "make", lambda *_: changed.append("rules"))
     file = matched_file(tmp_path, "{ driver: a }")
@@ -199,7 +199,7 @@ def test_rules_between_the_right_devices(
 ) -> None:
     """To remove them is right whatever the device is."""
     seen: list[str] = []
-    monkeypatch.setattr("canshaper.can.device.match_fault", lambda bus: seen.append(bus.channel))
+    monkeypatch.setattr("canshaper.bus.device.match_fault", lambda bus: seen.append(bus.channel))
     monkeypatch.setattr(cangw, "load_module", lambda: None)
     monkeypatch.setattr(cangw, "make", lambda *_: ([], []))
     file = matched_file(tmp_path, "{ driver: a }")

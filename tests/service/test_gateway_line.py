@@ -8,8 +8,8 @@ from crccheck.crc import Crc8SaeJ1850
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.e2e import Profile2
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.e2e import Profile2
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import Reason
 from tests.service.emergency import DBC, STOP, STOP_ID
 from tests.service.gateway_rig import TICK_NS, GatewayRig

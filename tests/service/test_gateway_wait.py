@@ -8,13 +8,13 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.bus import open_port
-from canshaper.can.cangw import GatewayError, Rule
-from canshaper.can.frame import FrameFault
-from canshaper.can.raw import CAN_FRAME, RawPort
-from canshaper.service import gateway
-from canshaper.service.gateway import CHECK_NS, MOST_EMPTY, InLine
-from canshaper.service.standstill import Standstill
+from canshaper.bus.port import open_port
+from canshaper.bus.raw import CAN_FRAME, RawPort
+from canshaper.codec.frame import FrameFault
+from canshaper.daemon import gateway
+from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InLine
+from canshaper.daemon.standstill import Standstill
+from canshaper.protocols.gateway.cangw import GatewayError, Rule
 from tests.service.gateway_rig import GatewayRig
 
 WAIT_S = 0.1

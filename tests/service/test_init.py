@@ -8,8 +8,8 @@ import pytest
 from click.testing import Result
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "forwarder.dbc"

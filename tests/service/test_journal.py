@@ -12,7 +12,7 @@ from types import FrameType
 
 import pytest
 
-from canshaper.service.journal import MOST_BYTES, MOST_LINES, JournalHandler
+from canshaper.daemon.journal import MOST_BYTES, MOST_LINES, JournalHandler
 
 # Only to end a test that hangs: nothing here waits for anything.
 ANSWER_S = 30
@@ -257,7 +257,7 @@ def test_a_record_that_cannot_be_formatted_stops_nothing(
 
 SET_UP = """
 import logging
-from canshaper.service import journal
+from canshaper.daemon import journal
 journal.set_up()
 logging.getLogger("canshaper").info("axis=slew")
 logging.getLogger("canshaper").debug("no")

@@ -5,12 +5,12 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.can.layout import Layout
-from canshaper.can.protection import Protection, Protector
-from canshaper.service.controller import Controller
-from canshaper.service.exchange import exchange, take
-from canshaper.service.gateway import InLine
-from canshaper.service.standstill import LEAST_LEAVE_NS, Standstill
+from canshaper.codec.layout import Layout
+from canshaper.codec.protection import Protection, Protector
+from canshaper.controller.controller import Controller
+from canshaper.daemon.exchange import exchange, take
+from canshaper.daemon.gateway import InLine
+from canshaper.daemon.standstill import LEAST_LEAVE_NS, Standstill
 from tests.service.conftest import ROOT
 from tests.service.gateway_rig import GatewayRig
 from tests.service.standing import MS, Machine, Make, valves
@@ -166,7 +166,7 @@ def test_between_two_ticks_of_a_gateway_a_standstill_is_left_to_the_tick(
     gateway.levers.queue = [gateway.rig.lever(Slew=1000)]
     times = iter((0, 0, 101 * MS))
     gateway.standstill.clock = lambda: gateway.last_ns + next(times)
-    monkeypatch.setattr("canshaper.service.gateway.select.select", lambda *_: ([1], [], []))
+    monkeypatch.setattr("canshaper.daemon.gateway.select.select", lambda *_: ([1], [], []))
     line = InLine(gateway.rig.deployment, lambda _fault: None)
     line.wait(0.2, gateway.rig.controller, gateway.ports, gateway.standstill)
     assert len(gateway.levers.queue) == 1

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
 from tests.service import canopen_rig, j1939_rig
 from tests.service.conftest import Rig

@@ -14,9 +14,9 @@ import can
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.multicast import LocalMulticastBus
+from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 ANSWER_S = 60.0  # only to end a test that hangs

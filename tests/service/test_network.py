@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.shaping.states import State
 from tests.service.j1939_rig import AVC, JOYSTICK, OTHER, OWN, ROOT, Rig, bjm, flow, ids
 

@@ -12,7 +12,7 @@ from types import FrameType
 
 import pytest
 
-from canshaper.service.notify import ServiceManager
+from canshaper.daemon.notify import ServiceManager
 
 TICK_NS = 20_000_000
 

@@ -8,14 +8,14 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.codecs import Sender
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.signals import raw_limits
-from canshaper.service.controller import Controller
-from canshaper.service.guarded import Guarded
-from canshaper.service.runner import AxisRunner
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.signals import raw_limits
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.controller.runner import AxisRunner
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import Reason, State
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.shaping.states import State
 from tests.service.conftest import Rig
 from tests.service.emergency import Machine

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
 from canshaper.shaping.states import State
 from tests.can.protected_machine import IDS, load
 

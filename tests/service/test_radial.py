@@ -5,7 +5,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.shaping.states import Reason, State
 from tests.service.conftest import Rig
 

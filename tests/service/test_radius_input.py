@@ -5,8 +5,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.frame import FrameFault
-from canshaper.service.radius import RadiusInput
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.radius import RadiusInput
 from tests.service.conftest import Rig
 
 FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"

@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8SaeJ1850
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import FrameFault
-from canshaper.service.radius import RadiusInput
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.radius import RadiusInput
+from canshaper.machine.deployment import Deployment
 from tests.can.protected_machine import load
 
 TICK_NS = 20_000_000

@@ -11,13 +11,13 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError, Problem
-from canshaper.service import reading as reading_module
-from canshaper.service.controller import Controller
-from canshaper.service.reading import Reading
+from canshaper.controller.controller import Controller
+from canshaper.daemon import reading as reading_module
+from canshaper.daemon.reading import Reading
+from canshaper.machine.deployment import Deployment
 from tests.service.conftest import ROOT, TICK_NS
 
 SHIPPED = sorted((ROOT / "config").glob("forwarder*.yaml"))

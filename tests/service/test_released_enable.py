@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from canshaper.can.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.service.conftest import SLOW_VALVE, Rig
 

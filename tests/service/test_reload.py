@@ -9,18 +9,18 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.bus import BusError, Port
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import BusState, Frame, FrameFault
-from canshaper.can.socketcan import Ids
+from canshaper.bus.port import BusError, Port
+from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.service import daemon as module
-from canshaper.service import loop, standstill
-from canshaper.service import ports as service_ports
-from canshaper.service.adjust import Adjuster
-from canshaper.service.controller import Controller
-from canshaper.service.daemon import Daemon
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.daemon import daemon as module
+from canshaper.daemon import loop, standstill
+from canshaper.daemon import ports as service_ports
+from canshaper.daemon.daemon import Daemon
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.ids import Ids
 from canshaper.shaping.states import Reason, State
 from tests.service.conftest import ROOT, TICK_NS, Rig
 

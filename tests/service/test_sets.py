@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError
 from canshaper.shaping.gff import Gff
 from tests.service.conftest import Rig

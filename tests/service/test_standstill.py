@@ -4,9 +4,9 @@ import re
 
 import pytest
 
-from canshaper.service import loop
-from canshaper.service.loop import run_at_deadlines
-from canshaper.service.standstill import Standstill, longest_gap_ns
+from canshaper.daemon import loop
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.daemon.standstill import Standstill, longest_gap_ns
 from canshaper.shaping.states import State
 from tests.service.conftest import ROOT
 from tests.service.emergency import DBC, LAST, STOP

@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.config.bus import CanopenNode
-from canshaper.service.canopen import NodeGate, RemoteNode
+from canshaper.protocols.canopen.nodes import NodeGate, RemoteNode
 from canshaper.shaping.states import Reason, State
 from tests.service.canopen_rig import BOOT_UP, HOLD, OPERATIONAL, STOPPED, CanopenRig
 from tests.service.conftest import Rig

@@ -6,9 +6,9 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000

@@ -6,7 +6,7 @@ import pytest
 from cantools.database.can import Signal
 from cantools.database.conversion import BaseConversion
 
-from canshaper.service.value import measurable
+from canshaper.inputs.value import measurable
 
 LARGEST = sys.float_info.max
 

@@ -7,14 +7,14 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.cli.app import app
 from canshaper.design.comparison.candidates import candidates, nominal_mode, with_candidate
 from canshaper.design.comparison.limits import limits_for
 from canshaper.design.comparison.manoeuvres import RANDOM_SEEDS, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure, measure_all
 from canshaper.design.comparison.summary import beaten_by, recommendations, rows
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.report.pareto import Limits, Point, draw, figure
 
 FILE = Path(__file__).parents[2] / "config" / "forwarder.yaml"

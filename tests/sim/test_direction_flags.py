@@ -2,9 +2,9 @@
 
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.design.lockstep import drive
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import random_script
 
 ROOT = Path(__file__).parents[2]

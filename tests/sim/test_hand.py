@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
 
 CONFIG = Path(__file__).parents[2] / "config"

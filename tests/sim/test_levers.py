@@ -9,10 +9,10 @@ from typing import Any
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
+from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
-from canshaper.service.controller import Controller
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import SCRIPTS, random_script

@@ -7,12 +7,12 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
 from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError
 from canshaper.design.lockstep import DriveError, drive
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import JOINT_AXES, TIP_AXES
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.levers import LeverNode

@@ -6,10 +6,10 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.service.controller import Controller
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script

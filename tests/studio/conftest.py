@@ -16,8 +16,8 @@ from typing import Any
 import pytest
 from websockets.sync.client import ClientConnection, connect
 
-from canshaper.can.bus import Port, open_port
-from canshaper.can.frame import Frame
+from canshaper.bus.port import Port, open_port
+from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 
 # Only to end a test that hangs.

@@ -19,7 +19,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 
-from canshaper.can.binding import load_deployment
+from canshaper.machine.binding import load_deployment
 from canshaper.studio.client import MOST_BYTES, MOST_NONSENSE, MOST_PER_S
 from canshaper.studio.server import MOST_PAGES
 from canshaper_sim.hand import Hand, Held

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.can.binding import load_deployment
 from canshaper.config.sets import Feel
-from canshaper.service.adjust import Adjuster
-from canshaper.service.controller import Controller
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
 from canshaper.shaping.gff import poles_from_denominator
 from canshaper.studio.crane import copied
 from canshaper.studio.sliders import CALM, LENGTH, RANGES, adjustable, sliders, values

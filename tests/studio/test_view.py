@@ -5,10 +5,10 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.service.counters import Counters
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.counters import Counters
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import Reason, State
 from canshaper.studio.view import SILENT_S, CraneView
 from canshaper.studio.words import FAULTS, REASONS, STATES, fault_words, reason_words, state_words

@@ -3,9 +3,9 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.can.binding import load_deployment
 from canshaper.cli.app import app
 from canshaper.config.filters import RobustFilter
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 

@@ -159,7 +159,7 @@ def test_a_shipped_file_is_not_written_to(tmp_path: Path, monkeypatch: pytest.Mo
 
 def test_the_daemon_never_imports_the_tuner() -> None:
     code = (
-        "import sys, canshaper.cli.app, canshaper.service.daemon\n"
+        "import sys, canshaper.cli.app, canshaper.daemon.daemon\n"
         "heavy = ('casadi', 'scipy', 'numpy', 'matplotlib')\n"
         "bad = [m for m in sys.modules if m.split('.')[0] in heavy"
         " or m.startswith('canshaper.design.tuning')]\n"

@@ -7,13 +7,13 @@ sender. The stick has to stay in neutral; moving it ends the measurement.
 import statistics
 from collections.abc import Iterator
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.fit import Calibration, CalibrationError, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.speed import SpeedFeedback
-from canshaper.service.controller import Controller
-from canshaper.service.lever import LeverInput
+from canshaper.controller.controller import Controller
+from canshaper.inputs.lever import LeverInput
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import Off

@@ -6,13 +6,13 @@ from collections.abc import Callable
 from contextlib import ExitStack
 from types import FrameType
 
-from canshaper.can.bus import Port, open_port
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import FrameFault
+from canshaper.bus.port import Port, open_port
+from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.service.exchange import exchange
-from canshaper.service.loop import run_at_deadlines
-from canshaper.service.standstill import Standstill
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.deployment import Deployment
 
 # How often the end is told to every valve: a frame may be lost.
 LAST_FRAMES = 3

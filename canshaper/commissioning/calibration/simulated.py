@@ -2,8 +2,8 @@
 
 from collections.abc import Callable
 
-from canshaper.can.deployment import Deployment
 from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import Script

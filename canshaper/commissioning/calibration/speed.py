@@ -2,16 +2,16 @@
 
 from cantools.database.can import Message, Signal
 
-from canshaper.can.codecs import LeverCodec
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput
-from canshaper.can.j1939 import NULL, group_of
-from canshaper.can.protection import UNPROTECTED
-from canshaper.can.signals import find_signal
+from canshaper.codec.codecs import LeverCodec
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import NULL, group_of
+from canshaper.codec.protection import UNPROTECTED
+from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input
 from canshaper.config.source import DeploymentError, Problem
-from canshaper.service.value import ValueInput, measurable
+from canshaper.inputs.value import ValueInput, measurable
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
 
 # Feedback older than that says nothing of the axis, which must not go on unseen.
 SILENT_MS = 500

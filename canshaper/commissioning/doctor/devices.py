@@ -5,7 +5,7 @@ import json
 import re
 from pathlib import Path
 
-from canshaper.can.device import (
+from canshaper.bus.device import (
     ROOT,
     Ask,
     Device,

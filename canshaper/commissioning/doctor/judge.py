@@ -3,11 +3,11 @@
 from collections import Counter
 from collections.abc import Callable
 
-from canshaper.can.deployment import Deployment
 from canshaper.commissioning.doctor.figures import quantile, summary
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY
+from canshaper.machine.deployment import Deployment
 
 # Names of the runs.
 IDLE, LOADED = "idle", "under load"

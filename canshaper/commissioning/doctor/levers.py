@@ -8,12 +8,12 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.clock import boottime_ns
-from canshaper.can.deployment import Deployment
-from canshaper.can.raw import CAN_FRAME
+from canshaper.bus.clock import boottime_ns
+from canshaper.bus.raw import CAN_FRAME
 from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY, real_time, say_ready
-from canshaper.service.loop import run_at_deadlines
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.strokes import Script
 

@@ -6,15 +6,15 @@ import time
 from collections.abc import Callable
 from itertools import pairwise
 
-from canshaper.can.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundInput
-from canshaper.can.raw import CAN_FRAME
-from canshaper.can.socketcan import open_sockets
+from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
+from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.socketcan import open_sockets
+from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.figures import summary
 from canshaper.commissioning.doctor.finding import Finding, Level
-from canshaper.service.finder import InputFinder
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
 
 LOOK_S = 0.2
 

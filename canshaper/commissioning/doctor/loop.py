@@ -8,19 +8,19 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.clock import boottime_ns
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame, FrameFault
-from canshaper.can.raw import RawPort
+from canshaper.bus.clock import boottime_ns
+from canshaper.bus.raw import RawPort
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
-from canshaper.service.controller import Controller
-from canshaper.service.events import Event
-from canshaper.service.exchange import exchange
-from canshaper.service.guarded import Guarded
-from canshaper.service.loop import run_at_deadlines
-from canshaper.service.realtime import Collector, lock_memory, refuse_huge_pages
-from canshaper.service.standstill import Standstill
+from canshaper.controller.controller import Controller
+from canshaper.controller.events import Event
+from canshaper.controller.guarded import Guarded
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 
 
 class WatchedPort(RawPort):

@@ -9,10 +9,10 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.raw import CAN_FRAME
+from canshaper.bus.raw import CAN_FRAME
 from canshaper.commissioning.doctor.load import load_kinds
 from canshaper.commissioning.doctor.processes import Children, MeasureError, output, ready
+from canshaper.machine.deployment import Deployment
 
 # How often the run is looked after, and how much longer than asked it may take.
 LOOK_S = 0.2

@@ -10,10 +10,10 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from canshaper.can.deployment import Deployment
 from canshaper.commissioning.doctor.figures import Summary, histogram, summary
 from canshaper.commissioning.doctor.finding import Finding, Level, fit
 from canshaper.commissioning.doctor.measure import Run
+from canshaper.machine.deployment import Deployment
 
 STYLES = {Level.OK: "green", Level.NOTE: "dim", Level.WARNING: "yellow", Level.BAD: "bold red"}
 BAR = 22

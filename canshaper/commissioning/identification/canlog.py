@@ -8,11 +8,9 @@ from pathlib import Path
 import numpy as np
 from cantools.database.can import Message, Signal
 
-from canshaper.can.database import Messages
-from canshaper.can.deployment import Deployment
-from canshaper.can.j1939 import NULL, group_of
-from canshaper.can.layout import Layout, is_j1939
-from canshaper.can.signals import find_signal, special_codes
+from canshaper.codec.j1939 import NULL, group_of
+from canshaper.codec.layout import Layout, is_j1939
+from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples
 from canshaper.commissioning.identification.series import (
     IdentificationError,
@@ -22,6 +20,8 @@ from canshaper.commissioning.identification.series import (
     ordered,
     unit_of,
 )
+from canshaper.machine.database import Messages
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import CutOffError, LogError, LogFile
 
 

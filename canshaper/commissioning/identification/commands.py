@@ -6,14 +6,14 @@ from typing import Any
 
 import numpy as np
 
-from canshaper.can.codecs import WrongLengthError
-from canshaper.can.deployment import BoundAxis, Deployment
-from canshaper.can.frame import Frame
-from canshaper.can.inputs import BoundLever
-from canshaper.can.layout import Layout
+from canshaper.codec.codecs import WrongLengthError
+from canshaper.codec.frame import Frame
+from canshaper.codec.layout import Layout
 from canshaper.commissioning.identification.driven import STANDS
 from canshaper.commissioning.identification.series import Array, Command
-from canshaper.service.finder import InputFinder
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.inputs import BoundLever
 
 # Silence of a command's message after which nothing is known of the command, s.
 _SILENT_S = 2.0

@@ -6,10 +6,10 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.live import Live
 
-from canshaper.can.bus import BusError
-from canshaper.can.deployment import Deployment
+from canshaper.bus.port import BusError
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import clock, screen, status_line
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener
 
 # How often a bus that has gone is looked for.

@@ -3,12 +3,12 @@
 from collections import Counter, deque
 from dataclasses import dataclass, field
 
-from canshaper.can.deployment import Deployment
-from canshaper.can.frame import Frame
+from canshaper.codec.frame import Frame
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.deployment import Deployment
 from canshaper.recording.history import History, Told
 from canshaper.recording.listen import Heard
 from canshaper.recording.sorting import Key
-from canshaper.service.finder import InputFinder
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000

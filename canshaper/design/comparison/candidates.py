@@ -4,10 +4,10 @@ from dataclasses import dataclass, replace
 
 from pydantic import TypeAdapter
 
-from canshaper.can.deployment import BoundRadial, Deployment
 from canshaper.config.filters import Filter, RobustFilter
 from canshaper.config.schema import RadialConfig
 from canshaper.design.tuning.robust import RobustShaper, least_residual
+from canshaper.machine.deployment import BoundRadial, Deployment
 from canshaper.shaping.fir import zv_taps
 from canshaper.shaping.sway import SwayMode
 

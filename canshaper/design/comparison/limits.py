@@ -2,10 +2,10 @@
 
 from collections.abc import Sequence
 
-from canshaper.can.deployment import Deployment
 from canshaper.design.comparison.candidates import nominal_mode
 from canshaper.design.comparison.measure import Outcome
 from canshaper.design.tuning.robust import least_residual, time_optimal_s
+from canshaper.machine.deployment import Deployment
 from canshaper.report.pareto import Limits
 from canshaper_sim.crane import CraneParameters
 

@@ -6,11 +6,11 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from canshaper.can.binding import load_deployment
-from canshaper.can.deployment import Deployment
 from canshaper.design.comparison.candidates import Candidate, with_candidate
 from canshaper.design.comparison.manoeuvres import Manoeuvre
 from canshaper.design.lockstep import drive
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import axis_metrics
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway

@@ -3,7 +3,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.can.binding import load_deployment
+from canshaper.machine.binding import load_deployment
 from studies.paper.study import FIGURES, Study, steps
 
 FILE = Path(__file__).resolve().parents[3] / "config" / "forwarder.yaml"

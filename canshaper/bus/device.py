@@ -1,0 +1,269 @@
+"""The device behind a CAN interface: names change hands, a serial number and a place do not.
+
+Where the facts come from: /sys/class/net for serial number, place, channel and driver of hardware;
+rtnetlink (linux/if_link.h, linux/can/netlink.h) for the bit rate, and for the kind of an interface
+without hardware.
+"""
+
+import errno
+import os
+import re
+import socket
+import struct
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from canshaper.bus.netlink import ACKNOWLEDGE, ask, attributes
+from canshaper.config.bus import Bus
+
+ROOT = Path("/")
+# linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
+GET_LINK = 18
+LINK_INFO, INFO_KIND, INFO_DATA, CAN_BIT_TIMING = 18, 1, 2, 1
+_LINK = struct.Struct("=BxHiII")  # ifinfomsg
+_BITRATE = struct.Struct("=I")  # the first member of can_bittiming
+# What two places in the tree of devices are called, and which of their parents they stand for; as
+# the builtin path_id of udev makes ID_PATH.
+_USB_PORT = re.compile(r"\d+-(.+)")
+_CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
+
+
+KindAndBitrate = tuple[str | None, int | None]
+Ask = Callable[[int], KindAndBitrate]
+
+
+class WrongDeviceError(Exception):
+    """An interface is not the device of the deployment; the message says what differs."""
+
+
+@dataclass(frozen=True)
+class Device:
+    """What is behind an interface; None where it has no such thing.
+
+    Attributes:
+        name: of the interface.
+        serial: serial number of a USB adapter.
+        path: where it is plugged in, as udev's ID_PATH.
+        port: channel of an adapter, from 0.
+        driver: of the kernel; the kind of an interface without hardware, such as vcan.
+        bitrate: bit/s.
+        channels: interfaces of the same adapter.
+    """
+
+    name: str
+    serial: str | None
+    path: str | None
+    port: int
+    driver: str | None
+    bitrate: int | None
+    channels: int = 1
+
+
+def kind_and_bitrate(index: int) -> KindAndBitrate:
+    """Ask the kernel for kind and bit rate of an interface.
+
+    Raises:
+        OSError: there is no such interface, or netlink is not permitted.
+    """
+    (body,) = ask(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
+    info = dict(attributes(dict(attributes(body[_LINK.size :])).get(LINK_INFO, b"")))
+    kind = info.get(INFO_KIND, b"").rstrip(b"\0").decode() or None
+    timing = (
+        dict(attributes(info.get(INFO_DATA, b""))).get(CAN_BIT_TIMING) if kind == "can" else b""
+    )
+    return kind, (_BITRATE.unpack_from(timing)[0] if timing else None)
+
+
+def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate) -> Device:
+    """The device behind an interface.
+
+    Args:
+        name: of the interface.
+        root: of the file system.
+        ask_kernel: for kind and bit rate of the interface with an index.
+
+    Raises:
+        OSError: ENODEV where there is no such interface, or the name changed hands meanwhile;
+            others where the kernel cannot be asked.
+    """
+    directory = root / "sys/class/net" / name
+    index = _number(directory / "ifindex")
+    if index is None:
+        raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+    kind, bitrate = ask_kernel(index)
+    hardware = directory / "device"
+    real = hardware.is_dir()
+    places = list(_upwards(hardware.resolve(), root)) if real else []
+    device = Device(
+        name,
+        _serial(places),
+        _path(places),
+        _number(directory / "dev_port") or _number(directory / "dev_id") or 0,
+        (_linked(hardware / "driver") if real else None) or kind,
+        bitrate,
+        max(len(list((hardware / "net").glob("*"))), 1),
+    )
+    if _number(directory / "ifindex") != index:  # what was read may be of two devices
+        raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
+    return device
+
+
+def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
+    """Compare the device that bound sockets are on with the one of the deployment.
+
+    By what they are bound to: the name may have changed hands since it was looked up.
+
+    Raises:
+        WrongDeviceError: it is another one, or what it is cannot be known.
+        OSError: the interface is gone.
+    """
+    if bus.match is None:
+        return
+    names = [one.getsockname()[0] for one in sockets]
+    try:
+        device = read_device(names[0])
+    except OSError as error:
+        if error.errno == errno.ENODEV:
+            raise
+        raise WrongDeviceError(f"{bus.channel} cannot be looked at: {error.strerror}") from error
+    # Each socket was bound by the name, and the kernel returns the name that its device has now.
+    if {*names, *(one.getsockname()[0] for one in sockets)} != {device.name}:
+        raise WrongDeviceError(f"the name {bus.channel} changed hands while it was opened")
+    if fault := device_fault(bus, device):
+        raise WrongDeviceError(fault)
+
+
+def device_fault(bus: Bus, device: Device) -> str | None:
+    """Why a device is not the one of a bus; None where it is, or the bus asks for none."""
+    wanted = expected(bus, device)
+    wrong = [key for key, value in wanted.items() if getattr(device, key) != value]
+    if not wrong:
+        return None
+    asked = ", ".join(f"{_WORDS[key]} {wanted[key]}" for key in wrong)
+    there = ", ".join(_text(key, getattr(device, key)) for key in wrong)
+    return f"expected {asked}, but {device.name} has {there}"
+
+
+def expected(bus: Bus, device: Device) -> dict[str, str | int]:
+    """What a device has to have, by its fields.
+
+    The bit rate of the bus counts too, for an interface that has one.
+    """
+    if bus.match is None:
+        return {}
+    wanted: dict[str, str | int] = bus.match.model_dump(exclude_none=True)
+    if bus.bitrate is not None and device.bitrate is not None:
+        wanted.setdefault("bitrate", bus.bitrate)
+    return wanted
+
+
+def match_fault(bus: Bus) -> str | None:
+    """Why the interface of a bus is not its device now; None where it is.
+
+    Raises:
+        OSError: there is no such interface, or the kernel cannot be asked.
+    """
+    fault = device_fault(bus, read_device(bus.channel))
+    return f"{fault}{whereabouts(bus)}" if fault else None
+
+
+def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate) -> str:
+    """Which interface is the device of a bus now, behind a message; empty where none is named.
+
+    It is only reported, never used by itself: which bus is driven stands in the file.
+    """
+    match = bus.match
+    if match is None or (match.serial is None and match.path is None):
+        return ""
+    wanted = match.model_dump(exclude_none=True, exclude={"bitrate"})
+    names = []
+    for directory in sorted((root / "sys/class/net").glob("*")):
+        try:
+            device = read_device(directory.name, root, ask_kernel)
+        except OSError:  # it went away, or is no interface
+            continue
+        if all(getattr(device, key) == value for key, value in wanted.items()):
+            names.append(device.name)
+    if names == [bus.channel]:
+        return ""
+    return f"; the device of the file is {', '.join(names) or 'not here'}"
+
+
+_WORDS = {
+    "serial": "serial number",
+    "path": "path",
+    "port": "port",
+    "driver": "driver",
+    "bitrate": "bit rate",
+}
+
+
+def _text(key: str, value: str | int | None) -> str:
+    return f"no {_WORDS[key]}" if value is None else f"{_WORDS[key]} {value}"
+
+
+# -- /sys ------------------------------------------------------------------------------------------
+
+
+def _upwards(place: Path, root: Path) -> Iterator[Path]:
+    """A device and those that it is plugged into, up to /sys/devices."""
+    top = (root / "sys/devices").resolve()
+    while place != top and top in place.parents:
+        yield place
+        place = place.parent
+
+
+def _serial(places: Iterable[Path]) -> str | None:
+    """Serial number of the USB device that a place belongs to; not that of the hub above it."""
+    for place in places:
+        if (place / "idVendor").exists():
+            return _content(place / "serial")
+    return None
+
+
+def _path(places: Iterable[Path]) -> str | None:
+    """As udev's ID_PATH: the same in every boot, whatever else is plugged in.
+
+    Of neighbours of one subsystem, such as the hubs of an adapter, the one next to the device
+    says it all.
+    """
+    parts: list[str] = []
+    before = None
+    for place in places:
+        subsystem = _linked(place / "subsystem")
+        if subsystem != before or subsystem is None:
+            part = _part(subsystem, place.name)
+            parts += [part] if part else []
+        before = subsystem
+    return "-".join(reversed(parts)) or None
+
+
+def _part(subsystem: str | None, name: str) -> str | None:
+    if subsystem == "usb":
+        port = _USB_PORT.fullmatch(name)
+        return f"usb-0:{port[1]}" if port else None
+    if subsystem == "spi":
+        chip = _CHIP_SELECT.fullmatch(name)
+        return f"cs-{chip[1]}" if chip else None
+    return f"{subsystem}-{name}" if subsystem in ("pci", "platform") else None
+
+
+def _linked(file: Path) -> str | None:
+    """Last part of where a link leads."""
+    try:
+        return file.readlink().name
+    except OSError:
+        return None
+
+
+def _content(file: Path) -> str | None:
+    try:
+        return file.read_text(encoding="utf-8", errors="replace").strip() or None
+    except OSError:
+        return None
+
+
+def _number(file: Path) -> int | None:
+    text = _content(file)
+    return int(text, 0) if text else None

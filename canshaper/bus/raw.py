@@ -1,0 +1,357 @@
+"""A bus on raw sockets that carry the kernel's ``struct can_frame``, made for a control loop.
+
+What a valve needs: a frame goes out now or not at all; frames that do not get onto the bus are seen
+and no more are queued behind them; an interface that comes back is used again by itself.
+"""
+
+import errno
+import select
+import socket
+import struct
+import time
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator
+from typing import Any
+
+from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.socketcan import dropped_frames, set_filters
+from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
+from canshaper.machine.ids import Ids
+
+CAN_FRAME = struct.Struct("=IB3x8s")  # linux/can.h, struct can_frame
+SIZE = CAN_FRAME.size
+
+# Frames taken in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
+# empties any backlog and still cannot hold up the tick for ever.
+MOST_FRAMES = 2000
+# Of ids that nobody knows; the rest is dropped, their count is "at least".
+MOST_UNKNOWN = 20
+# Frames of one id under way for so long without one of them getting onto the bus: one waits, one is
+# being sent, one more for a confirmation that comes just after the tick. A slow bus with a fast
+# loop is no fault, so time has to pass as well: 30 frames of 250 kbit/s.
+MOST_UNCONFIRMED = 3
+UNCONFIRMED_NS = 20_000_000
+# How often a bus that took no frames is tried again, with one frame, neutral by then.
+PROBE_NS = 500_000_000
+# How often an interface that has gone is looked for; it shall work again within a second.
+REOPEN_NS = 200_000_000
+# Claims of ours under way: on a bus that takes none, one every PROBE_NS until its queue is full.
+MOST_CLAIMS = 32
+# linux/can/error.h: classes in the id, controller state in data[1].
+CLASS_CONTROLLER, CLASS_BUS_OFF, CLASS_RESTARTED = 0x4, 0x40, 0x100
+OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
+# States in which a frame of ours that gets onto the bus is news.
+SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.FAILED))
+# The device is no more; the socket would have to be bound to a new one.
+GONE = frozenset((errno.ENODEV, errno.ENXIO, errno.EBADF))
+LOST = frozenset((BusState.DOWN, BusState.FAILED))
+# States in which the sockets are closed, to be opened again.
+AWAY = frozenset((BusState.GONE, BusState.DOWN, BusState.WRONG_DEVICE))
+UP = BusState.UP
+_EACH_FRAME = range(MOST_FRAMES)  # made once: it takes as long as a poll
+
+
+class RawPort:
+    """One bus on raw sockets.
+
+    Args:
+        name: name of the bus in the deployment file.
+        open_sockets: opens, non-blocking, a socket for the messages that are taken and perhaps
+            two for what else is to be seen, see ``socketcan.open_sockets``; called again after
+            the interface was gone.
+        ids: the messages that matter, handed to it.
+        on_fault: called with every fault of the bus.
+        confirms: whether our own frames come back when they were sent, with MSG_CONFIRM.
+        matched: whether ``open_sockets`` looks at the device: then an interface that was down is
+            opened again too, because name and bit rate may be others when it is back.
+
+    Attributes:
+        state: of the bus, as far as seen.
+        arrived_ns: when the frame arrived that ``frames`` has just handed out, by
+            ``boottime_ns``.
+
+    Raises:
+        OSError: the sockets cannot be opened.
+        WrongDeviceError: the interface is another device.
+    """
+
+    def __init__(
+        self,
+        name: str,
+        open_sockets: Callable[[Ids | None], list[socket.socket]],
+        ids: Ids | None,
+        on_fault: Callable[[FrameFault], None],
+        *,
+        confirms: bool,
+        matched: bool = False,
+    ) -> None:
+        self.name = name
+        self.state = UP
+        self.arrived_ns = 0
+        self._open = open_sockets
+        self._on_fault = on_fault
+        self._confirms = confirms
+        self._matched = matched
+        self._sockets: list[socket.socket] = []
+        self._unconfirmed: dict[int, int] = {}
+        self._since_ns: dict[int, int] = {}
+        self._not_before_ns = 0
+        self._dropped = 0
+        self._ids = ids
+        self._valves = _words(ids.valves if ids else ())
+        self._claims = _words(ids.claims if ids else ())
+        self._claimed: deque[Any] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
+        self._use()
+
+    # -- receiving -----------------------------------------------------------------------------
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits, in order; ends when there is none or the bus fails."""
+        if not self._sockets and not self._reopened():
+            return
+        waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
+        arrivals.begin()
+        for _ in _EACH_FRAME:
+            if not waiting(0):  # cheaper than the exception of a socket with nothing to read
+                arrivals.emptied()
+                return
+            try:
+                data, ancillary, _flags, _sender = receive(SIZE, ANCILLARY_BYTES)
+            except OSError as error:
+                self._failed(error)
+                return
+            if self._claimed and len(data) == SIZE and self._seen_back(CAN_FRAME.unpack(data)):
+                continue
+            frame = self._frame(data)
+            if frame is not None:
+                if self.state is not UP and self.state in LOST:
+                    self._up()
+                self.arrived_ns = arrivals.of(ancillary)
+                yield frame
+
+    def others(self) -> Iterator[Frame]:
+        """What can wait until the valves have been told: our own frames, seen back, are taken in.
+
+        Frames of other senders with our ids, and of ids that nobody knows, are handed out.
+        """
+        for number, most in ((1, MOST_FRAMES), (2, MOST_UNKNOWN)):
+            yield from self._others(number, most)
+        if self._sockets and (dropped := dropped_frames(self._sockets[:2])) != self._dropped:
+            self._dropped = dropped
+            self._forget()  # confirmations may be among them
+            self._on_fault(FrameFault.FRAMES_LOST)
+
+    def _others(self, number: int, most: int) -> Iterator[Frame]:
+        if number >= len(self._sockets):
+            return
+        waiting, receive = self._waiting[number], self._sockets[number].recvmsg
+        for _ in range(most):
+            if not waiting(0):
+                return
+            try:
+                data, _ancillary, flags, _sender = receive(SIZE)
+            except OSError as error:
+                self._failed(error)
+                return
+            if flags & socket.MSG_CONFIRM and len(data) == SIZE:
+                self._confirmed(CAN_FRAME.unpack(data)[0])
+            elif (frame := self._frame(data)) is not None:
+                yield frame
+
+    def _frame(self, data: bytes) -> Frame | None:
+        """The frame, where it is one that can be taken."""
+        if len(data) != SIZE:
+            self._on_fault(FrameFault.WRONG_LENGTH)
+            return None
+        word, length, payload = CAN_FRAME.unpack(data)
+        if word <= socket.CAN_SFF_MASK and length <= 8:  # the most frequent kind first
+            return new_frame(Frame, (self.name, word, False, payload[:length]))
+        if word & socket.CAN_ERR_FLAG:  # first: its id is an error class, and could match
+            self._error_frame(word, payload)
+            return None
+        if word & socket.CAN_RTR_FLAG or length > 8:
+            self._on_fault(FrameFault.WRONG_LENGTH)
+            return None
+        return Frame(self.name, word & socket.CAN_EFF_MASK, True, payload[:length])
+
+    def _error_frame(self, word: int, payload: bytes) -> None:
+        fault = FrameFault.ERROR_FRAME
+        controller = payload[1] if word & CLASS_CONTROLLER else 0
+        if word & CLASS_BUS_OFF:
+            fault = FrameFault.BUS_OFF
+            self._block(BusState.BUS_OFF)
+        elif controller & PASSIVE:
+            fault = FrameFault.BUS_PASSIVE
+            if self.state is UP:
+                self.state = BusState.PASSIVE
+        elif word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # less than passive
+            self._up()
+        elif controller & OVERFLOW:
+            fault = FrameFault.FRAMES_LOST
+        self._on_fault(fault)
+
+    # -- sending -------------------------------------------------------------------------------
+
+    def send(self, frame: Frame) -> bool:
+        """Send now or not at all; False when the frame did not go out."""
+        if not self._sockets or (self._not_before_ns and self._blocked()):
+            return False
+        _bus, word, extended, data = frame
+        if extended:
+            word |= socket.CAN_EFF_FLAG
+        under_way = self._unconfirmed.get(word, 0)
+        if under_way and self._stuck(word, under_way):
+            return False
+        packed = CAN_FRAME.pack(word, len(data), data)
+        try:
+            self._send(packed)
+        except OSError as error:
+            self._failed(error)
+            return False
+        if word in self._claims:
+            self._claimed.append(CAN_FRAME.unpack(packed))
+        elif self._confirms:
+            self._unconfirmed[word] = under_way + 1
+        return True
+
+    def _confirmed(self, word: int) -> None:
+        self._unconfirmed[word] = max(0, self._unconfirmed.get(word, 0) - 1)
+        self._since_ns.pop(word, None)
+        if self.state in SILENT:
+            self._up()
+
+    def _seen_back(self, content: Any) -> bool:
+        """Whether this is a claim of ours; no other kind of ours comes to the first socket."""
+        if content not in self._claimed:
+            return False
+        self._claimed.remove(content)
+        self._confirmed(content[0])
+        return True
+
+    def _stuck(self, word: int, under_way: int) -> bool:
+        """Whether frames of this id have been under way for too long to queue another one."""
+        now_ns = time.monotonic_ns()
+        since_ns = self._since_ns.setdefault(word, now_ns)
+        if under_way < MOST_UNCONFIRMED or now_ns - since_ns < UNCONFIRMED_NS:
+            return False
+        self._on_fault(FrameFault.NOT_CONFIRMED)
+        if word in self._valves:
+            self._block(BusState.NOT_CONFIRMED)
+        elif now_ns - since_ns > PROBE_NS:  # a status message may starve where valves get through
+            self._unconfirmed[word] = 0
+            del self._since_ns[word]
+        return True
+
+    def _block(self, state: BusState) -> None:
+        """Queue nothing more for a while."""
+        self.state = state
+        self._not_before_ns = time.monotonic_ns() + PROBE_NS
+        self._forget()
+
+    def _blocked(self) -> bool:
+        """Whether this frame must wait; one at a time may try whether it gets through."""
+        now_ns = time.monotonic_ns()
+        if now_ns < self._not_before_ns:
+            return True
+        self._not_before_ns = now_ns + PROBE_NS
+        self._forget()
+        return False
+
+    def _forget(self) -> None:
+        self._unconfirmed.clear()
+        self._since_ns.clear()
+
+    # -- the interface -------------------------------------------------------------------------
+
+    def _up(self) -> None:
+        self.state = UP
+        self._not_before_ns = 0
+
+    def _failed(self, error: OSError) -> None:
+        if error.errno in GONE:
+            self._away(BusState.GONE, FrameFault.BUS_GONE)
+        elif error.errno == errno.ENETDOWN:
+            if self._matched:
+                self._away(BusState.DOWN, FrameFault.BUS_DOWN)
+                return
+            if self.state is not BusState.DOWN:
+                self._on_fault(FrameFault.BUS_DOWN)
+            self.state = BusState.DOWN
+            self._forget()  # the queue is emptied with the interface
+            self._claimed.clear()
+        elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
+            self.state = BusState.FAILED
+            self._on_fault(FrameFault.BUS_ERROR)
+
+    def _away(self, state: BusState, fault: FrameFault) -> None:
+        """Take and send nothing until the interface is opened again; report a fault once."""
+        self.close()
+        self._not_before_ns = time.monotonic_ns() + REOPEN_NS
+        if self.state is not state:
+            self.state = state
+            self._on_fault(fault)
+
+    def _use(self) -> None:
+        arrivals = Arrivals()  # before a frame can arrive
+        self._sockets = sockets = self._open(self._ids)
+        self._arrivals = arrivals
+        sockets[0].setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
+        self._waiting = [_poll(one) for one in sockets]
+        self._receive = sockets[0].recvmsg
+        self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
+        self._forget()
+        self._claimed.clear()
+        self._dropped = 0
+        self._not_before_ns = 0
+
+    def _reopened(self) -> bool:
+        """Look for an interface that has gone, was down, or was another device."""
+        if self.state not in AWAY or time.monotonic_ns() < self._not_before_ns:
+            return False
+        try:
+            self._use()
+        except WrongDeviceError:
+            self._away(BusState.WRONG_DEVICE, FrameFault.BUS_WRONG_DEVICE)
+            return False
+        except OSError as error:
+            if error.errno in GONE:
+                self._away(BusState.GONE, FrameFault.BUS_GONE)
+            self._not_before_ns = time.monotonic_ns() + REOPEN_NS
+            return False
+        if self.state is not BusState.DOWN:  # which is over with the first frame
+            self.state = UP
+        return True
+
+    def watch(self, name: str, ids: Ids) -> None:
+        """Serve another deployment: its name of the bus, its messages."""
+        self.name, self._ids = name, ids
+        self._valves, self._claims = _words(ids.valves), _words(ids.claims)
+        self._forget()
+        if self._sockets:
+            try:
+                set_filters(self._sockets, ids)
+            except OSError as error:
+                self._failed(error)
+
+    def fileno(self) -> int:
+        """File descriptor to wait on; -1 while the interface is gone."""
+        return self._sockets[0].fileno() if self._sockets else -1
+
+    def close(self) -> None:
+        """Close the sockets."""
+        for one in self._sockets:
+            one.close()
+        self._sockets = []
+
+
+def _poll(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
+    """Whether a socket has something to read, asked within so many ms."""
+    poll = select.poll()
+    poll.register(one, select.POLLIN)
+    return poll.poll
+
+
+def _words(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
+    """The kernel's ids of messages."""
+    return frozenset(i | socket.CAN_EFF_FLAG if extended else i for i, extended in messages)

@@ -1,0 +1,110 @@
+"""SocketCAN sockets: ids to filters, and the options that a control loop needs.
+
+python-can opens them too, but keeps from us what decides here: whether a frame is our own one, seen
+back from the bus, how many the kernel has dropped, and a filter for the ids that do not matter.
+"""
+
+import socket
+import struct
+from collections.abc import Iterable
+
+from canshaper.bus.device import WrongDeviceError, check_device
+from canshaper.codec.canopen import SERVICES
+from canshaper.codec.j1939 import group_mask
+from canshaper.config.bus import Bus
+from canshaper.machine.ids import Ids
+
+# linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.
+CAN_RAW_ERR_FILTER = 2
+CAN_INV_FILTER = 0x20000000
+SO_MEMINFO = 55
+MOST_FILTERS = 512  # CAN_RAW_FILTER_MAX
+# linux/can/error.h: all classes but 0x2, a lost arbitration, which is the daily life of a bus.
+ERROR_CLASSES = 0x1FFFFFFD
+# Room for the backlog of a long stall; the default holds about 300 frames.
+RECEIVE_BUFFER_BYTES = 1 << 20
+
+EFF = socket.CAN_EFF_FLAG
+_FILTER = struct.Struct("=II")
+_MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
+
+
+def open_sockets(bus: Bus, ids: Ids | None) -> list[socket.socket]:
+    """Open the sockets of one interface, and look at its device where the deployment names one.
+
+    With ``ids`` there are three: for the messages that are taken; for those that we send, which
+    hears our own frames back, other senders and the error frames; for ids that nobody knows. So
+    neither our own frames nor a flood of foreign ones stand before a lever's. Without ``ids``,
+    one for everything.
+
+    Raises:
+        OSError: the kernel has no CAN, or there is no such interface.
+        WrongDeviceError: the interface is another device; nothing was sent or taken.
+    """
+    opened: list[socket.socket] = []
+    try:
+        for _ in range(1 if ids is None else 3):
+            opened.append(socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
+            opened[-1].setblocking(False)
+        opened[0].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+        opened[0 if ids is None else 1].setsockopt(
+            socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, ERROR_CLASSES
+        )
+        if ids is not None:
+            # What is sent on the first comes back on the second as another socket's frame, without
+            # MSG_CONFIRM; so it is sent on the second.
+            opened[1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_RECV_OWN_MSGS, 1)
+            opened[2].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)  # all, not one
+            set_filters(opened, ids)
+        for one in opened:
+            one.bind((bus.channel,))
+        check_device(opened, bus)
+    except (OSError, WrongDeviceError):
+        for one in opened:
+            one.close()
+        raise
+    return opened
+
+
+def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
+    """Let the three sockets hear these messages."""
+    # What the DBC files know besides is left to the reader where it is too much.
+    ours = ids.taken | ids.sent
+    all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
+    whole_kinds = ids.j1939 + len(SERVICES) * ids.canopen
+    others = all_known if len(all_known) + whole_kinds <= MOST_FILTERS else ours
+    groups: tuple[Iterable[int], ...] = ids.taken_groups, ids.sent_groups, ()
+    for one, messages, some, flag in zip(
+        sockets, (ids.taken, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
+    ):
+        words = [_word_and_mask(message) for message in messages]
+        words += [(group | EFF, group_mask(group) | EFF) for group in some]
+        if flag and ids.j1939:
+            words.append((EFF, EFF))
+        if flag and ids.canopen:
+            words += [(base, mask | EFF) for base, mask, _ in SERVICES]
+        if flag and ids.in_line:
+            words = []  # no filter at all: nothing is heard
+        filters = filter_words((word | flag, mask) for word, mask in words)
+        one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
+
+
+def filter_words(words: Iterable[tuple[int, int]]) -> bytes:
+    """Filters as the kernel takes them: an id and the mask of its bits that matter, each."""
+    return b"".join(_FILTER.pack(word, mask) for word, mask in words)
+
+
+def dropped_frames(sockets: list[socket.socket]) -> int:
+    """Frames that the kernel has dropped because a receive queue was full."""
+    return sum(
+        _MEMINFO.unpack(one.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, _MEMINFO.size))[8]
+        for one in sockets
+    )
+
+
+def _word_and_mask(message: tuple[int, bool]) -> tuple[int, int]:
+    """Filter for one message: its id in its own width; a mask without the flags fits both."""
+    can_id, extended = message
+    if extended:
+        return can_id | socket.CAN_EFF_FLAG, socket.CAN_EFF_MASK | socket.CAN_EFF_FLAG
+    return can_id, socket.CAN_SFF_MASK | socket.CAN_EFF_FLAG

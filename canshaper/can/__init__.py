@@ -1,1 +1,0 @@
-"""Signals on CAN: DBC binding, codecs and buses."""

@@ -1,0 +1,121 @@
+"""Profiles 1 and 2 of AUTOSAR E2E, for the eight bytes of classical CAN.
+
+Source: AUTOSAR PRS_E2EProtocol (FO R20-11), profiles 1 and 2, whose protocol examples are in the
+tests. Start and end values of the CRCs, order of the bytes of the data ID and counter positions are
+those of the MIT-licensed Python package autosar-e2e and of torsko/autosar-e2e, which agree.
+
+Both lay a header over the first bytes of a message: the CRC fills byte 0, the counter the lower
+half of byte 1. Other positions are not taken.
+"""
+
+from collections.abc import Sequence
+
+from canshaper.codec.crc8 import AUTOSAR, SAE_J1850
+
+COUNTER = 0x0F
+"""Bits of byte 1 that hold the counter."""
+
+
+class E2e:
+    """What both profiles share.
+
+    Attributes:
+        counts: values of the counter.
+        bits: how many of the first bits of a message are the header.
+    """
+
+    counts: int
+    bits = 12
+
+    def __eq__(self, other: object) -> bool:
+        """Whether that is the same profile with the same data ID."""
+        return type(other) is type(self) and vars(other) == vars(self)
+
+    def __hash__(self) -> int:
+        return hash(type(self))
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame of two bytes or more has the header that it should."""
+        count = data[1] & COUNTER
+        return count < self.counts and data[0] == self.crc(data, count)
+
+    def seal(self, data: bytes, count: int) -> bytes:
+        """The same frame with its header."""
+        data = bytes((0, self.second(data[1], count))) + data[2:]
+        return bytes((self.crc(data, count),)) + data[1:]
+
+    def second(self, byte: int, count: int) -> int:
+        """Byte 1 with this counter; ``byte`` is what the signals of the message make of it."""
+        return byte & ~COUNTER | count
+
+    def crc(self, data: bytes, count: int) -> int:
+        """CRC of a frame whose counter is ``count``."""
+        raise NotImplementedError
+
+
+class Profile1(E2e):
+    """CRC-8 SAE J1850 over the data ID and then the bytes from 1; counter 0 to 14, 15 is invalid.
+
+    Args:
+        data_id: 16 bits that tell this message from all others.
+        mode: bytes of it that enter the CRC. ``both``: the low one, then the high one. ``low``: the
+            low one. ``alternating``: the low one with even counters, the high one with odd ones.
+            ``nibble``: the low one, then a zero; four bits of the high one are sent in the upper
+            half of byte 1.
+
+    Attributes:
+        starts: register of the CRC after the data ID, for even and for odd counters.
+
+    The profile starts the CRC with 0 and does not invert its result, unlike the algorithm of that
+    name in catalogues.
+    """
+
+    counts = 15
+
+    def __init__(self, data_id: int, mode: str) -> None:
+        low, high = data_id & 0xFF, data_id >> 8
+        even: tuple[int, ...] = (low,)
+        odd = even
+        if mode == "both":
+            even = odd = (low, high)
+        elif mode == "alternating":
+            odd = (high,)
+        elif mode == "nibble":
+            even = odd = (low, 0)
+        self.starts = tuple(SAE_J1850.run(0, bytes(first)) for first in (even, odd))
+        self._nibble = (high & 0x0F) << 4 if mode == "nibble" else None
+        self.bits = 12 if self._nibble is None else 16
+
+    def right(self, data: bytes) -> bool:
+        """Whether header and sent part of the data ID are what they should be."""
+        if self._nibble is not None and data[1] & 0xF0 != self._nibble:
+            return False
+        return super().right(data)
+
+    def second(self, byte: int, count: int) -> int:
+        """Byte 1 with this counter, and the part of the data ID that is sent."""
+        return super().second(byte if self._nibble is None else self._nibble, count)
+
+    def crc(self, data: bytes, count: int) -> int:
+        """CRC of a frame."""
+        return SAE_J1850.run(self.starts[count & 1], data[1:])
+
+
+class Profile2(E2e):
+    """CRC-8 0x2F over the bytes from 1 and then the data ID of the counter, which is 0 to 15.
+
+    Args:
+        data_ids: 16 data IDs of 8 bits, by the counter.
+
+    Attributes:
+        ids: them as bytes.
+    """
+
+    counts = 16
+
+    def __init__(self, data_ids: Sequence[int]) -> None:
+        self.ids = tuple(bytes((i,)) for i in data_ids)
+
+    def crc(self, data: bytes, count: int) -> int:
+        """CRC of a frame."""
+        return AUTOSAR.of(data[1:] + self.ids[count])

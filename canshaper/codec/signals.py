@@ -1,0 +1,233 @@
+"""Signals of a DBC message: raw codes are tested first, then scaled.
+
+cantools scales whatever it finds: an error code of 1022 at 0.1 % per bit becomes 102.2 %. So
+everything here is decoded raw (``Layout``) and judged raw.
+"""
+
+import math
+import re
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+from cantools.database.can import Message, Signal
+
+from canshaper.codec.canopen import FULL_SET_POINT
+from canshaper.codec.layout import Layout, is_j1939
+from canshaper.shaping.states import Reason
+
+# Names that the tables of a DBC give to raw values that are no measurement, as words in small
+# letters: SensorError is "sensor error". In a name without any gap, such as sensorerror, they are
+# found too, but not in Default, Interrupted, Terrain and Preserved.
+_WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
+_NOT_AVAILABLE = re.compile(r"not ?avail|unavail|\bsna\b|^n ?a$")
+_ERROR = re.compile(
+    r"\berr(?!and)|err\b|error|(?<!\bde)fault|fail|invalid|not ?valid|(?<!\bp)reserved|defect"
+)
+
+
+def find_signal(message: Message, name: str) -> Signal | None:
+    """Signal of that name, or None."""
+    return next((s for s in message.signals if s.name == name), None)
+
+
+def raw_limits(signal: Signal) -> tuple[int, int]:
+    """Smallest and largest raw value that the bits of an integer signal hold."""
+    if signal.is_signed:
+        return -(1 << (signal.length - 1)), (1 << (signal.length - 1)) - 1
+    return 0, (1 << signal.length) - 1
+
+
+def symmetrical_range(signal: Signal) -> str | None:
+    """Why the DBC range of a velocity signal cannot serve as full scale, or None when it can."""
+    low, high = signal.minimum, signal.maximum
+    if fault := _no_range(signal):
+        return fault
+    if not math.isclose(-(low or 0.0), high or 0.0):
+        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is a symmetrical one"
+    return _not_reached(signal)
+
+
+def magnitude_range(signal: Signal) -> str | None:
+    """The same for a velocity whose direction is told by flags: its range begins at 0."""
+    if fault := _no_range(signal):
+        return fault
+    if signal.minimum != 0.0:
+        found = f"[{signal.minimum:g}|{signal.maximum:g}]"
+        return f"{signal.name} has the range {found}; allowed with direction flags is one from 0"
+    return _not_reached(signal)
+
+
+def _no_range(signal: Signal) -> str | None:
+    low, high = signal.minimum, signal.maximum
+    if not signal.scale:
+        return f"{signal.name} has a scale of 0, allowed is any other"
+    if low is None or high is None or high <= low:
+        return f"{signal.name} has no range in the DBC; full speed is taken from it"
+    return None
+
+
+def _not_reached(signal: Signal) -> str | None:
+    """Why the bits of a signal do not reach the ends of its range."""
+    if signal.is_float:
+        return None
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
+    raw_low, raw_high = raw_limits(signal)
+    ends = [(v - signal.offset) / signal.scale for v in (low, high)]
+    # A millionth of a step: scale and range are decimals, 88.9 / 0.7 is a little above 127.
+    if min(ends) < raw_low - 1e-6 or max(ends) > raw_high + 1e-6:
+        return (
+            f"{signal.name} cannot reach its range [{low:g}|{high:g}] with {signal.length}"
+            f" bits at {signal.scale:g} per bit"
+        )
+    return None
+
+
+def valve_steps(full: float, scale: float) -> int:
+    """Raw steps from zero to full command; rounded down so that full is never passed."""
+    return int(full / scale + 1e-6)
+
+
+def command_fault(signal: Signal) -> str | None:
+    """Why a valve cannot be commanded with a signal of symmetrical range, or None."""
+    if valve_steps(signal.maximum or 0.0, abs(signal.scale)) < 10:
+        return f"{signal.name} has fewer than 10 steps to full command"
+    zero = signal.offset / signal.scale
+    if abs(zero - round(zero)) > 1e-6:
+        return f"{signal.name} has no raw value for zero, which neutral needs"
+    return None
+
+
+def set_point_fault(signal: Signal) -> str | None:
+    """Why a command signal cannot be the set point of a valve of CiA 408, or None."""
+    if signal.offset:
+        return f"{signal.name} has the offset {signal.offset:g}; a set point of CiA 408 has none"
+    if (steps := valve_steps(signal.maximum or 0.0, abs(signal.scale))) > FULL_SET_POINT:
+        text = f"{signal.name} has {steps} steps to full command; a set point of CiA 408 has"
+        return f"{text} {FULL_SET_POINT}, and float at {raw_limits(signal)[1]}"
+    return None
+
+
+def status_faults(message: Message, names: Iterable[str], codes: dict[str, int]) -> list[str]:
+    """Why a message cannot carry a status.
+
+    Args:
+        message: the message.
+        names: signals of the status.
+        codes: largest number that a signal has to carry, where that is fixed.
+    """
+    signals = {s.name: s for s in message.signals if s.name in names}
+    missing = [n for n in names if n not in signals]
+    faults = [f"lacks the signals {', '.join(missing)}"] if missing else []
+    for name, signal in signals.items():
+        if signal.is_float or not signal.scale:
+            found = "is a float" if signal.is_float else "has a scale of 0"
+            faults.append(f"{name} {found}; allowed is an integer signal with a scale")
+        elif raw_limits(signal)[1] < codes.get(name, 0):
+            faults.append(f"{name} cannot carry {codes[name]} with {signal.length} bits")
+    return faults
+
+
+def special_codes(signal: Signal) -> dict[Any, Reason]:
+    """Raw values that are no measurement by the table of the DBC."""
+    special: dict[Any, Reason] = {}
+    for raw, name in (signal.choices or {}).items():
+        words = " ".join(_WORD.findall(str(name))).lower()
+        if _NOT_AVAILABLE.search(words):
+            special[raw] = Reason.STICK_NOT_AVAILABLE
+        elif _ERROR.search(words):
+            special[raw] = Reason.STICK_ERROR
+    return special
+
+
+def special_name(signal: Signal, value: float) -> str | None:
+    """Name in the DBC of a value that is no measurement, or None; ``value`` is in its unit."""
+    special = special_codes(signal)
+    codes = {raw * signal.scale + signal.offset: raw for raw in special}
+    return str((signal.choices or {})[codes[value]]) if value in codes else None
+
+
+def radius_range(signal: Signal) -> str | None:
+    """Why the DBC range of a radius cannot serve to tell what is one, or None when it can."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        return f"{signal.name} has no range in the DBC; what lies outside is no radius"
+    if low < 0.0:
+        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is one from 0 m or more"
+    return None
+
+
+# Of full scale; covers the rounding of scale and offset, and is less than any resolution.
+ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, slots=True)
+class VelocitySignal:
+    """Signed velocity of a stick: raw value to command or fault."""
+
+    name: str
+    scale: float
+    offset: float
+    full: float
+    special: dict[Any, Reason]
+
+    @classmethod
+    def of(cls, signal: Signal) -> "VelocitySignal":
+        """Bind a DBC signal with a ``symmetrical_range``, or a ``magnitude_range``."""
+        full = float(signal.maximum or 0.0)
+        return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal))
+
+    def read(self, raw: dict[str, Any]) -> float | Reason:
+        """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
+        found: float = raw[self.name]
+        fault = self.special.get(found)
+        if fault is not None:
+            return fault
+        value: float = (found * self.scale + self.offset) / self.full
+        if -1.0 <= value <= 1.0:
+            return value
+        if not math.isfinite(value):
+            return Reason.STICK_NOT_A_NUMBER
+        if abs(value) > 1.0 + ROUNDING:
+            return Reason.STICK_OUT_OF_RANGE
+        return math.copysign(1.0, value)
+
+
+class FieldSet:
+    """Physical values to the raw fields of one message; what is not set keeps its start value.
+
+    That is GenSigStartValue; without one 0, in messages of J1939 all bits 1: not available.
+
+    Attributes:
+        message: the message.
+        layout: where its signals lie.
+        start: raw start value of every signal.
+    """
+
+    def __init__(self, message: Message) -> None:
+        self.message = message
+        self.layout = Layout(message)
+        self.start: dict[str, Any] = {
+            s.name: self._start(s, is_j1939(message)) for s in message.signals
+        }
+        self._fields = {
+            s.name: (s.scale, s.offset, *raw_limits(s)) for s in message.signals if not s.is_float
+        }
+
+    @staticmethod
+    def _start(signal: Signal, all_ones: bool) -> int | float:
+        """GenSigStartValue (a raw value), within the bits of the signal."""
+        if signal.is_float:
+            return float(signal.raw_initial or 0.0)
+        low, high = raw_limits(signal)
+        if all_ones and signal.raw_initial is None:
+            return -1 if signal.is_signed else high
+        return min(max(int(signal.raw_initial or 0), low), high)
+
+    def raw(self, name: str, value: float) -> int:
+        """Raw value nearest to a physical one, held within the bits of the signal.
+
+        Held, not refused: a status beyond its range shall still be seen.
+        """
+        scale, offset, low, high = self._fields[name]
+        return min(max(round((value - offset) / scale), low), high)

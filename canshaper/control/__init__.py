@@ -1,1 +1,0 @@
-"""The control socket: numbers of a running daemon, asked for and changed by other programs."""

@@ -1,0 +1,1 @@
+"""Frames in, frames out, without sockets and without a clock."""

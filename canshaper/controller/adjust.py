@@ -1,0 +1,108 @@
+"""Numbers of a running machine, changed within the limits of its deployment file.
+
+The new numbers are lost when the daemon ends or reads its file again.
+"""
+
+from collections.abc import Iterable, Mapping
+
+from canshaper.config.adjust import Key, adjusted, value
+from canshaper.config.schema import AxisConfig
+from canshaper.controller.controller import Controller
+from canshaper.controller.runner import AxisRunner
+from canshaper.machine.filters import filter_fault
+from canshaper.machine.stopping import stop_fault
+
+# In one request: each axis that changes costs the loop some 40 us.
+MOST_NUMBERS = 16
+
+
+class Adjuster:
+    """Changes what the deployment's ``control`` section allows.
+
+    Args:
+        controller: the machine.
+    """
+
+    def __init__(self, controller: Controller) -> None:
+        self._axes = controller.axes
+        self._deployment = controller.deployment
+        control = self._deployment.config.control
+        self._ranges = control.adjustable if control else {}
+        self._in_file = {text: self._now(text) for text in self._ranges}
+
+    def table(self) -> dict[str, dict[str, float]]:
+        """Of every adjustable number its value now, that of the file, the least and the most."""
+        return {
+            text: {"now": self._now(text), "file": self._in_file[text], "low": low, "high": high}
+            for text, (low, high) in self._ranges.items()
+        }
+
+    def change(self, values: Mapping[str, object]) -> list[str]:
+        """Change numbers, all or none of them, without a jump of any output.
+
+        Args:
+            values: numbers by their keys, as in the file's ``adjustable``.
+
+        Returns:
+            What has changed, a line for the log each.
+
+        Raises:
+            ValueError: what was found and what is allowed; nothing has changed.
+        """
+        numbers = dict(self._checked(values))
+        by_axis: dict[str, dict[Key, float]] = {}
+        for key, number in numbers.items():
+            by_axis.setdefault(key.axis, {})[key] = number
+        configs = {
+            name: self._config(name, self._axes[name], axis) for name, axis in by_axis.items()
+        }
+        told = [f"{key}={number:g} was={self._now(str(key)):g}" for key, number in numbers.items()]
+        for name, config in configs.items():
+            self._axes[name].adjust(config)
+        for runner in self._axes.values():
+            if runner.compensator is not None:
+                runner.compensator.adjust()
+        return told
+
+    def _now(self, text: str) -> float:
+        key = _key(text)
+        found = value(self._axes[key.axis].bound.config, key)
+        assert found is not None  # checked with the deployment
+        return found
+
+    def _checked(self, values: Mapping[str, object]) -> Iterable[tuple[Key, float]]:
+        if not values:
+            raise ValueError("found no number to change")
+        if len(values) > MOST_NUMBERS:
+            text = f"found {len(values)} numbers, allowed are {MOST_NUMBERS} in one request"
+            raise ValueError(text)
+        for text, number in values.items():
+            if text not in self._ranges:
+                raise ValueError(f"{text}: not adjustable; allowed are {', '.join(self._ranges)}")
+            low, high = self._ranges[text]
+            if isinstance(number, bool) or not isinstance(number, int | float):
+                raise ValueError(f"{text}: found {number!r}, allowed is a number")
+            if not low <= number <= high:  # nor is one that is no number
+                raise ValueError(f"{text}: found {number:g}, allowed is {low:g} to {high:g}")
+            yield _key(text), float(number)
+
+    def _config(self, name: str, runner: AxisRunner, values: Mapping[Key, float]) -> AxisConfig:
+        try:
+            config = adjusted(runner.bound.config, values)
+        except ValueError as error:
+            raise ValueError(f"axes.{name}.{error}") from None
+        if config.limits != runner.bound.config.limits and not runner.axis.neutral:
+            state = runner.axis.state.name
+            raise ValueError(f"axes.{name}.limits: the axis is {state}; limits change in neutral")
+        rate = config.limits.slowest_per_s
+        if fault := filter_fault(config.filter, config.sway, runner.period_s, rate):
+            raise ValueError(f"axes.{name}.filter: {fault}")
+        if fault := stop_fault(self._deployment, name, config):
+            raise ValueError(f"axes.{name}.limits.stop_distance_m: {fault}")
+        return config
+
+
+def _key(text: str) -> Key:
+    key = Key.parsed(text)
+    assert key is not None  # checked with the deployment
+    return key

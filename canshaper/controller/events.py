@@ -1,0 +1,60 @@
+"""What an administrator wants to read: changes of axes and valves."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+from canshaper.codec.frame import Frame
+from canshaper.inputs.feedback import Following
+from canshaper.shaping.states import Transition
+
+
+class Told(Protocol):
+    """Anything that is to be read."""
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something an administrator wants to read: a change of state of an axis."""
+
+    axis: str
+    transition: Transition
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        t = self.transition
+        return f"axis={self.axis} state={t.new.name} from={t.old.name} reason={t.reason.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class FeedbackEvent:
+    """The feedback of a valve says something else than before."""
+
+    axis: str
+    following: Following
+    value: float
+    sent: float
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        found = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
+        return f"axis={self.axis} valve={self.following.value} {found}"
+
+
+@dataclass(frozen=True, slots=True)
+class RefusalEvent:
+    """The output guard has refused a valve frame."""
+
+    frame: Frame
+    why: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        bus, can_id, _, data = self.frame
+        return f"output=refused bus={bus} id={can_id:#x} data={data.hex()} {self.why}"

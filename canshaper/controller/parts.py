@@ -1,0 +1,48 @@
+"""The parts of a controller whose state outlives a reload, by what they are on the machine."""
+
+from collections.abc import Iterator, Mapping
+
+from canshaper.controller.runner import AxisRunner
+from canshaper.inputs.carry_over import Key, Part
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.canopen.nodes import CanopenBus
+from canshaper.protocols.j1939.network import Network
+
+
+def parts(
+    deployment: Deployment,
+    inputs: Mapping[tuple[str, int, bool], Part],
+    axes: Mapping[str, AxisRunner],
+    canopen: Mapping[str, CanopenBus],
+    network: Network,
+) -> dict[Key, Part]:
+    """Every part by its key.
+
+    A bus is known by interface and channel, a message by its id, whatever the file calls them. An
+    axis that is renamed is still that of its valve.
+
+    Args:
+        deployment: the machine.
+        inputs: what receives a message, by bus and id.
+        axes: the axes by name.
+        canopen: our node on each bus of CANopen.
+        network: our nodes of J1939, and inputs from any address.
+    """
+    places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
+
+    def found() -> Iterator[tuple[Key, Part]]:
+        for (bus, *message), entry in inputs.items():
+            yield ("input", *places[bus], *message), entry
+        for sender in deployment.senders():
+            bus, *message = sender.key
+            yield ("sender", *places[bus], *message), sender.protector
+        for name, runner in axes.items():
+            bus, *message = runner.bound.valve.message.sender.key
+            signal = runner.bound.config.valve.signal
+            yield ("valve", *places[bus], *message, signal), runner
+            yield ("axis", name), runner
+        for bus, nodes in canopen.items():
+            yield ("canopen", *places[bus], nodes.own), nodes
+        yield from network.parts(places)
+
+    return dict(found())

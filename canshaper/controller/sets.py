@@ -1,0 +1,92 @@
+"""Sway data and filter of an axis in motion: by the grapple, and by the operator's choice."""
+
+from collections.abc import Mapping, Sequence
+
+from canshaper.config.schema import AxisConfig
+from canshaper.config.sets import Feel
+from canshaper.inputs.value import ValueInput
+from canshaper.machine.deployment import BoundAxis
+from canshaper.machine.filters import parameter_sets
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
+from canshaper.shaping.sway import SwayModel
+
+# Between two changes of one axis: a weight that trembles must not keep the loop busy.
+LEAST_BETWEEN_NS = 100_000_000
+
+
+class SetChooser:
+    """Keeps sway data and filter of one axis at what grapple and operator ask for.
+
+    Args:
+        bound: the axis.
+        axis: its state machine, which is retuned.
+        grapple: tells what hangs on the crane, where there is a signal for it.
+        feel: the operator's choice, where there is one.
+        codes: its codes by name.
+
+    Attributes:
+        number: set in force: 0 the axis' own, then its sets, then each feel and its sets, in the
+            order of the file; between two sets the nearer one.
+    """
+
+    def __init__(
+        self,
+        bound: BoundAxis,
+        axis: Axis,
+        grapple: ValueInput | None,
+        feel: ValueInput | None,
+        codes: Mapping[str, int],
+    ) -> None:
+        config = bound.config
+        self.number = 0
+        self._axis = axis
+        self._grapple = grapple
+        self._feel = feel
+        self._rate = config.limits.slowest_per_s
+        self._codes = {float(code): name for name, code in codes.items()}
+        self._programs = programs(bound)
+        self._first: dict[str, int] = {}
+        number = 0
+        for name, (_, sets) in self._programs.items():
+            self._first[name] = number
+            number += 1 + len(sets)
+        self._now: tuple[str, int | None] = ("", None)
+        self._not_before_ns = 0
+
+    def update(self, now_ns: int) -> None:
+        """Retune the axis where something has changed."""
+        feel = self._feel.fresh(now_ns) if self._feel else None
+        name = self._codes.get(feel, "") if feel is not None else ""
+        if name not in self._programs:
+            name = ""
+        base, sets = self._programs[name]
+        value = self._grapple.fresh(now_ns) if self._grapple and sets else None
+        steps = None if value is None else position(sets, value)
+        if (name, steps) == self._now or now_ns < self._not_before_ns:
+            return
+        self._now, self._not_before_ns = (name, steps), now_ns + LEAST_BETWEEN_NS
+        chosen = base if steps is None else at_position(sets, steps)
+        self.number = self._first[name]
+        if steps is not None:
+            self.number += 1 + round(steps / STEPS_BETWEEN)
+        self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway))
+
+    def _shaper(self, chosen: ParameterSet, sway: SwayModel) -> Shaper:
+        return build_shaper(
+            chosen.kind, sway.tick_s, sway, valve_rate_per_s=self._rate, **chosen.parameters
+        )
+
+
+def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
+    """What an axis can run, by the name of the feel ("" without one): its own set, and others."""
+    config = bound.config
+    assert config.sway is not None  # checked with the deployment
+    mode = config.sway.mode()
+    found: dict[str, tuple[ParameterSet, Sequence[ParameterSet]]] = {}
+    parts: dict[str, AxisConfig | Feel] = {"": config, **config.feels}
+    for name, part in parts.items():
+        base = ParameterSet(0.0, mode, part.filter.kind, part.filter.parameters())
+        found[name] = (base, parameter_sets(part.sets))
+    return found

@@ -1,0 +1,1 @@
+"""The process around the controller: loop, buses, reload, service manager, control socket."""

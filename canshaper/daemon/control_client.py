@@ -1,0 +1,60 @@
+"""The other end of the control socket: for ``canshaper set`` and the live page."""
+
+import json
+import socket
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from canshaper.daemon.control_server import MOST_BYTES
+
+# The daemon answers within a tick or two.
+ANSWER_S = 5.0
+
+
+class ControlError(Exception):
+    """The daemon cannot be asked, or refuses; the message says why."""
+
+
+def table(path: Path) -> dict[str, dict[str, float]]:
+    """What is adjustable: by its key the value ``now``, that of the ``file``, ``low``, ``high``.
+
+    Raises:
+        ControlError: no daemon answers.
+    """
+    found = _ask(path, {})
+    assert isinstance(found["adjustable"], dict)
+    return found["adjustable"]
+
+
+def change(path: Path, values: Mapping[str, float]) -> None:
+    """Change numbers of a running daemon, all or none, until it ends or reads its file again.
+
+    Args:
+        path: its control socket.
+        values: numbers by their keys, such as ``axes.slew.sway.period_s``.
+
+    Raises:
+        ControlError: no daemon answers, or it refuses; then nothing has changed.
+    """
+    _ask(path, {"set": dict(values)})
+
+
+def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
+    with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as one:
+        one.settimeout(ANSWER_S)
+        try:
+            one.connect(str(path))
+            one.send(json.dumps(request).encode())
+            data = one.recv(MOST_BYTES)
+        except TimeoutError:
+            raise ControlError(f"{path}: the daemon does not answer") from None
+        except OSError as error:
+            text = error.strerror or str(error)
+            raise ControlError(f"{path}: {text}: no daemon with a control section?") from None
+    if not data:
+        raise ControlError(f"{path}: the daemon takes no more connections now")
+    found: dict[str, Any] = json.loads(data)
+    if "error" in found:
+        raise ControlError(str(found["error"]))
+    return found

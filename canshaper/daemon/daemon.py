@@ -1,0 +1,349 @@
+"""The daemon: buses, controller and loop together; signals; what is told to people."""
+
+import logging
+import signal
+import time
+from collections.abc import Callable, Iterable, Mapping
+from types import FrameType
+from typing import Any
+
+from canshaper.bus.clock import boottime_ns
+from canshaper.bus.port import BusError, Port
+from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.daemon.control_server import ControlServer
+from canshaper.daemon.exchange import exchange
+from canshaper.daemon.gateway import InLine
+from canshaper.daemon.loop import run_at_deadlines
+from canshaper.daemon.notify import ServiceManager
+from canshaper.daemon.ports import (
+    close_ports,
+    new_ports,
+    open_ports,
+    received_at_first,
+    waiting,
+)
+from canshaper.daemon.reading import Reading
+from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.deployment import Deployment
+
+log = logging.getLogger("canshaper")
+
+# How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
+NEUTRAL_TRIES_S = 0.1
+SECOND_NS = 1_000_000_000
+# Nobody hears us there, or we nobody.
+OFF_BUS = frozenset(
+    (
+        BusState.BUS_OFF,
+        BusState.NOT_CONFIRMED,
+        BusState.DOWN,
+        BusState.GONE,
+        BusState.WRONG_DEVICE,
+    )
+)
+
+
+class Daemon:
+    """Runs a deployment until it is told to stop.
+
+    Args:
+        load: reads the deployment, at the start and, in another process, at every SIGHUP.
+            One that only listens sends no valve frame.
+
+    Raises:
+        DeploymentError: the deployment is not valid.
+        BusError: a bus cannot be opened.
+    """
+
+    def __init__(self, load: Callable[[], Deployment]) -> None:
+        self._load = load
+        self._stop = False
+        self._reload = False  # asked for and not yet begun
+        self._reading: Reading | None = None
+        self._next: Deployment | None = None  # read, and good
+        self._waiting_told = False
+        self._manager = ServiceManager()
+        self._collector = Collector()
+        self._logged_fault = FrameFault.NONE
+        self._log_again_ns = 0
+        self._told_ns = 0
+        self._latest_ns = 0
+        deployment = load()
+        self._ports = open_ports(deployment, {}, self._on_fault)
+        self._line = self._in_line(deployment)
+        self._standstill = Standstill(deployment)
+        self._use(deployment)
+        self._control = self._open_control(deployment)
+
+    def run(self) -> None:
+        """Run until SIGTERM or SIGINT; then every valve is told neutral and the buses close."""
+        for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
+            signal.signal(number, self._on_signal)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, the end of a Reading would be lost
+        names = ",".join(self._controller.axes)
+        if self._controller.deployment.listen_only:
+            log.warning("listen-only=yes valves=none: nothing is sent but status")
+        refuse_huge_pages()
+        why = lock_memory()
+        log.info("memory=%s", f"not-locked ({why})" if why else "locked")
+        self._collector.freeze()
+        self._send_neutral()  # most valves want to see it before they listen to anything else
+        log.info("started file=%s axes=%s", self._controller.deployment.path, names)
+        self._log_identity()
+        self._manager.ready(f"started, axes {names}")
+        try:
+            while not self._stop:
+                run_at_deadlines(self._tick_ns, self._body, self._wait if self._line else None)
+        finally:
+            self._manager.stopping()
+            self._send_neutral()
+            close_ports(self._ports.values())
+            if self._line:
+                self._line.close()
+            if self._reading:
+                self._reading.end()
+            if self._control:
+                self._control.close()
+        listened = self._controller.deployment.listen_only
+        log.info("stopped valves=%s", "not-sent" if listened else "neutral")
+
+    # -- one tick ------------------------------------------------------------------------------
+
+    def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
+        """Take all waiting frames, tick the axes, send, then housekeeping.
+
+        A reload, refused or not, has taken its time as all else has: the next tick sees it.
+        """
+        controller = self._controller
+        exchange(self._guarded, self._ports, now_ns, missed, self._standstill)
+        if self._line:
+            self._line.pass_others()
+        self._latest_ns = max(self._latest_ns, late_ns)
+        self._housekeeping(now_ns)
+        applied = False
+        if self._next and controller.neutral and not self._stop:
+            applied = self._apply(self._next)
+        return not (self._stop or applied)
+
+    def _wait(self, seconds: float) -> None:
+        """In a gateway: pass frames on until the next deadline."""
+        assert self._line is not None  # asked of a gateway only
+        self._line.wait(seconds, self._guarded, self._ports, self._standstill)
+
+    def _housekeeping(self, now_ns: int) -> None:
+        """Tell what changed; everything that may take time comes after the frames are out."""
+        controller = self._controller
+        self._manager.ping(now_ns)
+        for event in controller.events:
+            log.info("%s", event.text)
+        controller.events.clear()
+        for name, port in self._ports.items():
+            if port.state in OFF_BUS:
+                controller.unheard(name)
+            if port.state is not self._bus_states[name]:
+                self._bus_states[name] = port.state
+                level = logging.INFO if port.state is BusState.UP else logging.WARNING
+                log.log(level, "bus=%s state=%s", name, port.state.value)
+        fault = controller.counters.last_fault
+        if fault is not self._logged_fault and now_ns >= self._log_again_ns:
+            self._logged_fault = fault
+            if fault is not FrameFault.NONE:  # the counters of a reload begin without a fault
+                self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
+                log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
+        if self._reload or self._reading or self._next:
+            self._prepare_reload()
+        if self._line:
+            self._line.check(now_ns, neutral=controller.neutral)
+        if self._control:
+            self._control.serve(self._answer, now_ns)
+        if now_ns >= self._told_ns:
+            self._told_ns = now_ns + SECOND_NS
+            self._manager.status(self._summary())
+            self._send_identity()
+            self._latest_ns = 0
+            for handler in logging.getLogger().handlers:
+                handler.flush()  # a reader that was slow may be back
+        self._collector.pause(now_ns)
+
+    def _summary(self) -> str:
+        """One line for people: axes, buses, lateness of the last second, deadlines missed."""
+        axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
+        buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
+        missed = self._controller.counters.values["MissedDeadlines"]
+        first = ["listen-only"] if self._controller.deployment.listen_only else []
+        return ", ".join(
+            [*first, *axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
+        )
+
+    def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
+        """One request from the control socket."""
+        values = request.get("set", {})
+        if request.keys() - {"set"} or not isinstance(values, dict):
+            raise ValueError('allowed is {} or {"set": {KEY: VALUE}}')
+        if "set" in request:
+            try:
+                changes = self._adjuster.change(values)
+            except ValueError as error:
+                log.warning("set=refused %s %s", peer, error)
+                raise
+            for change in changes:
+                log.info("set %s %s", change, peer)
+        return {"adjustable": self._adjuster.table()}
+
+    # -- deployments ---------------------------------------------------------------------------
+
+    def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
+        self._controller = Controller(deployment)
+        if before:
+            self._controller.follow(before)
+        self._guarded = Guarded(self._controller)
+        self._adjuster = Adjuster(self._controller)
+        self._bus_states = dict.fromkeys(self._ports, BusState.UP)
+        self._tick_ns = deployment.config.tick_ms * 1_000_000
+
+    def _in_line(self, deployment: Deployment) -> InLine | None:
+        """What passes frames on, where we stand in a line."""
+        in_line = deployment.config.gateway and not deployment.listen_only
+        return InLine(deployment, self._on_fault) if in_line else None
+
+    def _open_control(self, deployment: Deployment) -> ControlServer | None:
+        """The control socket, where there shall be one; a machine works without it too."""
+        control = deployment.config.control
+        if control is None:
+            return None
+        path = control.path(deployment.path)
+        try:
+            return ControlServer(path, int(control.mode, 8))
+        except OSError as error:
+            log.error("control=none socket=%s %s", path, error.strerror or error)
+            return None
+
+    def _prepare_reload(self) -> None:
+        """A step towards the deployment as its files are now: the loop never waits for it.
+
+        Nothing is begun while something moves: even a new process costs a tick a millisecond.
+        """
+        neutral = self._controller.neutral
+        if self._reload and neutral:
+            if self._reading:  # of files that may have changed since
+                self._reading.end()
+            self._reload, self._reading, self._next = False, None, None
+            try:
+                self._reading = Reading(self._load)
+            except OSError as error:
+                self._refuse(f"cannot read: {error.strerror}")
+        elif self._reading and (found := self._reading.result()) is not None:
+            self._reading = None
+            if isinstance(found, Deployment):
+                self._next = found
+            else:
+                self._refuse(found)
+        waiting = not neutral and bool(self._reload or self._next)
+        if waiting and not self._waiting_told:
+            log.info("reload=waiting until every axis is neutral")
+        self._waiting_told = waiting
+
+    def _apply(self, deployment: Deployment) -> bool:
+        """Replace the deployment, if its buses can be opened; else go on as before.
+
+        Called with every axis neutral and behind a tick, so a bus may take its time.
+
+        Returns:
+            Whether it was replaced; a loop with its tick has to begin.
+        """
+        self._manager.reloading()
+        self._next = None
+        config = self._controller.deployment.config
+        opened = {bus: self._ports[name] for name, bus in config.buses.items()}
+        ports: dict[str, Port] = {}
+        try:
+            ports = open_ports(deployment, opened, self._on_fault)
+            line = self._in_line(deployment)
+        except BusError as error:
+            close_ports(new_ports(ports, opened))
+            self._manager.ready("as before")
+            self._refuse(str(error))
+            return False
+        self._send_neutral()
+        closed = [port for port in opened.values() if port not in ports.values()]
+        if closed:
+            self._read(waiting(closed))
+            close_ports(closed)
+        new = new_ports(ports, opened)
+        waited = received_at_first(new, deployment) if new else []
+        for name, port in ports.items():
+            port.watch(name, deployment.ids(name))
+        self._ports = ports
+        if self._line:
+            self._line.close()
+        self._line = line
+        if self._control:
+            self._control.close()
+        self._use(deployment, before=self._controller)
+        if new:
+            self._read(waited)
+        self._standstill = Standstill(deployment, before=self._standstill)
+        self._control = self._open_control(deployment)
+        log.info("reload=applied file=%s", deployment.path)
+        self._log_identity()
+        self._manager.ready("reload applied")
+        self._told_ns = boottime_ns() + SECOND_NS
+        self._collector.freeze()
+        return True
+
+    def _read(self, waited: Iterable[Frame]) -> None:
+        """Frames of a bus that is opened again: old by now, but bad news among them counts."""
+        self._controller.stalled()
+        now_ns = boottime_ns()
+        for frame in waited:
+            self._controller.receive(frame, now_ns)
+
+    def _refuse(self, why: str) -> None:
+        """Tell why a reload changes nothing."""
+        lines = why.splitlines()
+        for line in lines:
+            log.error("reload=refused %s", line)
+        self._manager.status(f"reload refused: {lines[0]}")
+        self._told_ns = boottime_ns() + SECOND_NS
+
+    # -- ends ----------------------------------------------------------------------------------
+
+    def _send_neutral(self) -> None:
+        """Send every valve neutral, for a while again where a queue is full."""
+        waiting: list[Frame] = self._guarded.neutral_frames()
+        until = time.monotonic() + NEUTRAL_TRIES_S
+        while waiting:
+            waiting = [f for f in waiting if not self._ports[f.bus].send(f)]
+            if time.monotonic() > until:
+                break
+            if waiting:
+                time.sleep(0.005)
+        for frame in waiting:
+            log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
+
+    def _log_identity(self) -> None:
+        """What runs, by its hashes: a machine that was signed off is compared with these."""
+        for line in self._controller.deployment.identity.lines():
+            log.info("identity %s", line)
+
+    def _send_identity(self) -> None:
+        """The digest of what runs, where a message carries it and its bus may be used."""
+        deployment = self._controller.deployment
+        status = deployment.identity_status
+        if status and status.sender.key[0] not in self._controller.silent_buses:
+            frame = status.frame(deployment.identity.digest)
+            if not self._ports[frame.bus].send(frame):
+                self._controller.send_failed(frame)
+
+    def _on_fault(self, fault: FrameFault) -> None:
+        self._controller.counters.add(fault)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        if number == signal.SIGHUP:
+            self._reload = True
+        else:
+            self._stop = True

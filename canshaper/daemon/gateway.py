@@ -1,0 +1,209 @@
+"""The daemon in the line: it waits for frames, not only for its deadline, and passes them on."""
+
+import errno
+import logging
+import select
+import socket
+import time
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
+
+from canshaper.bus.device import WrongDeviceError, check_device
+from canshaper.bus.port import BusError, Port
+from canshaper.bus.raw import GONE, REOPEN_NS, SIZE
+from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
+from canshaper.codec.frame import FrameFault
+from canshaper.config.bus import Bus
+from canshaper.daemon.exchange import Reckons, take
+from canshaper.daemon.standstill import Standstill
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.gateway.cangw import GatewayError, Rule, between, difference, rules
+from canshaper.protocols.gateway.passing import Pattern
+from canshaper.protocols.gateway.rules import excluded, passing_rules
+
+log = logging.getLogger("canshaper")
+
+# Foreign frames that are passed on before the levers are looked at again.
+MOST_AT_ONCE = 8
+# Rounds that find nothing to take though a socket has something: frames of no use, or an error.
+MOST_EMPTY = 10
+CHECK_NS = 10_000_000_000
+
+
+class Bridge:
+    """Passes the frames of others on, in both directions and in their order.
+
+    Args:
+        buses: both, of SocketCAN.
+        excluded: the frames that do not pass.
+        on_fault: called with every frame that could not be passed on.
+
+    Raises:
+        BusError: an interface cannot be opened.
+    """
+
+    def __init__(
+        self,
+        buses: tuple[Bus, Bus],
+        excluded: Iterable[Pattern],
+        on_fault: Callable[[FrameFault], None],
+    ) -> None:
+        self._buses = buses
+        self._matched = any(bus.match for bus in buses)
+        words = [(pattern.value | CAN_INV_FILTER, pattern.mask) for pattern in excluded]
+        self._filters = filter_words(words)
+        self._on_fault = on_fault
+        self._not_before_ns = 0
+        self.sockets: list[socket.socket] = []
+        try:
+            self._open()
+        except (OSError, WrongDeviceError) as error:
+            names = " and ".join(bus.channel for bus in buses)
+            why = error.strerror if isinstance(error, OSError) else error
+            raise BusError(f"gateway: cannot open {names}: {why}") from error
+
+    def _open(self) -> None:
+        opened: list[socket.socket] = []
+        try:
+            for bus in self._buses:
+                opened.append(socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
+                opened[-1].setblocking(False)
+                opened[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
+                opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)
+                opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
+                opened[-1].bind((bus.channel,))
+                check_device(opened[-1:], bus)
+        except (OSError, WrongDeviceError):
+            for one in opened:
+                one.close()
+            raise
+        self.sockets = opened
+
+    def pass_on(self) -> int:
+        """Pass on what waits, but no more than a few; how many there were."""
+        if not self.sockets:
+            self._reopen()
+        count = 0
+        for source, destination in zip(self.sockets, self.sockets[::-1], strict=True):
+            for _ in range(MOST_AT_ONCE):
+                try:
+                    data = source.recv(SIZE)
+                except BlockingIOError:
+                    break
+                except OSError as error:
+                    if error.errno in GONE or (self._matched and error.errno == errno.ENETDOWN):
+                        self._gone()
+                        return count
+                    break  # down: told by the port of this bus
+                count += 1
+                try:
+                    destination.send(data)
+                except OSError:
+                    self._on_fault(FrameFault.SEND_FAILED)
+        return count
+
+    def _gone(self) -> None:
+        self.close()
+        self._not_before_ns = time.monotonic_ns() + REOPEN_NS
+
+    def _reopen(self) -> None:
+        now_ns = time.monotonic_ns()
+        if now_ns >= self._not_before_ns:
+            self._not_before_ns = now_ns + REOPEN_NS
+            with suppress(OSError, WrongDeviceError):  # reported by the port of this bus
+                self._open()
+
+    def close(self) -> None:
+        """Close both sockets."""
+        for one in self.sockets:
+            one.close()
+        self.sockets = []
+
+
+class InLine:
+    """What a gateway asks of the daemon besides its ticks.
+
+    Args:
+        deployment: one with a gateway.
+        on_fault: called with every fault.
+
+    Raises:
+        BusError: an interface cannot be opened.
+    """
+
+    def __init__(self, deployment: Deployment, on_fault: Callable[[FrameFault], None]) -> None:
+        gateway = deployment.config.gateway
+        assert gateway is not None  # only such deployments have one
+        self._bridge: Bridge | None = None
+        self._check_ns = 0
+        self._told: str | None = None
+        first, second = (deployment.config.buses[bus] for bus in gateway.between)
+        self._kernel = gateway.passing == "kernel"
+        self._real = {first.interface, second.interface} == {"socketcan"}
+        self._wanted = passing_rules(deployment)
+        if not self._real:
+            log.warning("gateway=nothing-passes others are passed on with socketcan only")
+        elif not self._kernel:
+            self._bridge = Bridge((first, second), excluded(deployment), on_fault)
+
+    def wait(
+        self,
+        seconds: float,
+        reckons: Reckons,
+        ports: Mapping[str, Port],
+        standstill: Standstill,
+    ) -> None:
+        """Until a deadline pass on what comes; frames of the levers first.
+
+        What comes later is left to the tick, which knows whether the loop stood still: it must not
+        leave with the velocities from before.
+        """
+        clock = standstill.clock
+        until_ns = clock() + round(seconds * 1e9)
+        empty = 0
+        while (left_ns := until_ns - clock()) > 0:
+            if empty > MOST_EMPTY:
+                time.sleep(left_ns / 1e9)
+                return
+            waiting = [fd for fd in (port.fileno() for port in ports.values()) if fd >= 0]
+            if self._bridge:
+                waiting += [one.fileno() for one in self._bridge.sockets]
+            ready, _, _ = select.select(waiting, [], [], left_ns / 1e9)
+            now_ns = clock()
+            if not ready or now_ns >= until_ns or standstill.over(now_ns):
+                return
+            empty += not (take(reckons, ports, now_ns, standstill) + self.pass_others())
+
+    def pass_others(self) -> int:
+        """Pass on a few frames of others, where that is our part; how many there were."""
+        return self._bridge.pass_on() if self._bridge else 0
+
+    def check(self, now_ns: int, *, neutral: bool) -> None:
+        """Tell when the rules of the kernel are not those that they should be.
+
+        Looked at now and then, and only while nothing moves: it takes a part of a tick.
+        """
+        if not self._kernel or not self._real or not neutral or now_ns < self._check_ns:
+            return
+        self._check_ns = now_ns + CHECK_NS
+        if (found := rules_fault(self._wanted)) != self._told:
+            self._told = found
+            level = logging.WARNING if found else logging.INFO
+            log.log(level, "gateway=%s", found or "rules-right")
+
+    def close(self) -> None:
+        """Pass nothing on any more."""
+        if self._bridge:
+            self._bridge.close()
+
+
+def rules_fault(wanted: list[Rule]) -> str:
+    """What is wrong with the kernel's rules while the daemon runs; empty where nothing is."""
+    try:
+        found = between({rule.source for rule in wanted}, rules())
+    except GatewayError as error:
+        return f"rules-not-known {error}"
+    more, missing = difference(found, wanted)
+    faults = [f"rules-missing {len(missing)} of {len(wanted)}"] if missing else []
+    faults += [f"rules-too-many {', '.join(map(str, more))}"] if more else []
+    return "; ".join(faults)

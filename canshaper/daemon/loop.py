@@ -1,0 +1,38 @@
+"""A loop at fixed absolute deadlines, on a clock that no one sets."""
+
+import time
+from collections.abc import Callable
+
+from canshaper.bus.clock import boottime_ns
+
+
+def run_at_deadlines(
+    period_ns: int,
+    body: Callable[[int, int, int], bool],
+    wait: Callable[[float], None] | None = None,
+) -> None:
+    """Call ``body`` at every deadline until it returns False.
+
+    The deadlines are fixed in advance, so lateness does not add up. Deadlines that have passed
+    are counted and left out, never caught up in a burst.
+
+    Args:
+        period_ns: time between two deadlines.
+        body: called with the time by ``boottime_ns``, the number of deadlines missed since its
+            last call, and how late it is, in ns after the first deadline it has not yet been called
+            for.
+        wait: lets so many seconds pass; by default it sleeps.
+    """
+    clock = boottime_ns
+    deadline = now = clock()
+    while True:
+        late = now - deadline
+        missed = late // period_ns if late > 0 else 0
+        deadline += missed * period_ns
+        if not body(now, missed, late):
+            return
+        deadline += period_ns
+        left = deadline - clock()
+        if left > 0:
+            (wait or time.sleep)(left / 1e9)
+        now = clock()

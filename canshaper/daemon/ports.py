@@ -1,0 +1,72 @@
+"""The open buses of a daemon, from one deployment to the next."""
+
+import time
+from collections.abc import Callable, Iterable, Mapping
+
+from canshaper.bus.port import BusError, ListeningPort, Port, WrongBusError, open_port
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.config.bus import Bus
+from canshaper.machine.deployment import Deployment
+
+# Until what was sent last has left a queue of some frames, also on a bus with other traffic.
+ON_THE_BUS_S = 0.1
+
+
+def open_ports(
+    deployment: Deployment, opened: Mapping[Bus, Port], on_fault: Callable[[FrameFault], None]
+) -> dict[str, Port]:
+    """Ports of a deployment by name, those among them that are open already included.
+
+    Args:
+        deployment: one that only listens gets ports that send no valve frame.
+        opened: what is open.
+        on_fault: called with every fault of a bus.
+
+    Raises:
+        BusError: a bus cannot be opened, or is another device; what is open stays as it is.
+    """
+    ports: dict[str, Port] = {}
+    try:
+        for name, bus in deployment.config.buses.items():
+            ids = deployment.ids(name)
+            port = opened.get(bus) or open_port(name, bus, on_fault, ids)
+            listens = deployment.listen_only and bus not in opened
+            ports[name] = ListeningPort(port, ids) if listens else port
+    except BusError as error:
+        close_ports(new_ports(ports, opened))
+        if isinstance(error, WrongBusError):
+            place = ("buses", error.bus, "match")
+            raise BusError(str(deployment.source.problem(place, error.why))) from error
+        raise
+    return ports
+
+
+def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Port]:
+    """Those among ports that were not open before."""
+    return [port for port in ports.values() if port not in opened.values()]
+
+
+def waiting(ports: Iterable[Port]) -> list[Frame]:
+    """What waits in ports that are about to be closed."""
+    return [frame for port in ports for frame in (*port.frames(), *port.others())]
+
+
+def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame]:
+    """What new ports receive at first, without what we send: that is our own from the ports before.
+
+    They cannot know it for ours, and it would look like a second sender of every valve's id.
+    """
+    time.sleep(ON_THE_BUS_S)
+    ours = {port.name: deployment.ids(port.name) for port in new}
+    return [
+        frame
+        for port in new
+        for frame in (*port.frames(), *port.others())
+        if frame[1:3] not in ours[port.name].sent | ours[port.name].claims
+    ]
+
+
+def close_ports(ports: Iterable[Port]) -> None:
+    """Close them."""
+    for port in ports:
+        port.close()

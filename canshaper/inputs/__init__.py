@@ -1,0 +1,1 @@
+"""What is known of each received message: is it valid, in sequence, fresh?"""

@@ -1,0 +1,80 @@
+"""Does the valve do what it is told? Its own feedback, compared with the commands."""
+
+import math
+from collections import deque
+from enum import Enum
+from typing import Self
+
+from canshaper.codec.signals import find_signal
+from canshaper.inputs.value import ValueInput, measurable
+from canshaper.machine.inputs import BoundFeedback
+
+
+class Following(Enum):
+    """What the feedback of a valve says."""
+
+    UNKNOWN = "unknown"
+    """Nothing was heard of it yet, and it is not late."""
+    YES = "following"
+    NO = "not-following"
+    """The spool is elsewhere than any command of the last moments asked for."""
+    LOST = "lost"
+
+
+class Feedback(ValueInput):
+    """Feedback of one valve: estimated flow, or position of the spool.
+
+    Args:
+        bound: its message.
+        period_s: time between two commands.
+
+    Attributes:
+        following: what it says.
+    """
+
+    def __init__(self, bound: BoundFeedback, period_s: float) -> None:
+        config = bound.config
+        signal = find_signal(bound.message, config.signal)
+        assert signal is not None  # checked with the deployment
+        super().__init__(bound, signal.name, *measurable(signal))
+        self._full = config.full if config.full is not None else float(signal.maximum or 0.0)
+        self._tolerance = config.tolerance_pct / 100.0
+        self._commands = deque([0.0], maxlen=1 + math.ceil(config.settle_ms / 1000.0 / period_s))
+        self._waited_for_ns: int | None = None  # the first one, since then
+        self.following = Following.UNKNOWN
+
+    @property
+    def part(self) -> float:
+        """The last value as a part of full."""
+        return self.value / self._full
+
+    def check(self, sent: float, now_ns: int) -> bool:
+        """Compare with the commands so far and this one; whether ``following`` has changed.
+
+        Args:
+            sent: the command as a part of full, without the deadband of the valve.
+            now_ns: monotonic time.
+        """
+        # What the valve shows now may answer any of the commands of its settling time.
+        self._commands.append(sent)
+        before = self.following
+        if self._waited_for_ns is None:
+            self._waited_for_ns = now_ns
+        told_ns = self._waited_for_ns if self.measured_ns is None else self.measured_ns
+        if now_ns - told_ns > self._timeout_ns:
+            self.following = Following.LOST
+        elif self.measured_ns is not None:
+            low = min(self._commands) - self._tolerance
+            high = max(self._commands) + self._tolerance
+            self.following = Following.YES if low <= self.part <= high else Following.NO
+        return self.following is not before
+
+    def copy_state(self, before: Self) -> None:
+        """A valve that does not follow is still reported until its feedback says otherwise."""
+        super().copy_state(before)
+        self.following = before.following
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+        super().forget()
+        self._waited_for_ns = None

@@ -1,0 +1,143 @@
+"""A message that is taken: is it whole, right, in sequence, and still fresh?"""
+
+from abc import ABC, abstractmethod
+from typing import Any, Self
+
+from canshaper.codec.codecs import WrongLengthError
+from canshaper.codec.frame import FrameFault
+from canshaper.machine.inputs import BoundInput
+from canshaper.shaping.states import Reason
+
+# A member by way of its class takes ten times as long as a name, for every frame.
+GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
+
+
+class Input(ABC):
+    """What is known of one message now.
+
+    Its age begins with the arrival of its frame. What is bad news in a frame counts from when the
+    frame is read: it is numbered, not dated, so that none is too old to be seen.
+
+    Attributes:
+        raw: raw values of the last frame that counted, by signal.
+        commands: its velocities, or why there is none, by signal.
+    """
+
+    def __init__(self, bound: BoundInput) -> None:
+        self._codec = bound.codec
+        self._guard = bound.guard()
+        self._counter = bound.protection.counter
+        self._timeout_ns = bound.config.timeout_ms * 1_000_000
+        self._heard_ns: int | None = None
+        self._refused_ns: int | None = None
+        self._received_ns: int | None = None
+        self.raw: dict[str, Any] = {}
+        self.commands: dict[str, float | Reason] = {}
+
+    def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
+        """Take a frame, or say what is wrong with it; only a good one is news."""
+        try:
+            raw, commands = self._codec.decode(data)
+        except WrongLengthError:
+            return FrameFault.WRONG_LENGTH
+        guard = self._guard
+        if self._heard_ns is None or arrived_ns - self._heard_ns > self._timeout_ns:
+            guard.begin_anew()
+        fault = guard.judge(data, raw[self._counter] if self._counter else 0)
+        if fault is CHECKSUM:
+            self._refused_ns = arrived_ns
+            return fault
+        self._heard_ns = arrived_ns
+        counts = guard.qualified and not fault
+        content = self.heard(raw, commands, arrived_ns, counts)
+        if not counts:
+            self._refused_ns = arrived_ns
+            return fault
+        self.raw, self.commands, self._received_ns = raw, commands, arrived_ns
+        return content
+
+    @abstractmethod
+    def heard(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
+    ) -> FrameFault:
+        """A frame with the right checksum came; the last one still stands in ``raw``.
+
+        Args:
+            raw: its raw values, by signal.
+            commands: its velocities, or why there is none, by signal.
+            arrived_ns: when it arrived.
+            counts: whether it may be used. A switch may tell something without that.
+
+        Returns:
+            What is wrong with its content.
+        """
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+        self._received_ns = self._heard_ns = None
+
+    def copy_state(self, before: Self) -> None:
+        """Continue the sequence of the same message; its values have to come again to count."""
+        self._guard.copy_state(before._guard)
+        self._heard_ns, self._refused_ns = before._heard_ns, before._refused_ns
+
+    def lost(self, now_ns: int) -> Reason | None:
+        """Why nothing is known now; None while the last good frame is fresh."""
+        if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
+            return None
+        if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
+            return Reason.STICK_UNTRUSTED
+        return Reason.STICK_TIMEOUT
+
+
+class EmergencyStopInput(Input):
+    """The emergency stop of a deployment.
+
+    Attributes:
+        presses: how often it was seen pressed.
+    """
+
+    def __init__(self, bound: BoundInput, signal: str) -> None:
+        super().__init__(bound)
+        self._signal = signal
+        self.presses = 0
+        self._pressed = False
+
+    def heard(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
+    ) -> FrameFault:
+        """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
+        if raw[self._signal] != 0:
+            self.presses += 1
+            self._pressed = True
+        elif counts:
+            self._pressed = False
+        return GOOD
+
+    def copy_state(self, before: Self) -> None:
+        """A stop that is pressed stays so until a frame that counts says otherwise."""
+        super().copy_state(before)
+        self._pressed = before._pressed
+
+    def stops(self, now_ns: int) -> bool:
+        """Whether nothing may move now: it is pressed, or not heard."""
+        return self._pressed or self.lost(now_ns) is not None
+
+    def stop(self, now_ns: int, presses: int) -> Reason | None:
+        """Why nothing may move now, or None.
+
+        Args:
+            now_ns: monotonic time.
+            presses: as they were when this was asked last.
+        """
+        if self._pressed or self.presses > presses:
+            return Reason.EMERGENCY_STOP
+        return Reason.EMERGENCY_STOP_LOST if self.lost(now_ns) else None

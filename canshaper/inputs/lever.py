@@ -1,0 +1,114 @@
+"""What is known of one lever now: its last good frame, and what an axis may use of it."""
+
+from typing import Any, Self
+
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.input import GOOD, Input
+from canshaper.machine.inputs import BoundLever
+from canshaper.shaping.states import Reason, StickInput
+
+_new = tuple.__new__  # StickInput(...) in half the time
+
+
+class LeverInput(Input):
+    """Takes the frames of one lever; answers what an axis may use of them at a moment.
+
+    Attributes:
+        releases: how often its enable was seen released. A release counts when it is read, however
+            long ago its frame arrived; all that has an age is as old as its arrival.
+    """
+
+    def __init__(self, lever: BoundLever) -> None:
+        super().__init__(lever)
+        config = lever.config
+        self._enable = config.enable
+        self._reset = config.reset
+        self._off = config.anti_sway_off
+        self._frozen_ns = round(config.frozen_s * 1e9)
+        self._changed_ns: dict[str, int] = {}
+        self.releases = 0
+        self._released = False
+        self._doubted = 0  # number of the last release in a frame that does not count
+
+    @property
+    def released(self) -> bool:
+        """Whether enable is released, by the last frame that says so or says otherwise."""
+        return self._released
+
+    def heard(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
+    ) -> FrameFault:
+        """Note since when each stick is where it is; codes that are no measurement are a fault.
+
+        A released enable needs no trust, however short it is; only a frame that counts ends it.
+        """
+        enable = raw[self._enable]
+        if enable == 0:
+            self.releases += 1
+            self._released = True
+            if not counts:
+                self._doubted = self.releases
+        elif counts:
+            self._released = False
+        if not counts:
+            return GOOD
+        valid = enable in (0, 1)
+        last = self.commands
+        for name, command in commands.items():
+            if command != last.get(name):
+                self._changed_ns[name] = arrived_ns
+            if type(command) is Reason:
+                valid = False
+        return GOOD if valid else FrameFault.INVALID_SIGNAL
+
+    def copy_state(self, before: Self) -> None:
+        """An enable that is released stays so until a frame that counts says otherwise."""
+        super().copy_state(before)
+        self._released = before._released
+
+    def stick(
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
+    ) -> StickInput:
+        """Input of the axis that this signal drives.
+
+        Args:
+            signal: name of its velocity signal.
+            now_ns: monotonic time.
+            releases: as they were when this axis asked last.
+            trip: a cause for neutral at once, handed through.
+            neutral_band: |stick| up to which it counts as neutral and may stand still for ever.
+        """
+        released = self._released or self.releases > releases
+        received_ns = self._received_ns
+        if received_ns is None or now_ns - received_ns > self._timeout_ns:
+            lost = self.lost(now_ns)
+            # Seen released is more than lost: an immediate stop, not the shaped one.
+            released = self.releases > releases or (
+                self._released and lost is Reason.STICK_UNTRUSTED
+            )
+            # What the switches did meanwhile is not known; one that is held was not pressed.
+            return StickInput(fault=lost, enabled=not released, reset=True, trip=trip)
+        raw = self.raw
+        command = self.commands[signal]
+        bypass = self._off is not None and raw[self._off] == 1
+        reset = self._reset is not None and raw[self._reset] == 1
+        enable = raw[self._enable]
+        if type(command) is Reason:
+            fault: Reason | None = command
+        elif released:
+            fault = None
+        elif enable != 1:  # nor 0, which is released
+            fault = Reason.SWITCH_INVALID
+        elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
+            fault = Reason.STICK_FROZEN
+        else:
+            return _new(StickInput, (command, None, True, bypass, reset, trip))
+        if released and enable != 0 and (self._released or self._doubted > releases):
+            fault = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
+        elif fault is None:
+            return StickInput(command, enabled=False, reset=reset, trip=trip)
+        return StickInput(fault=fault, enabled=not released, reset=reset, trip=trip)

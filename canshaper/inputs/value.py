@@ -1,0 +1,76 @@
+"""One number out of a message, while it is fresh: a radius, a weight, a choice, a flow."""
+
+import sys
+from typing import Any
+
+from cantools.database.can import Signal
+
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.signals import find_signal, special_codes
+from canshaper.inputs.input import GOOD, Input
+from canshaper.machine.inputs import BoundInput
+from canshaper.shaping.states import Reason
+
+LARGEST = sys.float_info.max
+
+
+class ValueInput(Input):
+    """The value of one signal.
+
+    Args:
+        bound: its message.
+        name: the signal.
+        low: smallest value that is one; by default every number.
+        high: largest.
+
+    Attributes:
+        value: the last one that counted, in the unit of the DBC.
+        measured_ns: when it arrived; None when there is none.
+    """
+
+    def __init__(
+        self, bound: BoundInput, name: str, low: float = -LARGEST, high: float = LARGEST
+    ) -> None:
+        super().__init__(bound)
+        signal = find_signal(bound.message, name)
+        assert signal is not None  # checked with the deployment
+        self._name, self._scale, self._offset = name, signal.scale, signal.offset
+        self._special = special_codes(signal)
+        self._low, self._high = low, high
+        self.value = 0.0
+        self.measured_ns: int | None = None
+
+    def heard(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
+    ) -> FrameFault:
+        """An error code is no value, nor is what lies outside the range, or is no number."""
+        code = raw[self._name]
+        value = code * self._scale + self._offset
+        if code in self._special or not self._low <= value <= self._high:
+            return FrameFault.INVALID_SIGNAL
+        if counts:
+            self.value, self.measured_ns = value, arrived_ns
+        return GOOD
+
+    def fresh(self, now_ns: int) -> float | None:
+        """The value; None while it is not known."""
+        if self.measured_ns is None or now_ns - self.measured_ns > self._timeout_ns:
+            return None
+        return self.value
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+        super().forget()
+        self.measured_ns = None
+
+
+def measurable(signal: Signal) -> tuple[float, float]:
+    """What of a signal can be a measurement; a millionth more, for the rounding of decimals."""
+    low, high = signal.minimum, signal.maximum
+    if low is None or high is None or high <= low:
+        return -LARGEST, LARGEST
+    return low - 1e-6 * (high - low), high + 1e-6 * (high - low)

@@ -1,0 +1,1 @@
+"""A deployment file and its DBC files, checked and bound together."""

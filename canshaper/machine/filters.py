@@ -1,0 +1,120 @@
+"""Filters of a deployment against the period of the valve that they drive."""
+
+from collections.abc import Sequence
+from typing import Any
+
+from canshaper.config.adjust import Key, faults
+from canshaper.config.control import Control
+from canshaper.config.filters import Filter, RobustFilter
+from canshaper.config.schema import AxisConfig
+from canshaper.config.sets import Feel, SetConfig
+from canshaper.config.source import Place
+from canshaper.config.sway import Sway
+from canshaper.machine.valves import ValveBinder
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position
+from canshaper.shaping.sway import SwayMode, SwayModel
+
+
+class FilterBinder(ValveBinder):
+    """Checks them, or notes every problem."""
+
+    def check_filters(self, place: Place, axis: AxisConfig, period_s: float) -> None:
+        """Every filter that the axis may get has to run at the period of its valve."""
+        rate = axis.limits.slowest_per_s
+        found: list[tuple[Place, Filter, Sway | None]] = []
+        parts: list[tuple[Place, AxisConfig | Feel]] = [(place, axis)]
+        parts += [((*place, "feels", name), feel) for name, feel in axis.feels.items()]
+        for at, part in parts:
+            found.append(((*at, "filter"), part.filter, axis.sway))
+            for i, one in enumerate(part.sets):
+                found.append(((*at, "sets", i, "filter"), one.filter, one.sway))
+            if part.sets and not self.config.grapple:
+                self.add((*at, "sets"), "need the signal that chooses them; found no grapple")
+        good = True
+        for at, chosen, sway in found:
+            if fault := filter_fault(chosen, sway, period_s, rate):
+                self.add(at, fault)
+                good = False
+        for at, part in parts if good else []:
+            if fault := _fault_between(part.sets, period_s, rate):
+                self.add((*at, "sets"), fault)
+        if len(found) > 1 and axis.sway is None:
+            self.add(place, "has sets or feels, and no sway data of its own; found no sway")
+        codes = self.config.feel.codes if self.config.feel else {}
+        for name in axis.feels:
+            if name not in codes:
+                allowed = ", ".join(codes) or "none: there is no feel at the top level"
+                self.add((*place, "feels", name), f"found {name!r}, feels are {allowed}")
+
+    def check_control(self, control: Control) -> None:
+        """Every adjustable number has to be one that can be changed in motion."""
+        for text, (low, high) in control.adjustable.items():
+            place = ("control", "adjustable", text)
+            key = Key.parsed(text)
+            if key is None:
+                self.add(place, "found no key of an axis; allowed is axes.AXIS.SECTION.NAME")
+            elif key.axis not in self.config.axes:
+                names = ", ".join(self.config.axes)
+                self.add(place, f"found axis {key.axis!r}, axes are {names}")
+            else:
+                for fault in faults(key, self.config.axes[key.axis], low, high):
+                    self.add(place, fault)
+
+
+def filter_fault(
+    chosen: Filter, sway: Sway | None, period_s: float, valve_rate_per_s: float
+) -> str | None:
+    """Why a filter cannot run, or None.
+
+    Args:
+        chosen: the filter.
+        sway: sway data that it runs with.
+        period_s: time between two commands to the valve.
+        valve_rate_per_s: rate of the valve, full speeds per second.
+    """
+    if isinstance(chosen, RobustFilter) and chosen.tick_ms != round(1000.0 * period_s):
+        return (
+            f"tick_ms of the taps is {chosen.tick_ms} ms, allowed is the period of the valve,"
+            f" {1000.0 * period_s:g} ms"
+        )
+    mode = sway.mode() if sway else None
+    return _fault(chosen.kind, chosen.parameters(), mode, period_s, valve_rate_per_s)
+
+
+def parameter_sets(sets: Sequence[SetConfig]) -> list[ParameterSet]:
+    """Sets of an axis or of a feel as they run."""
+    return [
+        ParameterSet(one.at, one.sway.mode(), one.filter.kind, one.filter.parameters())
+        for one in sets
+    ]
+
+
+def _fault_between(
+    sets: Sequence[SetConfig], period_s: float, valve_rate_per_s: float
+) -> str | None:
+    """Why a filter between two sets cannot run, or None.
+
+    Each that the load may ask for is built here, so that none is refused in motion.
+    """
+    running = parameter_sets(sets)
+    for steps in range((len(running) - 1) * STEPS_BETWEEN):
+        one = at_position(running, steps)
+        if fault := _fault(one.kind, one.parameters, one.mode, period_s, valve_rate_per_s):
+            return f"at {one.at:g}, between two sets: {fault}"
+    return None
+
+
+def _fault(
+    kind: str,
+    parameters: dict[str, Any],
+    mode: SwayMode | None,
+    period_s: float,
+    valve_rate_per_s: float,
+) -> str | None:
+    try:
+        model = SwayModel(mode, period_s) if mode else None
+        build_shaper(kind, period_s, model, valve_rate_per_s=valve_rate_per_s, **parameters)
+    except ValueError as error:
+        return str(error)
+    return None

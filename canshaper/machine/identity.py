@@ -1,0 +1,54 @@
+"""What runs, by content: the deployment file, its DBC files and the program.
+
+Whoever signs a machine off notes these; a changed file or program shows in log, status and bundle.
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from hashlib import sha256
+from pathlib import Path
+
+import canshaper
+from canshaper.codec.codecs import DIGEST_BITS
+
+
+@dataclass(frozen=True)
+class Identity:
+    """SHA-256 of everything that decides what a valve gets, but for Python and its packages.
+
+    Attributes:
+        deployment: of the deployment file, in hexadecimal digits.
+        dbc: of its DBC files, by their names in the deployment file.
+    """
+
+    deployment: str
+    dbc: dict[str, str]
+
+    @property
+    def digest(self) -> int:
+        """16 bits for a display: equal only, but for 1 of 65 536, where all hashes are equal.
+
+        The order of the DBC files counts, their names do not: a copy with other paths is the same.
+        """
+        together = "\n".join([program_sha256(), self.deployment, *self.dbc.values()])
+        return int(sha256(together.encode()).hexdigest()[: DIGEST_BITS // 4], 16)
+
+    def lines(self) -> list[str]:
+        """For people and logs: the digest, then every hash in full."""
+        return [
+            f"digest={self.digest:#06x}",
+            f"program=sha256:{program_sha256()} version={canshaper.__version__}",
+            f"deployment=sha256:{self.deployment}",
+            *(f"dbc=sha256:{value} file={name}" for name, value in self.dbc.items()),
+        ]
+
+
+@cache
+def program_sha256() -> str:
+    """Of the modules of canshaper as they lie on the disk, by path: the same however installed."""
+    root = Path(canshaper.__file__).parent
+    total = sha256()
+    for path in sorted(root.rglob("*.py")):
+        total.update(f"{path.relative_to(root).as_posix()}\n".encode())
+        total.update(sha256(path.read_bytes()).digest())
+    return total.hexdigest()

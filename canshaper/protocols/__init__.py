@@ -1,0 +1,1 @@
+"""Protocols on top of CAN, each in a folder of its own."""

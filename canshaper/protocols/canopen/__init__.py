@@ -1,0 +1,1 @@
+"""CANopen: heartbeat and emergency of nodes, valves of CiA 408."""

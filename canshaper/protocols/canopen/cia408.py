@@ -1,0 +1,120 @@
+"""A valve of CiA 408: brought step by step into the state in which it follows its set point.
+
+Control and status word as a maker's own driver uses them: init, disabled, hold, active, at least
+50 ms apart, each when the status word tells the state before. The set point stays 0 until then,
+because the axis is neutral until then. A fault is reset by an edge of the ready bit; the axis stays
+tripped until the operator resets it.
+"""
+
+from typing import Any
+
+from canshaper.codec.canopen import READY_BIT, RESET_FAULT, STATE_BITS, ValveState
+from canshaper.codec.frame import FrameFault
+from canshaper.codec.valve import ValveMessage
+from canshaper.inputs.input import GOOD, Input
+from canshaper.machine.inputs import BoundStatusWord
+from canshaper.shaping.states import Reason
+
+STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIVE)
+HOLD = STEPS.index(ValveState.HOLD)
+STEP_NS = 50_000_000
+# A state that is not reached within this time: once more from the beginning. A valve that boots is
+# not ready for more than a second, and no fault is reset before this time.
+GIVE_UP_NS = 2_000_000_000
+RESET_AGAIN_NS = 500_000_000
+STATE_MASK = (1 << STATE_BITS) - 1
+
+
+class ValveControl(Input):
+    """Control word of one valve, by its status word.
+
+    Args:
+        bound: message with the status word.
+        control: name of the signal with the control word.
+        message: message of the valve, which the control word is put into.
+    """
+
+    def __init__(self, bound: BoundStatusWord, control: str, message: ValveMessage) -> None:
+        super().__init__(bound)
+        self._signal = bound.config.signal
+        self._status_timeout_ns = bound.config.timeout_ms * 1_000_000
+        self._control = control
+        self._message = message
+        self._state: int | None = None
+        self._told_ns = 0
+        self._left = False  # it was in another state than ACTIVE since it was looked at
+        self._step = 0
+        self._since_ns: int | None = None  # when this word was first put; None: at the next tick
+        self._reset_ns = 0
+        self._reached = False
+        self._word = 0
+        self._go(0, None)
+
+    def heard(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        counts: bool,
+    ) -> FrameFault:
+        """The low four bits tell the state; that it has left ACTIVE takes no trust."""
+        state = int(raw[self._signal]) & STATE_MASK
+        self._left |= state != ValveState.ACTIVE
+        if counts:
+            self._state, self._told_ns = state, arrived_ns
+        return GOOD
+
+    def gate(self, neutral: bool, now_ns: int) -> Reason | None:
+        """Why the axis may not move; the control word goes one step on where it is time."""
+        if self._state is None or now_ns - self._told_ns > self._status_timeout_ns:
+            self.begin_anew()
+        self._next(now_ns)
+        works = self._state == self._word == ValveState.ACTIVE and not self._left
+        self._left = False
+        if works:
+            return None
+        return Reason.VALVE_NOT_READY if neutral else Reason.VALVE_FAULT
+
+    def _next(self, now_ns: int) -> None:
+        """One step on, back to the beginning, or a reset of the valve's fault."""
+        if self._since_ns is None:
+            self._since_ns = now_ns
+        passed_ns = now_ns - self._since_ns
+        if self._state is None or passed_ns < STEP_NS:
+            return
+        boots = self._step == 0 and passed_ns <= GIVE_UP_NS
+        if self._word == RESET_FAULT:  # what follows it is an edge of the ready bit
+            self._go(HOLD, now_ns)
+        elif not self._state & READY_BIT and not boots:
+            if now_ns >= self._reset_ns:
+                self._reset_ns = now_ns + RESET_AGAIN_NS
+                self._put(RESET_FAULT, now_ns)
+        elif self._state == self._word:
+            self._reached = True
+            if self._step + 1 < len(STEPS):
+                self._go(self._step + 1, now_ns)
+        elif self._reached or passed_ns > GIVE_UP_NS:
+            self._go(0, now_ns)
+
+    def begin_anew(self) -> None:
+        """The valve is not what it was: nothing known of it, and from INIT once more."""
+        self._state = None
+        self._go(0, None)
+
+    def _go(self, step: int, now_ns: int | None) -> None:
+        self._step, self._reached = step, False
+        self._put(int(STEPS[step]), now_ns)
+
+    def _put(self, word: int, now_ns: int | None) -> None:
+        self._word, self._since_ns = word, now_ns
+        self._message.raw[self._control] = word
+
+    def hold(self) -> None:
+        """Let a valve that is active hold: the last thing it is told."""
+        if self._word == ValveState.ACTIVE:
+            self._message.raw[self._control] = int(ValveState.HOLD)
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+        super().forget()
+        self.begin_anew()

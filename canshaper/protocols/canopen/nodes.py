@@ -1,0 +1,245 @@
+"""Our node on a bus of CANopen: heartbeats, emergencies, and starting the others (CiA 301)."""
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Self
+
+from canshaper.codec.canopen import (
+    EMERGENCY,
+    GENERIC_ERROR,
+    HEARTBEAT,
+    NMT,
+    NO_EMERGENCY,
+    START,
+    STATE_MASK,
+    NodeState,
+)
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.config.bus import Canopen, CanopenNode
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.shaping.states import Reason
+
+if TYPE_CHECKING:
+    from canshaper.controller.runner import AxisRunner
+
+# Between two commands to start one node: what it needs to answer with a heartbeat.
+START_AGAIN_NS = 500_000_000
+BOOT_UP, OPERATIONAL = bytes((NodeState.BOOT_UP,)), bytes((NodeState.OPERATIONAL,))
+
+
+@dataclass(frozen=True, slots=True)
+class NodeEvent:
+    """Another node says something else than before."""
+
+    bus: str
+    node: str
+    told: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"bus={self.bus} node={self.node} {self.told}"
+
+
+class RemoteNode:
+    """Another node, as its heartbeats and emergency messages show it.
+
+    Attributes:
+        state: what it said last; None when nothing was heard of it, or for too long.
+        emergency: its error code, 0 for none.
+        stops: how often it said another state than OPERATIONAL, or fell silent.
+        alarms: how often it told an error.
+    """
+
+    def __init__(self, config: CanopenNode) -> None:
+        self.id = config.id
+        self.state: int | None = None
+        self.emergency = NO_EMERGENCY
+        self.stops = self.alarms = 0
+        self._timeout_ns = config.heartbeat_ms * 1_000_000
+        self._heard_ns = 0
+        self._start_ns = 0
+
+    def heartbeat(self, data: bytes, arrived_ns: int) -> FrameFault:
+        """Take a heartbeat; a node that boots has no emergency any more."""
+        if len(data) != 1:
+            return FrameFault.WRONG_LENGTH
+        if self.state is not None and arrived_ns - self._heard_ns > self._timeout_ns:
+            self.stops += 1  # it was lost, though no tick has seen that
+        self.state = data[0] & STATE_MASK
+        self._heard_ns = arrived_ns
+        if self.state != NodeState.OPERATIONAL:
+            self.stops += 1
+        if self.state == NodeState.BOOT_UP:
+            self.emergency = NO_EMERGENCY
+            self._start_ns = arrived_ns
+        return FrameFault.NONE
+
+    def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
+        """Take an emergency message.
+
+        Error code 0 tells that one error is over; only with an error register of 0 are all.
+        """
+        if len(data) != 8:
+            return FrameFault.WRONG_LENGTH
+        code, register = int.from_bytes(data[:2], "little"), data[2]
+        if code == NO_EMERGENCY and register:
+            self.emergency = self.emergency or GENERIC_ERROR
+            return FrameFault.NONE
+        self.emergency = code
+        if code == NO_EMERGENCY:
+            return FrameFault.NONE
+        self.alarms += 1
+        return FrameFault.NODE_EMERGENCY
+
+    def lost(self, now_ns: int) -> bool:
+        """Whether it has just fallen silent; its state is not known any more then."""
+        if self.state is None or now_ns - self._heard_ns <= self._timeout_ns:
+            return False
+        self.state = None
+        self.stops += 1  # an axis with a slow valve may not be asked before it is back
+        return True
+
+    def forget(self) -> None:
+        """Its state counts no more; an error that it reported does until it reports its end."""
+        self.state = None
+
+    def copy_state(self, before: Self) -> None:
+        """What the same node said last, and when."""
+        self.state, self.emergency = before.state, before.emergency
+        self._heard_ns, self._start_ns = before._heard_ns, before._start_ns
+
+    def to_start(self, now_ns: int) -> bool:
+        """Whether it is to be started now."""
+        if self.state in (NodeState.OPERATIONAL, None) or now_ns < self._start_ns:
+            return False
+        self._start_ns = now_ns + START_AGAIN_NS
+        return True
+
+    @property
+    def works(self) -> bool:
+        """Whether what it sends and takes means something."""
+        return self.state == NodeState.OPERATIONAL and self.emergency == NO_EMERGENCY
+
+
+class NodeGate:
+    """Why an axis may not move, by the node of its lever or of its valve.
+
+    Args:
+        node: that node.
+        in_motion: what an axis in motion is told when it no longer works.
+        control: state machine of the valve, which begins anew with a node that does.
+    """
+
+    def __init__(
+        self, node: RemoteNode, in_motion: Reason, control: ValveControl | None = None
+    ) -> None:
+        self._node = node
+        self._in_motion = in_motion
+        self._control = control
+        self._stops, self._alarms = node.stops, node.alarms
+
+    def __call__(self, neutral: bool, _now_ns: int) -> Reason | None:
+        """The reason, or None; a failure since it was asked last counts, however short it was."""
+        node = self._node
+        stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
+        self._stops, self._alarms = node.stops, node.alarms
+        if self._control is not None and (stopped or node.state != NodeState.OPERATIONAL):
+            self._control.begin_anew()
+        if node.works and not (stopped or alarmed):
+            return None
+        return Reason.NODE_FAULT if neutral else self._in_motion
+
+
+class _Heard:
+    """One kind of message of another node."""
+
+    def __init__(self, node: RemoteNode, take: Callable[[bytes, int], FrameFault]) -> None:
+        self._node = node
+        self.receive = take
+
+    def forget(self) -> None:
+        """Nothing good received so far counts any more."""
+        self._node.forget()
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with what the same node said."""
+        self._node.copy_state(before._node)
+
+
+class CanopenBus:
+    """All that CANopen asks of us on one bus.
+
+    Attributes:
+        own: our node id.
+        nodes: the other nodes, by name.
+        inputs: what takes their messages, by id.
+    """
+
+    def __init__(self, bus: str, config: Canopen) -> None:
+        self._bus = bus
+        self.own = config.node
+        self._cycle_ns = config.heartbeat_ms * 1_000_000
+        self._due_ns = 0
+        self._booted = False
+        self._master = config.master
+        self.nodes = {name: RemoteNode(node) for name, node in config.nodes.items()}
+        self._told: dict[str, str] = {}
+        self.inputs: dict[int, _Heard] = {}
+        for node in self.nodes.values():
+            self.inputs[HEARTBEAT + node.id] = _Heard(node, node.heartbeat)
+            self.inputs[EMERGENCY + node.id] = _Heard(node, node.alarm)
+
+    def copy_state(self, before: Self) -> None:
+        """Continue our heartbeat: a reload is no start of our node."""
+        self._booted, self._due_ns = before._booted, before._due_ns
+
+    def frames(self, now_ns: int) -> Iterator[Frame]:
+        """What is due now: our boot-up message or heartbeat, and commands to start."""
+        if not self._booted:
+            self._booted, self._due_ns = True, now_ns + self._cycle_ns
+            yield Frame(self._bus, HEARTBEAT + self.own, False, BOOT_UP)
+        elif now_ns >= self._due_ns:
+            # From the time it was due, so that lateness does not add up; but never in a burst.
+            self._due_ns = max(self._due_ns + self._cycle_ns, now_ns)
+            yield Frame(self._bus, HEARTBEAT + self.own, False, OPERATIONAL)
+        if self._master:
+            for node in self.nodes.values():
+                if node.to_start(now_ns):
+                    yield Frame(self._bus, NMT, False, bytes((START, node.id)))
+
+    def lost(self, now_ns: int) -> int:
+        """How many nodes have just fallen silent."""
+        return sum(node.lost(now_ns) for node in self.nodes.values())
+
+    def changes(self) -> Iterator[NodeEvent]:
+        """What the nodes say else than at the last call."""
+        for name, node in self.nodes.items():
+            state = "lost" if node.state is None else _name(node.state)
+            told = f"state={state} emergency={node.emergency:#06x}"
+            if self._told.get(name) != told:
+                self._told[name] = told
+                yield NodeEvent(self._bus, name, told)
+
+
+def _name(state: int) -> str:
+    known = {s.value: s.name for s in NodeState}
+    return known.get(state, f"unknown ({state})")
+
+
+def canopen_buses(
+    deployment: Deployment, axes: "Mapping[str, AxisRunner]"
+) -> dict[str, CanopenBus]:
+    """Our node on each bus of CANopen; axes are told the nodes of their lever and valve."""
+    buses = {n: CanopenBus(n, b.canopen) for n, b in deployment.config.buses.items() if b.canopen}
+    for runner in axes.values():
+        config = runner.bound.config
+        lever, valve = deployment.config.levers[config.stick.lever], config.valve
+        if lever.node:
+            node = buses[lever.bus].nodes[lever.node]
+            runner.gates.insert(0, NodeGate(node, Reason.NODE_FAULT))
+        if valve.cia408 and valve.cia408.node:
+            node = buses[valve.bus].nodes[valve.cia408.node]
+            runner.gates.insert(0, NodeGate(node, Reason.VALVE_FAULT, runner.control))
+    return buses

@@ -1,0 +1,196 @@
+"""Rules of the kernel's CAN gateway (module can-gw): list, add and remove them over netlink.
+
+A rule hands the frames of one interface that fit a pattern to another interface, perhaps changed:
+bytes AND, then OR, then a checksum anew. Formats and their order: linux/can/gw.h, and
+net/can/gw.c of the kernel, which compares all of a rule when one is removed. To list takes no
+right, to change CAP_NET_ADMIN.
+"""
+
+import errno
+import socket
+import struct
+import subprocess
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from canshaper.bus.netlink import ACKNOWLEDGE, DUMP, ask, attribute, attributes
+from canshaper.codec.kernel_check import CS_CRC8, CS_XOR
+from canshaper.protocols.gateway.passing import Pattern
+
+# linux/can/gw.h, linux/rtnetlink.h; Python has no names for most of these.
+NEW, DELETE, GET = 24, 25, 26  # RTM_NEWROUTE, RTM_DELROUTE, RTM_GETROUTE
+AND, OR, XOR, SET = range(1, 5)
+SOURCE, DESTINATION, FILTER, LIMIT_HOPS, UID = 9, 10, 11, 13, 14
+FD_MODIFICATIONS = range(15, 19)
+CAN_TO_CAN, ECHO, ON_DATA = 1, 1, 4
+_RULE = struct.Struct("=BBH")  # rtcanmsg
+_MODIFICATION = struct.Struct("=IB3x8sB")  # cgw_frame_mod
+_WORDS = struct.Struct("=II")
+MODIFYING = frozenset((AND, OR, XOR, SET, CS_XOR, CS_CRC8, UID, *FD_MODIFICATIONS))
+
+
+class GatewayError(Exception):
+    """The kernel's gateway cannot do what it is asked; the message says why."""
+
+
+@dataclass(frozen=True, order=True)
+class Rule:
+    """A rule.
+
+    Attributes:
+        source: interface that the frames come from.
+        destination: interface that they go to.
+        pattern: which they are.
+        changes: attributes that change them, by number, as the kernel has them.
+        flags: those of the rule.
+        hops: how many rules may pass one frame on.
+    """
+
+    source: str
+    destination: str
+    pattern: Pattern
+    changes: tuple[tuple[int, bytes], ...] = ()
+    # Programs on this machine see what is passed on as they see everything else.
+    flags: int = ECHO
+    # A frame passes once: never back, nor round through other rules.
+    hops: int = 1
+
+    def __str__(self) -> str:
+        """For people."""
+        word, mask = self.pattern.value, self.pattern.mask
+        changed = ", changed" if self.changes else ""
+        return f"{self.source} -> {self.destination} {word:x}:{mask:x}{changed}"
+
+
+def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], ...]:
+    """Changes of the bytes of a frame.
+
+    Args:
+        keep: bits that stay, byte 0 the lowest.
+        put: bits that are set after that.
+        length: bytes of the frame; those behind it stay.
+    """
+    behind = (1 << 64) - (1 << 8 * length)
+    found = []
+    for kind, bits in ((AND, keep | behind), (OR, put)):
+        data = (bits & (1 << 64) - 1).to_bytes(8, "little")
+        found.append((kind, _MODIFICATION.pack(0, 0, data, ON_DATA)))
+    return tuple(found)
+
+
+def load_module() -> None:
+    """Load the module, where it is none of the kernel's own parts and not there yet."""
+    if not Path("/sys/module/can_gw").exists():
+        subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # add() tells why
+
+
+def rules() -> list[Rule]:
+    """All rules of the kernel.
+
+    Raises:
+        GatewayError: it cannot be asked.
+    """
+    names: dict[int, str] = {}
+    try:
+        bodies = list(ask(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
+        found = [_read(body, names) for body in bodies if body[0] == socket.AF_CAN]
+    except OSError as error:
+        raise GatewayError(f"rules of can-gw cannot be listed: {error.strerror}") from error
+    return found
+
+
+def add(rule: Rule) -> None:
+    """Add a rule.
+
+    Raises:
+        GatewayError: the kernel refuses.
+    """
+    _change(NEW, rule)
+
+
+def remove(rule: Rule) -> None:
+    """Remove a rule.
+
+    Raises:
+        GatewayError: the kernel refuses, or there is none.
+    """
+    _change(DELETE, rule)
+
+
+def _change(kind: int, rule: Rule) -> None:
+    try:
+        ends = [socket.if_nametoindex(n) for n in (rule.source, rule.destination)]
+        for _ in ask(kind, ACKNOWLEDGE, _message(rule, *ends)):
+            pass
+    except OSError as error:
+        why = error.strerror or str(error)
+        if error.errno == errno.EPERM:
+            why = "not permitted; it takes root"
+        elif error.errno == errno.EOPNOTSUPP:
+            why = "this kernel has no can-gw, or its module is not loaded: modprobe can-gw"
+        verb = "set up" if kind == NEW else "removed"
+        raise GatewayError(f"rule {rule} cannot be {verb}: {why}") from error
+
+
+def _message(rule: Rule, source: int, destination: int) -> bytes:
+    parts = [_RULE.pack(socket.AF_CAN, CAN_TO_CAN, rule.flags)]
+    fields = [*rule.changes]
+    if rule.hops:
+        fields.append((LIMIT_HOPS, bytes((rule.hops,))))
+    fields += [
+        (FILTER, _WORDS.pack(rule.pattern.value, rule.pattern.mask)),
+        (SOURCE, struct.pack("=I", source)),
+        (DESTINATION, struct.pack("=I", destination)),
+    ]
+    parts += [attribute(kind, payload) for kind, payload in fields]
+    return b"".join(parts)
+
+
+def _read(body: bytes, names: dict[int, str]) -> Rule:
+    flags = _RULE.unpack_from(body)[2]
+    fields = dict(attributes(body[_RULE.size :]))
+    ends = []
+    for kind in (SOURCE, DESTINATION):
+        (index,) = struct.unpack("=I", fields[kind])
+        if index not in names:
+            names[index] = socket.if_indextoname(index)
+        ends.append(names[index])
+    value, mask = _WORDS.unpack(fields.get(FILTER, bytes(8)))
+    changes = tuple((kind, fields[kind]) for kind in sorted(MODIFYING & fields.keys()))
+    hops = fields.get(LIMIT_HOPS, b"\0")[0]
+    return Rule(ends[0], ends[1], Pattern(value, mask), changes, flags, hops)
+
+
+def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+    """Make the rules between these interfaces exactly these; others stay as they are.
+
+    Returns:
+        (removed, added). Removed first: for a moment less passes, and never more.
+
+    Raises:
+        GatewayError: the kernel refuses.
+    """
+    more, missing = difference(between(interfaces, rules()), wanted)
+    for rule in more:
+        remove(rule)
+    for rule in missing:
+        add(rule)
+    return more, missing
+
+
+def difference(found: Iterable[Rule], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+    """(rules that are too many, rules that are missing)."""
+    more, missing = list(found), []
+    for rule in wanted:
+        if rule in more:
+            more.remove(rule)  # one of them: the same rule twice would pass each frame twice
+        else:
+            missing.append(rule)
+    return more, missing
+
+
+def between(names: Iterable[str], found: Iterable[Rule]) -> list[Rule]:
+    """Those of the rules that lead from one of these interfaces to another of them."""
+    ends = {*names}
+    return [rule for rule in found if {rule.source, rule.destination} <= ends]

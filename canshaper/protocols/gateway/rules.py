@@ -1,0 +1,111 @@
+"""A gateway in the line: which frames pass, and the rules of the kernel that make it so."""
+
+from collections.abc import Iterator
+
+from canshaper.codec.j1939 import NULL, WITHOUT_PRIORITY, group_mask, group_of
+from canshaper.codec.kernel_check import kernel_check
+from canshaper.codec.layout import is_j1939
+from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundLever
+from canshaper.protocols.gateway.cangw import Rule, changed_bytes
+from canshaper.protocols.gateway.passing import EFF, Pattern, all_but, exactly
+
+
+def excluded(deployment: Deployment) -> frozenset[Pattern]:
+    """Frames that nobody passes on, in neither direction.
+
+    Those of the levers, which only we pass on; all that we send ourselves, so that nobody can send
+    it through us; and what the deployment blocks.
+    """
+    gateway = deployment.config.gateway
+    assert gateway is not None  # only such deployments are asked
+    found = {_of(lever) for lever in deployment.levers.values() if lever.key[0] in gateway.between}
+    for bus in gateway.between:
+        j1939 = deployment.is_j1939(bus)
+        found |= {
+            _whatever_priority(can_id) if j1939 and extended else exactly(can_id, extended)
+            for can_id, extended in deployment.ids(bus).sent
+        }
+    for name in gateway.blocked:
+        message = deployment.messages.find(name)
+        assert not isinstance(message, str)  # checked with the deployment
+        can_id, extended = message[1].frame_id, message[1].is_extended_frame
+        if is_j1939(message[1]):
+            found.add(_group(can_id, None if can_id & 0xFF == NULL else can_id & 0xFF))
+        else:
+            found.add(exactly(can_id, extended))
+    return frozenset(found)
+
+
+def patterns(deployment: Deployment) -> list[Pattern]:
+    """Frames that pass in both directions."""
+    return all_but(excluded(deployment))
+
+
+def passing_rules(deployment: Deployment) -> list[Rule]:
+    """Rules of the kernel that pass them."""
+    ends = channels(deployment)
+    return [Rule(a, b, p) for a, b in (ends, ends[::-1]) for p in patterns(deployment)]
+
+
+def fallback_rules(deployment: Deployment) -> list[Rule]:
+    """Rules for the frames of the levers while the daemon is away."""
+    gateway = deployment.config.gateway
+    assert gateway is not None
+    found = []
+    for lever, message in _passed(deployment):
+        source = deployment.config.buses[lever.key[0]].channel
+        destination = deployment.config.buses[message.sender.key[0]].channel
+        if gateway.fallback == "pass":
+            found.append(Rule(source, destination, _of(lever)))
+        elif gateway.fallback == "neutral":
+            found.append(Rule(source, destination, _of(lever), _neutral(message)))
+    return found
+
+
+def _passed(deployment: Deployment) -> Iterator[tuple[BoundLever, RewrittenMessage]]:
+    """Levers whose frames leave on the other bus, with what they leave as."""
+    seen = set()
+    for axis in deployment.axes.values():
+        lever, message = deployment.levers[axis.config.stick.lever], axis.valve.message
+        if isinstance(message, RewrittenMessage) and lever.name not in seen:
+            seen.add(lever.name)
+            yield lever, message
+
+
+def _of(lever: BoundLever) -> Pattern:
+    """Frames of a lever, of J1939 whatever their priority."""
+    _, can_id, extended = lever.key
+    if lever.by_group:
+        return _group(can_id, None if lever.any_source else can_id & 0xFF)
+    return _whatever_priority(can_id) if is_j1939(lever.message) else exactly(can_id, extended)
+
+
+def _whatever_priority(can_id: int) -> Pattern:
+    """A message of J1939 from one node, to one where it has a destination."""
+    return Pattern(can_id & WITHOUT_PRIORITY | EFF, WITHOUT_PRIORITY | EFF)
+
+
+def _group(can_id: int, source: int | None) -> Pattern:
+    """A group of J1939, from one address or from all."""
+    mask, value = group_mask(can_id) | EFF, group_of(can_id) | EFF
+    return Pattern(value, mask) if source is None else Pattern(value | source, mask | 0xFF)
+
+
+def channels(deployment: Deployment) -> tuple[str, str]:
+    """Interfaces of both buses, in the order of the file."""
+    gateway = deployment.config.gateway
+    assert gateway is not None  # only such deployments are asked
+    first, second = (deployment.config.buses[bus].channel for bus in gateway.between)
+    return first, second
+
+
+def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
+    """Changes that make a frame of a lever one with all its sticks in neutral."""
+    length = message.sender.fields.message.length
+    checks, clear = kernel_check(message.sender.protection, length)
+    return (
+        *changed_bytes(~(message.ours_mask | clear), message.neutral_bits(), length),
+        *checks,
+    )

@@ -1,0 +1,144 @@
+"""Active faults for the other nodes of a J1939 bus: DM1 of SAE J1939-73.
+
+One fault fits into one frame, more of them are sent by the broadcast of SAE J1939-21.
+"""
+
+from collections.abc import Iterator, Sequence
+from typing import NamedTuple, Self
+
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import (
+    DEFAULT_PRIORITY,
+    DM1,
+    LOWEST_PRIORITY,
+    TRANSPORT,
+    TRANSPORT_DATA,
+    identifier,
+)
+from canshaper.inputs.feedback import Following
+from canshaper.shaping.states import Reason
+
+CYCLE_NS = 1_000_000_000
+# A change is told at once, but not again and again.
+LEAST_BETWEEN_NS = 200_000_000
+# SAE J1939-21: 50 to 200 ms between the packets of a broadcast.
+PACKET_NS = 50_000_000
+BROADCAST = 32
+AMBER_LAMP = 0x04
+NO_LAMP_FLASHES = 0xFF
+
+# Failure mode identifiers of SAE J1939-73.
+ERRATIC, ABNORMAL_RATE, BAD_DEVICE, SPECIAL, RECEIVED_IN_ERROR = 2, 9, 12, 14, 19
+NOT_RESPONDING = 7
+FMI_OF = {
+    Reason.STICK_TIMEOUT: ABNORMAL_RATE,
+    Reason.STICK_ERROR: RECEIVED_IN_ERROR,
+    Reason.STICK_NOT_AVAILABLE: RECEIVED_IN_ERROR,
+    Reason.STICK_OUT_OF_RANGE: ERRATIC,
+    Reason.STICK_NOT_A_NUMBER: ERRATIC,
+    Reason.SWITCH_INVALID: ERRATIC,
+    Reason.STICK_CONTRADICTORY: ERRATIC,
+    Reason.STICK_FROZEN: ERRATIC,
+    Reason.STICK_UNTRUSTED: ERRATIC,
+    Reason.LOOP_OVERRUN: BAD_DEVICE,
+    Reason.OUTPUT_INVALID: BAD_DEVICE,
+    Reason.SEND_FAILED: ABNORMAL_RATE,
+    Reason.LOOP_STALLED: BAD_DEVICE,
+    Reason.EMERGENCY_STOP_LOST: ABNORMAL_RATE,
+    Reason.SECOND_SENDER: SPECIAL,
+    Reason.NODE_FAULT: ABNORMAL_RATE,
+    Reason.VALVE_FAULT: BAD_DEVICE,
+    Reason.OUTPUT_REFUSED: BAD_DEVICE,
+}
+"""Failure mode of an axis by its reason; what the operator does is no fault."""
+
+FMI_OF_FOLLOWING = {Following.NO: NOT_RESPONDING, Following.LOST: ABNORMAL_RATE}
+"""Failure mode of a valve by what its feedback says."""
+
+
+class Fault(NamedTuple):
+    """A diagnostic trouble code.
+
+    Attributes:
+        spn: suspect parameter number.
+        fmi: failure mode.
+        times: how often it came, up to 126.
+    """
+
+    spn: int
+    fmi: int
+    times: int
+
+
+def dm1_data(faults: Sequence[Fault]) -> bytes:
+    """Content of DM1: lamps, and four bytes for each fault."""
+    lamps = bytes((AMBER_LAMP if faults else 0, NO_LAMP_FLASHES))
+    codes = (
+        (f.spn & 0xFFFF).to_bytes(2, "little")
+        + bytes((f.spn >> 16 << 5 | f.fmi, min(f.times, 126)))
+        for f in faults
+    )
+    return lamps + (b"".join(codes) or bytes(4))
+
+
+class ActiveFaults:
+    """Sends DM1 every second and when it changes."""
+
+    def __init__(self, bus: str, address: int) -> None:
+        self._bus = bus
+        self._address = address
+        self._active: set[tuple[int, int]] = set()
+        self._told: set[tuple[int, int]] = set()
+        self._count: dict[tuple[int, int], int] = {}
+        self._next_ns = 0
+        self._change_ns = 0
+        self._packets: list[bytes] = []
+        self._packet_ns = 0
+
+    def copy_state(self, before: Self) -> None:
+        """Continue with the same faults: how often they came, and a broadcast under way."""
+        self._active, self._told = set(before._active), set(before._told)
+        self._count, self._packets = dict(before._count), list(before._packets)
+        self._next_ns, self._change_ns = before._next_ns, before._change_ns
+        self._packet_ns = before._packet_ns
+
+    def frames(
+        self, active: Sequence[tuple[int, int]], now_ns: int, *, requested: bool = False
+    ) -> Iterator[Frame]:
+        """What is due now.
+
+        Args:
+            active: (SPN, FMI) of every fault that is there now.
+            now_ns: monotonic time.
+            requested: another node has asked for it.
+        """
+        now = set(active)
+        for code in now - self._active:
+            self._count[code] = self._count.get(code, 0) + 1
+        self._active = now
+        changed = now != self._told and now_ns >= self._change_ns
+        if not self._packets and (requested or changed or now_ns >= self._next_ns):
+            self._told = now
+            self._next_ns = now_ns + CYCLE_NS
+            self._change_ns = now_ns + LEAST_BETWEEN_NS
+            data = dm1_data([Fault(*code, self._count[code]) for code in active])
+            if len(data) <= 8:
+                yield self._frame(DM1, data.ljust(8, b"\xff"))
+            else:
+                parts = [data[i : i + 7].ljust(7, b"\xff") for i in range(0, len(data), 7)]
+                self._packets = [bytes((n, *part)) for n, part in enumerate(parts, 1)]
+                self._packet_ns = now_ns + PACKET_NS
+                head = bytes((BROADCAST,)) + len(data).to_bytes(2, "little")
+                tail = bytes((len(parts), 0xFF)) + DM1.to_bytes(3, "little")
+                yield self._frame(TRANSPORT, head + tail, LOWEST_PRIORITY)
+        elif self._packets and now_ns >= self._packet_ns:
+            self._packet_ns = now_ns + PACKET_NS
+            yield self._frame(TRANSPORT_DATA, self._packets.pop(0), LOWEST_PRIORITY)
+
+    def interrupt(self) -> None:
+        """Nothing may be sent now: a broadcast under way is not gone on with later."""
+        self._packets.clear()
+        self._next_ns = 0
+
+    def _frame(self, pgn: int, data: bytes, priority: int = DEFAULT_PRIORITY) -> Frame:
+        return Frame(self._bus, identifier(pgn, self._address, priority=priority), True, data)

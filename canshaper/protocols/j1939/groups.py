@@ -1,0 +1,155 @@
+"""Messages of J1939 that are known by their group, whatever their priority."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, Self
+
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.j1939 import GLOBAL
+from canshaper.inputs.carry_over import Part
+
+if TYPE_CHECKING:
+    from canshaper.controller.runner import AxisRunner
+
+
+class Taken(Protocol):
+    """Takes the frames of one message."""
+
+    def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
+        """Take one."""
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+
+
+class Received(Taken, Part, Protocol):
+    """An input of a controller."""
+
+
+@dataclass(frozen=True, slots=True)
+class SourceEvent:
+    """A message comes from an address that is taken now, or from one that is not."""
+
+    bus: str
+    message: str
+    source: int
+    taken: int
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        found = f"bus={self.bus} message={self.message} source={self.source:#04x}"
+        return found if self.source == self.taken else f"{found} ignored, taken={self.taken:#04x}"
+
+
+class AnySource:
+    """An input from the first address that is heard; from another one when that falls silent.
+
+    Args:
+        bus: name of the bus.
+        message: name of the message.
+        taken: the input.
+        timeout_ns: its age limit.
+        runners: axes that it moves. A lever that takes over is another lever: neutral comes first.
+
+    Attributes:
+        events: addresses that are new here, since the owner emptied the list.
+    """
+
+    def __init__(
+        self,
+        bus: str,
+        message: str,
+        taken: Taken,
+        timeout_ns: int,
+        runners: "Sequence[AxisRunner]" = (),
+    ) -> None:
+        self.events: list[SourceEvent] = []
+        self._bus, self._message = bus, message
+        self._input = taken
+        self._timeout_ns = timeout_ns
+        self._runners = runners
+        self._source: int | None = None
+        self._ignored: set[int] = set()
+        self._heard_ns = 0
+
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
+        """Take a frame; two levers that send the same group cannot be told apart."""
+        source = frame.can_id & 0xFF
+        if source != self._source:
+            if self._source is not None:
+                if arrived_ns - self._heard_ns <= self._timeout_ns:
+                    return self._other(source, self._source)
+                # No tick need have seen the silence in between.
+                self._input.forget()
+                for runner in self._runners:
+                    runner.lost = True
+            self._source = source
+            self._ignored.clear()
+            self.events.append(SourceEvent(self._bus, self._message, source, source))
+        self._heard_ns = arrived_ns
+        return self._input.receive(frame.data, arrived_ns)
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+        self._input.forget()
+
+    def copy_state(self, before: Self) -> None:
+        """The address that counted still does; another one has to wait for its silence."""
+        self._source, self._heard_ns = before._source, before._heard_ns
+        self._ignored = set(before._ignored)
+
+    def _other(self, source: int, taken: int) -> FrameFault:
+        if source not in self._ignored:
+            self._ignored.add(source)
+            self.events.append(SourceEvent(self._bus, self._message, source, taken))
+        return FrameFault.SECOND_SENDER
+
+
+class TakenGroup:
+    """The inputs of one group: of one address each, or of whatever address comes.
+
+    Args:
+        own: our address on the bus; nobody else may send from it.
+
+    Attributes:
+        of: input by the address it is taken from.
+        rest: the input from any address.
+    """
+
+    def __init__(self, own: int | None) -> None:
+        self._own = own
+        self.of: dict[int, Taken] = {}
+        self.rest: AnySource | None = None
+
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
+        """Take a frame; from an address that nobody asked for it is other traffic."""
+        source = frame.can_id & 0xFF
+        if source == self._own:
+            return FrameFault.SECOND_SENDER
+        if (one := self.of.get(source)) is not None:
+            return one.receive(frame.data, arrived_ns)
+        return self.rest.receive(frame, arrived_ns) if self.rest else FrameFault.NONE
+
+
+class CommandedByOthers:
+    """Commands to valves of ours that are not ours: another address, or another priority."""
+
+    def __init__(self, runners: "Sequence[AxisRunner]") -> None:
+        self._runners = [
+            (runner, _destination(runner.bound.valve.message.sender.key[1])) for runner in runners
+        ]
+
+    def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
+        """Two controllers must not drive one crane; a valve at another destination is not ours."""
+        to, fault = _destination(frame.can_id), FrameFault.NONE
+        for runner, destination in self._runners:
+            if to in (destination, GLOBAL):
+                runner.contest(arrived_ns)
+                fault = FrameFault.SECOND_SENDER
+        return fault
+
+
+def _destination(can_id: int) -> int:
+    """The PDU specific byte: where the group has no destination, a part of it."""
+    return can_id >> 8 & 0xFF

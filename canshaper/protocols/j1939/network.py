@@ -1,0 +1,181 @@
+"""J1939 on the buses of a deployment: our nodes, and messages known by their group."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from canshaper.codec.frame import Frame
+from canshaper.codec.j1939 import CLAIMED, group_of, name_bytes, pgn_of
+from canshaper.config.bus import J1939
+from canshaper.inputs.carry_over import Key, Part
+from canshaper.inputs.feedback import Following
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput, BoundLever
+from canshaper.protocols.j1939.claim import ClaimState
+from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING
+from canshaper.protocols.j1939.groups import (
+    AnySource,
+    CommandedByOthers,
+    Received,
+    SourceEvent,
+    TakenGroup,
+)
+from canshaper.protocols.j1939.node import GROUPS, Node
+
+if TYPE_CHECKING:
+    from canshaper.controller.runner import AxisRunner
+
+
+@dataclass(frozen=True, slots=True)
+class AddressEvent:
+    """Our address on a bus is claimed, or lost."""
+
+    bus: str
+    address: int
+    state: ClaimState
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"bus={self.bus} address={self.address:#04x} state={self.state.value}"
+
+
+class Network:
+    """Nodes and groups of all buses.
+
+    Args:
+        deployment: the machine.
+        axes: its axes, which are told the node on the bus of their valve.
+        taken: its inputs with their messages.
+
+    Attributes:
+        nodes: our node on each bus of J1939.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        axes: "Mapping[str, AxisRunner]",
+        taken: Sequence[tuple[BoundInput, Received]],
+    ) -> None:
+        buses = deployment.config.buses
+        self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
+        self._axes = axes
+        self.nodes = {
+            name: Node(
+                name, config, frozenset(_cyclic(deployment, name)), guest=deployment.listen_only
+            )
+            for name, config in self._configs.items()
+        }
+        self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
+        self._groups: dict[tuple[str, int], Node | TakenGroup | CommandedByOthers] = {}
+        self._any: dict[tuple[str, int], tuple[AnySource, Part]] = {}
+        for bus, node in self.nodes.items():
+            self._groups |= {(bus, group): node for group in GROUPS}
+            there = [
+                r for r in axes.values() if r.bound.config.valve.bus == bus and not r.bound.rewrites
+            ]
+            for runner in there:
+                if not deployment.listen_only:  # it reckons, whoever has the address
+                    runner.gates.append(node.gate)
+            for group in deployment.sent_groups(bus):
+                runners = [
+                    r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group
+                ]
+                self._groups[bus, group] = CommandedByOthers(runners)
+        for bound, one in taken:
+            if bound.by_group:
+                self._take(bound, one)
+
+    def _take(self, bound: BoundInput, one: Received) -> None:
+        bus, can_id = bound.config.bus, bound.key[1]
+        entry = self._groups.get((bus, group_of(can_id)))
+        if not isinstance(entry, TakenGroup):
+            config = self._configs.get(bus)
+            entry = TakenGroup(config.address if config else None)
+            self._groups[bus, group_of(can_id)] = entry
+        if not bound.any_source:
+            entry.of[can_id & 0xFF] = one
+            return
+        name = bound.name if isinstance(bound, BoundLever) else None
+        moved = [r for r in self._axes.values() if r.bound.config.stick.lever == name]
+        timeout_ns = bound.config.timeout_ms * 1_000_000
+        entry.rest = AnySource(bus, bound.message.name, one, timeout_ns, moved)
+        self._any[bus, group_of(can_id)] = entry.rest, one
+
+    def entry(self, bus: str, can_id: int) -> Node | TakenGroup | CommandedByOthers | None:
+        """Who takes a message, by its group."""
+        return self._groups.get((bus, group_of(can_id)))
+
+    @property
+    def silent(self) -> frozenset[str]:
+        """Buses on which our address is not ours: only the node itself may send there."""
+        claimed = ClaimState.CLAIMED
+        return frozenset(n for n, node in self.nodes.items() if node.state is not claimed)
+
+    def frames(self, now_ns: int) -> Iterator[Frame]:
+        """What the nodes have to send now."""
+        for bus, node in self.nodes.items():
+            yield from node.frames(self._active_faults(bus), now_ns)
+
+    def changes(self) -> Iterator[AddressEvent | SourceEvent]:
+        """What became of our addresses since the last call, and which others are new."""
+        for bus, node in self.nodes.items():
+            if node.state is not self._told[bus]:
+                self._told[bus] = node.state
+                yield AddressEvent(bus, self._configs[bus].address, node.state)
+        for one, _ in self._any.values():
+            yield from one.events
+            one.events.clear()
+
+    def send_failed(self, frame: Frame) -> None:
+        """A frame did not reach its bus: who has lost what we say may have taken our address."""
+        if node := self.nodes.get(frame.bus):
+            node.send_failed(claim=frame.extended and pgn_of(frame.can_id) == CLAIMED)
+
+    def unheard(self, bus: str) -> None:
+        """Claims of others were missed on this bus: claim anew before anything else."""
+        if node := self.nodes.get(bus):
+            node.unheard()
+
+    def stalled(self) -> None:
+        """Claims were missed on all buses."""
+        for node in self.nodes.values():
+            node.unheard()
+
+    def forget(self, bus: str | None = None) -> None:
+        """Of inputs from any address nothing received so far counts; of one bus, or of all."""
+        for (where, _), (one, _) in self._any.items():
+            if bus in (None, where):
+                one.forget()
+
+    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+        """What a reload carries over, see ``parts``; ``places`` is what the buses are, by name."""
+        for (bus, group), (source, received) in self._any.items():
+            yield ("source", *places[bus], group), source
+            yield ("input", *places[bus], group), received
+        for bus, node in self.nodes.items():
+            config = self._configs[bus]
+            key = (*places[bus], config.address, name_bytes(config.name))
+            yield ("node", *key), node
+            axes = [n for n, r in self._axes.items() if r.bound.config.valve.bus == bus]
+            # By their place among the axes; with others a number would be that of another fault.
+            yield ("faults", *key, config.first_spn, *self._axes, *axes), node.faults
+
+    def _active_faults(self, bus: str) -> list[tuple[int, int]]:
+        """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""
+        first, found = self._configs[bus].first_spn, []
+        for i, runner in enumerate(self._axes.values()):
+            if runner.bound.config.valve.bus != bus:
+                continue
+            if (fmi := FMI_OF.get(runner.axis.reason)) is not None:
+                found.append((first + 2 * i, fmi))
+            following = runner.feedback.following if runner.feedback else Following.UNKNOWN
+            if (fmi := FMI_OF_FOLLOWING.get(following)) is not None:
+                found.append((first + 2 * i + 1, fmi))
+        return found
+
+
+def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
+    """Groups that we send again and again under our address, by their number."""
+    return (pgn_of(can_id) for can_id, extended in deployment.ids(bus).sent if extended)

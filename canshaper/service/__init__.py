@@ -1,1 +1,0 @@
-"""The daemon: controller (frames in, frames out), loop, health."""
