@@ -76,6 +76,7 @@ class Daemon:
         while self.readers() in ([], [but]):
             assert time.monotonic() < until
         (reader,) = self.readers()
+        os.kill(int(reader), signal.SIGSTOP)  # as if its files came from a disk that hangs
         return reader
 
     def end(self) -> int:
@@ -136,20 +137,18 @@ def test_a_bus_that_cannot_be_opened_ends_the_reload_as_before(daemon: Daemon) -
 
 
 def test_the_loop_never_waits_for_files(daemon: Daemon) -> None:
-    """One that can be opened and never read is given up for the next reload, and at the end."""
-    daemon.file.unlink()
-    os.mkfifo(daemon.file)
+    """A reader that hangs is given up for the next reload, and at the end."""
+    slow = daemon.text + "".join(f"key{i}: 1\n" for i in range(9000))  # so that it is caught
+    daemon.file.write_text(slow, encoding="utf-8")
     first = daemon.reader_after_reload()
     assert daemon.goes_on()
     second = daemon.reader_after_reload(but=first)
     assert daemon.goes_on()
-    daemon.file.unlink()
     daemon.file.write_text(daemon.text, encoding="utf-8")
     daemon.reload()
     assert len(daemon.told("reload applied")) == 2
     assert daemon.readers() == []
-    daemon.file.unlink()
-    os.mkfifo(daemon.file)
+    daemon.file.write_text(slow, encoding="utf-8")
     third = daemon.reader_after_reload()
     assert daemon.end() == 0
     assert [pid for pid in (first, second, third) if Path("/proc", pid).exists()] == []

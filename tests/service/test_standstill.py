@@ -96,11 +96,14 @@ def test_a_loop_that_is_held_up_in_its_sleep_trips_by_the_time_that_was(
 # -- the clock -------------------------------------------------------------------------------------
 
 
+CLOCKED = ("bus", "inputs", "protocols", "controller", "daemon", "commissioning")
+
+
 def test_no_loop_has_a_clock_that_stands_still_in_a_suspend() -> None:
     """What is compared with the time of a tick has to be of the same clock."""
     monotonic = re.compile(r"monotonic_ns\(\)|= time\.monotonic_ns\b")
     own = {"raw.py", "gateway.py", "notify.py"}  # of bus and service manager, which ask themselves
-    rooms = [ROOT / "canshaper" / name for name in ("can", "service", "commissioning")]
+    rooms = [ROOT / "canshaper" / name for name in CLOCKED]
     files = [file for room in rooms for file in room.rglob("*.py")]
     assert {"loop.py", "levers.py", "run.py", "daemon.py"} < {file.name for file in files}
     for file in files:
