@@ -9,6 +9,7 @@ import typer
 
 from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
 from canshaper.cli.console import SafeConsole, echo
+from canshaper.shaping.registry import KINDS
 
 if TYPE_CHECKING:
     from canshaper.commissioning.identification.judge import Finding
@@ -209,8 +210,7 @@ def _tell(
         axis = deployment.axes[one.axis].config
         if one.axis in written and axis.sets:
             echo(f"{one.axis} has sets, which stay as they are: change them by hand.")
-        if one.sway and axis.filter.kind in ("gff", "robust"):
-            command = "tune" if axis.filter.kind == "gff" else "robust"
+        if one.sway and (command := KINDS[axis.filter.kind].designed_by):
             if one.cover_pct:
                 command = "robust"
             command += f" {deployment.path} --axis {one.axis}"

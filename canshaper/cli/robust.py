@@ -45,7 +45,7 @@ def robust(
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
     """
     from canshaper.config.edit import Value, set_values
-    from canshaper.config.filters import RobustFilter
+    from canshaper.config.filters import filter_of
     from canshaper.config.source import DeploymentError
     from canshaper.design.tuning.evaluate import Machine, evaluate
     from canshaper.design.tuning.robust import least_residual, shortest
@@ -109,7 +109,7 @@ def robust(
         highlight=False,
     )
     console.print(_table(measured))
-    chosen = RobustFilter(kind="robust", tick_ms=tick_ms, taps=taps)
+    chosen = filter_of("robust", tick_ms=tick_ms, taps=taps)
     _tell_stop(deployment, axis, chosen, found.duration_s, console)
     if write:
         console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")

@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from canshaper.config.filters import GffFilter
+from canshaper.config.filters import Filter, filter_of
 from canshaper.config.load import limits
 from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
@@ -57,11 +57,11 @@ class Stopwatch:
         return 1.0 - math.pow(self.last / self.first, 0.1)
 
     @property
-    def filter(self) -> GffFilter:
+    def filter(self) -> Filter:
         """A filter to begin with."""
         omega = 2.0 * math.pi / self.period_s
         poles = [float(_rounded(-share * omega)) for share in POLES_TO_OMEGA]
-        return GffFilter(kind="gff", poles_rad_s=poles)
+        return filter_of("gff", poles_rad_s=poles)
 
     @property
     def sway(self) -> Sway:
@@ -194,7 +194,7 @@ def _axis(axis: FirstAxis, lever_timeout_ms: int) -> Iterator[str]:
     sway = swing.sway
     shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
     yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
-    poles = ", ".join(f"{pole:g}" for pole in swing.filter.poles_rad_s or ())
+    poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
     yield "    # To begin with; better is `canshaper robust FILE --axis NAME --write`."
     yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
     yield "    # First motion at reduced speed: raise max_pct when all is well."

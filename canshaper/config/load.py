@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
 from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.shaping.registry import FAULTS
 
 _S = TypeVar("_S", bound=Section)
 
@@ -29,8 +30,11 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
     """Read and validate a deployment file.
 
     Raises:
-        DeploymentError: with every problem of the file, each with its line.
+        DeploymentError: with every problem of the file, each with its line; or a package that adds
+            filters has a fault, and which filters there are is not sure.
     """
+    if FAULTS:
+        raise DeploymentError([Problem(package, None, "", text) for package, text in FAULTS])
     return load_section(path, DeploymentConfig)
 
 

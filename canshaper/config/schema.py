@@ -14,7 +14,7 @@ from canshaper.config.section import Section, number
 from canshaper.config.sets import Feel, FeelSwitch, Grapple, SetConfig, sets_fault
 from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import KINDS_OF_SWAY
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.valve_curve import ValveCurve
 
 
@@ -267,7 +267,7 @@ class AxisConfig(Section):
 
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
-        if self.filter.kind in KINDS_OF_SWAY and self.sway is None:
+        if KINDS[self.filter.kind].needs_sway and self.sway is None:
             raise ValueError(
                 f"filter {self.filter.kind} needs the sway data of the axis; found no sway"
             )

@@ -10,7 +10,7 @@ from canshaper.config.filters import Filter
 from canshaper.config.input import Input
 from canshaper.config.section import Section, number
 from canshaper.config.sway import Sway
-from canshaper.shaping.registry import KINDS_OF_SWAY
+from canshaper.shaping.registry import KINDS
 
 
 class SetConfig(Section):
@@ -55,7 +55,7 @@ def sets_fault(kind: str, sets: Sequence[SetConfig]) -> str | None:
     """Why sets cannot stand beside a filter of this kind, or None."""
     if not sets:
         return None
-    if kind not in KINDS_OF_SWAY:
+    if not KINDS[kind].needs_sway:
         return f"filter {kind} knows no sway; sets are for filters that do"
     for one in sets:
         if one.filter.kind != kind:

@@ -8,8 +8,9 @@ from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import BoundAxis
 from canshaper.machine.filters import parameter_sets
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position, position
+from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
 
 # Between two changes of one axis: a weight that trembles must not keep the loop busy.

@@ -5,7 +5,7 @@ from typing import Any
 
 from canshaper.config.adjust import Key, faults
 from canshaper.config.control import Control
-from canshaper.config.filters import Filter, RobustFilter
+from canshaper.config.filters import Filter
 from canshaper.config.schema import AxisConfig
 from canshaper.config.sets import Feel, SetConfig
 from canshaper.config.source import Place
@@ -73,11 +73,6 @@ def filter_fault(
         period_s: time between two commands to the valve.
         valve_rate_per_s: rate of the valve, full speeds per second.
     """
-    if isinstance(chosen, RobustFilter) and chosen.tick_ms != round(1000.0 * period_s):
-        return (
-            f"tick_ms of the taps is {chosen.tick_ms} ms, allowed is the period of the valve,"
-            f" {1000.0 * period_s:g} ms"
-        )
     mode = sway.mode() if sway else None
     return _fault(chosen.kind, chosen.parameters(), mode, period_s, valve_rate_per_s)
 

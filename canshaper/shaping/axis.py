@@ -9,7 +9,6 @@ import math
 from collections.abc import Callable
 
 from canshaper.shaping.added import AddedBounds
-from canshaper.shaping.limit_aware import carry_over
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
@@ -18,7 +17,7 @@ from canshaper.shaping.limits import (
     rate_limited,
     within,
 )
-from canshaper.shaping.registry import Shaper
+from canshaper.shaping.shapers.kind import Shaper, carry_over
 from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 

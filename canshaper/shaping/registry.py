@@ -1,82 +1,48 @@
-"""Every filter that an axis may run, by the name it has in a deployment file."""
+"""Every filter that an axis may run, by the name it has in a deployment file.
+
+The kinds of this package stand in ``canshaper.shaping.shapers``. Another package adds one by an
+entry point of the group ``canshaper.shapers`` that names a ``ShaperKind``.
+"""
 
 import math
-from collections.abc import Callable, Sequence
-from typing import Protocol
+from collections.abc import Iterable
+from importlib.metadata import EntryPoint, entry_points
 
-from canshaper.shaping.fir import Fir, convolved, ei_taps, zv_taps
-from canshaper.shaping.gff import Gff
-from canshaper.shaping.limit_aware import LimitAware
-from canshaper.shaping.smoothing import FirstOrder, SCurve
-from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.shapers import fir, gff, limit_aware, off, smoothing
+from canshaper.shaping.shapers.kind import Shaper, ShaperKind
+from canshaper.shaping.sway import SwayModel
 
-
-class Shaper(Protocol):
-    """What the axis asks of a filter."""
-
-    def wanted(self, command: float) -> float:
-        """Return the output the filter asks for, before limits; ``command`` in [-1, 1].
-
-        Called once a tick, also while the axis is neutral (then with command 0).
-        """
-        ...
+GROUP = "canshaper.shapers"
+BUILT_IN = (*off.KINDS, *gff.KINDS, *smoothing.KINDS, *fir.KINDS, *limit_aware.KINDS)
 
 
-class Off:
-    """No shaping: the output limits alone stand between stick and valve."""
+def with_entry_points(
+    kinds: Iterable[ShaperKind], points: Iterable[EntryPoint]
+) -> tuple[dict[str, ShaperKind], list[tuple[str, str]]]:
+    """Kinds by their names, those of other packages after the given ones.
 
-    __slots__ = ()
-
-    def wanted(self, command: float) -> float:
-        """Return the command itself."""
-        return command
-
-
-def _gff(
-    sway: SwayModel,
-    *,
-    a1: float | None = None,
-    a2: float | None = None,
-    poles_rad_s: Sequence[float] | None = None,
-    third_pole_rad_s: float | None = None,
-) -> Shaper:
-    if poles_rad_s is not None:
-        return Gff(sway, (poles_rad_s[0], poles_rad_s[1]), third_pole_rad_s)
-    if a1 is not None and a2 is not None:
-        return Gff.from_denominator(sway, a1, a2, third_pole_rad_s)
-    raise ValueError("allowed are a1 and a2, or poles_rad_s")
-
-
-def _zvd(sway: SwayModel) -> Shaper:
-    zv = zv_taps(sway.mode, sway.tick_s)
-    return Fir(convolved(zv, zv))
+    Returns:
+        (the kinds, for each entry point that gives none: its package, and why).
+    """
+    known, faults = {kind.name: kind for kind in kinds}, []
+    for point in sorted(points, key=lambda point: point.name):
+        package = point.dist.name if point.dist else point.value
+        try:
+            kind = point.load()
+            if not isinstance(kind, ShaperKind):
+                raise ValueError(f"found a {type(kind).__name__}, allowed is a ShaperKind")
+            if kind.name in known:
+                raise ValueError(f"the kind {kind.name!r} is there already")
+        except Exception as error:  # a module of another package may raise anything
+            text = " ".join(f"{type(error).__name__}: {error}".split())
+            faults.append((f"package {package}", f"entry point {point.name} of {GROUP}: {text}"))
+        else:
+            known[kind.name] = kind
+    return known, faults
 
 
-def _two_mode(sway: SwayModel, *, period_s: float, damping_ratio: float) -> Shaper:
-    try:
-        second = SwayModel(SwayMode.from_period(period_s, damping_ratio), sway.tick_s).mode
-    except ValueError as error:
-        raise ValueError(f"second mode: {error}") from None
-    return Fir(convolved(zv_taps(sway.mode, sway.tick_s), zv_taps(second, sway.tick_s)))
-
-
-# Filters that need the sway of their axis.
-_OF_SWAY: dict[str, Callable[..., Shaper]] = {
-    "gff": _gff,
-    "zv": lambda sway: Fir(zv_taps(sway.mode, sway.tick_s)),
-    "zvd": _zvd,
-    "ei": lambda sway, *, residual_pct: Fir(ei_taps(sway.mode, sway.tick_s, residual_pct / 100.0)),
-    "two_mode": _two_mode,
-    "robust": lambda sway, *, taps, rate_per_s: LimitAware(sway, Fir(taps), rate_per_s),
-}
-# Filters that need the tick only.
-_OF_TICK: dict[str, Callable[..., Shaper]] = {
-    "off": lambda _tick_s: Off(),
-    "first_order": FirstOrder,
-    "s_curve": SCurve,
-}
-KINDS_OF_SWAY = frozenset(_OF_SWAY)
-KINDS = (*_OF_TICK, *_OF_SWAY)
+KINDS, FAULTS = with_entry_points(BUILT_IN, entry_points(group=GROUP))
+"""Every kind by its name; and faults of other packages, with which no deployment is loaded."""
 
 
 def build_shaper(
@@ -99,10 +65,11 @@ def build_shaper(
     Raises:
         ValueError: the parameters make no filter, or it needs sway data and there is none.
     """
-    if kind in _OF_TICK:
-        return _OF_TICK[kind](tick_s, **parameters)
+    declared = KINDS[kind]
+    if declared.needs_valve_rate:
+        parameters["valve_rate_per_s"] = valve_rate_per_s
+    if not declared.needs_sway:
+        return declared.build(tick_s, **parameters)
     if sway is None:
         raise ValueError(f"filter {kind} needs the sway data of the axis; found no sway")
-    if kind == "robust":
-        parameters["rate_per_s"] = valve_rate_per_s
-    return _OF_SWAY[kind](sway, **parameters)
+    return declared.build(sway, **parameters)

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from itertools import zip_longest
 from typing import Any
 
-from canshaper.shaping.gff import poles_from_denominator
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 
 # Positions between two sets that are told apart: 1 to 2 % of their difference.
@@ -54,20 +54,14 @@ def at_position(sets: Sequence[ParameterSet], steps: int) -> ParameterSet:
     first, second = sets[low], sets[low + 1]
     share = part / STEPS_BETWEEN
     mode = first.mode.towards(second.mode, share)
-    one, two = _by_poles(first.parameters), _by_poles(second.parameters)
+    one, two = first.parameters, second.parameters
+    if (interpolable := KINDS[first.kind].interpolable) is not None:
+        one, two = interpolable(one), interpolable(two)
     parameters = {name: _between(one[name], two[name], share) for name in one.keys() & two.keys()}
+    whole = (name for name, value in one.items() if isinstance(value, int))
+    parameters |= {name: round(parameters[name]) for name in whole if name in parameters}
     at = _between(first.at, second.at, share)
     return ParameterSet(at, mode, first.kind, parameters)
-
-
-def _by_poles(parameters: dict[str, Any]) -> dict[str, Any]:
-    """G_FF by its poles, the faster one first: between two denominators they may become complex."""
-    rest = dict(parameters)
-    if "a1" in rest:
-        rest["poles_rad_s"] = poles_from_denominator(rest.pop("a1"), rest.pop("a2"))
-    if "poles_rad_s" in rest:
-        rest["poles_rad_s"] = sorted(rest["poles_rad_s"])
-    return rest
 
 
 def _between(first: Any, second: Any, share: float) -> Any:

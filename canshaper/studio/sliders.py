@@ -9,8 +9,8 @@ import math
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.config.filters import FirstOrderFilter, GffFilter
 from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.shaping.registry import KINDS
 
 CALM, LENGTH = "calm", "length"
 RANGES = {CALM: (0.5, 2.0), LENGTH: (0.5, 2.0)}
@@ -51,15 +51,11 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
 
 def _calm(name: str, axis: AxisConfig) -> list[Number]:
     """Time constants: all poles move along their rays, so that the filter keeps its shape."""
-    place, section = f"axes.{name}.filter", axis.filter
-    powers: dict[str, float] = {}
     if axis.sway is None:  # the daemon refuses: without a model there is nothing to join to
         return []
-    if isinstance(section, GffFilter):
-        powers = {"a1": 1.0, "a2": 2.0, "third_pole_rad_s": -1.0}
-    elif isinstance(section, FirstOrderFilter):
-        powers = {"time_constant_s": 1.0}
-    return _numbers(place, section, powers)
+    parameters = KINDS[axis.filter.kind].parameters
+    powers = {p.name: p.stretch_power for p in parameters if p.stretch_power}
+    return _numbers(f"axes.{name}.filter", axis.filter, powers)
 
 
 def _length(name: str, axis: AxisConfig) -> list[Number]:

@@ -14,7 +14,7 @@ from canshaper.design.tuning.formulation import (
 )
 from canshaper.design.tuning.manual import manual
 from canshaper.design.tuning.optimal import Tuning, tune
-from canshaper.shaping.gff import denominator_from_poles
+from canshaper.shaping.shapers.gff import denominator_from_poles
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.grapple import Grapple
 from studies.paper import printed

@@ -14,10 +14,10 @@ from dataclasses import replace
 from functools import cache
 from typing import Final
 
-from canshaper.config.filters import GffFilter
+from canshaper.config.filters import filter_of
 from canshaper.design.lockstep import drive
 from canshaper.machine.deployment import Deployment
-from canshaper.shaping.gff import Gff
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
@@ -79,7 +79,7 @@ def real_run(deployment: Deployment, axis: str, poles_rad_s: tuple[float, float]
     """
     bound = deployment.axes[axis]
     config = bound.config.model_copy(
-        update={"filter": GffFilter(kind="gff", poles_rad_s=list(poles_rad_s))}
+        update={"filter": filter_of("gff", poles_rad_s=list(poles_rad_s))}
     )
     tuned = replace(deployment, axes={**deployment.axes, axis: replace(bound, config=config)})
     raw = drive(deployment, stroke(axis), bypass=True)

@@ -7,7 +7,7 @@ brackets. As printed: a corrigendum exists, which is not taken into account.
 import math
 from typing import Final
 
-from canshaper.shaping.gff import poles_from_denominator
+from canshaper.shaping.shapers.gff import poles_from_denominator
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 # [4.1, 4.2] denominators of the two optimal filters, s and s^2, and their poles, rad/s

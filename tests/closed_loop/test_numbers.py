@@ -12,7 +12,7 @@ from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import compare
-from canshaper.shaping.gff import poles_from_denominator
+from canshaper.shaping.shapers.gff import poles_from_denominator
 from canshaper.shaping.sway import SwayMode
 from canshaper_sim.operator import SCRIPTS, Script, Stroke
 

@@ -3,6 +3,8 @@
 import re
 from collections.abc import Sequence
 
+from canshaper.shaping.registry import KINDS
+
 # A word, a number, a sign or a blank: what a change may replace.
 TOKEN = re.compile(r"[A-Za-z_]+|-?[0-9.]+|\s+|.")
 
@@ -18,7 +20,8 @@ YAML_WORDS = (
     *("# ", "---\n", "...\n", "%YAML 1.1\n", "qualify: 3", "frozen_s: 1", "alive_max_step: 200"),
     *_words("crane left right slew near_far lift Slew NearFar Enable Reset AliveCounter LeverLeft"),
     *_words("LeverRight SlewCommand ShaperStatus SlewStatus X Y Lever Stop Tip Radius Count Sum"),
-    *_words("gff robust zv zvd ei two_mode first_order s_curve kind taps machine.dbc"),
+    *_words("kind taps machine.dbc"),
+    *(name for kind in KINDS.values() for name in (kind.name, *(p.name for p in kind.parameters))),
     "checksum: { signal: Reset, kind: xor }",
     "flags: { neutral: Enable, negative: Reset, positive: AntiSwayOff }",
     "emergency_stop: { bus: crane, message: TipVelocity, signal: SlewRate, timeout_ms: 100 }\n",

@@ -10,7 +10,8 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
-from canshaper.shaping.registry import Shaper, build_shaper
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.sway import SwayModel
 from tests.service.conftest import Rig
 

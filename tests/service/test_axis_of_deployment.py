@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.fir import Fir
-from canshaper.shaping.limit_aware import LimitAware
-from canshaper.shaping.smoothing import FirstOrder
+from canshaper.shaping.shapers.fir import Fir
+from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.shapers.smoothing import FirstOrder
 from canshaper.shaping.states import State, StickInput
 from canshaper.shaping.sway import SwayModel
 from tests.service.conftest import Rig

@@ -8,7 +8,7 @@ import pytest
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import StickInput
 from tests.service.conftest import Rig
 

@@ -86,7 +86,7 @@ def test_the_stopwatch_becomes_sway_data_and_a_filter(tmp_path: Path) -> None:
     assert sway.period_s == pytest.approx(3.0)
     assert (1 - sway.decay_per_swing) ** 10 == pytest.approx(0.25, rel=0.01)
     assert sway.full_speed_m_s == 2.5
-    poles = axis(file, "slew").filter.poles_rad_s
+    poles = axis(file, "slew").filter.parameters()["poles_rad_s"]
     # The first step of the filter, 1 / (a2 w^2), is no more than what was asked.
     assert poles[0] * poles[1] / (2 * 3.14159265 / 3.0) ** 2 <= 1.0
     assert load_deployment(file).config.control is not None

@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError
-from canshaper.shaping.gff import Gff
+from canshaper.shaping.shapers.gff import Gff
 from tests.service.conftest import Rig
 
 DBC = {

@@ -1,9 +1,9 @@
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Shaper
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.states import State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 

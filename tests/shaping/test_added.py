@@ -10,9 +10,10 @@ from hypothesis import strategies as st
 
 from canshaper.shaping.added import AddedBounds
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.fir import Fir
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.shapers.fir import Fir
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput
 
 TICK_S = 0.05

@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 from canshaper.shaping.axis import MOST_OWED, Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 

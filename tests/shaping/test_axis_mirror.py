@@ -5,8 +5,8 @@ import random
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 

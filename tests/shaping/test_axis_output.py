@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.axis import BLEND_S, Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, build_shaper
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 

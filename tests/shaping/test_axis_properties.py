@@ -11,9 +11,10 @@ from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 

@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from canshaper.shaping.fir import Fir, convolved, ei_taps, residual_left, zv_taps
+from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, residual_left, zv_taps
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 MODES = [SwayMode.from_period(2.2, zeta) for zeta in (0.0, 0.05, 0.3)]

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy import signal
 
-from canshaper.shaping.gff import Gff, denominator_from_poles, poles_from_denominator
+from canshaper.shaping.shapers.gff import Gff, denominator_from_poles, poles_from_denominator
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICKS_S = (0.001, 0.005, 0.01, 0.02, 0.05)

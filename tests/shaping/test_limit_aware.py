@@ -6,11 +6,13 @@ import random
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.fir import Fir, zv_taps
-from canshaper.shaping.gff import Gff
-from canshaper.shaping.limit_aware import POLE_PER_OMEGA, LimitAware
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper, build_shaper
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.shapers.fir import Fir, zv_taps
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.limit_aware import POLE_PER_OMEGA, LimitAware
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 

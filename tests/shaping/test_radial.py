@@ -4,8 +4,8 @@ import math
 
 import pytest
 
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.radial import RadialCompensation
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode, SwayModel
 
 LENGTH_M = 1.2

@@ -1,19 +1,30 @@
 """Every filter by its name: the one that is built is the one that was asked for."""
 
 import math
+from importlib.metadata import EntryPoint
+from typing import Any
 
 import pytest
 
-from canshaper.shaping.fir import Fir, convolved, ei_taps, zv_taps
-from canshaper.shaping.gff import Gff, poles_from_denominator
-from canshaper.shaping.limit_aware import LimitAware
-from canshaper.shaping.registry import KINDS, KINDS_OF_SWAY, Off, Shaper, build_shaper
-from canshaper.shaping.smoothing import FirstOrder, SCurve
+from canshaper.shaping.registry import (
+    BUILT_IN,
+    FAULTS,
+    GROUP,
+    KINDS,
+    build_shaper,
+    with_entry_points,
+)
+from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, zv_taps
+from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
+from canshaper.shaping.shapers.kind import Parameter, Shaper, ShaperKind
+from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
 MODE = SwayMode.from_period(2.2, 0.05)
-SECOND = SwayMode.from_period(0.9, 0.01)
+OF_SWAY = [kind.name for kind in KINDS.values() if kind.needs_sway]
 TAPS = [0.5, 0.2, 0.3]
 COMMANDS = [1.0] * 40 + [-0.4] * 40 + [0.0] * 40
 
@@ -32,42 +43,30 @@ def model() -> SwayModel:
     return SwayModel(MODE, TICK_S)
 
 
+def parameters(kind: str) -> dict[str, Any]:
+    return {**next(iter(KINDS[kind].settings(MODE, TICK_S).values()))}
+
+
 def direct(kind: str, sway: SwayModel) -> Shaper:
-    zv = zv_taps(MODE, TICK_S)
+    zv, given = zv_taps(MODE, TICK_S), parameters(kind)
+    second = SwayMode.from_period(0.4 * MODE.period_s, 0.02)
     return {
         "off": Off,
-        "first_order": lambda: FirstOrder(TICK_S, 0.7),
-        "s_curve": lambda: SCurve(TICK_S, 1.0, 7.0),
-        "gff": lambda: Gff(sway, poles_from_denominator(0.42, 0.043)),
+        "first_order": lambda: FirstOrder(TICK_S, 0.3 * MODE.period_s),
+        "s_curve": lambda: SCurve(TICK_S, 2.2 / MODE.period_s, 16.0 / MODE.period_s),
+        "gff": lambda: Gff(sway, poles_from_denominator(given["a1"], given["a2"])),
         "zv": lambda: Fir(zv),
         "zvd": lambda: Fir(convolved(zv, zv)),
-        "ei": lambda: Fir(ei_taps(MODE, TICK_S, 0.08)),
-        "two_mode": lambda: Fir(convolved(zv, zv_taps(SECOND, TICK_S))),
-        "robust": lambda: LimitAware(sway, Fir(TAPS), 1.5),
+        "ei": lambda: Fir(ei_taps(MODE, TICK_S, 0.05)),
+        "two_mode": lambda: Fir(convolved(zv, zv_taps(second, TICK_S))),
+        "robust": lambda: LimitAware(sway, Fir(zv), 1.5),
     }[kind]()
 
 
-PARAMETERS: dict[str, dict[str, object]] = {
-    "off": {},
-    "first_order": {"time_constant_s": 0.7},
-    "s_curve": {"rate_per_s": 1.0, "jerk_per_s2": 7.0},
-    "gff": {"a1": 0.42, "a2": 0.043},
-    "zv": {},
-    "zvd": {},
-    "ei": {"residual_pct": 8.0},
-    "two_mode": {"period_s": 0.9, "damping_ratio": 0.01},
-    "robust": {"taps": TAPS},
-}
-
-
-def test_every_kind_is_here() -> None:
-    assert set(PARAMETERS) == set(KINDS)
-
-
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", [kind.name for kind in BUILT_IN])
 def test_a_filter_by_name_is_the_filter(kind: str) -> None:
     sway, other = model(), model()
-    built = build_shaper(kind, TICK_S, sway, valve_rate_per_s=1.5, **PARAMETERS[kind])
+    built = build_shaper(kind, TICK_S, sway, valve_rate_per_s=1.5, **parameters(kind))
     right = direct(kind, other)
     assert type(built) is type(right)
     got, expected = answer(built, sway, 0.03), answer(right, other, 0.03)
@@ -87,28 +86,28 @@ def test_gff_by_poles_or_by_denominator_with_and_without_a_third_pole(
         {"poles_rad_s": list(poles)},
         {"a1": -(1.0 / p + 1.0 / q), "a2": 1.0 / (p * q)},
     )
-    for parameters in given:
+    for one in given:
         sway = model()
-        built = build_shaper("gff", TICK_S, sway, **parameters, third_pole_rad_s=third)
+        built = build_shaper("gff", TICK_S, sway, **one, third_pole_rad_s=third)
         assert answer(built, sway) == pytest.approx(expected, abs=1e-9)
 
 
-@pytest.mark.parametrize("parameters", [{}, {"a1": 0.42}, {"a2": 0.043}])
-def test_half_a_denominator_is_refused(parameters: dict[str, object]) -> None:
+@pytest.mark.parametrize("given", [{}, {"a1": 0.42}, {"a2": 0.043}])
+def test_half_a_denominator_is_refused(given: dict[str, object]) -> None:
     with pytest.raises(ValueError, match=r"^allowed are a1 and a2, or poles_rad_s$"):
-        build_shaper("gff", TICK_S, model(), **parameters)
+        build_shaper("gff", TICK_S, model(), **given)
 
 
-@pytest.mark.parametrize("kind", sorted(KINDS_OF_SWAY))
+@pytest.mark.parametrize("kind", OF_SWAY)
 def test_a_filter_of_the_swing_needs_sway_data(kind: str) -> None:
     says = f"^filter {kind} needs the sway data of the axis; found no sway$"
     with pytest.raises(ValueError, match=says):
-        build_shaper(kind, TICK_S, None, **PARAMETERS[kind])
+        build_shaper(kind, TICK_S, None, **parameters(kind))
 
 
-@pytest.mark.parametrize("kind", sorted(set(KINDS) - KINDS_OF_SWAY))
+@pytest.mark.parametrize("kind", [k for k in KINDS if k not in OF_SWAY])
 def test_the_others_do_without(kind: str) -> None:
-    built = build_shaper(kind, TICK_S, None, valve_rate_per_s=1.5, **PARAMETERS[kind])
+    built = build_shaper(kind, TICK_S, None, valve_rate_per_s=1.5, **parameters(kind))
     assert answer(built, model()) == answer(direct(kind, model()), model())
 
 
@@ -128,3 +127,91 @@ def test_without_a_valve_rate_the_robust_shaper_takes_the_valve_for_quick() -> N
     assert got == answer(LimitAware(other, Fir(TAPS)), other, 0.03)
     slow = model()
     assert answer(LimitAware(slow, Fir(TAPS), 1.5), slow, 0.03) != got
+
+
+def test_taps_run_at_their_own_period() -> None:
+    says = r"^tick_ms of the taps is 40 ms, allowed is the period of the valve, 20 ms$"
+    with pytest.raises(ValueError, match=says):
+        build_shaper("robust", TICK_S, model(), taps=TAPS, tick_ms=40)
+    build_shaper("robust", TICK_S, model(), taps=TAPS, tick_ms=20)
+
+
+# -- declarations, and those of other packages -----------------------------------------------------
+
+
+def kind_of(name: str = "notch", *parameters: Parameter) -> ShaperKind:
+    return ShaperKind(name, "", lambda _tick_s: Off(), lambda _m, _t: {name: {}}, parameters)
+
+
+def number(name: str = "width_s", low: float = 1, **more: Any) -> Parameter:
+    return Parameter(name, low, 2, "s", "width", **more)
+
+
+@pytest.mark.parametrize("name", ["", "Notch", "2d", "notch ", "kind", "sway", "tick_s"])
+def test_a_name_that_cannot_be_one_is_refused(name: str) -> None:
+    with pytest.raises(ValueError, match=f"^filter {name}: the name '{name}' is not allowed here$"):
+        kind_of(name)
+    with pytest.raises(ValueError, match=f"^filter notch: the name '{name}' is not allowed here$"):
+        kind_of("notch", number(name))
+    kind_of("notch_2", number("width_2_s"))
+
+
+def test_a_parameter_stands_once_and_has_a_range_with_its_default() -> None:
+    with pytest.raises(ValueError, match=r"^filter notch: the name 'width_s' is not allowed here$"):
+        kind_of("notch", number(), number())
+    for default in (0.9, 2.1, math.nan):
+        with pytest.raises(ValueError, match=r"^parameter width_s: default .*, range 1 to 2$"):
+            number(default=default)
+    with pytest.raises(ValueError, match=r"^parameter width_s: default 3, range 3 to 2$"):
+        number(low=3)
+    assert (number(default=1.0).default, number(default=2.0).default) == (1.0, 2.0)
+
+
+class Dist:
+    name = "crane-extras"
+
+
+def point(name: str, loaded: object) -> EntryPoint:
+    """An entry point of an installed package that gives this, or raises it."""
+
+    class Loaded(EntryPoint):
+        dist = Dist()  # type: ignore[assignment]
+
+        def load(self) -> object:
+            if isinstance(loaded, Exception):
+                raise loaded
+            return loaded
+
+    return Loaded(name, f"extras:{name}", GROUP)
+
+
+def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -> None:
+    assert not FAULTS
+    two, one = kind_of("two"), kind_of("one")
+    kinds, faults = with_entry_points(BUILT_IN, [point("b", two), point("a", one)])
+    assert list(kinds.values()) == [*BUILT_IN, one, two]
+    assert faults == []
+
+
+@pytest.mark.parametrize(
+    ("loaded", "says"),
+    [
+        (ImportError("No module\nnamed x"), "ImportError: No module named x"),
+        (kind_of("zv"), "ValueError: the kind 'zv' is there already"),
+        (7, "ValueError: found a int, allowed is a ShaperKind"),
+    ],
+)
+def test_a_package_that_gives_no_kind_is_named_and_the_next_one_counts(
+    loaded: object, says: str
+) -> None:
+    kinds, faults = with_entry_points(BUILT_IN, [point("x", loaded), point("y", kind_of())])
+    assert list(kinds) == [*(kind.name for kind in BUILT_IN), "notch"]
+    assert kinds["zv"] in BUILT_IN
+    assert faults == [("package crane-extras", f"entry point x of canshaper.shapers: {says}")]
+
+
+def test_an_entry_point_of_no_package_goes_by_what_it_names() -> None:
+    _, faults = with_entry_points((), [EntryPoint("x", "no_such_module:KIND", GROUP)])
+    (((package, text)),) = faults
+    assert package == "package no_such_module:KIND"
+    assert text.endswith("ModuleNotFoundError: No module named 'no_such_module'")

@@ -12,9 +12,10 @@ import pytest
 from scipy import signal
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff, poles_from_denominator
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import State, StickInput
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode, SwayModel
 

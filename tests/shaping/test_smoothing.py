@@ -4,7 +4,7 @@ from itertools import pairwise
 
 import pytest
 
-from canshaper.shaping.smoothing import FirstOrder, SCurve
+from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 
 
 def test_first_order_reaches_63_percent_after_its_time_constant() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy import signal
 
-from canshaper.shaping.gff import Gff
+from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICKS_S = (0.005, 0.02, 0.05)

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import StickInput
 from canshaper.shaping.valve_curve import ValveCurve
 

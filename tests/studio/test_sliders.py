@@ -9,7 +9,7 @@ from canshaper.config.sets import Feel
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from canshaper.shaping.gff import poles_from_denominator
+from canshaper.shaping.shapers.gff import poles_from_denominator
 from canshaper.studio.crane import copied
 from canshaper.studio.sliders import CALM, LENGTH, RANGES, adjustable, sliders, values
 

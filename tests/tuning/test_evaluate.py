@@ -7,7 +7,8 @@ import pytest
 from canshaper.design.tuning.evaluate import Machine, evaluate, gff, press
 from canshaper.design.tuning.formulation import POLE_PER_RATE
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, build_shaper
+from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.sway import SwayMode
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)

@@ -13,7 +13,7 @@ from canshaper.design.tuning.formulation import (
 )
 from canshaper.design.tuning.manual import manual
 from canshaper.design.tuning.optimal import Tuning, tune
-from canshaper.shaping.gff import denominator_from_poles
+from canshaper.shaping.shapers.gff import denominator_from_poles
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 # The paper publishes no pendulum. With these two, and Q on the deviation of the state, one second

@@ -9,7 +9,7 @@ from canshaper.design.tuning.robust import (
     shortest,
     time_optimal_s,
 )
-from canshaper.shaping.fir import residual_left
+from canshaper.shaping.shapers.fir import residual_left
 from canshaper.shaping.sway import SwayMode
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)

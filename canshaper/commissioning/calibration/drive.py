@@ -16,7 +16,7 @@ from canshaper.inputs.lever import LeverInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import MOVING, Reason, State, StickInput
 
 # A command below this is neutral: the ramp begins there.

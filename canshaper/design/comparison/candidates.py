@@ -2,13 +2,11 @@
 
 from dataclasses import dataclass, replace
 
-from pydantic import TypeAdapter
-
-from canshaper.config.filters import Filter, RobustFilter
+from canshaper.config.filters import Filter, filter_of
 from canshaper.config.schema import RadialConfig
 from canshaper.design.tuning.robust import RobustShaper, least_residual
 from canshaper.machine.deployment import BoundRadial, Deployment
-from canshaper.shaping.fir import zv_taps
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 
 # Time of the run-on that every filter is given: longer than the longest of them takes.
@@ -24,7 +22,7 @@ class Candidate:
     Attributes:
         name: what it is called.
         filter: as it would stand in a deployment file.
-        ours: G_FF limit-aware or robust.
+        ours: limit-aware, as G_FF and the robust shaper are.
         radial: with radial compensation (slew axes).
     """
 
@@ -49,32 +47,12 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
     mode = config.sway.mode()
     tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
     rate = config.limits.slowest_per_s
-    omega, period = mode.omega_rad_s, mode.period_s
-    one = {"a1": 2.0000001 / omega, "a2": 1.0 / omega**2}
+    period = mode.period_s
     found = [
-        Candidate("off", _filter(kind="off")),
-        Candidate("first order", _filter(kind="first_order", time_constant_s=0.3 * period)),
-        Candidate(
-            "S-curve", _filter(kind="s_curve", rate_per_s=2.2 / period, jerk_per_s2=16.0 / period)
-        ),
-        Candidate("ZV", _filter(kind="zv")),
-        Candidate("ZVD", _filter(kind="zvd")),
-        Candidate("EI 5 %", _filter(kind="ei", residual_pct=5.0)),
-        Candidate("two-mode", _filter(kind="two_mode", period_s=0.4 * period, damping_ratio=0.02)),
-        Candidate("G_FF slew poles", _filter(kind="gff", a1=0.42, a2=0.043), ours=True),
-        Candidate("G_FF near-far poles", _filter(kind="gff", a1=0.708, a2=0.12), ours=True),
-        Candidate("G_FF no jump over 1", _filter(kind="gff", **one), ours=True),
-        Candidate("G_FF third pole -4", _third_pole(-4.0), ours=True),
-        Candidate("G_FF third pole -5", _third_pole(-5.0), ours=True),
+        Candidate(label, filter_of(kind.name, **parameters), ours=kind.limit_aware)
+        for kind in sorted(KINDS.values(), key=lambda kind: kind.limit_aware)
+        for label, parameters in kind.settings(mode, tick_s).items()
     ]
-    zv = zv_taps(mode, tick_s)
-    found.append(
-        Candidate(
-            "limit-aware ZV",
-            RobustFilter(kind="robust", tick_ms=round(1000.0 * tick_s), taps=zv),
-            ours=True,
-        )
-    )
     for periods, range_pct in DESIGNS:
         shaper = least_residual(
             mode,
@@ -93,13 +71,10 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
     return found
 
 
-def robust_filter(shaper: RobustShaper, tick_s: float) -> RobustFilter:
+def robust_filter(shaper: RobustShaper, tick_s: float) -> Filter:
     """A designed impulse response as it stands in a deployment file."""
-    return RobustFilter(
-        kind="robust",
-        tick_ms=round(1000.0 * tick_s),
-        taps=[round(tap, 8) for tap in shaper.taps],
-    )
+    taps = [round(tap, 8) for tap in shaper.taps]
+    return filter_of("robust", tick_ms=round(1000.0 * tick_s), taps=taps)
 
 
 def radial_of(deployment: Deployment, axis: str) -> BoundRadial | None:
@@ -129,12 +104,3 @@ def nominal_mode(deployment: Deployment, axis: str) -> SwayMode:
     sway = deployment.axes[axis].config.sway
     assert sway is not None  # candidates() has refused it
     return sway.mode()
-
-
-def _filter(**parameters: object) -> Filter:
-    adapter: TypeAdapter[Filter] = TypeAdapter(Filter)
-    return adapter.validate_python(parameters)
-
-
-def _third_pole(pole: float) -> Filter:
-    return _filter(kind="gff", poles_rad_s=[pole, pole], third_pole_rad_s=pole)

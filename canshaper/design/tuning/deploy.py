@@ -5,10 +5,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
 
-from canshaper.config.filters import GffFilter
+from canshaper.config.filters import Filter, filter_of
 from canshaper.design.tuning.evaluate import Evaluation, Machine, ShaperFor, evaluate, gff
 from canshaper.design.tuning.optimal import FLAT, Tuning
-from canshaper.shaping.gff import denominator_from_poles, poles_from_denominator
+from canshaper.shaping.shapers.gff import denominator_from_poles, poles_from_denominator
 from canshaper.shaping.sway import SwayMode
 
 _DIGITS = 6
@@ -36,10 +36,9 @@ class Setting:
     measures: Evaluation
 
     @property
-    def filter(self) -> GffFilter:
+    def filter(self) -> Filter:
         """The same as the filter of an axis."""
-        third = self.third_pole_rad_s
-        return GffFilter(kind="gff", a1=self.a1, a2=self.a2, third_pole_rad_s=third)
+        return filter_of("gff", a1=self.a1, a2=self.a2, third_pole_rad_s=self.third_pole_rad_s)
 
     def values(self) -> dict[str, float | None]:
         """Keys of the filter section; None for those that have to go."""

@@ -12,9 +12,10 @@ from dataclasses import dataclass, field
 
 from canshaper.design.tuning.formulation import SETTLED, at_length
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.gff import Gff
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import Off, Shaper
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 

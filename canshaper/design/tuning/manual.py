@@ -2,7 +2,7 @@
 
 from canshaper.design.tuning.formulation import FASTEST_RAD_S, POLE_DISTANCE, SLOWEST_RAD_S
 from canshaper.design.tuning.optimal import Tuning
-from canshaper.shaping.gff import denominator_from_poles
+from canshaper.shaping.shapers.gff import denominator_from_poles
 from canshaper.shaping.sway import SwayMode
 
 # "Slightly less than two times the first pole."

@@ -11,7 +11,7 @@ import numpy as np
 from canshaper.design.tuning.conflict import Infeasible, box_conflict, explain, feasible_point
 from canshaper.design.tuning.formulation import Task
 from canshaper.design.tuning.program import Program, Solution, Vector
-from canshaper.shaping.gff import denominator_from_poles
+from canshaper.shaping.shapers.gff import denominator_from_poles
 
 # "As good": what the poles may do within so much of the optimal cost.
 FLAT = 0.01

@@ -7,7 +7,7 @@ and no iterate can leave the set of filters, as it can with the printed form in 
 The cost watches Eq. 13 sampled exactly: u is held, so a chain of first-order lags gives v of
 v = u / (a2 s^2 + a1 s + 1) by a matrix exponential that also holds for a double pole, and
 y = v + b1 v' + b2 v''. The requirements watch the filter as it is deployed, state feedback on the
-sampled sway model (``canshaper.shaping.gff``), so that what they promise is what is sent.
+sampled sway model (``canshaper.shaping.shapers.gff``), so that what they promise is what is sent.
 """
 
 import math

@@ -11,11 +11,12 @@ With no limit acting the difference is zero, and the shaper is itself.
 """
 
 import math
-from typing import Protocol
+from collections.abc import Sequence
 
-from canshaper.shaping.fir import Fir
-from canshaper.shaping.gff import Gff
-from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.shapers.fir import Fir, zv_taps
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Parameter, Parameters, Shaper, ShaperKind
+from canshaper.shaping.sway import SwayMode, SwayModel
 
 # Both poles of the feedback, in natural frequencies: quicker than the swing, and slow enough for a
 # valve that takes a fifth of a second to full speed.
@@ -26,24 +27,6 @@ POLE_PER_OMEGA = -1.4
 # follow grows with the root of its rate, as for the poles of G_FF; 1.3 left least swing of 0.4 to
 # 1.6 over valves of 0.7 to 5 full speeds per second.
 POLE_PER_ROOT = -1.3
-
-
-class _Shaper(Protocol):
-    def wanted(self, command: float) -> float: ...
-
-
-def carry_over(old: _Shaper, new: _Shaper, command: float) -> None:
-    """Give a new shaper a memory: that of the one before it, where both are of one kind.
-
-    Args:
-        old: the one before.
-        new: the new one.
-        command: the command now; without a better memory it counts as the one for long.
-    """
-    if type(old) is type(new) and hasattr(new, "inherit"):
-        new.inherit(old)
-    elif hasattr(new, "begin_at"):
-        new.begin_at(command)
 
 
 class LimitAware:
@@ -98,3 +81,48 @@ class LimitAware:
             - self._gff.k1 * (sway.angle - twin.angle)
             - self._gff.k2 * (sway.rate - twin.rate)
         )
+
+
+def _robust(
+    sway: SwayModel,
+    *,
+    taps: Sequence[float],
+    valve_rate_per_s: float,
+    tick_ms: float | None = None,
+) -> Shaper:
+    if tick_ms is not None and tick_ms != round(1000.0 * sway.tick_s):
+        raise ValueError(
+            f"tick_ms of the taps is {tick_ms:g} ms, allowed is the period of the valve,"
+            f" {1000.0 * sway.tick_s:g} ms"
+        )
+    return LimitAware(sway, Fir(taps), valve_rate_per_s)
+
+
+def _check(*, taps: Sequence[float], tick_ms: int) -> None:
+    Fir(taps)
+
+
+def _settings(mode: SwayMode, tick_s: float) -> dict[str, Parameters]:
+    taps = zv_taps(mode, tick_s)
+    return {"limit-aware ZV": {"tick_ms": round(1000.0 * tick_s), "taps": taps}}
+
+
+KINDS = (
+    ShaperKind(
+        "robust",
+        "A non-negative impulse response, designed for a range of pendulum lengths.",
+        _robust,
+        _settings,
+        (
+            Parameter(
+                *("tick_ms", 1, 200, "ms", "period of the taps: that of the valve"), whole=True
+            ),
+            Parameter("taps", 0, 1, "", "tap of the impulse response", entries=(1, 1000)),
+        ),
+        needs_sway=True,
+        needs_valve_rate=True,
+        limit_aware=True,
+        check=_check,
+        designed_by="robust",
+    ),
+)

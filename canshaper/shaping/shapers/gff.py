@@ -14,9 +14,11 @@ state, so the gain is one for every K, not only for an exactly computed one.)
 """
 
 import math
+from collections.abc import Sequence
 from typing import Self
 
-from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.shapers.kind import Parameter, Parameters, Shaper, ShaperKind
+from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 class Gff:
@@ -113,3 +115,84 @@ def denominator_from_poles(poles_rad_s: tuple[float, float]) -> tuple[float, flo
     """Coefficients (a1, a2) of the denominator with these two negative poles."""
     p, q = poles_rad_s
     return -(1.0 / p + 1.0 / q), 1.0 / (p * q)
+
+
+def _gff(
+    sway: SwayModel,
+    *,
+    a1: float | None = None,
+    a2: float | None = None,
+    poles_rad_s: Sequence[float] | None = None,
+    third_pole_rad_s: float | None = None,
+) -> Shaper:
+    if poles_rad_s is not None:
+        return Gff(sway, (poles_rad_s[0], poles_rad_s[1]), third_pole_rad_s)
+    if a1 is not None and a2 is not None:
+        return Gff.from_denominator(sway, a1, a2, third_pole_rad_s)
+    raise ValueError("allowed are a1 and a2, or poles_rad_s")
+
+
+def _check(**parameters: float) -> None:
+    given = parameters.keys() - {"third_pole_rad_s"}
+    if given == {"a1", "a2"}:
+        poles_from_denominator(parameters["a1"], parameters["a2"])
+    elif given != {"poles_rad_s"}:
+        found = ", ".join(sorted(given)) or "neither"
+        raise ValueError(f"found {found}; allowed are a1 and a2, or poles_rad_s")
+
+
+def _by_poles(parameters: Parameters) -> Parameters:
+    """By its poles, the faster one first: between two denominators they may become complex."""
+    rest = dict(parameters)
+    if "a1" in rest:
+        rest["poles_rad_s"] = poles_from_denominator(rest.pop("a1"), rest.pop("a2"))
+    return rest | {"poles_rad_s": sorted(rest["poles_rad_s"])}
+
+
+def _settings(mode: SwayMode, _tick_s: float) -> dict[str, Parameters]:
+    omega = mode.omega_rad_s
+    return {
+        "G_FF slew poles": {"a1": 0.42, "a2": 0.043},
+        "G_FF near-far poles": {"a1": 0.708, "a2": 0.12},
+        "G_FF no jump over 1": {"a1": 2.0000001 / omega, "a2": 1.0 / omega**2},
+        "G_FF third pole -4": {"poles_rad_s": [-4.0, -4.0], "third_pole_rad_s": -4.0},
+        "G_FF third pole -5": {"poles_rad_s": [-5.0, -5.0], "third_pole_rad_s": -5.0},
+    }
+
+
+KINDS = (
+    ShaperKind(
+        "gff",
+        "The limit-aware G_FF, by its denominator (a1, a2) or by its poles.",
+        _gff,
+        _settings,
+        (
+            Parameter(
+                *("a1", 1e-3, 20, "s", "coefficient a1 of the denominator"),
+                optional=True,
+                stretch_power=1.0,
+            ),
+            Parameter(
+                *("a2", 1e-6, 100, "s^2", "coefficient a2 of the denominator"),
+                optional=True,
+                stretch_power=2.0,
+            ),
+            Parameter(
+                *("poles_rad_s", -100, -0.1, "rad/s", "pole of the filter"),
+                optional=True,
+                entries=(2, 2),
+            ),
+            Parameter(
+                *("third_pole_rad_s", -100, -0.1, "rad/s"),
+                "a third pole, which removes the first jump",
+                optional=True,
+                stretch_power=-1.0,
+            ),
+        ),
+        needs_sway=True,
+        limit_aware=True,
+        check=_check,
+        interpolable=_by_poles,
+        designed_by="tune",
+    ),
+)

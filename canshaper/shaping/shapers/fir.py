@@ -11,7 +11,8 @@ from collections import deque
 from collections.abc import Sequence
 from operator import mul
 
-from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.shapers.kind import Parameter, Shaper, ShaperKind
+from canshaper.shaping.sway import SwayMode, SwayModel
 
 
 class Fir:
@@ -106,3 +107,57 @@ def residual_left(taps: Sequence[float], mode: SwayMode, tick_s: float) -> float
     """Fraction of the swing that a bare shaper leaves in a mode."""
     step = cmath.exp(-mode.pole * tick_s)
     return abs(sum(tap * step**k for k, tap in enumerate(taps)))
+
+
+def _zv(sway: SwayModel) -> Shaper:
+    return Fir(zv_taps(sway.mode, sway.tick_s))
+
+
+def _zvd(sway: SwayModel) -> Shaper:
+    zv = zv_taps(sway.mode, sway.tick_s)
+    return Fir(convolved(zv, zv))
+
+
+def _ei(sway: SwayModel, *, residual_pct: float) -> Shaper:
+    return Fir(ei_taps(sway.mode, sway.tick_s, residual_pct / 100.0))
+
+
+def _two_mode(sway: SwayModel, *, period_s: float, damping_ratio: float) -> Shaper:
+    try:
+        second = SwayModel(SwayMode.from_period(period_s, damping_ratio), sway.tick_s).mode
+    except ValueError as error:
+        raise ValueError(f"second mode: {error}") from None
+    return Fir(convolved(zv_taps(sway.mode, sway.tick_s), zv_taps(second, sway.tick_s)))
+
+
+KINDS = (
+    ShaperKind("zv", "Zero vibration.", _zv, lambda _mode, _tick_s: {"ZV": {}}, needs_sway=True),
+    ShaperKind(
+        *("zvd", "Zero vibration and derivative.", _zvd),
+        lambda _mode, _tick_s: {"ZVD": {}},
+        needs_sway=True,
+    ),
+    ShaperKind(
+        *("ei", "Extra-insensitive.", _ei),
+        lambda _mode, _tick_s: {"EI 5 %": {"residual_pct": 5.0}},
+        (
+            Parameter(
+                *("residual_pct", 0.1, 20, "%", "swing left at the nominal period"), default=5.0
+            ),
+        ),
+        needs_sway=True,
+    ),
+    ShaperKind(
+        "two_mode",
+        "ZV for the sway of the axis and for a second mode, such as a log in the grapple.",
+        _two_mode,
+        lambda mode, _tick_s: {
+            "two-mode": {"period_s": 0.4 * mode.period_s, "damping_ratio": 0.02}
+        },
+        (
+            Parameter("period_s", 0.15, 12, "s", "period of the second mode"),
+            Parameter("damping_ratio", 0, 0.95, "", "damping ratio of the second mode"),
+        ),
+        needs_sway=True,
+    ),
+)

@@ -2,6 +2,8 @@
 
 import math
 
+from canshaper.shaping.shapers.kind import Parameter, ShaperKind
+
 
 class FirstOrder:
     """First-order lag on the command.
@@ -72,3 +74,28 @@ class SCurve:
     def inherit(self, old: "SCurve") -> None:
         """Go on from where another one stands."""
         self._value, self._slope = old._value, old._slope
+
+
+KINDS = (
+    ShaperKind(
+        "first_order",
+        "A first-order lag.",
+        FirstOrder,
+        lambda mode, _tick_s: {"first order": {"time_constant_s": 0.3 * mode.period_s}},
+        (Parameter("time_constant_s", 0.01, 5, "s", "time to 63 % of a step", stretch_power=1.0),),
+    ),
+    ShaperKind(
+        "s_curve",
+        "Limited rate and limited change of rate.",
+        SCurve,
+        lambda mode, _tick_s: {
+            "S-curve": {"rate_per_s": 2.2 / mode.period_s, "jerk_per_s2": 16.0 / mode.period_s}
+        },
+        (
+            Parameter("rate_per_s", 0.2, 100, "full speeds per s", "fastest change"),
+            Parameter(
+                "jerk_per_s2", 0.2, 1000, "full speeds per s^2", "fastest change of the rate"
+            ),
+        ),
+    ),
+)
