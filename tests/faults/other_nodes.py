@@ -36,7 +36,7 @@ class NodeRules:
             code, register = int.from_bytes(frame.data[:2], "little"), frame.data[2]
             if code:
                 self._since.add("the node has an emergency")
-            self._emergency = bool(code) or (self._emergency and bool(register))
+            self._emergency = bool(code or register)  # only with both 0 all errors are over
 
     def seen(self, now_ns: int) -> set[str]:
         """What is wrong with it, or was since it was looked at."""

@@ -89,7 +89,7 @@ class Rules:
         for words in self._words.values():
             words.hear(frame, arrived_ns)
         for address in self.addresses.values():
-            address.hear(frame, arrived_ns)
+            address.hear(frame, arrived_ns if self._pending_ns is None else self._pending_ns)
 
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""

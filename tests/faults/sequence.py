@@ -223,7 +223,8 @@ class Sequence:
         if any(address for address in self.machine.addresses.values()):
             world.at(round(end_s * 1e9), lambda: self.reload("same"))
         for node in world.nodes.values():
-            world.at(round(end_s * 1e9), lambda node=node: node.emergency(0, 0))
+            at_ns = round(end_s * 1e9) + 2 * self.machine.tick_ns
+            world.at(at_ns, lambda node=node: node.emergency(0, 0))
         # Whatever runs on has come to rest, and nobody else has sent our frames for a second.
         settle_s = max(settle_s, self.machine.rest_ticks * self.machine.tick_ns / 1e9)
         for after_s, healthy in (
