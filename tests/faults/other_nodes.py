@@ -6,8 +6,8 @@ from tests.faults.machine import Node, Words
 
 BOOT_UP, OPERATIONAL = 0, 5
 ACTIVE, STATE_BITS = 0xF, 0xF
-# Time from a claim that wins over ours to our silence, and from one that does not to our answer.
-ANSWER_NS = 100_000_000
+# Ticks from a claim that does not win over ours to our answer, at most.
+ANSWER_TICKS = 5
 WAIT_NS, SLACK_NS = 250_000_000, 1_000_000
 
 
@@ -94,18 +94,23 @@ class AddressRules:
         self._claim = (bus, 0x18EEFF00 | own, True)
         self._name: int | None = None
         self._claimed_ns = 0
-        self._answer_by_ns: int | None = None
+        self._unanswered: int | None = None  # so many ticks
         self.lost = False
         self.reloaded = False
 
-    def hear(self, frame: Frame, now_ns: int) -> None:
+    def ticked(self) -> None:
+        """A tick begins."""
+        if self._unanswered is not None:
+            self._unanswered += 1
+
+    def hear(self, frame: Frame) -> None:
         """A frame was read: is it a claim for our address?"""
         if frame[:3] != self._claim or len(frame.data) != 8 or self._name is None:
             return
         if int.from_bytes(frame.data, "little") <= self._name:
             self.lost, self.reloaded = True, False
-        elif not self.lost:
-            self._answer_by_ns = now_ns + ANSWER_NS
+        elif not self.lost and self._unanswered is None:
+            self._unanswered = 0
 
     def sent(self, frame: Frame, now_ns: int) -> str:
         """What is wrong with a frame of ours."""
@@ -117,7 +122,7 @@ class AddressRules:
             if self._name is None or self.lost:
                 self._claimed_ns = now_ns
             self._name = int.from_bytes(frame.data, "little")
-            self.lost, self._answer_by_ns = False, None
+            self.lost, self._unanswered = False, None
             return ""
         return self._under_it(now_ns) if frame.can_id & 0xFF == self._own else ""
 
@@ -127,6 +132,6 @@ class AddressRules:
             return "a frame before the address is ours"
         if self.lost:
             return "a frame from an address that is another's"
-        if self._answer_by_ns is not None and now_ns > self._answer_by_ns:
+        if self._unanswered is not None and self._unanswered > ANSWER_TICKS:
             return "a claim of our address was not answered"
         return ""

@@ -89,7 +89,7 @@ class Rules:
         for words in self._words.values():
             words.hear(frame, arrived_ns)
         for address in self.addresses.values():
-            address.hear(frame, arrived_ns if self._pending_ns is None else self._pending_ns)
+            address.hear(frame)
 
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""
@@ -107,6 +107,8 @@ class Rules:
             self._ticked_ns = now_ns
             for key in self._ticks:
                 self._ticks[key] += 1
+            for address in self.addresses.values():
+                address.ticked()
             for one in self.axes.values():
                 one.after(gap_ns, now_ns, longest_ns=self._longest_gap_ns)
         for name, one in self.axes.items():
