@@ -2,6 +2,7 @@
 
 import pytest
 
+from canshaper.service.controller import Controller
 from canshaper.shaping.states import State
 from tests.service.conftest import SLOW_VALVE
 from tests.service.emergency import (
@@ -181,4 +182,25 @@ def test_it_is_pressed_between_its_frames_too(changed_rig: Make, code: int, step
     machine.rig.receive(machine.stop(0))
     machine.rig.run(2)
     machine.rig.run(2, Reset=1)
+    assert machine.states() == READY
+
+
+def test_a_short_press_just_before_a_reload_is_one_behind_it(machine: Machine) -> None:
+    """Pressed and free again, and no tick of the controller before has seen it."""
+    rig = machine.rig
+    machine.run(3)
+    rig.receive(machine.stop(1))
+    rig.receive(machine.stop(0))
+    before, rig.controller = rig.controller, Controller(rig.deployment)
+    rig.controller.follow(before)
+    machine.run(3)
+    assert machine.states() == PRESSED
+
+
+def test_without_a_press_a_reload_trips_nothing(machine: Machine) -> None:
+    rig = machine.rig
+    machine.run(3)
+    before, rig.controller = rig.controller, Controller(rig.deployment)
+    rig.controller.follow(before)
+    machine.run(3)
     assert machine.states() == READY
