@@ -31,6 +31,7 @@ class AxisRules:
         self._presses = 0
         self._pressed_again = False
         self._skipped = 0
+        self.lost = 0  # frames that were not sent since the last one
         self._count: int | None = None
 
     # -- before a frame ---------------------------------------------------------------------------
@@ -128,8 +129,9 @@ class AxisRules:
         field = self.axis.valve_counter
         if field is None or self.axis.valve_key[1] == self.axis.lever.key[1]:  # the lever's own
             return ""
+        gaps, self.lost = 1 + late + self._skipped + self.lost, 0
         last, self._count = self._count, self.axis.sent(frame.data)[1]
-        if last is None or 1 <= (self._count - last) & field.mask <= 1 + late + self._skipped:
+        if last is None or 1 <= (self._count - last) & field.mask <= gaps:
             return ""
         return f"alive counter {self._count} after {last}"
 

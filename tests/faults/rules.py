@@ -94,8 +94,9 @@ class Rules:
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""
         for one in self._by_valve.get(frame[:3], ()):
-            one.count(frame, late=False)
-            one.causes.add("the last frame was not sent")
+            one.lost += 1
+            if one.velocity or one.axis.sent(frame.data)[0]:  # at rest nothing is lost
+                one.causes.add("the last frame was not sent")
 
     def decide(self) -> None:
         """Bring every axis to what has been read."""
