@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.service.controller import Controller
+from canshaper.controller.controller import Controller
 from canshaper.shaping.states import State
 from tests.service.conftest import SLOW_VALVE
 from tests.service.emergency import (
