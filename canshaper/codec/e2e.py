@@ -10,7 +10,7 @@ half of byte 1. Other positions are not taken.
 
 from collections.abc import Sequence
 
-from canshaper.codec.crc8 import AUTOSAR, SAE_J1850
+from canshaper.checksums import AUTOSAR, SAE_J1850
 
 COUNTER = 0x0F
 """Bits of byte 1 that hold the counter."""

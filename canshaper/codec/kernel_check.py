@@ -2,9 +2,9 @@
 
 import struct
 
-from canshaper.codec.crc8 import AUTOSAR, SAE_J1850, Crc8
+from canshaper.checksums import AUTOSAR, CHECKSUMS, SAE_J1850, Checksum, Crc8, Xor
 from canshaper.codec.e2e import Profile1, Profile2
-from canshaper.codec.protection import Checksum, Protection
+from canshaper.codec.protection import Protection
 
 # linux/can/gw.h: attributes of a rule that compute a checksum.
 CS_XOR, CS_CRC8 = 5, 6
@@ -17,28 +17,31 @@ PLAIN, BY_COUNTER = 0, 2
 def neutral_fault(protection: Protection, length: int) -> str | None:
     """Why the kernel cannot protect a frame of so many bytes anew that it has changed, or None."""
     check = protection.check
-    if isinstance(check, Checksum) and check.kind == "sum":
-        return "can-gw of the kernel knows no checksum of the kind sum"
-    if isinstance(check, Checksum) and check.kind != "xor" and check.byte not in (0, length - 1):
-        return f"can-gw of the kernel reckons {check.kind} in the first or last byte only"
+    if isinstance(check, Checksum):
+        kernel = CHECKSUMS[check.kind].kernel
+        if not isinstance(kernel, Xor | Crc8):
+            return f"can-gw of the kernel knows no checksum of the kind {check.kind}"
+        if isinstance(kernel, Crc8) and check.byte not in (0, length - 1):
+            return f"can-gw of the kernel reckons {check.kind} in the first or last byte only"
     if isinstance(check, Profile1) and check.starts[0] != check.starts[1]:
         return "can-gw of the kernel knows no data ID that alternates"
     return None
 
 
 def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, bytes], ...], int]:
-    """The check as can-gw reckons it, and bits that have to be 0 before."""
+    """The check as can-gw reckons it, and bits that have to be 0 before; no ``neutral_fault``."""
     check = protection.check
     last = length - 1
     if check is None:
         return (), 0
-    if isinstance(check, Checksum) and check.kind == "xor":
-        # Over all bytes, its own among them, which therefore is 0 before.
-        return ((CS_XOR, _XOR.pack(0, last, check.byte, 0)),), 0xFF << 8 * check.byte
     if isinstance(check, Checksum):
-        crc = SAE_J1850 if check.kind == "crc8_sae_j1850" else AUTOSAR
+        kernel = CHECKSUMS[check.kind].kernel
+        if isinstance(kernel, Xor):
+            # Over all bytes, its own among them, which therefore is 0 before.
+            return ((CS_XOR, _XOR.pack(0, last, check.byte, kernel.start)),), 0xFF << 8 * check.byte
+        assert isinstance(kernel, Crc8)
         first = 1 if check.byte == 0 else 0
-        return _crc8(crc, (first, last - 1 + first, check.byte), crc.start, crc.end), 0
+        return _crc8(kernel, (first, last - 1 + first, check.byte), kernel.start, kernel.end), 0
     if isinstance(check, Profile1):
         return _crc8(SAE_J1850, (1, last, 0), check.starts[0], 0), 0
     assert isinstance(check, Profile2)

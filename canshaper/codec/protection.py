@@ -4,44 +4,15 @@ The rule of the counter is that of E2E: a step of 1 up to a largest one is good 
 is a repetition and no news, a larger one is a wrong sequence.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import reduce
-from operator import xor
 from typing import Any, Self
 
-from canshaper.codec.crc8 import AUTOSAR, SAE_J1850
+from canshaper.checksums import Checksum
 from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.layout import Layout
 
-CHECKSUMS: dict[str, Callable[[bytes], int]] = {
-    "xor": lambda data: reduce(xor, data, 0),
-    "sum": lambda data: sum(data) & 0xFF,
-    "crc8_sae_j1850": SAE_J1850.of,
-    "crc8_autosar": AUTOSAR.of,
-}
-"""Eight-bit checksums by name, over all bytes of a frame but the one that holds the checksum."""
-
 GOOD = FrameFault.NONE  # by way of the class it takes ten times as long
-
-
-@dataclass(frozen=True, slots=True)
-class Checksum:
-    """One of ``CHECKSUMS`` and the byte that holds it."""
-
-    kind: str
-    byte: int
-
-    def right(self, data: bytes) -> bool:
-        """Whether a frame has the checksum that it should."""
-        at = self.byte
-        return CHECKSUMS[self.kind](data[:at] + data[at + 1 :]) == data[at]
-
-    def seal(self, data: bytes, count: int) -> bytes:
-        """The same frame with its checksum; the counter is one of its signals."""
-        before, after = data[: self.byte], data[self.byte + 1 :]
-        return before + bytes((CHECKSUMS[self.kind](before + after),)) + after
 
 
 @dataclass(frozen=True, slots=True)

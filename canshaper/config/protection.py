@@ -1,18 +1,24 @@
 """How a message is protected, taken or sent: counter and checksum, or a profile of AUTOSAR E2E."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, model_validator
+from pydantic import BeforeValidator, Field, model_validator
 
+from canshaper.checksums import checksum_names, known_checksum
 from canshaper.config.section import Section, number
 
 
-class Checksum(Section):
-    """Checksum of a message, over all its bytes but the one that holds it."""
+def _kinds(schema: dict[str, Any]) -> None:
+    """Names of the kinds into the JSON schema, when that is made."""
+    schema["enum"] = checksum_names()
 
-    signal: str = Field(description="signal that holds it: 8 bits that fill a byte")
-    kind: Literal["xor", "sum", "crc8_sae_j1850", "crc8_autosar"] = Field(
-        description="how it is computed"
+
+class Checksum(Section):
+    """Checksum of a message, over all its bits but its own."""
+
+    signal: str = Field(description="signal that holds it: half a byte, a byte, or two bytes")
+    kind: Annotated[str, BeforeValidator(known_checksum)] = Field(
+        description="how it is computed", examples=["crc8_sae_j1850"], json_schema_extra=_kinds
     )
 
 

@@ -273,5 +273,6 @@ class _Binder(FilterBinder):
         self.problems += [file.problem(message, fault) for fault in faults]
         ticks = self.period(file, message)
         use = dict.fromkeys(codec.SIGNALS, "a signal of the status")
-        protection = self.protection(place, status, message, use)
+        address = self.address(status.bus, message, takes=False)
+        protection = self.protection(place, status, message, use, address)
         return (self.sender(status.bus, message, protection), ticks) if ticks else None

@@ -302,7 +302,8 @@ class InputBinder(ProtectionBinder):
         self, place: Place, config: Input, message: Message, use: dict[str, str]
     ) -> Protection:
         """Protection of a message that is taken, and the largest step of its counter."""
-        protection = self.protection(place, config, message, use)
+        address = self.address(config.bus, message, takes=True, source=config.source)
+        protection = self.protection(place, config, message, use, address)
         most = protection.counts // 2
         # Beyond half of its range a step back could not be told from a step forward.
         if protection.counts and (config.alive_max_step or 0) > most:

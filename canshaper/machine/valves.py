@@ -152,7 +152,8 @@ class ValveBinder(InputBinder):
         file, message = found
         ticks = self.period(file, message)
         use: dict[str, str] = {}
-        protection = self.protection(place, valve, message, use)
+        address = self.address(valve.bus, message, takes=taken is not None, source=source)
+        protection = self.protection(place, valve, message, use, address)
         if taken is None:
             codec = ValveMessage(self.sender(valve.bus, message, protection))
         else:

@@ -4,8 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.checksums import Checksum
 from canshaper.codec.e2e import Profile1, Profile2
-from canshaper.codec.protection import Checksum, Protection
+from canshaper.codec.protection import Protection
 from tests.can.protected_machine import IDS, LEVER, RADIUS, STATUS, VALVES, line_of, load, problems
 
 VALVE_OF = {

@@ -5,8 +5,9 @@ from pathlib import Path
 import cantools
 import pytest
 
+from canshaper.checksums import Checksum
 from canshaper.codec.kernel_check import neutral_fault
-from canshaper.codec.protection import Checksum, Protection
+from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.config.source import DeploymentError
 from canshaper.machine.binding import load_deployment

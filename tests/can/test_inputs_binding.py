@@ -2,9 +2,11 @@
 
 import pytest
 
+from canshaper.checksums import CHECKSUMS, Checksum, ChecksumKind
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import UNPROTECTED, Checksum, Protection
+from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.controller.controller import Controller
+from tests.can.checksum_reference import PLACES
 from tests.can.conftest import Machine
 
 COUNTER = "alive_counter: AliveCounter"
@@ -64,8 +66,10 @@ def test_a_lever_without_protection(machine: Machine) -> None:
     assert (config.alive_max_step, config.qualify, config.frozen_s) == (None, 1, 20.0)
 
 
-@pytest.mark.parametrize("kind", ["xor", "sum", "crc8_sae_j1850", "crc8_autosar"])
+@pytest.mark.parametrize("kind", CHECKSUMS)
 def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
+    place = PLACES[CHECKSUMS[kind].bits]
+    protected.in_dbc(SIGNALS, f' SG_ Check : {place} (1,0) [0|1] "" SHAPER\n')
     lever(
         protected,
         f"checksum: {{ signal: Check, kind: {kind} }}",
@@ -75,7 +79,11 @@ def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
     )
     deployment = protected.load()
     left, right = deployment.levers.values()
-    assert left.protection == Protection("AliveCounter", 256, Checksum(kind, 6))
+    byte = int(place.partition("|")[0]) // 8
+    assert left.protection == Protection("AliveCounter", 256, Checksum(kind, byte))
+    check = left.protection.check
+    assert isinstance(check, Checksum)
+    assert check.can_id == 0x110
     assert right.protection == Protection("AliveCounter", 256)
     Controller(deployment)
 
@@ -104,6 +112,61 @@ def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
 
 
 @pytest.mark.parametrize(
+    ("signal", "place"),
+    [
+        ("40|4@1+", Checksum("sum4", 5)),
+        ("43|4@0+", Checksum("sum4", 5)),
+        ("44|4@1+", Checksum("sum4", 5, 4)),
+        ("47|4@0+", Checksum("sum4", 5, 4)),
+        ("40|16@1+", Checksum("crc16_arc", 5)),
+        ("47|16@0+", Checksum("crc16_arc", 5, 0, "big")),
+    ],
+)
+def test_a_checksum_of_another_width(protected: Machine, signal: str, place: Checksum) -> None:
+    protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
+    lever(protected, f"checksum: {{ signal: Check, kind: {place.kind} }}")
+    assert protected.load().levers["left"].protection.check == place
+
+
+@pytest.mark.parametrize(
+    ("kind", "signal", "part"),
+    [
+        ("sum4", "42|4@1+", "half of a byte"),
+        ("sum4", "46|4@0+", "half of a byte"),
+        ("sum4", "48|8@1+", "half of a byte"),
+        ("sum4", "48|4@1-", "half of a byte"),
+        ("crc16_arc", "48|8@1+", "pair of bytes"),
+        ("crc16_arc", "44|12@1+", "pair of bytes"),
+        ("crc16_arc", "39|16@1+", "pair of bytes"),
+        ("crc16_arc", "47|12@0+", "pair of bytes"),
+        ("crc16_arc", "40|16@1-", "pair of bytes"),
+    ],
+)
+def test_a_checksum_that_fills_no_such_part(
+    protected: Machine, kind: str, signal: str, part: str
+) -> None:
+    protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
+    line = lever(protected, f"checksum: {{ signal: Check, kind: {kind} }}")
+    assert protected.problems() == [
+        f"machine.yaml:{line}: levers.left.checksum.signal: Check is no unsigned {part} of its own;"
+        " allowed is one that is"
+    ]
+
+
+def test_an_algorithm_that_fails_is_a_problem_of_the_file(
+    protected: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not of the first tick."""
+    row = ChecksumKind("", 8, lambda _id, _place, data: data[99])
+    monkeypatch.setitem(CHECKSUMS, "fails", row)
+    line = lever(protected, "checksum: { signal: Check, kind: fails }")
+    assert protected.problems() == [
+        f"machine.yaml:{line}: levers.left.checksum.kind: found 'fails', which fails on LeverLeft:"
+        " IndexError: index out of range"
+    ]
+
+
+@pytest.mark.parametrize(
     ("text", "says"),
     [
         (
@@ -113,8 +176,8 @@ def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
         ),
         (
             "checksum: { signal: Check, kind: crc8 }",
-            "levers.left.checksum.kind: found 'crc8', allowed is 'xor', 'sum', 'crc8_sae_j1850' or"
-            " 'crc8_autosar'",
+            "levers.left.checksum.kind: found 'crc8', allowed is"
+            f" {', '.join(map(repr, [*CHECKSUMS][:-1]))} or {[*CHECKSUMS][-1]!r}",
         ),
         ("checksum: { signal: Check }", "levers.left.checksum.kind: "),
         ("checksum: { kind: xor }", "levers.left.checksum.signal: "),

@@ -6,9 +6,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.checksums import CHECKSUMS, Checksum, ChecksumKind, Xor
 from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2
 from canshaper.codec.kernel_check import kernel_check, neutral_fault
-from canshaper.codec.protection import CHECKSUMS, Checksum, Protection
+from canshaper.codec.protection import Protection
 from canshaper.protocols.gateway.cangw import CS_CRC8, CS_XOR, changed_bytes
 
 LENGTH = 8
@@ -38,15 +39,42 @@ def by_the_kernel(check: Checksum | E2e, data: bytes) -> bytes:
 frames = st.binary(min_size=LENGTH, max_size=LENGTH)
 
 
-@pytest.mark.parametrize(("kind", "byte"), [
-    ("xor", 0), ("xor", 3), ("xor", 7), ("crc8_sae_j1850", 0), ("crc8_sae_j1850", 7),
-    ("crc8_autosar", 0), ("crc8_autosar", 7),
-])  # fmt: skip
+POSSIBLE = [
+    Checksum(kind, byte)
+    for kind in CHECKSUMS
+    for byte in range(LENGTH)
+    if neutral_fault(Protection(check=Checksum(kind, byte)), LENGTH) is None
+]
+
+
+def test_a_row_is_possible_by_what_it_says() -> None:
+    kernel = {kind: row.kernel for kind, row in CHECKSUMS.items()}
+    assert {check.kind for check in POSSIBLE} == {kind for kind, one in kernel.items() if one}
+    assert [c.byte for c in POSSIBLE if c.kind == "xor"] == list(range(LENGTH))
+    assert [c.byte for c in POSSIBLE if c.kind == "crc8_autosar"] == [0, LENGTH - 1]
+
+
+@pytest.mark.parametrize("check", POSSIBLE, ids=str)
 @given(data=frames)
-def test_checksums(kind: str, byte: int, data: bytes) -> None:
-    check = Checksum(kind, byte)
-    assert kind in CHECKSUMS
+def test_checksums(check: Checksum, data: bytes) -> None:
     assert by_the_kernel(check, data) == check.seal(data, 0)
+
+
+@pytest.mark.parametrize("kind", [kind for kind, row in CHECKSUMS.items() if not row.kernel])
+def test_no_other_is_sent_in_place_of_one_that_the_kernel_cannot_make(kind: str) -> None:
+    protection = Protection(check=Checksum(kind, 0))
+    text = f"can-gw of the kernel knows no checksum of the kind {kind}"
+    assert neutral_fault(protection, LENGTH) == text
+    with pytest.raises(AssertionError):
+        kernel_check(protection, LENGTH)
+
+
+@given(data=frames)
+def test_exclusive_or_with_another_start(data: bytes) -> None:
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setitem(CHECKSUMS, "xor_5a", ChecksumKind("from 0x5A", 8, Xor(0x5A)))
+        check = Checksum("xor_5a", 2)
+        assert by_the_kernel(check, data) == check.seal(data, 0)
 
 
 @pytest.mark.parametrize("mode", ["both", "low", "nibble"])

@@ -58,6 +58,8 @@ def one_of(arguments: tuple[Any, ...], kind: str) -> Any:
 def of_field(field: FieldInfo, kind: str) -> Any:
     if isinstance(field.default, str):
         return field.default
+    if field.examples:
+        return field.examples[0]
     return whole(field.annotation, kind, (field,))
 
 

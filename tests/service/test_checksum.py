@@ -1,26 +1,20 @@
 """A lever whose frames carry a checksum: a right one, a wrong one."""
 
 from collections.abc import Callable
-from functools import reduce
-from operator import xor
 from typing import Any
 
 import pytest
-from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
 
+from canshaper.checksums import CHECKSUMS
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
+from tests.can.checksum_reference import PLACES, with_checksum
 from tests.service.conftest import Rig
 
 # timeout_ms of the shipped levers, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
-CHECK_AT = 6
 ALL = "    alive_counter: AliveCounter\n"
-CHECK = {
-    ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n': (
-        ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n SG_ Check : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
-    )
-}
+RESET = ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n'
 
 
 Make = Callable[..., Rig]
@@ -38,27 +32,20 @@ def last_fault(rig: Rig) -> FrameFault:
     return rig.controller.counters.last_fault
 
 
-KINDS: dict[str, Callable[[bytes], int]] = {
-    "xor": lambda data: reduce(xor, data),
-    "sum": lambda data: sum(data) % 256,
-    "crc8_sae_j1850": Crc8SaeJ1850.calc,
-    "crc8_autosar": Crc8Autosar.calc,
-}
-
-
 class Protected:
-    """A rig whose levers carry a checksum, made by the library."""
+    """A rig whose levers carry a checksum, made by the reference."""
 
     def __init__(self, make: Make, kind: str = "crc8_sae_j1850") -> None:
         line = f"    checksum: {{ signal: Check, kind: {kind} }}\n"
-        self.rig = make({ALL: ALL + line}, CHECK)
-        self._calculate = KINDS[kind]
+        self._kind, self._bits = kind, CHECKSUMS[kind].bits
+        check = f' SG_ Check : {PLACES[self._bits]} (1,0) [0|1] "" SHAPER\n'
+        self.rig = make({ALL: ALL + line}, {RESET: RESET + check})
 
     def frame(self, name: str = "LeverLeft", *, error: int = 0, **raw: int) -> Frame:
         frame = self.rig.lever(name, Check=0, **raw)
-        data = bytearray(frame.data)
-        data[CHECK_AT] = error ^ self._calculate(bytes(data[:CHECK_AT] + data[CHECK_AT + 1 :]))
-        return frame._replace(data=bytes(data))
+        data = with_checksum(self._kind, self._bits, frame.can_id, frame.data)
+        wrong = data[:6] + bytes((data[6] ^ error,)) + data[7:]  # each has a bit in byte 6
+        return frame._replace(data=wrong)
 
     def run(self, ticks: int = 1, *, error: int = 0, **raw: int) -> dict[str, dict[str, Any]]:
         sent: dict[str, dict[str, Any]] = {}
@@ -68,7 +55,7 @@ class Protected:
         return sent
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", CHECKSUMS)
 def test_a_lever_with_a_right_checksum_drives(changed_rig: Make, kind: str) -> None:
     protected = Protected(changed_rig, kind)
     protected.run(3)
@@ -76,7 +63,7 @@ def test_a_lever_with_a_right_checksum_drives(changed_rig: Make, kind: str) -> N
     assert protected.rig.count("InvalidSignals") == 0
 
 
-@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("kind", CHECKSUMS)
 def test_a_lever_with_a_wrong_checksum_never_arms(changed_rig: Make, kind: str) -> None:
     protected = Protected(changed_rig, kind)
     protected.run(20, error=1)

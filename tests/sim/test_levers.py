@@ -1,14 +1,12 @@
 """The simulated levers: what they send is right for every protection that a deployment may ask."""
 
 from collections.abc import Callable
-from functools import reduce
-from operator import xor
 from pathlib import Path
-from typing import Any
 
 import pytest
-from crccheck.crc import Crc8Autosar, Crc8SaeJ1850
+from crccheck.crc import Crc8Autosar
 
+from canshaper.checksums import CHECKSUMS
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
@@ -16,11 +14,11 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import SCRIPTS, random_script
+from tests.can.checksum_reference import PLACES, with_checksum
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = random_script(1)
 
-CHECK = ' SG_ Check : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
 RESET = ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n'
 COUNTER = "    alive_counter: AliveCounter\n"
 LAST = "status: { bus: crane, message: ShaperStatus }"
@@ -49,7 +47,8 @@ def machine(tmp_path: Path) -> Make:
         check = f"    checksum: {{ signal: Check, kind: {kind} }}\n"
         text = text.replace(COUNTER, COUNTER + check)
         dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
-        dbc = dbc.replace(RESET, RESET + CHECK).replace("BO_ 512 SlewCommand", STOP_DBC)
+        check = f' SG_ Check : {PLACES[CHECKSUMS[kind].bits]} (1,0) [0|1] "" SHAPER\n'
+        dbc = dbc.replace(RESET, RESET + check).replace("BO_ 512 SlewCommand", STOP_DBC)
         left, right, stop = (f'BA_ "GenMsgCycleTime" BO_ {n} ' for n in (272, 273, 64))
         dbc = dbc.replace(f"{left}20;", f"{left}{cycles[0]};\n{stop}{cycles[2]};")
         dbc = dbc.replace(f"{right}20;", f"{right}{cycles[1]};")
@@ -69,24 +68,19 @@ def frames(node: LeverNode, milliseconds: int) -> dict[int, list[tuple[int, byte
     return found
 
 
-CHECKSUMS: dict[str, Callable[[bytes], Any]] = {
-    "xor": lambda data: reduce(xor, data),
-    "sum": lambda data: sum(data) % 256,
-    "crc8_sae_j1850": Crc8SaeJ1850.calc,
-    "crc8_autosar": Crc8Autosar.calc,
-}
-
-
 @pytest.mark.parametrize("kind", CHECKSUMS)
 def test_every_frame_has_the_next_counter_and_its_checksum(machine: Make, kind: str) -> None:
     sent = frames(LeverNode(machine(kind), SCRIPT), 20_000)
-    for can_id, at, modulus, name in ((0x110, 6, 256, kind), (0x40, 2, 16, "crc8_autosar")):
+    for can_id, modulus in ((0x110, 256), (0x40, 16)):
         counter = 7 if can_id == 0x110 else 1
         counts = [data[counter] for _, data in sent[can_id]]
         assert len(counts) > modulus  # it went round
         assert counts == [(counts[0] + i) % modulus for i in range(len(counts))]
         for _, data in sent[can_id]:
-            assert data[at] == CHECKSUMS[name](data[:at] + data[at + 1 :])
+            if can_id == 0x110:
+                assert data == with_checksum(kind, CHECKSUMS[kind].bits, can_id, data)
+            else:
+                assert data[2] == Crc8Autosar.calc(data[:2])
 
 
 @pytest.mark.parametrize("cycles", [(20, 20, 50), (20, 50, 20), (10, 20, 100), (30, 20, 50)])

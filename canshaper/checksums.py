@@ -1,0 +1,263 @@
+"""Checksums: one row for each kind, those of other packages too.
+
+A row is all that there is of a kind. From it come the names that a deployment file may have, the
+JSON schema, the table in docs/checksums.md, what is verified and what is sent, and what can-gw of
+the kernel may send instead of us.
+"""
+
+import binascii
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+from functools import cache, reduce
+from importlib.metadata import EntryPoint, entry_points
+from operator import xor
+from typing import Literal
+
+from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, Crc16Arc
+
+GROUP = "canshaper.checksums"
+"""Entry points of packages: the name of a kind, and the ``ChecksumKind`` that it is."""
+
+
+@dataclass(frozen=True, slots=True)
+class Checksum:
+    """The checksum of one message, as it is bound.
+
+    Attributes:
+        kind: its row in ``CHECKSUMS``.
+        byte: where it begins.
+        shift: its lowest bit in that byte: 4 in the upper half, else 0.
+        order: of its bytes, where it has two.
+        can_id: identifier of the message; two messages are never compared, only two deployments.
+    """
+
+    kind: str
+    byte: int
+    shift: int = 0
+    order: Literal["little", "big"] = "little"
+    can_id: int = field(default=0, compare=False)
+
+    def others(self, data: bytes) -> bytes:
+        """The bytes of a frame in which no bit of it lies."""
+        return data[: self.byte] + data[self.byte + (CHECKSUMS[self.kind].bits + 7) // 8 :]
+
+    def right(self, data: bytes) -> bool:
+        """Whether a frame has the checksum that it should."""
+        return self.seal(data, 0) == data
+
+    def seal(self, data: bytes, count: int) -> bytes:
+        """The same frame with its checksum; the counter is one of its signals."""
+        row, first, order = CHECKSUMS[self.kind], self.byte, self.order
+        bits = row.bits
+        size = (bits + 7) // 8
+        before, after = data[:first], data[first + size :]
+        rest = data[first] & 0xF0 >> self.shift if bits == 4 else 0  # the other half of the byte
+        clear = before + rest.to_bytes(size, order) + after
+        value = row.algorithm(self.can_id, self, clear) & (1 << bits) - 1
+        return before + (value << self.shift | rest).to_bytes(size, order) + after
+
+
+Algorithm = Callable[[int, Checksum, bytes], int]
+"""Checksum of a frame by its CAN id, the place of the checksum, and its data.
+
+The bits of the checksum are 0 in the data. Of the result the lowest bits count. It runs in every
+tick: it waits for nothing, keeps nothing and raises nothing.
+"""
+
+
+class KernelSum:
+    """Computed here and, from the same numbers, by the kernel: see ``codec.kernel_check``."""
+
+    def of(self, data: bytes) -> int:
+        """Checksum of these bytes."""
+        raise NotImplementedError
+
+    def __call__(self, _can_id: int, place: Checksum, data: bytes) -> int:
+        """That of a frame: over the bytes but the one that it lies in."""
+        at = place.byte
+        return self.of(data[:at] + data[at + 1 :])
+
+
+class Xor(KernelSum):
+    """Exclusive or of all bytes.
+
+    Attributes:
+        start: what it begins with.
+    """
+
+    def __init__(self, start: int = 0) -> None:
+        self.start = start
+
+    def of(self, data: bytes) -> int:
+        """Exclusive or of ``data`` and the start."""
+        return reduce(xor, data, self.start)
+
+
+class Crc8(KernelSum):
+    """The CRC of a class of crccheck that reflects nothing; the library works bit by bit.
+
+    Attributes:
+        start: the register before the first byte.
+        end: what the register is changed by after the last.
+        table: the register after one byte, by what both are together.
+    """
+
+    def __init__(self, library: type[Crc8Base]) -> None:
+        self.end: int = library.calc(b"", initvalue=0)
+        self.start: int = library.calc(b"") ^ self.end
+        self.table = bytes(library.calc(bytes((i,)), initvalue=0) ^ self.end for i in range(256))
+
+    def run(self, value: int, data: bytes) -> int:
+        """The register after ``data``, where it was ``value`` before."""
+        table = self.table
+        for byte in data:
+            value = table[value ^ byte]
+        return value
+
+    def of(self, data: bytes) -> int:
+        """CRC of ``data`` with the start value and the final inversion of the algorithm."""
+        return self.run(self.start, data) ^ self.end
+
+
+SAE_J1850 = Crc8(Crc8SaeJ1850)
+"""Polynomial 0x1D, start and end 0xFF."""
+AUTOSAR = Crc8(Crc8Autosar)
+"""Polynomial 0x2F, start and end 0xFF."""
+
+
+@dataclass(frozen=True, slots=True)
+class ChecksumKind:
+    """How a checksum is computed.
+
+    Attributes:
+        text: what it is, for people.
+        bits: its width: 4, 8 or 16.
+        algorithm: what computes it. A ``KernelSum`` computes it in the kernel too.
+        needs_id: whether the CAN id counts: the sender of such a message has to be known.
+
+    Raises:
+        ValueError: another width, or a ``KernelSum`` with another one than 8.
+    """
+
+    text: str
+    bits: int
+    algorithm: Algorithm
+    needs_id: bool = False
+
+    def __post_init__(self) -> None:
+        if self.bits not in (4, 8, 16):
+            raise ValueError(f"a checksum of {self.bits} bits, allowed are 4, 8 and 16")
+        if self.kernel and self.bits != 8:
+            raise ValueError(f"a checksum of can-gw of {self.bits} bits, allowed are 8")
+
+    @property
+    def kernel(self) -> KernelSum | None:
+        """What can-gw of the kernel has to be given to compute the same; None where it cannot."""
+        return self.algorithm if isinstance(self.algorithm, KernelSum) else None
+
+
+def _nibbles(_can_id: int, _place: Checksum, data: bytes) -> int:
+    return sum(data) + sum(byte >> 4 for byte in data)  # modulo 16 a byte is its lower half
+
+
+def _sum_id(can_id: int, _place: Checksum, data: bytes) -> int:
+    return sum(data) + sum(can_id.to_bytes(4, "little"))
+
+
+def _ccitt_false(_can_id: int, place: Checksum, data: bytes) -> int:
+    return binascii.crc_hqx(place.others(data), 0xFFFF)
+
+
+_ARC = tuple(Crc16Arc.calc(bytes((i,))) for i in range(256))
+
+
+def _arc(_can_id: int, place: Checksum, data: bytes) -> int:
+    value = 0
+    for byte in place.others(data):
+        value = value >> 8 ^ _ARC[(value ^ byte) & 0xFF]
+    return value
+
+
+CHECKSUMS: dict[str, ChecksumKind] = {
+    "xor": ChecksumKind("exclusive or of the bytes", 8, Xor()),
+    "sum": ChecksumKind("sum of the bytes", 8, lambda _id, _place, data: sum(data)),
+    "crc8_sae_j1850": ChecksumKind("CRC 0x1D, start and end 0xFF", 8, SAE_J1850),
+    "crc8_autosar": ChecksumKind("CRC 0x2F, start and end 0xFF (8H2F)", 8, AUTOSAR),
+    "sum_id": ChecksumKind("sum of the bytes and of those of the CAN id", 8, _sum_id, True),
+    "sum_length": ChecksumKind(
+        "sum of the bytes and of their number, with that of the checksum",
+        8,
+        lambda _id, _place, data: sum(data) + len(data),
+    ),
+    "sum4": ChecksumKind("sum of the half bytes", 4, _nibbles),
+    "crc16_ccitt_false": ChecksumKind("CRC 0x1021, start 0xFFFF (IBM 3740)", 16, _ccitt_false),
+    "crc16_arc": ChecksumKind("CRC 0x8005, reflected, start 0", 16, _arc),
+}
+"""Every kind by its name, over all bytes of a frame but its own. Those of packages join it when a
+deployment names them."""
+
+_OURS = frozenset(CHECKSUMS)
+
+
+def known_checksum(kind: object) -> str:
+    """The name of a kind, which is in ``CHECKSUMS`` from now on.
+
+    Raises:
+        ValueError: there is no such kind, or two have the name, or its package cannot be loaded;
+            one line for the person who wrote the deployment file.
+    """
+    name = kind if isinstance(kind, str) else ""
+    entries = _packages().get(name, [])
+    owners = [*["canshaper"] * (name in _OURS), *map(_owner, entries)]
+    if len(owners) > 1:
+        text = f"found {kind!r}, a name that {' and '.join(owners)} have"
+        raise ValueError(f"{text}; allowed is one package with it")
+    if entries and name not in CHECKSUMS:
+        CHECKSUMS[name] = _loaded(entries[0])
+    if name not in CHECKSUMS:
+        *first, last = map(repr, checksum_names())
+        raise ValueError(f"found {kind!r}, allowed is {', '.join(first)} or {last}")
+    return name
+
+
+def checksum_names() -> list[str]:
+    """Names of all kinds, ours first; no package is loaded for it."""
+    return list(dict.fromkeys([*CHECKSUMS, *_packages()]))
+
+
+def checksum_table() -> Iterator[str]:
+    """The table of all kinds in Markdown, line by line.
+
+    Raises:
+        ValueError: as ``known_checksum``.
+    """
+    yield "| kind | bits | what it is | can-gw of the kernel makes it |"
+    yield "|---|---|---|---|"
+    for row in ((name, CHECKSUMS[known_checksum(name)]) for name in checksum_names()):
+        name, kind = row
+        yield f"| `{name}` | {kind.bits} | {kind.text} | {'yes' if kind.kernel else 'no'} |"
+
+
+@cache
+def _packages() -> dict[str, list[EntryPoint]]:
+    """What packages declare, by name: read once, and when a deployment has a checksum."""
+    declared: dict[str, list[EntryPoint]] = {}
+    for entry in entry_points(group=GROUP):
+        declared.setdefault(entry.name, []).append(entry)
+    return declared
+
+
+def _owner(entry: EntryPoint) -> str:
+    return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
+
+
+def _loaded(entry: EntryPoint) -> ChecksumKind:
+    text = f"found {entry.name!r} of the package {_owner(entry)}"
+    try:
+        kind = entry.load()
+    except Exception as error:  # whatever the package does
+        reason = " ".join(f"{type(error).__name__}: {error}".split())
+        raise ValueError(f"{text}, which cannot be loaded: {reason}") from None
+    if not isinstance(kind, ChecksumKind):
+        raise ValueError(f"{text}, which is a {type(kind).__name__}; allowed is a ChecksumKind")
+    return kind
