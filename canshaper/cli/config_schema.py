@@ -1,24 +1,68 @@
 """``canshaper config-schema``: the JSON schema of the deployment file, for editors."""
 
 import json
+from collections.abc import Iterable, Iterator
 
+import typer
+
+from canshaper.cli.common import fail
 from canshaper.cli.console import echo
+from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 
 
-def config_schema() -> None:
+def config_schema(
+    filters: bool = typer.Option(
+        False, "--filters", help="Instead the table of filters, as in docs/deployment.md."
+    ),
+) -> None:
     """Print the JSON schema of the deployment file.
 
     Editors with a YAML language server check and complete a file that starts with
 
       # yaml-language-server: $schema=deployment.schema.json
 
+    Filters of other packages that are installed are in the schema, and in the table.
+
     Examples:
 
       canshaper config-schema > deployment.schema.json
-    """
-    from canshaper.config.schema import DeploymentConfig
 
+      canshaper config-schema --filters
+    """
+    from canshaper.config.load import check_packages
+    from canshaper.config.schema import DeploymentConfig
+    from canshaper.config.source import DeploymentError
+    from canshaper.shaping.registry import KINDS
+
+    try:
+        check_packages()
+    except DeploymentError as error:
+        raise fail(error) from None
+    if filters:
+        echo("\n".join(filter_table(KINDS.values())))
+        return
     schema = DeploymentConfig.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
     schema["title"] = "canshaper deployment"
     echo(json.dumps(schema, indent=2))
+
+
+def filter_table(kinds: Iterable[ShaperKind]) -> Iterator[str]:
+    """Lines of a Markdown table of filters."""
+    yield "| `kind` | parameters | what it is | needs `sway` |"
+    yield "|---|---|---|---|"
+    for kind in kinds:
+        parameters = "; ".join(_cell(parameter) for parameter in kind.parameters)
+        text = kind.summary
+        if kind.designed_by:
+            text += f" Designed by `canshaper {kind.designed_by}`."
+        yield f"| `{kind.name}` | {parameters} | {text} | {'yes' if kind.needs_sway else ''} |"
+
+
+def _cell(parameter: Parameter) -> str:
+    default = "" if parameter.default is None else f" (default {parameter.default:g})"
+    optional = " (optional)" if parameter.optional else ""
+    least, most = parameter.entries or (1, 1)
+    count = "" if most == 1 else f"{most} of " if least == most else f"{least} to {most} of "
+    limits = f"{count}{parameter.low:g} to {parameter.high:g} {parameter.unit}".rstrip()
+    return f"`{parameter.name}`{optional}{default}: {parameter.description}, {limits}"

@@ -33,9 +33,18 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
         DeploymentError: with every problem of the file, each with its line; or a package that adds
             filters has a fault, and which filters there are is not sure.
     """
+    check_packages()
+    return load_section(path, DeploymentConfig)
+
+
+def check_packages() -> None:
+    """Refuse to go on where a package that adds filters has a fault.
+
+    Raises:
+        DeploymentError: one problem for each fault, with the name of the package.
+    """
     if FAULTS:
         raise DeploymentError([Problem(package, None, "", text) for package, text in FAULTS])
-    return load_section(path, DeploymentConfig)
 
 
 def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:

@@ -30,7 +30,9 @@ def with_entry_points(
         try:
             kind = point.load()
             if not isinstance(kind, ShaperKind):
-                raise ValueError(f"found a {type(kind).__name__}, allowed is a ShaperKind")
+                raise ValueError(
+                    f"found a value of type {type(kind).__name__}, allowed is a ShaperKind"
+                )
             if kind.name in known:
                 raise ValueError(f"the kind {kind.name!r} is there already")
         except Exception as error:  # a module of another package may raise anything

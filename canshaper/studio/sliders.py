@@ -54,7 +54,7 @@ def _calm(name: str, axis: AxisConfig) -> list[Number]:
     if axis.sway is None:  # the daemon refuses: without a model there is nothing to join to
         return []
     parameters = KINDS[axis.filter.kind].parameters
-    powers = {p.name: p.stretch_power for p in parameters if p.stretch_power}
+    powers = {p.name: p.stretch for p in parameters if p.stretch}
     return _numbers(f"axes.{name}.filter", axis.filter, powers)
 
 

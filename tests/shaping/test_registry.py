@@ -198,7 +198,7 @@ def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -
     [
         (ImportError("No module\nnamed x"), "ImportError: No module named x"),
         (kind_of("zv"), "ValueError: the kind 'zv' is there already"),
-        (7, "ValueError: found a int, allowed is a ShaperKind"),
+        (7, "ValueError: found a value of type int, allowed is a ShaperKind"),
     ],
 )
 def test_a_package_that_gives_no_kind_is_named_and_the_next_one_counts(

@@ -131,20 +131,26 @@ def _two_mode(sway: SwayModel, *, period_s: float, damping_ratio: float) -> Shap
 
 
 KINDS = (
-    ShaperKind("zv", "Zero vibration.", _zv, lambda _mode, _tick_s: {"ZV": {}}, needs_sway=True),
     ShaperKind(
-        *("zvd", "Zero vibration and derivative.", _zvd),
+        "zv",
+        "Zero vibration: two impulses, half a swing apart.",
+        _zv,
+        lambda _mode, _tick_s: {"ZV": {}},
+        needs_sway=True,
+    ),
+    ShaperKind(
+        "zvd",
+        "Zero vibration and derivative: ZV twice, forgives more error of the period.",
+        _zvd,
         lambda _mode, _tick_s: {"ZVD": {}},
         needs_sway=True,
     ),
     ShaperKind(
-        *("ei", "Extra-insensitive.", _ei),
+        "ei",
+        "Extra-insensitive: leaves some swing at the nominal period, none next to it.",
+        _ei,
         lambda _mode, _tick_s: {"EI 5 %": {"residual_pct": 5.0}},
-        (
-            Parameter(
-                *("residual_pct", 0.1, 20, "%", "swing left at the nominal period"), default=5.0
-            ),
-        ),
+        (Parameter("residual_pct", 0.1, 20, "%", "swing left at the nominal period", default=5.0),),
         needs_sway=True,
     ),
     ShaperKind(

@@ -160,35 +160,31 @@ def _settings(mode: SwayMode, _tick_s: float) -> dict[str, Parameters]:
     }
 
 
+_PARAMETERS = (
+    Parameter("a1", 1e-3, 20, "s", "coefficient a1 of the denominator", optional=True, stretch=1.0),
+    Parameter(
+        "a2", 1e-6, 100, "s^2", "coefficient a2 of the denominator", optional=True, stretch=2.0
+    ),
+    Parameter(
+        "poles_rad_s", -100, -0.1, "rad/s", "pole of the filter", optional=True, entries=(2, 2)
+    ),
+    Parameter(
+        "third_pole_rad_s",
+        -100,
+        -0.1,
+        "rad/s",
+        "a third pole, which removes the first jump",
+        optional=True,
+        stretch=-1.0,
+    ),
+)
 KINDS = (
     ShaperKind(
         "gff",
-        "The limit-aware G_FF, by its denominator (a1, a2) or by its poles.",
+        "The limit-aware G_FF, by a1 and a2 (its denominator) or by its poles.",
         _gff,
         _settings,
-        (
-            Parameter(
-                *("a1", 1e-3, 20, "s", "coefficient a1 of the denominator"),
-                optional=True,
-                stretch_power=1.0,
-            ),
-            Parameter(
-                *("a2", 1e-6, 100, "s^2", "coefficient a2 of the denominator"),
-                optional=True,
-                stretch_power=2.0,
-            ),
-            Parameter(
-                *("poles_rad_s", -100, -0.1, "rad/s", "pole of the filter"),
-                optional=True,
-                entries=(2, 2),
-            ),
-            Parameter(
-                *("third_pole_rad_s", -100, -0.1, "rad/s"),
-                "a third pole, which removes the first jump",
-                optional=True,
-                stretch_power=-1.0,
-            ),
-        ),
+        _PARAMETERS,
         needs_sway=True,
         limit_aware=True,
         check=_check,

@@ -48,7 +48,7 @@ class Parameter:
         default: value where the key is missing.
         optional: the key may be missing, and then the constructor does not get it.
         entries: of a list: least and largest number of entries.
-        stretch_power: power of a factor by which the studio stretches the filter in time.
+        stretch: power of a factor by which the studio stretches the filter in time.
 
     Raises:
         ValueError: the default is outside of the range, or there is no range.
@@ -63,7 +63,7 @@ class Parameter:
     default: float | None = None
     optional: bool = False
     entries: tuple[int, int] | None = None
-    stretch_power: float = 0.0
+    stretch: float = 0.0
 
     def __post_init__(self) -> None:
         value = self.low if self.default is None else self.default

@@ -110,13 +110,11 @@ def _settings(mode: SwayMode, tick_s: float) -> dict[str, Parameters]:
 KINDS = (
     ShaperKind(
         "robust",
-        "A non-negative impulse response, designed for a range of pendulum lengths.",
+        "A non-negative impulse response, for a range of pendulum lengths, made limit-aware.",
         _robust,
         _settings,
         (
-            Parameter(
-                *("tick_ms", 1, 200, "ms", "period of the taps: that of the valve"), whole=True
-            ),
+            Parameter("tick_ms", 1, 200, "ms", "period of the taps: that of the valve", whole=True),
             Parameter("taps", 0, 1, "", "tap of the impulse response", entries=(1, 1000)),
         ),
         needs_sway=True,

@@ -1,0 +1,163 @@
+"""A package that adds a kind of filter: one file, and the kind is wherever the others are."""
+
+import json
+import os
+import shutil
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "own_filter"
+SLEW = "filter: { kind: gff, a1: 0.708, a2: 0.12 }"
+OWN = "filter: { kind: moving_average, window_s: %s }"
+# What a drive, the comparison and a process of the comparison do with the kind.
+WORK = """
+import json, pickle, sys
+from pathlib import Path
+from canshaper.design.comparison.candidates import candidates
+from canshaper.design.comparison.manoeuvres import manoeuvres
+from canshaper.design.comparison.measure import measure
+from canshaper.design.comparison.summary import rows
+from canshaper.design.lockstep import drive
+from canshaper.machine.binding import load_deployment
+from canshaper_sim.operator import script_named
+
+deployment = load_deployment(Path(sys.argv[1]))
+sent = drive(deployment, script_named("pulse-slew")).axes["slew"].sent
+own = [c for c in candidates(deployment, "slew") if c.filter.kind == "moving_average"]
+outcomes = [measure(deployment, "slew", c, manoeuvres("slew")[0], 0) for c in own]
+print(json.dumps({
+    "sent": sent,
+    "rows": [(c.name, c.ours, c.radial) for c in own],
+    "same": pickle.loads(pickle.dumps(own)) == own,
+    "residual_deg": [o.residual_deg for o in outcomes],
+}))
+"""
+
+
+def installed(directory: Path, module: str = "") -> Path:
+    """The package of the example as an installer leaves it; with another module on request."""
+    project = tomllib.loads((EXAMPLE / "pyproject.toml").read_text())["project"]
+    info = directory / f"crane_extras-{project['version']}.dist-info"
+    info.mkdir(parents=True)
+    heading = f"Name: {project['name']}\nVersion: {project['version']}\n"
+    (info / "METADATA").write_text(f"Metadata-Version: 2.1\n{heading}")
+    points = project["entry-points"]["canshaper.shapers"]
+    lines = ["[canshaper.shapers]", *(f"{name} = {value}" for name, value in points.items())]
+    (info / "entry_points.txt").write_text("\n".join(lines) + "\n")
+    shutil.copy(EXAMPLE / "moving_average.py", directory)
+    if module:
+        (directory / "moving_average.py").write_text(module)
+    return directory
+
+
+def python(packages: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command, environment = [sys.executable, *arguments], {**os.environ, "PYTHONPATH": str(packages)}
+    return subprocess.run(
+        command, env=environment, cwd=ROOT, capture_output=True, text=True, check=False
+    )
+
+
+def canshaper(packages: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    return python(packages, "-m", "canshaper", *arguments)
+
+
+@pytest.fixture(scope="module")
+def packages(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return installed(tmp_path_factory.mktemp("packages"))
+
+
+def machine(directory: Path, window_s: str) -> tuple[Path, int]:
+    """A machine whose slew axis has the filter, and the line that it stands in."""
+    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+    assert SLEW in text
+    text = text.replace("../dbc", str(ROOT / "dbc")).replace(SLEW, OWN % window_s, 1)
+    file = directory / "machine.yaml"
+    file.write_text(text, encoding="utf-8")
+    return file, text[: text.index("moving_average")].count("\n") + 1
+
+
+def test_it_is_in_the_schema_and_in_the_table(packages: Path) -> None:
+    schema = json.loads(canshaper(packages, "config-schema").stdout)
+    kinds = schema["$defs"]["AxisConfig"]["properties"]["filter"]["discriminator"]["mapping"]
+    assert kinds["moving_average"] == "#/$defs/MovingAverageFilter"
+    window = schema["$defs"]["MovingAverageFilter"]["properties"]["window_s"]
+    assert (window["minimum"], window["maximum"], window["unit"]) == (0.1, 10, "s")
+    row = canshaper(packages, "config-schema", "--filters").stdout.splitlines()[-1]
+    assert row == (
+        "| `moving_average` | `window_s`: time over which the mean is taken, 0.1 to 10 s"
+        " | Mean of the commands of the last seconds. |  |"
+    )
+
+
+def test_check_knows_its_parameters(packages: Path, tmp_path: Path) -> None:
+    file, line = machine(tmp_path, "2.4")
+    done = canshaper(packages, "check", str(file))
+    assert done.returncode == 0, done.stderr
+    assert "-> moving_average -> " in done.stdout
+    for window_s, says in (("11", "found 11, allowed is 0.1 to 10 s"), ("x", "found 'x', allowed")):
+        machine(tmp_path, window_s)
+        done = canshaper(packages, "check", str(file))
+        assert done.returncode == 2
+        assert done.stderr.startswith(f"{file}:{line}: axes.slew.filter.window_s: {says}")
+        assert done.stderr.splitlines()[1:] in ([], ["1 problem"])
+
+
+def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> None:
+    file, _ = machine(tmp_path, "2")
+    done = python(packages, "-c", WORK, str(file))
+    assert done.returncode == 0, done.stderr
+    found = json.loads(done.stdout)
+    # The mean over two seconds rises for two seconds, by half a percent of a full stick each tick.
+    sent = found["sent"]
+    start = next(i for i, value in enumerate(sent) if value)
+    steps = [sent[i + 1] - sent[i] for i in range(start, start + 90)]
+    assert sum(steps) / len(steps) == pytest.approx(max(sent) / 100.0, rel=0.05)
+    assert max(steps) <= 2.0 * max(sent) / 100.0
+    assert found["rows"] == [["mean over a swing", False, False]]
+    assert found["same"]
+    assert len(found["residual_deg"]) == 1
+    assert found["residual_deg"][0] < 2.0  # off leaves 16 degrees
+
+
+@pytest.mark.parametrize(
+    ("module", "says", "verb"),
+    [
+        (
+            "import no_such_module\n",
+            "ModuleNotFoundError: No module named 'no_such_module'",
+            "run forwarder.yaml",
+        ),
+        (
+            "KIND = 7\n",
+            "ValueError: found a value of type int, allowed is a ShaperKind",
+            "config-schema",
+        ),
+        (
+            "from canshaper.shaping.shapers.off import KINDS\nKIND = KINDS[0]\n",
+            "ValueError: the kind 'off' is there already",
+            "check forwarder.yaml",
+        ),
+    ],
+)
+def test_a_package_with_a_fault_is_named_in_one_line(
+    tmp_path: Path, module: str, says: str, verb: str
+) -> None:
+    done = canshaper(installed(tmp_path / "packages", module), *verb.split())
+    assert done.returncode == 2
+    first, *rest = done.stderr.splitlines()
+    name = "entry point moving_average of canshaper.shapers"
+    assert first == f"package crane-extras: {name}: {says}"
+    assert rest in ([], ["1 problem"])
+    assert done.stdout == ""
+
+
+def test_the_page_shows_the_table_as_it_is_printed() -> None:
+    page = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8")
+    table = canshaper(ROOT, "config-schema", "--filters").stdout
+    assert f"<!-- canshaper config-schema --filters -->\n{table}<!-- end of filters -->" in page
+    assert (EXAMPLE / "moving_average.py").read_text().split('"""\n\n', 1)[1] in page
