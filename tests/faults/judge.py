@@ -223,10 +223,13 @@ class AxisJudge:
         if before < 0.0:
             before, now = -before, -now
         grown = before + axis.rise + slack
-        if before > 0.0 > now:
-            fallen = -axis.rise * max(0.0, 1.0 - before / axis.fall) - slack
+        # An added velocity may end at once: the rate holds for what is left of the command.
+        most = axis.largest_added + OWED if axis.largest_added else 0.0
+        own = max(0.0, before - most)
+        if own > 0.0 > now:
+            fallen = -axis.rise * max(0.0, 1.0 - own / axis.fall) - slack
         else:
-            fallen = before - axis.fall - slack if before else -axis.rise - slack
+            fallen = own - axis.fall - slack if own else -axis.rise - slack
         if not fallen - edge <= now <= grown + edge:
             return f"rates allow {fallen:.4f} to {grown:.4f}, found {now:.4f}"
         if self._must_fall and now >= before:
