@@ -317,6 +317,7 @@ class Judge:
             fault = ""
             if axis := self._by_valve.get(key):
                 axis.contested_ns = now_ns
+                axis.causes.add(heard.SECOND_SENDER)  # however old it is when it is read
         else:
             fault = "" if key[1:] in self._others else "UnknownId"
         if fault:
