@@ -71,6 +71,27 @@ def test_process_is_real_time_locked_and_nobody(forwarder: Unit) -> None:
     assert user.startswith("canshaper:")
 
 
+def lock_of_ours(held: bool) -> str:
+    """The lock of logind that holds off a suspend, once it is held or is not."""
+    until = time.monotonic() + ANSWER_S
+    while True:
+        listed = run("systemd-inhibit", "--list", "--no-pager", "--no-legend").stdout.splitlines()
+        ours = [line for line in listed if line.startswith("canshaper")]
+        if bool(ours) == held:
+            return "".join(ours)
+        assert time.monotonic() < until, run("journalctl", "-u", "canshaper-awake").stdout
+        time.sleep(0.2)
+
+
+def test_no_suspend_while_an_instance_runs(forwarder: Unit) -> None:
+    lock = lock_of_ours(held=True)
+    assert "sleep" in lock
+    assert "handle-lid-switch" in lock
+    assert lock.rstrip().endswith("block")
+    forwarder.systemctl("stop")
+    assert lock_of_ours(held=False) == ""
+
+
 def test_exposure_of_the_loaded_unit(forwarder: Unit) -> None:
     verdict = run("systemd-analyze", "security", "--no-pager", forwarder.name).stdout
     found = re.search(r"Overall exposure level for \S+: ([0-9.]+)", verdict)
