@@ -6,11 +6,14 @@ the kernel may send instead of us.
 """
 
 import binascii
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from functools import cache, reduce
+from hashlib import sha256
 from importlib.metadata import EntryPoint, entry_points
 from operator import xor
+from pathlib import Path
 from typing import Literal
 
 from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, Crc16Arc
@@ -132,11 +135,11 @@ class ChecksumKind:
     Attributes:
         text: what it is, for people.
         bits: its width: 4, 8 or 16.
-        algorithm: what computes it. A ``KernelSum`` computes it in the kernel too.
+        algorithm: what computes it. An ``Xor`` or a ``Crc8`` computes it in the kernel too.
         needs_id: whether the CAN id counts: the sender of such a message has to be known.
 
     Raises:
-        ValueError: another width, or a ``KernelSum`` with another one than 8.
+        ValueError: another width, or one that the kernel computes and has not 8 bits.
     """
 
     text: str
@@ -151,9 +154,10 @@ class ChecksumKind:
             raise ValueError(f"a checksum of can-gw of {self.bits} bits, allowed are 8")
 
     @property
-    def kernel(self) -> KernelSum | None:
-        """What can-gw of the kernel has to be given to compute the same; None where it cannot."""
-        return self.algorithm if isinstance(self.algorithm, KernelSum) else None
+    def kernel(self) -> Xor | Crc8 | None:
+        """What can-gw of the kernel computes the same from; None where it cannot."""
+        algorithm = self.algorithm
+        return algorithm if isinstance(algorithm, Xor | Crc8) else None
 
 
 def _nibbles(_can_id: int, _place: Checksum, data: bytes) -> int:
@@ -197,6 +201,8 @@ CHECKSUMS: dict[str, ChecksumKind] = {
 deployment names them."""
 
 _OURS = frozenset(CHECKSUMS)
+_SHA256: dict[str, str] = {}
+"""Of the modules that added a kind, by kind."""
 
 
 def known_checksum(kind: object) -> str:
@@ -208,12 +214,12 @@ def known_checksum(kind: object) -> str:
     """
     name = kind if isinstance(kind, str) else ""
     entries = _packages().get(name, [])
-    owners = [*["canshaper"] * (name in _OURS), *map(_owner, entries)]
+    owners = [*["canshaper"] * (name in _OURS), *sorted(map(_owner, entries))]
     if len(owners) > 1:
         text = f"found {kind!r}, a name that {' and '.join(owners)} have"
         raise ValueError(f"{text}; allowed is one package with it")
     if entries and name not in CHECKSUMS:
-        CHECKSUMS[name] = _loaded(entries[0])
+        CHECKSUMS[name], _SHA256[name] = _loaded(entries[0])
     if name not in CHECKSUMS:
         *first, last = map(repr, checksum_names())
         raise ValueError(f"found {kind!r}, allowed is {', '.join(first)} or {last}")
@@ -225,6 +231,13 @@ def checksum_names() -> list[str]:
     return list(dict.fromkeys([*CHECKSUMS, *_packages()]))
 
 
+def package_line(kind: str) -> str | None:
+    """Which package added a kind, with the SHA-256 of the module; None for one of ours."""
+    if kind not in _SHA256:
+        return None
+    return f"checksum=sha256:{_SHA256[kind]} kind={kind} package={_owner(_packages()[kind][0])}"
+
+
 def checksum_table() -> Iterator[str]:
     """The table of all kinds in Markdown, line by line.
 
@@ -233,8 +246,8 @@ def checksum_table() -> Iterator[str]:
     """
     yield "| kind | bits | what it is | can-gw of the kernel makes it |"
     yield "|---|---|---|---|"
-    for row in ((name, CHECKSUMS[known_checksum(name)]) for name in checksum_names()):
-        name, kind = row
+    for name in checksum_names():
+        kind = CHECKSUMS[known_checksum(name)]
         yield f"| `{name}` | {kind.bits} | {kind.text} | {'yes' if kind.kernel else 'no'} |"
 
 
@@ -251,13 +264,14 @@ def _owner(entry: EntryPoint) -> str:
     return f"{entry.dist.name} {entry.dist.version}" if entry.dist else entry.value
 
 
-def _loaded(entry: EntryPoint) -> ChecksumKind:
+def _loaded(entry: EntryPoint) -> tuple[ChecksumKind, str]:
     text = f"found {entry.name!r} of the package {_owner(entry)}"
     try:
         kind = entry.load()
+        program = Path(str(sys.modules[entry.module].__file__)).read_bytes()
     except Exception as error:  # whatever the package does
         reason = " ".join(f"{type(error).__name__}: {error}".split())
         raise ValueError(f"{text}, which cannot be loaded: {reason}") from None
     if not isinstance(kind, ChecksumKind):
         raise ValueError(f"{text}, which is a {type(kind).__name__}; allowed is a ChecksumKind")
-    return kind
+    return kind, sha256(program).hexdigest()

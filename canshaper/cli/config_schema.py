@@ -14,6 +14,9 @@ def config_schema(
     filters: bool = typer.Option(
         False, "--filters", help="Instead the table of filters, as in docs/deployment.md."
     ),
+    checksums: bool = typer.Option(
+        False, "--checksums", help="Instead the table of checksums, as in docs/checksums.md."
+    ),
 ) -> None:
     """Print the JSON schema of the deployment file.
 
@@ -21,14 +24,17 @@ def config_schema(
 
       # yaml-language-server: $schema=deployment.schema.json
 
-    Filters of other packages that are installed are in the schema, and in the table.
+    Filters and checksums of other packages that are installed are in the schema, and in the tables.
 
     Examples:
 
       canshaper config-schema > deployment.schema.json
 
       canshaper config-schema --filters
+
+      canshaper config-schema --checksums
     """
+    from canshaper.checksums import checksum_table
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
     from canshaper.config.source import DeploymentError
@@ -36,10 +42,13 @@ def config_schema(
 
     try:
         check_packages()
-    except DeploymentError as error:
+        table = [*checksum_table()] if checksums else []
+    except (DeploymentError, ValueError) as error:  # of a package
         raise fail(error) from None
     if filters:
-        echo("\n".join(filter_table(KINDS.values())))
+        table += filter_table(KINDS.values())
+    if table:
+        echo("\n".join(table))
         return
     schema = DeploymentConfig.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"

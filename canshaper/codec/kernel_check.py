@@ -19,7 +19,7 @@ def neutral_fault(protection: Protection, length: int) -> str | None:
     check = protection.check
     if isinstance(check, Checksum):
         kernel = CHECKSUMS[check.kind].kernel
-        if not isinstance(kernel, Xor | Crc8):
+        if kernel is None:
             return f"can-gw of the kernel knows no checksum of the kind {check.kind}"
         if isinstance(kernel, Crc8) and check.byte not in (0, length - 1):
             return f"can-gw of the kernel reckons {check.kind} in the first or last byte only"
@@ -39,7 +39,7 @@ def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, 
         if isinstance(kernel, Xor):
             # Over all bytes, its own among them, which therefore is 0 before.
             return ((CS_XOR, _XOR.pack(0, last, check.byte, kernel.start)),), 0xFF << 8 * check.byte
-        assert isinstance(kernel, Crc8)
+        assert kernel is not None
         first = 1 if check.byte == 0 else 0
         return _crc8(kernel, (first, last - 1 + first, check.byte), kernel.start, kernel.end), 0
     if isinstance(check, Profile1):

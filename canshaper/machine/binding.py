@@ -3,6 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
+from canshaper.checksums import package_line
 from canshaper.codec.codecs import AxisStatusCodec, IdentityCodec, Sender, ServiceStatusCodec
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.rewrite import RewrittenMessage
@@ -78,6 +79,7 @@ class _Binder(FilterBinder):
             Identity(
                 self.source.sha256,
                 {n: f.sha256 for n, f in zip(config.dbc, messages.files, strict=True)},
+                tuple(line for kind in sorted(self.kinds) if (line := package_line(kind))),
             ),
             IdentityCodec(identity[0]) if identity else None,
             grapple,

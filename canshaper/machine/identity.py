@@ -19,10 +19,12 @@ class Identity:
     Attributes:
         deployment: of the deployment file, in hexadecimal digits.
         dbc: of its DBC files, by their names in the deployment file.
+        checksums: of the modules of packages that make its checksums, a line for each.
     """
 
     deployment: str
     dbc: dict[str, str]
+    checksums: tuple[str, ...] = ()
 
     @property
     def digest(self) -> int:
@@ -30,7 +32,8 @@ class Identity:
 
         The order of the DBC files counts, their names do not: a copy with other paths is the same.
         """
-        together = "\n".join([program_sha256(), self.deployment, *self.dbc.values()])
+        parts = [program_sha256(), self.deployment, *self.dbc.values(), *self.checksums]
+        together = "\n".join(parts)
         return int(sha256(together.encode()).hexdigest()[: DIGEST_BITS // 4], 16)
 
     def lines(self) -> list[str]:
@@ -40,6 +43,7 @@ class Identity:
             f"program=sha256:{program_sha256()} version={canshaper.__version__}",
             f"deployment=sha256:{self.deployment}",
             *(f"dbc=sha256:{value} file={name}" for name, value in self.dbc.items()),
+            *self.checksums,
         ]
 
 

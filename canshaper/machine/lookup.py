@@ -25,6 +25,8 @@ class Lookup:
     problems: list[Problem] = field(default_factory=list)
     messages: Messages = field(default_factory=lambda: Messages([]))
     on_bus: dict[str, list[Message]] = field(default_factory=dict)
+    kinds: set[str] = field(default_factory=set)
+    """Of its checksums."""
     _used: dict[tuple[str, int, bool], str] = field(default_factory=dict)
 
     def add(self, place: Place, text: str) -> None:

@@ -60,6 +60,7 @@ class ProtectionBinder(Lookup):
             return None
         at: Place = (*place, "checksum", "signal")
         kind, (can_id, any_source) = config.checksum.kind, address
+        self.kinds.add(kind)
         signal = self.signal(at, message, config.checksum.signal)
         if signal is None:
             return None

@@ -1,6 +1,8 @@
 """Every row of the table of checksums: published values, and each place that one may have."""
 
+from hashlib import sha256
 from importlib.metadata import EntryPoint
+from pathlib import Path
 from typing import Any
 
 import pytest
@@ -17,7 +19,9 @@ from canshaper.checksums import (
     checksum_names,
     checksum_table,
     known_checksum,
+    package_line,
 )
+from canshaper.machine.identity import Identity
 from tests.can.checksum_reference import REFERENCE
 
 # Over the digits 1 to 9, id 0, the checksum behind them. Of the CRCs the check value in the
@@ -160,6 +164,7 @@ NO_KIND = "no kind"
 def packages(monkeypatch: pytest.MonkeyPatch) -> Any:
     """Declares entry points of packages; the table is as before afterwards."""
     monkeypatch.setattr(module, "CHECKSUMS", dict(CHECKSUMS))
+    monkeypatch.setattr(module, "_SHA256", {})
 
     def declare(**entries: str) -> None:
         found = [EntryPoint(name, value, module.GROUP) for name, value in entries.items()]
@@ -177,6 +182,21 @@ def test_a_kind_of_a_package_joins_the_table_when_it_is_named(packages: Any) -> 
     assert known_checksum("always5") == known_checksum("always5") == "always5"
     assert module.CHECKSUMS["always5"] is OWN
     assert checksum_names() == [*VALUES, "always5", "broken"]
+
+
+def test_what_runs_names_the_module_of_a_package(packages: Any) -> None:
+    packages(always5=f"{__name__}:OWN")
+    assert package_line("always5") is None  # not yet loaded
+    known_checksum("always5")
+    line = package_line("always5")
+    assert line == (
+        f"checksum=sha256:{sha256(Path(__file__).read_bytes()).hexdigest()} kind=always5"
+        f" package={__name__}:OWN"
+    )
+    assert package_line("xor") is None
+    with_it, other, without = (Identity("0", {}, lines) for lines in ((line,), ("-",), ()))
+    assert len({with_it.digest, other.digest, without.digest}) == 3
+    assert with_it.lines()[-1] == line
 
 
 @pytest.mark.parametrize(

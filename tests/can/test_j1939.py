@@ -1,6 +1,7 @@
 """Identifiers of J1939, and what a deployment may ask of them."""
 
 import errno
+import re
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.bus.socketcan import MOST_FILTERS, set_filters
+from canshaper.checksums import Checksum
 from canshaper.codec.frame import BusState, Frame
 from canshaper.codec.j1939 import (
     CLAIMED,
@@ -292,3 +294,35 @@ def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:
     set_filters(sockets, ids)
     for one in sockets:
         assert len(one.filters) // 8 <= MOST_FILTERS
+
+
+def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
+    """Its address is in the id: that of the joystick, and ours in what we send."""
+    lever = ' SG_ Check : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 2365446398'
+    for name in ("Button9", "Button10", "Button11", "Button12"):
+        machine.dbc = re.sub(rf" SG_ {name} : .*\n", "", machine.dbc, count=1)
+        machine.dbc = re.sub(rf"VAL_ {BJM1} {name} .*\n", "", machine.dbc)
+    machine.in_dbc("\nBO_ 2365446398", lever)
+    flow = ' SG_ ExtendedFlow : 24|16@1+ (0.0015625,0) [0|100] "%" VALVES\n'
+    machine.in_dbc(flow, flow + ' SG_ Check : 40|8@1+ (1,0) [0|255] "" VALVES\n')
+    check = "checksum: { signal: Check, kind: sum_id }"
+    line = machine.in_yaml("    message: BJM1\n", f"    message: BJM1\n    {check}\n") + 1
+    machine.in_yaml("      message: AVC0\n", f"      message: AVC0\n      {check}\n")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: levers.left.checksum.kind: found 'sum_id', which depends on the id,"
+        " and BJM1 may come from any source; allowed is it with a known one"
+    ]
+    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x21\n")
+    deployment = machine.load()
+    protections = {
+        "lever": (deployment.levers["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
+        "valve": (deployment.axes["slew"].valve.message.sender.protection, 0x0CFE3000 | OWN),
+    }
+    for protection, can_id in protections.values():
+        assert isinstance(protection.check, Checksum)
+        assert protection.check.can_id == can_id
+    frame = deployment.axes["slew"].valve.message.frame()
+    assert frame.can_id == protections["valve"][1]
+    assert (
+        frame.data[5] == sum(frame.can_id.to_bytes(4, "big") + frame.data[:5] + b"\xff\xff") % 256
+    )
