@@ -7,9 +7,11 @@ from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
 from canshaper.cli.console import SafeConsole, echo
 from canshaper.config.bus import Bus
 from canshaper.config.schema import RadialConfig
+from canshaper.config.source import Problem
 from canshaper.machine.bus_load import BUSY
 from canshaper.machine.deployment import Deployment
 
+MOST_WARNINGS = 10  # of DBC files; others are counted
 # What joysticks do while the daemon is away.
 FALLBACKS = {
     "stop": "no joystick does without us",
@@ -24,7 +26,9 @@ def check(file: str = FILE) -> None:
     Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
     and how far its limits allow.
 
-    Exit code 0 when it is good, 2 when it is not. A bus that is loaded above 50 % at its bit rate
+    Exit code 0 when it is good, 2 when it is not. What is wrong in the DBC files with messages that
+    the deployment does not use is a warning, and so is a table of values (VAL_) without its
+    signal. A bus that is loaded above 50 % at its bit rate
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
     not start.
@@ -47,6 +51,7 @@ def check(file: str = FILE) -> None:
         raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None
     config = deployment.config
     echo(f"{deployment.path}: good")
+    _print_warnings(*deployment.messages.warnings())
     for name, bus in config.buses.items():
         echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
         if bus.match:
@@ -70,6 +75,16 @@ def check(file: str = FILE) -> None:
     print_stopping(deployment, SafeConsole())
     for place, text in unstated(deployment):
         echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
+
+
+def _print_warnings(count: int, warnings: list[Problem]) -> None:
+    """What is wrong with messages of the DBC files that the deployment does not use."""
+    if count:
+        echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages that are not used:")
+    for warning in warnings[:MOST_WARNINGS]:
+        echo(f"    {warning}")
+    if (more := count - MOST_WARNINGS) > 0:
+        echo(f"    and {more} more")
 
 
 def _match(bus: Bus) -> str:

@@ -70,7 +70,7 @@ def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Mess
         return deployment.messages
     loaded, problems = [], []
     for path in files or [data_directory() / "dbc" / "forwarder.dbc"]:
-        one, faults = load_dbc(path)
+        one, faults = load_dbc(path, ())
         problems += faults
         loaded += [one] if one else []
     if problems:

@@ -75,7 +75,7 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
     for path in files:
         file, wrong = load_dbc(path)
         problems += wrong
-        found += file.database.messages if file else []
+        found += file.messages if file else []
     if problems:
         raise DeploymentError(problems)
     return found

@@ -329,6 +329,9 @@ class Daemon:
         """What runs, by its hashes: a machine that was signed off is compared with these."""
         for line in self._controller.deployment.identity.lines():
             log.info("identity %s", line)
+        if count := self._controller.deployment.messages.warnings()[0]:
+            text = "of messages in the DBC files that are not used; canshaper check shows them"
+            log.warning("dbc-warnings=%d %s", count, text)
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""

@@ -1,9 +1,11 @@
 """Messages and signals that a deployment file names, or the problems with them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from cantools.database.can import Message, Signal
+from pydantic import BaseModel
 
 from canshaper.codec.canopen import STATE_BITS, service_of
 from canshaper.codec.codecs import Sender
@@ -11,9 +13,11 @@ from canshaper.codec.j1939 import NULL, WITHOUT_PRIORITY, has_destination, with_
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Protection
 from canshaper.codec.signals import find_signal, symmetrical_range
+from canshaper.config.gateway import Gateway
+from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place, Problem, Source
-from canshaper.machine.database import MOST_BYTES, DbcFile, Messages, load_dbc
+from canshaper.machine.database import MOST_BYTES, DbcFile, Messages, load_dbc, too_many
 
 
 @dataclass
@@ -48,15 +52,19 @@ class Lookup:
         if (size := sum(_size(directory / name) for name in self.config.dbc)) > MOST_BYTES:
             self.add(("dbc",), f"found {size} bytes in all, allowed are {MOST_BYTES} at most")
             return None
+        names = set(_messages(self.config))
         for i, name in enumerate(self.config.dbc):
             try:
-                file, problems = load_dbc(directory / name)
+                file, problems = load_dbc(directory / name, names)
             except OSError as error:
                 self.add(("dbc", i), f"found {name!r}: {error.strerror or error}")
                 continue
             self.problems += problems
             if file:
                 files.append(file)
+            if fault := too_many(files):
+                self.add(("dbc",), fault)
+                return None
         if len(files) < len(self.config.dbc):
             return None
         self.messages = Messages(files)
@@ -202,6 +210,19 @@ class Lookup:
             self.problems.append(file.problem(message, text))
             return 0
         return cycle // tick
+
+
+def _messages(section: BaseModel) -> Iterator[str]:
+    """Messages that a section of the deployment file and the sections in it name."""
+    if isinstance(section, Protected):
+        yield section.message
+    if isinstance(section, Gateway):
+        yield from section.blocked
+    for _, value in section:
+        parts = value.values() if isinstance(value, dict) else [value]
+        for part in parts:
+            if isinstance(part, BaseModel):
+                yield from _messages(part)
 
 
 def _size(path: Path) -> int:

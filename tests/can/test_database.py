@@ -21,8 +21,17 @@ SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
             "machine.dbc:6: not a DBC file that can be used: Invalid syntax at line 6",
         ),
         (
-            'VERSION "1"\n\nBU_: A\n\nBO_ 1 M: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n',
-            "machine.dbc:5: not a DBC file that can be used: The signal S does not fit",
+            'VERSION "1"\n\nBO_ 1 LeverLeft: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n',
+            "machine.dbc:3: not a DBC file that can be used: The signal S does not fit",
+        ),
+        # seen at the next statement only, which is that of a message that is not used
+        (
+            'VERSION "1"\n\nCM_ "end"\nBO_ 1 M: 1 A\n\nCM_ "end"\n',
+            "machine.dbc:4: not a DBC file that can be used: Invalid syntax at line 4",
+        ),
+        (
+            'VERSION "1"\n\nBO_ 1 M: 1 A\n\nCM_ "end\n',
+            "machine.dbc:5: not a DBC file that can be used: Invalid syntax at line 5",
         ),
     ],
 )

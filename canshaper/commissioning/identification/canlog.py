@@ -173,8 +173,7 @@ def _checked(
 ) -> list[str]:
     """Notes on what was left out of a signal."""
     if not reader.senders:
-        known = [m for m in messages.all() if (m.frame_id, m.is_extended_frame) in seen]
-        there = ", ".join(sorted(m.name for m in known)) or "none of the DBC files"
+        there = ", ".join(messages.named(seen)) or "none of the DBC files"
         raise IdentificationError(
             f"{path}: found no frame of {reader.message.name} (id {reader.message.frame_id:#x}) in"
             f" {frames} frames; messages in the log are {there}. Is it the right log, and the"

@@ -1,0 +1,66 @@
+"""What is wrong with the signals of a message that nobody uses, from its text in a DBC file.
+
+Messages that are used are checked by cantools.
+"""
+
+import re
+from collections.abc import Iterator
+
+# Bytes of a message whose signals are compared: the most that ISO 15765-2 sends in one.
+LONGEST = 4095
+_GAP = r"[ \t\n]*+(?://[^\n]*\n[ \t\n]*+)*+"
+_SIGNAL = re.compile(
+    _GAP.join((r"SG_\b", r"(\w++)", r"(\w*+)", ":", r"([^ \t\n|/]++)", r"\|")).encode()
+    + _GAP.join(("", r"([^ \t\n@/]++)", "@", r"(\d++)")).encode()
+)
+_NUMBER = re.compile(rb"\d{1,5}")
+
+
+def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
+    """Names of the signals of a message, and the first fault or None.
+
+    Args:
+        text: the signals of the message.
+        length: bytes of the message.
+    """
+    rows = _SIGNAL.findall(text)
+    fault = next(_faults(rows, length), None) if length <= LONGEST else None
+    return [row[0] for row in rows], fault
+
+
+def _faults(rows: list[tuple[bytes, ...]], length: int) -> Iterator[str]:
+    multiplexers = sum(mark.endswith(b"M") for _, mark, *_ in rows)
+    every = 0  # bits that any signal has; the lowest bit of the first byte is the lowest
+    taken: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
+    masks: list[tuple[bytes, int]] = []
+    for name, mark, first, count, order in rows:
+        mask = _mask(first, count, order, length)
+        if mask is None:
+            yield f"has {length} bytes, and the signal {name.decode()} is not within them"
+            return
+        chosen = b"" if mark.endswith(b"M") else mark
+        if chosen and multiplexers > 1:
+            continue  # which of them exclude each other is not said here
+        before = taken[b""] | taken.get(chosen, 0) if chosen else every
+        if before & mask:
+            other = next(n for n, m in masks if m & mask & before)
+            yield f"has overlapping signals, {other.decode()} and {name.decode()}"
+        taken[chosen] = taken.get(chosen, 0) | mask
+        every |= mask
+        masks.append((name, mask))
+
+
+def _mask(first: bytes, count: bytes, order: bytes, length: int) -> int | None:
+    """Bits of a signal in its message, or None where it has others."""
+    if not (_NUMBER.fullmatch(first) and _NUMBER.fullmatch(count)):
+        return None
+    begin, bits = int(first), int(count)
+    if order == b"0":  # from the highest bit downwards, and on in the next byte
+        begin = begin // 8 * 8 + 7 - begin % 8
+    left = 8 * length - begin - bits
+    if bits == 0 or left < 0:
+        return None
+    ones = (1 << bits) - 1
+    if order == b"0":
+        return int.from_bytes((ones << left).to_bytes(length, "big"), "little")
+    return ones << begin
