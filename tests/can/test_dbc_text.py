@@ -9,7 +9,9 @@ import cantools
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from typer.testing import CliRunner
 
+from canshaper.cli.app import app
 from canshaper.machine import database, dbc_text
 from canshaper.machine.database import Messages, load_dbc
 from tests.can.conftest import ROOT, Machine
@@ -261,6 +263,26 @@ def test_their_ids_and_names_are_known(machine: Machine) -> None:
     assert "Other" not in {m.name for m in messages.all()}
     names = ", ".join(messages.named(messages.ids()))
     assert messages.find("None") == f"found 'None', messages of the DBC files are {names}"
+
+
+def test_check_shows_the_first_of_them(machine: Machine) -> None:
+    machine.load()
+    command = ["check", str(machine.directory / "machine.yaml")]
+    assert "not used" not in CliRunner().invoke(app, command).output
+    line = machine.in_dbc("CM_ ", 'VAL_ 2000 None 1 "on" ;\nCM_ ')
+    machine.load()
+    shown = CliRunner().invoke(app, command)
+    assert shown.exit_code == 0
+    path = machine.directory / "machine.dbc"
+    assert "  1 WARNING in messages that are not used:" in shown.output
+    assert f"    {path}:{line}: VAL_ 2000 None is of a signal that there is not\n" in shown.output
+    assert "more" not in shown.output.split("not used:")[1].split("  bus")[0]
+    machine.in_dbc("CM_ ", 'VAL_ 2000 None 1 "on" ;\n' * 10 + "CM_ ")
+    machine.load()
+    shown = CliRunner().invoke(app, command)
+    assert "  11 WARNINGS in messages that are not used:" in shown.output
+    assert shown.output.count("that there is not") == 10
+    assert "    and 1 more\n" in shown.output
 
 
 # -- read when they are asked for -----------------------------------------------------------------

@@ -10,6 +10,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 SHIPPED = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
 DBC = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+SIGNAL = ' SG_ S : 0|8@1+ (1,0) [0|0] "" A\n'
 HEAD = 'VERSION ""\n\nBU_: A\n\n'
 # What must never be shown: it stands in a file outside of a bundle.
 SECRET = "a-secret-of-this-machine"
@@ -36,6 +37,15 @@ def with_dbc(name: str, text: str = "") -> Make:
             (folder / name).write_text(text, encoding="cp1252")
         (folder / "machine.yaml").write_text(SHIPPED.replace("../dbc/forwarder.dbc", name))
         return ["check", str(folder / "machine.yaml")]
+
+    return make
+
+
+def filled(head: str, row: str) -> Make:
+    """``canshaper check`` with a DBC file of 16 MB: a head, and one row as often as it goes."""
+
+    def make(folder: Path) -> list[str]:
+        return with_dbc("a.dbc", head + row * (16_000_000 // len(row)))(folder)
 
     return make
 
@@ -157,6 +167,16 @@ FILES: dict[str, Make] = {
     "DBC full of marks": with_dbc("a.dbc", HEAD + "BO_ 5 M: 8 A\n SG_ S " + "|" * 390_000),
     "DBC with more words": with_dbc("a.dbc", HEAD + "a " * 190_000),
     "DBC with a number of many digits": with_dbc("a.dbc", HEAD + f"BO_ {'9' * 390_000} M: 8 A\n"),
+    "DBC with 25 000 messages": with_dbc("a.dbc", messages(8, 1_500_000)),
+    "DBC of 16 MB, tables": filled(HEAD, 'VAL_ 1 A 0 "";\n'),
+    "DBC of 16 MB, one table": filled(HEAD + "VAL_ 1 A ", '0 "" '),
+    "DBC of 16 MB, tables without end": filled(HEAD, "VAL_ 1 A "),
+    "DBC of 16 MB, signals of one message": filled(HEAD + "BO_ 5 M: 4095 A\n", SIGNAL),
+    "DBC of 16 MB, signals of a used message": filled(HEAD + "BO_ 272 LeverLeft: 8 A\n", SIGNAL),
+    "DBC of 16 MB, quotes": filled(HEAD, '"'),
+    "DBC of 16 MB, quotes in a string": filled(HEAD + '"', '\\"'),
+    "DBC of 16 MB, empty lines": filled(HEAD, "\n"),
+    "DBC of 16 MB, words": filled(HEAD, "a "),
     "DBC files, many": many_files,
 }
 """By name; each is refused by ``canshaper check``."""

@@ -439,3 +439,22 @@ def test_the_digest_of_what_runs_is_sent_once_a_second_and_logged_at_every_chang
     assert digests[0] != digests[1]
     logged = [r.getMessage() for r in caplog.records if "identity digest=" in r.getMessage()]
     assert logged == [f"identity digest={digest:#06x}" for digest in digests]
+
+
+def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    other = 'VERSION ""\n\nBO_ 5 Other: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n'
+    bench.file.with_name("other.dbc").write_text(other, encoding="cp1252")
+
+    def script(number: int) -> None:
+        if number == 60:
+            assert "dbc-warnings" not in caplog.text
+            bench.reload("/forwarder.dbc]", "/forwarder.dbc, other.dbc]")
+        elif number == 120:
+            bench.stop()
+
+    with caplog.at_level("INFO", "canshaper"):
+        bench.run(script)
+    assert "reload=applied" in caplog.text
+    assert caplog.text.count("dbc-warnings=1 of messages in the DBC files that are not used") == 1
