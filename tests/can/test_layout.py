@@ -177,17 +177,20 @@ def test_what_has_no_layout() -> None:
     assert layout_fault(message) == "Ratio is a float of 24 bits, allowed are 16, 32 and 64"
 
 
-@pytest.mark.parametrize(
-    ("number", "message", "name"),
-    [(1024, "GrappleSway", "SwayParallel"), (272, "LeverLeft", "NearFar")],
-)
-def test_a_file_with_such_a_message_is_refused(
-    machine: Machine, number: int, message: str, name: str
-) -> None:
-    """Whether it is in use or not; cantools loads it, and fails with the first frame."""
+def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> str:
+    """Make one; cantools loads it, and fails with the first frame. Returns what is to be said."""
     line = machine.in_dbc(f"BO_ {number} {message}", f"BO_ {number} {message}")
     machine.in_dbc(f"{name} : 16|16@1-", f"{name} : 16|9@1-")
     machine.dbc += f"SIG_VALTYPE_ {number} {name} : 1;\n"
-    assert machine.problems() == [
-        f"machine.dbc:{line}: {message}: {name} is a float of 9 bits, allowed are 16, 32 and 64"
-    ]
+    fault = f"{name} is a float of 9 bits, allowed are 16, 32 and 64"
+    return f"machine.dbc:{line}: {message}: {fault}"
+
+
+def test_a_file_with_such_a_message_is_refused(machine: Machine) -> None:
+    says = float_of_9_bits(machine, 272, "LeverLeft", "NearFar")
+    assert machine.problems() == [says]
+
+
+def test_such_a_message_that_is_not_used_cannot_be_read(machine: Machine) -> None:
+    says = float_of_9_bits(machine, 1024, "GrappleSway", "SwayParallel")
+    assert machine.load().messages.find("GrappleSway") == f"{machine.directory}/{says}"
