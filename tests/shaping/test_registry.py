@@ -129,6 +129,36 @@ def test_without_a_valve_rate_the_robust_shaper_takes_the_valve_for_quick() -> N
     assert answer(LimitAware(slow, Fir(TAPS), 1.5), slow, 0.03) != got
 
 
+WHICH = "allowed are a1 and a2, or poles_rad_s"
+
+
+@pytest.mark.parametrize(
+    ("kind", "given", "says"),
+    [
+        ("gff", {}, f"found neither; {WHICH}"),
+        ("gff", {"third_pole_rad_s": -4.0}, f"found neither; {WHICH}"),
+        ("gff", {"a2": 0.1}, f"found a2; {WHICH}"),
+        ("gff", {"poles_rad_s": [-4.0, -4.0], "a1": 1.0}, f"found a1, poles_rad_s; {WHICH}"),
+        ("gff", {"a1": 1.0, "a2": 1.0}, r"a1 is 1, allowed is 2 or more for a2 = 1 .*"),
+        ("robust", {"taps": [0.5, 0.4], "tick_ms": 20}, r"sum of the taps is 0\.9, allowed is 1"),
+    ],
+)
+def test_parameters_that_do_not_go_together_are_refused_without_sway_data(
+    kind: str, given: dict[str, object], says: str
+) -> None:
+    check = KINDS[kind].check
+    assert check is not None
+    with pytest.raises(ValueError, match=f"^{says}$"):
+        check(**given)
+
+
+def test_what_goes_together_passes_the_check() -> None:
+    for kind in KINDS.values():
+        for given in kind.settings(MODE, TICK_S).values():
+            if kind.check is not None:
+                kind.check(**given)
+
+
 def test_taps_run_at_their_own_period() -> None:
     says = r"^tick_ms of the taps is 40 ms, allowed is the period of the valve, 20 ms$"
     with pytest.raises(ValueError, match=says):
