@@ -25,7 +25,7 @@ def with_entry_points(
         (the kinds, for each entry point that gives none: its package, and why).
     """
     known, faults = {kind.name: kind for kind in kinds}, []
-    for point in sorted(points, key=lambda point: point.name):
+    for point in sorted(points):
         package = point.dist.name if point.dist else point.value
         try:
             kind = point.load()

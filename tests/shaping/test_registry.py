@@ -166,6 +166,28 @@ def test_taps_run_at_their_own_period() -> None:
     build_shaper("robust", TICK_S, model(), taps=TAPS, tick_ms=20)
 
 
+def test_settings_are_those_of_the_comparison_in_its_order() -> None:
+    """With these names and numbers the tables in docs/comparison.md were made."""
+    mode = SwayMode.from_period(8.0, 0.0)
+    omega = math.pi / 4.0
+    found = [row for kind in BUILT_IN for row in kind.settings(mode, 0.6).items()]
+    assert found == [
+        ("off", {}),
+        ("G_FF slew poles", {"a1": 0.42, "a2": 0.043}),
+        ("G_FF near-far poles", {"a1": 0.708, "a2": 0.12}),
+        ("G_FF no jump over 1", {"a1": pytest.approx(2.0000001 / omega), "a2": 1.0 / omega**2}),
+        ("G_FF third pole -4", {"poles_rad_s": [-4.0, -4.0], "third_pole_rad_s": -4.0}),
+        ("G_FF third pole -5", {"poles_rad_s": [-5.0, -5.0], "third_pole_rad_s": -5.0}),
+        ("first order", {"time_constant_s": pytest.approx(2.4)}),
+        ("S-curve", {"rate_per_s": pytest.approx(0.275), "jerk_per_s2": pytest.approx(2.0)}),
+        ("ZV", {}),
+        ("ZVD", {}),
+        ("EI 5 %", {"residual_pct": 5.0}),
+        ("two-mode", {"period_s": pytest.approx(3.2), "damping_ratio": 0.02}),
+        ("limit-aware ZV", {"tick_ms": 600, "taps": zv_taps(mode, 0.6)}),
+    ]
+
+
 # -- declarations, and those of other packages -----------------------------------------------------
 
 
