@@ -1,6 +1,5 @@
 """Filters as they stand in a deployment file: one section for each kind of the registry."""
 
-from functools import partial
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
 from pydantic import Field, create_model, model_validator
@@ -26,8 +25,8 @@ class FilterSection(Section):
         return self.model_dump(exclude={"kind"}, exclude_none=True)
 
     def __reduce__(self) -> Any:
-        # The class of a kind is in no module; another process makes it from the same row.
-        return partial(filter_of, self.kind, **self.parameters()), ()
+        # The class of a kind is in no module; another process has made its own from the same row.
+        return _unpickled, (self.kind, self.model_fields_set, self.__dict__)
 
 
 def _section(kind: ShaperKind) -> type[FilterSection]:
@@ -56,6 +55,11 @@ def _field(parameter: Parameter) -> tuple[Any, Any]:
 
 SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}
 """Section of each kind, by its name."""
+
+
+def _unpickled(kind: str, given: set[str], values: dict[str, Any]) -> FilterSection:
+    return SECTIONS[kind].model_construct(given, **values)
+
 
 if TYPE_CHECKING:
     Filter = FilterSection

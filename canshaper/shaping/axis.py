@@ -150,7 +150,7 @@ class Axis:
                 self._drive(command, wanted, added)
             else:
                 self._rest()
-        except (ValueError, ArithmeticError):
+        except Exception:  # a filter of another package may raise anything
             self._output_invalid()
         self.told = self.sent - self._added
         if bounds is not None:
@@ -178,7 +178,7 @@ class Axis:
             for _ in range(min(ticks, MOST_HELD)):
                 self._shaper.wanted(command)
                 self.advance()
-        except (ValueError, ArithmeticError):
+        except Exception:  # the same
             self._output_invalid()
 
     def retune(self, mode: SwayMode, shaper_for: Callable[[SwayModel], Shaper]) -> None:

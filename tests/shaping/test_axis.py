@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, cast
 
 import pytest
 
@@ -272,18 +272,19 @@ def test_switches_that_are_on_at_the_start_make_no_edge(drive: Drive) -> None:
 # -- a filter gone wrong ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, ZeroDivisionError, OverflowError])
-def test_a_filter_without_a_number_trips_and_can_recover(
-    drive_with: DriveWith, bad: float | type[Exception]
-) -> None:
+@pytest.mark.parametrize(
+    "bad",
+    [math.nan, math.inf, -math.inf, ZeroDivisionError, OverflowError, KeyError, "0.1", None],
+)
+def test_a_filter_without_a_number_trips_and_can_recover(drive_with: DriveWith, bad: Any) -> None:
     class Broken:
         broken = False
 
         def wanted(self, command: float) -> float:
             if self.broken:
-                if isinstance(bad, float):
-                    return bad
-                raise bad
+                if isinstance(bad, type):
+                    raise bad
+                return cast(float, bad)
             return command
 
     shaper = Broken()

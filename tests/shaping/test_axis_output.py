@@ -340,10 +340,11 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
     assert left(4) <= 1.2 * left(0) + 0.002
 
 
-def test_a_filter_that_breaks_in_a_missed_tick_trips(drive: Drive) -> None:
+@pytest.mark.parametrize("error", [ArithmeticError, LookupError])
+def test_a_filter_that_breaks_in_a_missed_tick_trips(drive: Drive, error: type[Exception]) -> None:
     class Broken:
         def wanted(self, command: float) -> float:
-            raise ArithmeticError
+            raise error
 
     drive.moving()
     drive.axis._shaper = Broken()
