@@ -1,12 +1,10 @@
 """What one axis may be sent now, and why not more: limits, what was asked, rates."""
 
 import math
-from bisect import bisect_right
-from itertools import pairwise
 
-from canshaper.config.schema import Limits
 from canshaper.guard.bits import CommandBits, StickBits
 from canshaper.guard.inputs import Asked, GuardedJoystick, GuardedStop, largest
+from canshaper.guard.opening import openings
 from canshaper.machine.deployment import BoundAxis, Deployment
 
 # Part of full speed; less than any step, more than the rounding of floats.
@@ -19,42 +17,6 @@ LATE_PERIODS = 3
 FOREVER = 10**19  # ns
 # Commands whose velocity is kept, so that a fine one does not fill the memory.
 MOST_VELOCITIES = 4096
-
-
-class Opening:
-    """Velocity that a valve gives for a command, in one direction."""
-
-    __slots__ = ("_steps", "_velocities", "slopes")
-
-    def __init__(self, steps: list[float], velocities: list[float]) -> None:
-        self._steps, self._velocities = steps, velocities
-        self.slopes = [
-            (v1 - v0) / (s1 - s0)
-            for (s0, s1), (v0, v1) in zip(pairwise(steps), pairwise(velocities), strict=True)
-        ]
-
-    def velocity(self, steps: int) -> float:
-        """Part of full speed; beyond full command more than 1."""
-        at = self._steps
-        if steps <= at[0]:
-            return 0.0
-        i = min(bisect_right(at, steps), len(self.slopes)) - 1
-        return self._velocities[i] + (steps - at[i]) * self.slopes[i]
-
-
-def openings(limits: Limits, full: int) -> tuple[Opening, Opening]:
-    """Of the positive and of the negative direction, by dead band or measured curve."""
-    commands, speeds = limits.curve_command_pct, limits.curve_speed_pct
-    if commands is None or speeds is None:
-        one = Opening([limits.deadband_pct / 100.0 * full, float(full)], [0.0, 1.0])
-        return one, one
-    points = [(c / 100.0 * full, v / 100.0) for c, v in zip(commands, speeds, strict=True)]
-    edge = next(i for i, (_, speed) in enumerate(points) if speed == 0.0)
-    forth, back = points[edge + 1 :], [(-c, -v) for c, v in points[edge::-1]]
-    return (
-        Opening([c for c, _ in forth], [v for _, v in forth]),
-        Opening([c for c, _ in back], [v for _, v in back]),
-    )
 
 
 class GuardedAxis(Asked):
@@ -72,6 +34,9 @@ class GuardedAxis(Asked):
         "_added",
         "_adding",
         "_bound",
+        "_cut",
+        "_cut_ns",
+        "_cut_until_ns",
         "_down",
         "_fall",
         "_fall_least",
@@ -83,7 +48,9 @@ class GuardedAxis(Asked):
         "_maximum",
         "_more",
         "_openings",
+        "_own",
         "_period",
+        "_period_ns",
         "_reverse",
         "_rise",
         "_silent_ns",
@@ -119,6 +86,8 @@ class GuardedAxis(Asked):
         self._joystick, self._stop = joystick, stop
         self._adding: list[GuardedAxis] = []
         self._added = 0.0
+        self._cut, self._cut_ns, self._cut_until_ns = 0.0, 0, 0
+        self._own = [0.0, 0.0]  # speed at most without what is added, negative and positive
         message = deployment.levers[config.stick.lever].message
         joystick.drives(StickBits(message, config.stick), self)
         if stop is not None:
@@ -140,7 +109,7 @@ class GuardedAxis(Asked):
         full = self.bits.full
         self._full = min(one.velocity(full) for one in self._openings) - EPSILON
         self._velocities: dict[bytes, float] = {}
-        self._period = bound.period_ticks
+        self._period, self._period_ns = bound.period_ticks, period_ns
         self._velocity = 0.0  # of the last frame
         self._bound = self._down  # its size at most, before it was rounded
 
@@ -164,18 +133,21 @@ class GuardedAxis(Asked):
         if velocity != 0.0:
             reach, good_ns = self._asked_for(velocity, now_ns)
             last, period, size = self._velocity, self._period, abs(velocity)
+            before = self._up - abs(last) if velocity * last < 0.0 else self._bound
             periods = number // period - self.at[0] // period
-            if velocity * last < 0.0:  # a part of the time goes by on the way to zero
-                left = periods - (abs(last) - self._up) / self._fall
-                highest = (left * self._rise if left > 0.0 else 0.0) + self._up
-            else:
-                highest = self._bound + periods * self._rise + self._up
+            highest = self._highest(before, periods)
+            cut = own = 0.0
+            if now_ns < self._cut_until_ns:
+                # What was added against the axis' own part may end at once, and leaves that.
+                cut, own = self._cut, self._own[velocity > 0.0]
+                highest = max(highest, min(own, self._highest(before + cut, periods)))
             allowed = reach if reach < highest else highest
             bound = size + self._down
             if size > allowed and good_ns and velocity * last > 0.0:
                 # On its way back. The rates do not catch up on deadlines that were missed, so for
                 # the fall they do not count; and it has to be lower with each frame.
                 fallen = self._bound - (tick - self.at[1]) // period * self._fall_least
+                fallen = max(fallen, min(own, fallen + cut))
                 if fallen > allowed:
                     allowed, good_ns = fallen, 0
                     bound = min(bound, fallen)
@@ -186,6 +158,13 @@ class GuardedAxis(Asked):
         self.part, self.good_ns, self.at = part, good_ns, at
         self._velocity, self._bound = velocity, bound
         return ""
+
+    def _highest(self, before: float, periods: int) -> float:
+        """Speed that the rates allow after one in the same direction, negative in the other."""
+        if before < 0.0:  # a part of the time goes by on the way to zero
+            left = periods + before / self._fall
+            return (left * self._rise if left > 0.0 else 0.0) + self._up
+        return before + periods * self._rise + self._up
 
     def _asked_for(self, velocity: float, now_ns: int) -> tuple[float, int]:
         """Speed that was asked for in the direction of a velocity, and until when that holds.
@@ -210,7 +189,7 @@ class GuardedAxis(Asked):
         if sizes and (before := largest(sizes, since_ns)) > reach:
             reach, from_ns = before, sizes[0][1]
         if self._more:
-            reach, from_ns = self._reach(reach, now_ns), since_ns  # for this moment
+            reach, from_ns = self._reach(reach, now_ns, velocity > 0.0), since_ns  # for this moment
         until_ns = from_ns + self._kept_ns
         reach = min(reach, self._maximum)
         return reach, until_ns if until_ns < free_ns else free_ns
@@ -244,13 +223,15 @@ class GuardedAxis(Asked):
             limit = limit if allowed == reach else "rate"
         return f"axis={self.name} limit={limit} speed={velocity:.3f} allowed={allowed:.3f}"
 
-    def _reach(self, reach: float, now_ns: int) -> float:
+    def _reach(self, reach: float, now_ns: int, up: bool) -> float:
         """What may be, beyond what was asked in the direction of the output."""
         if self._reverse:
             reach = max(reach, self._most(now_ns))
         if self._faster and reach:
             reach = 1.0
+        self._own[up] = max(reach + self._up, self._own[up] - self._fall_least)
         if any(axis._most(now_ns) for axis in self._adding):
+            self._cut_until_ns = now_ns + self._cut_ns  # when asked for no more, it falls
             # A step is paid that rounding has left out before, and rounding comes on top.
             reach += self._added + 1.0 / self.bits.full + self._up
         return reach
@@ -260,6 +241,9 @@ class GuardedAxis(Asked):
         self._more = True
         self._adding.append(slew)
         self._added = max(self._added, most)
+        if slew is not self:
+            self._cut = self._added
+            self._cut_ns = math.ceil(1.0 / self._fall_least) * self._period_ns
 
     def _most(self, now_ns: int) -> float:
         """Speed that was asked for in any direction within the tail."""

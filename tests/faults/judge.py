@@ -220,8 +220,9 @@ class AxisJudge:
         low = min(self.low, before + axis.fall - slack)
         if not low - edge <= now <= high + edge:
             return f"allowed is {low:.4f} to {high:.4f}, found {now:.4f}"
+        low, high = self._range
         if before < 0.0:
-            before, now = -before, -now
+            before, now, low, high = -before, -now, -high, -low
         grown = before + axis.rise + slack
         # An added velocity may end at once: the rate holds for what is left of the command.
         most = axis.largest_added + OWED if axis.largest_added else 0.0
@@ -230,6 +231,9 @@ class AxisJudge:
             fallen = -axis.rise * max(0.0, 1.0 - own / axis.fall) - slack
         else:
             fallen = own - axis.fall - slack if own else -axis.rise - slack
+        if most:  # where it went against what is left, that is faster, as far as it was asked for
+            grown = max(grown, min(high + slack, grown + most))
+            fallen = min(fallen, max(low - slack, before - most - axis.rise - slack))
         if not fallen - edge <= now <= grown + edge:
             return f"rates allow {fallen:.4f} to {grown:.4f}, found {now:.4f}"
         if self._must_fall and now >= before:

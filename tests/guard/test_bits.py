@@ -5,8 +5,8 @@ import random
 import pytest
 
 from canshaper.config.schema import Limits
-from canshaper.guard.axis import openings
 from canshaper.guard.bits import CommandBits, StickBits
+from canshaper.guard.opening import openings
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import without_deadband
 from tests.faults import shipped
