@@ -1,6 +1,6 @@
 """Mutation run: change the code in small ways, one at a time, and see whether a test notices.
 
-    tools/mutation.py                     every module of the coverage gate: shaping, then service
+    tools/mutation.py                     every module of the coverage gate, group by group
     tools/mutation.py core                what runs in `make test`: state machine and output limits
     tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
 
@@ -19,11 +19,21 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SURVIVORS = ROOT / "tests/mutation/survivors.txt"
-# Not of service: tests of the daemon around the controller, which start processes and threads.
-AROUND = ("cli", "journal", "loop", "notify", "reading", "realtime")
+# Not of the controller: tests of the daemon around it, which start processes and threads.
+AROUND = ("cli", "journal", "live", "notify", "reading", "realtime")
+SERVICE = ["tests/service", *(f"--ignore-glob=*/test_{name}*.py" for name in AROUND)]
+# Groups: the rooms of the modules, and the tests that reach them.
+ROOMS = {
+    "shaping": ("shaping",),
+    "controller": ("inputs", "guard", "protocols", "controller"),
+    "daemon": ("daemon",),
+    "bus": ("bus",),
+}
 TESTS = {
     "shaping": ["tests/shaping"],
-    "service": ["tests/service", *(f"--ignore-glob=*/test_{name}*.py" for name in AROUND)],
+    "controller": [*SERVICE, "tests/guard"],
+    "daemon": SERVICE,
+    "bus": ["tests/can"],
 }
 CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
 CORE_TESTS = ["test_axis*.py", "test_limits.py", "test_sets.py", "test_valve_curve.py"]
@@ -31,22 +41,18 @@ COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
 
 
 def modules(group: str) -> list[str]:
-    """Modules of the coverage gate: those of ``shaping``, or all others, which are ``service``."""
+    """Modules of the coverage gate in the rooms of a group."""
     config = tomllib.loads((ROOT / "pyproject.toml").read_text())
     gate: list[str] = config["tool"]["coverage"]["run"]["source_pkgs"]
-    shaping = group == "shaping"
-    return [name for name in gate if name.startswith("canshaper.shaping") == shaping]
+    return [name for name in gate if name.split(".")[1] in ROOMS[group]]
 
 
 def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
     """Copy what the tests need and say there what mutmut shall do."""
     shutil.rmtree(work, ignore_errors=True)
-    for name in (*COPIED, "tests/shaping", "tests/service"):
+    for name in (*COPIED, "tests"):
         ignore = shutil.ignore_patterns("__pycache__")
         shutil.copytree(ROOT / name, work / name, ignore=ignore)
-    for name in ("tests/conftest.py", "tests/can/protected_machine.py"):
-        (work / name).parent.mkdir(exist_ok=True)
-        shutil.copy(ROOT / name, work / name)
     paths = [name.replace(".", "/") for name in mutated]
     only = [f"{path}/*" if (ROOT / path).is_dir() else f"{path}.py" for path in paths]
     (work / "pyproject.toml").write_text(
