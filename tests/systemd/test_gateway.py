@@ -35,7 +35,7 @@ def state(unit: Unit) -> str:
 
 
 def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
-    assert state(gateway) == "vcan0 vcan1: 42 rules, running"
+    assert state(gateway) == "vcan0 vcan1: 40 rules, running"
     gateway.wait_journal("gateway=rules-right", "")
     process = Path("/proc") / gateway.show("MainPID")
     effective = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
@@ -48,7 +48,7 @@ def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
         gateway.systemctl("kill", "--signal=KILL")
         gateway.wait_journal("away, 2 rules added", cursor)
         gateway.wait_restart(before)
-        assert state(gateway) == "vcan0 vcan1: 42 rules, running"
+        assert state(gateway) == "vcan0 vcan1: 40 rules, running"
         wait_for(far, "SlewStatus", lambda v: v["Reason"] == "STICK_NOT_NEUTRAL")
         gateway.systemctl("stop")
         assert state(gateway) == "vcan0 vcan1: 44 rules, away"
