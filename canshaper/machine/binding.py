@@ -20,7 +20,7 @@ from canshaper.config.sets import Feel
 from canshaper.config.source import DeploymentError, Place
 from canshaper.machine.deployment import BoundAxis, BoundRadial, Deployment
 from canshaper.machine.filters import FilterBinder
-from canshaper.machine.identity import Identity
+from canshaper.machine.identity import Identity, filter_lines
 from canshaper.machine.inputs import BoundSwitch
 from canshaper.machine.stopping import stated_fault
 
@@ -79,7 +79,10 @@ class _Binder(FilterBinder):
             Identity(
                 self.source.sha256,
                 {n: f.sha256 for n, f in zip(config.dbc, messages.files, strict=True)},
-                tuple(line for kind in sorted(self.kinds) if (line := package_line(kind))),
+                (
+                    *(line for kind in sorted(self.kinds) if (line := package_line(kind))),
+                    *filter_lines(self._filter_kinds()),
+                ),
             ),
             IdentityCodec(identity[0]) if identity else None,
             grapple,
@@ -87,6 +90,12 @@ class _Binder(FilterBinder):
             self.on_bus,
             source=self.source,
         )
+
+    def _filter_kinds(self) -> set[str]:
+        """Of every filter that may run; those of sets are of the kind of their axis or feel."""
+        axes = self.config.axes.values()
+        feels = (feel for axis in axes for feel in axis.feels.values())
+        return {axis.filter.kind for axis in axes} | {feel.filter.kind for feel in feels}
 
     def _values_of_sets(self) -> dict[Place, float]:
         """Values of the grapple that the sets name, by their places."""

@@ -3,6 +3,8 @@
 Whoever signs a machine off notes these; a changed file or program shows in log, status and bundle.
 """
 
+import sys
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from functools import cache
 from hashlib import sha256
@@ -10,6 +12,7 @@ from pathlib import Path
 
 import canshaper
 from canshaper.codec.codecs import DIGEST_BITS
+from canshaper.shaping.registry import ADDED
 
 
 @dataclass(frozen=True)
@@ -19,12 +22,12 @@ class Identity:
     Attributes:
         deployment: of the deployment file, in hexadecimal digits.
         dbc: of its DBC files, by their names in the deployment file.
-        checksums: of the modules of packages that make its checksums, a line for each.
+        packages: of the modules of packages that make its checksums and filters, a line for each.
     """
 
     deployment: str
     dbc: dict[str, str]
-    checksums: tuple[str, ...] = ()
+    packages: tuple[str, ...] = ()
 
     @property
     def digest(self) -> int:
@@ -32,7 +35,7 @@ class Identity:
 
         The order of the DBC files counts, their names do not: a copy with other paths is the same.
         """
-        parts = [program_sha256(), self.deployment, *self.dbc.values(), *self.checksums]
+        parts = [program_sha256(), self.deployment, *self.dbc.values(), *self.packages]
         together = "\n".join(parts)
         return int(sha256(together.encode()).hexdigest()[: DIGEST_BITS // 4], 16)
 
@@ -43,8 +46,17 @@ class Identity:
             f"program=sha256:{program_sha256()} version={canshaper.__version__}",
             f"deployment=sha256:{self.deployment}",
             *(f"dbc=sha256:{value} file={name}" for name, value in self.dbc.items()),
-            *self.checksums,
+            *self.packages,
         ]
+
+
+def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
+    """Which package added a filter, with the SHA-256 of its module; no line for one of ours."""
+    for kind in sorted(kinds):
+        if point := ADDED.get(kind):
+            program = sha256(Path(str(sys.modules[point.module].__file__)).read_bytes())
+            owner = f"{point.dist.name} {point.dist.version}" if point.dist else point.value
+            yield f"filter=sha256:{program.hexdigest()} kind={kind} package={owner}"
 
 
 @cache

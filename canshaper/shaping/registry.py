@@ -18,13 +18,14 @@ BUILT_IN = (*off.KINDS, *gff.KINDS, *smoothing.KINDS, *fir.KINDS, *limit_aware.K
 
 def with_entry_points(
     kinds: Iterable[ShaperKind], points: Iterable[EntryPoint]
-) -> tuple[dict[str, ShaperKind], list[tuple[str, str]]]:
+) -> tuple[dict[str, ShaperKind], dict[str, EntryPoint], list[tuple[str, str]]]:
     """Kinds by their names, those of other packages after the given ones.
 
     Returns:
-        (the kinds, for each entry point that gives none: its package, and why).
+        (the kinds, the entry points of those that were added, and for each entry point that gives
+        none: its package, and why).
     """
-    known, faults = {kind.name: kind for kind in kinds}, []
+    known, added, faults = {kind.name: kind for kind in kinds}, {}, []
     for point in sorted(points):
         package = point.dist.name if point.dist else point.value
         try:
@@ -39,12 +40,13 @@ def with_entry_points(
             text = " ".join(f"{type(error).__name__}: {error}".split())
             faults.append((f"package {package}", f"entry point {point.name} of {GROUP}: {text}"))
         else:
-            known[kind.name] = kind
-    return known, faults
+            known[kind.name], added[kind.name] = kind, point
+    return known, added, faults
 
 
-KINDS, FAULTS = with_entry_points(BUILT_IN, entry_points(group=GROUP))
-"""Every kind by its name; and faults of other packages, with which no deployment is loaded."""
+KINDS, ADDED, FAULTS = with_entry_points(BUILT_IN, entry_points(group=GROUP))
+"""Every kind by its name; entry points of those of other packages; faults of such packages, with
+which no deployment is loaded."""
 
 
 def build_shaper(

@@ -6,6 +6,7 @@ import shutil
 import subprocess
 import sys
 import tomllib
+from hashlib import sha256
 from pathlib import Path
 
 import pytest
@@ -99,6 +100,9 @@ def test_check_knows_its_parameters(packages: Path, tmp_path: Path) -> None:
     done = canshaper(packages, "check", str(file))
     assert done.returncode == 0, done.stderr
     assert "-> moving_average -> " in done.stdout
+    program = sha256((packages / "moving_average.py").read_bytes()).hexdigest()
+    identity = f"filter=sha256:{program} kind=moving_average package=crane-extras 1.0"
+    assert done.stdout.count(identity) == 1
     for window_s, says in (("11", "found 11, allowed is 0.1 to 10 s"), ("x", "found 'x', allowed")):
         machine(tmp_path, window_s)
         done = canshaper(packages, "check", str(file))

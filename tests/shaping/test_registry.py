@@ -240,9 +240,10 @@ def point(name: str, loaded: object) -> EntryPoint:
 def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -> None:
     assert not FAULTS
     two, one = kind_of("two"), kind_of("one")
-    kinds, faults = with_entry_points(BUILT_IN, [point("b", two), point("a", one)])
+    points = [point("b", two), point("a", one)]
+    kinds, added, faults = with_entry_points(BUILT_IN, points)
     assert list(kinds.values()) == [*BUILT_IN, one, two]
-    assert faults == []
+    assert (added, faults) == ({"two": points[0], "one": points[1]}, [])
 
 
 @pytest.mark.parametrize(
@@ -256,14 +257,15 @@ def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -
 def test_a_package_that_gives_no_kind_is_named_and_the_next_one_counts(
     loaded: object, says: str
 ) -> None:
-    kinds, faults = with_entry_points(BUILT_IN, [point("x", loaded), point("y", kind_of())])
+    kinds, added, faults = with_entry_points(BUILT_IN, [point("x", loaded), point("y", kind_of())])
+    assert list(added) == ["notch"]
     assert list(kinds) == [*(kind.name for kind in BUILT_IN), "notch"]
     assert kinds["zv"] in BUILT_IN
     assert faults == [("package crane-extras", f"entry point x of canshaper.shapers: {says}")]
 
 
 def test_an_entry_point_of_no_package_goes_by_what_it_names() -> None:
-    _, faults = with_entry_points((), [EntryPoint("x", "no_such_module:KIND", GROUP)])
+    *_, faults = with_entry_points((), [EntryPoint("x", "no_such_module:KIND", GROUP)])
     (((package, text)),) = faults
     assert package == "package no_such_module:KIND"
     assert text.endswith("ModuleNotFoundError: No module named 'no_such_module'")
