@@ -14,7 +14,8 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.hil.hand import with_checksum
+from canshaper.checksums import CHECKSUMS
+from tests.can.checksum_reference import REFERENCE
 from tests.hil.machine import ANSWER_S, DBC, FILE, Service, levers_on, open_bus, service
 from tests.hil.machine import wait_for as wait
 
@@ -254,7 +255,7 @@ def test_a_lost_joystick_ends_in_a_shaped_stop_and_silence(tmp_path: Path) -> No
         silent(far, {0x110, 0x111})
 
 
-@pytest.mark.parametrize("kind", ["xor", "crc8_sae_j1850"])
+@pytest.mark.parametrize("kind", [kind for kind, row in CHECKSUMS.items() if row.kernel])
 def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
     """Reckoned by crccheck at both ends; the kernel does it between."""
     dbc = (FILE.parents[1] / "dbc" / "forwarder.dbc").read_text()
@@ -277,20 +278,11 @@ def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
         for count in range(50):
             data = bytes((0x34, 0x12, 0xFF, 0x7F, 0x01, 0, count))
             near.send(can.Message(arbitration_id=0x110, is_extended_id=False,
-                                  data=data + bytes((check(kind, data),))))  # fmt: skip
+                                  data=data + bytes([REFERENCE[kind](0, data, 8)])))  # fmt: skip
             passed = far.recv(ANSWER_S)
             assert passed is not None
             assert bytes(passed.data[:7]) == bytes((0, 0, 0, 0, 1, 0, count))
-            assert passed.data[7] == check(kind, bytes(passed.data[:7]))
-
-
-def check(kind: str, data: bytes) -> int:
-    if kind == "xor":
-        found = 0
-        for byte in data:
-            found ^= byte
-        return found
-    return with_checksum(data[:6] + b"\0" + data[6:])[6]
+            assert passed.data[7] == REFERENCE[kind](0, bytes(passed.data[:7]), 8)
 
 
 def test_a_fallback_that_is_left_in_place_is_told_and_moves_nothing(tmp_path: Path) -> None:
