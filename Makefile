@@ -93,6 +93,7 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/tick.py
 	.venv/bin/python benchmarks/path.py
 	.venv/bin/python benchmarks/startup.py
+	.venv/bin/python benchmarks/large_dbc.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/replay.py
 	.venv/bin/python benchmarks/tune.py

@@ -79,7 +79,9 @@ class DbcFile:
             return "\n".join(str(problem) for problem in problems)
         if file.sha256 != self.sha256:
             return f"{self.path}: has changed since it was read"
-        return next(m for m in file.messages if m.name == name)
+        # Not the same name for cantools: a long one with a line end or a quote in it.
+        why = f"{self.path}: {name!r} has another name for the parser"
+        return next((m for m in file.messages if m.name == name), why)
 
 
 def load_dbc(
@@ -115,9 +117,11 @@ def load_dbc(
     # Of a file of messages alone nothing may be left, which cantools would not have as a file.
     parsed = _parsed(path, rest, bounded=bounded) if rest.strip() or not entries else []
     if isinstance(parsed, Problem):
-        # A statement without its end is seen at the next one, which the whole file has.
-        whole = _parsed(path, text.whole(), bounded=True) if _SYNTAX in parsed.message else parsed
-        return None, [whole if isinstance(whole, Problem) else parsed]
+        # A statement without its end is seen at the next one, which a file that is whole has.
+        whole = _parsed(path, text.whole(), bounded=True) if _SYNTAX in parsed.message else None
+        if isinstance(whole, Problem) and _SYNTAX in whole.message:
+            parsed = whole
+        return None, [parsed]
     warnings = list(_faults(path, entries, used))
     leftover = text.leftover(used)
     count = len(warnings) + len(leftover)
@@ -155,7 +159,7 @@ def _parsed(path: Path, text: str, *, bounded: bool) -> list[Message] | Problem:
             why += f" ({WIDE_ID})"
         if at := re.search(r"at line (\d+)", why):
             line = int(at.group(1))
-        elif at := re.search(r"in message (\w+)|unused VAL_ entries in DBC: (VAL_ \d+ \w+)", why):
+        elif at := re.search(r"in message (\w+)|unused \w+ entries in DBC: (\w+ \d+ \w+)", why):
             line = _line_of(text, rf"BO_\s+\d+\s+{at[1]}\b" if at[1] else re.escape(at[2]))
         else:
             line = None

@@ -4,7 +4,6 @@ Messages that are used are checked by cantools.
 """
 
 import re
-from collections.abc import Iterator
 
 # Bytes of a message whose signals are compared: the most that ISO 15765-2 sends in one.
 LONGEST = 4095
@@ -24,11 +23,11 @@ def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
         length: bytes of the message.
     """
     rows = _SIGNAL.findall(text)
-    fault = next(_faults(rows, length), None) if length <= LONGEST else None
+    fault = _fault(rows, length) if length <= LONGEST else None
     return [row[0] for row in rows], fault
 
 
-def _faults(rows: list[tuple[bytes, ...]], length: int) -> Iterator[str]:
+def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
     multiplexers = sum(mark.endswith(b"M") for _, mark, *_ in rows)
     every = 0  # bits that any signal has; the lowest bit of the first byte is the lowest
     taken: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
@@ -36,18 +35,18 @@ def _faults(rows: list[tuple[bytes, ...]], length: int) -> Iterator[str]:
     for name, mark, first, count, order in rows:
         mask = _mask(first, count, order, length)
         if mask is None:
-            yield f"has {length} bytes, and the signal {name.decode()} is not within them"
-            return
+            return f"has {length} bytes, and the signal {name.decode()} is not within them"
         chosen = b"" if mark.endswith(b"M") else mark
         if chosen and multiplexers > 1:
             continue  # which of them exclude each other is not said here
         before = taken[b""] | taken.get(chosen, 0) if chosen else every
         if before & mask:
             other = next(n for n, m in masks if m & mask & before)
-            yield f"has overlapping signals, {other.decode()} and {name.decode()}"
+            return f"has overlapping signals, {other.decode()} and {name.decode()}"
         taken[chosen] = taken.get(chosen, 0) | mask
         every |= mask
         masks.append((name, mask))
+    return None
 
 
 def _mask(first: bytes, count: bytes, order: bytes, length: int) -> int | None:

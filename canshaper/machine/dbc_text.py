@@ -61,7 +61,7 @@ _STATEMENTS = {
     "table": _row(_word("VAL_"), _id("table"), _NAME, f"{_TABLE};"),
     "type": _row(_word("SIG_VALTYPE_"), _id("type"), _NAME, ":", r"\d++", ";"),
     "long": _row(
-        _BA, '"SystemMessageLongSymbol"', _BO, _id("long"), r'"(?P<symbol>[^"\\]*+)"', ";"
+        _BA, '"SystemMessageLongSymbol"', _BO, _id("long"), r'"(?P<symbol>[^"\\\n]*+)"', ";"
     ),
     "of_message": _row(_BA, _STRING, _BO, _id("of_message"), _VALUE, ";"),
     "of_signal": _row(_BA, _STRING, _SG, _id("of_signal"), _NAME, _VALUE, ";"),
@@ -195,7 +195,7 @@ def dbc_text(data: bytes) -> DbcText:
         ends.append(match.end())
         numbers.append(number)
     entries = [
-        Entry(long.get(number) or name.decode(), number, line, _id_fault(number) or fault)
+        Entry(long.get(number, name.decode()), number, line, _id_fault(number) or fault)
         for name, number, line, fault in found
         if name != _NO_MESSAGE
     ]

@@ -24,6 +24,10 @@ SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
             'VERSION "1"\n\nBO_ 1 LeverLeft: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n',
             "machine.dbc:3: not a DBC file that can be used: The signal S does not fit",
         ),
+        (
+            f'VERSION "1"\n\nBO_ {"9" * 5000} M: 8 A\n',
+            "machine.dbc: not a DBC file that can be used: Exceeds the limit (4300 digits)",
+        ),
         # seen at the next statement only, which is that of a message that is not used
         (
             'VERSION "1"\n\nCM_ "end"\nBO_ 1 M: 1 A\n\nCM_ "end"\n',
@@ -95,6 +99,15 @@ def test_a_table_without_its_signal_is_told_at_the_table(machine: Machine) -> No
     (problem,) = machine.problems()
     assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: unused VAL_")
     assert "\n" not in problem
+
+
+def test_a_type_without_its_signal_is_told_at_the_type(machine: Machine) -> None:
+    machine.in_dbc("VAL_ 272 Enable", "SIG_VALTYPE_ 272 Enabel : 1;\nVAL_ 272 Enable")
+    line = machine.in_dbc("SIG_VALTYPE_ 272", "SIG_VALTYPE_ 272")
+    (problem,) = machine.problems()
+    assert problem.startswith(
+        f"machine.dbc:{line}: not a DBC file that can be used: unused SIG_VALTYPE_"
+    )
 
 
 def test_one_id_twice_in_one_file(machine: Machine) -> None:

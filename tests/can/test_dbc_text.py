@@ -318,6 +318,27 @@ def test_a_file_that_has_changed_is_not_mixed_with_what_was_read(machine: Machin
     assert messages.find("TipPosition") == f"{path}: has changed since it was read"
 
 
+SYMBOL = 'BA_ "SystemMessageLongSymbol" BO_ 1'
+
+
+@pytest.mark.parametrize("symbol", ["a\nb", 'a\\"b'])
+def test_a_long_name_that_is_none(file: Path, symbol: str) -> None:
+    """cantools takes it; nobody can name it."""
+    file.write_text(KINDS + f'{SYMBOL} "{symbol}";\n', encoding="cp1252")
+    loaded, _ = load_dbc(file, ())
+    assert loaded
+    assert [e.name for e in loaded.entries] == ["ALongerName", "Short"]
+    found = Messages([loaded]).find("Short")
+    assert found == f"{file}: 'Short' has another name for the parser"
+
+
+def test_an_empty_long_name(file: Path) -> None:
+    file.write_text(KINDS + f'{SYMBOL} "";\n', encoding="cp1252")
+    loaded, _ = load_dbc(file, {""})
+    assert loaded
+    assert [m.name for m in loaded.messages] == [e.name for e in loaded.entries[1:]] == [""]
+
+
 def test_all_that_can_be_loaded(file: Path) -> None:
     """For who asks which there are."""
     file.write_text(OTHER + OTHER.replace("BO_ 5 O", "BO_ 6 Bad_o").replace("8|8", "9|8"), "cp1252")

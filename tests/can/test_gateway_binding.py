@@ -40,6 +40,12 @@ def problems(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = (""
     return [str(p).rpartition(f"{folder}/")[2] for p in caught.value.problems]
 
 
+def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
+    blocked = ("fallback: neutral", "fallback: neutral\n  blocked: [GrappleSway, TipPosition]")
+    extra = {m.name for m in load(tmp_path, blocked).messages.all()}
+    assert extra - {m.name for m in load(tmp_path).messages.all()} == {"GrappleSway", "TipPosition"}
+
+
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [

@@ -71,6 +71,21 @@ def test_a_file_gives_the_terminal_no_commands(tmp_path: Path) -> None:
     assert "\\x1b[2J" in CliRunner().invoke(app, ["check", f"no{CLEAR}.yaml"]).output
 
 
+def test_a_warning_gives_the_terminal_no_commands(tmp_path: Path) -> None:
+    row = f'BA_ "SystemMessageLongSymbol" BO_ 5 "a{CLEAR}b";\nBO_ 5 M: 1 A\n'
+    signal = ' SG_ S : 0|9@1+ (1,0) [0|0] "" A\n'
+    head, tail = DBC.split("BO_ 272", 1)
+    defined = 'BA_DEF_ BO_ "SystemMessageLongSymbol" STRING ;\n'
+    text = f"{head}{defined}{row}{signal}BO_ 272{tail}"
+    (tmp_path / "a.dbc").write_text(text, encoding="cp1252")
+    file = tmp_path / "machine.yaml"
+    file.write_text(SHIPPED.replace("../dbc/forwarder.dbc", "a.dbc"))
+    result = CliRunner().invoke(app, ["check", str(file)])
+    assert result.exit_code == 0, result.output
+    assert "a\\x1b[2Jb: has 1 bytes, and the signal S is not within them" in result.output
+    assert "\x1b" not in result.output
+
+
 def test_the_channel_of_a_log_gives_the_terminal_no_commands(tmp_path: Path) -> None:
     log = tmp_path / "drive.log"
     log.write_text(f"(1.0) a{CLEAR} 110#00\n(1.1) b{CLEAR} 110#00\n")
