@@ -1,13 +1,14 @@
 """Measures of a setting, held to published ones, and what the valve does to fast poles."""
 
 import math
+from functools import partial
 
 import pytest
 
 from canshaper.design.tuning.evaluate import Machine, evaluate, gff, press
 from canshaper.design.tuning.formulation import POLE_PER_RATE
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.sway import SwayMode
 
@@ -57,7 +58,16 @@ def test_no_filter_leaves_everything() -> None:
         assert residual.machine == pytest.approx(1.0)
 
 
-def test_every_filter_of_the_registry_can_be_measured() -> None:
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_filter_of_the_registry_can_be_measured(kind: str) -> None:
+    """And leaves no more of the swing than none does."""
+    for given in KINDS[kind].settings(MODE, 0.02).values():
+        found = evaluate(MODE, 0.02, partial(build_shaper, kind, 0.02, **given), lengths_pct=(0,))
+        assert found.residuals[0].linear <= 1.0
+        assert (found.run_on_s > 0.0) is (kind != "off")
+
+
+def test_a_known_filter_leaves_what_it_should() -> None:
     found = evaluate(MODE, 0.02, lambda sway: build_shaper("zv", 0.02, sway))
     assert found.run_on_s == pytest.approx(1.10, abs=0.021)
     assert 100.0 * found.residuals[0].linear == pytest.approx(35.9, abs=0.2)
