@@ -3,15 +3,13 @@
 import typer
 
 from canshaper.bus.device import match_fault, whereabouts
-from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader
+from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader, print_warnings
 from canshaper.cli.console import SafeConsole, echo
 from canshaper.config.bus import Bus
 from canshaper.config.schema import RadialConfig
-from canshaper.config.source import Problem
 from canshaper.machine.bus_load import BUSY
 from canshaper.machine.deployment import Deployment
 
-MOST_WARNINGS = 10  # of DBC files; others are counted
 # What joysticks do while the daemon is away.
 FALLBACKS = {
     "stop": "no joystick does without us",
@@ -51,7 +49,7 @@ def check(file: str = FILE) -> None:
         raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None
     config = deployment.config
     echo(f"{deployment.path}: good")
-    _print_warnings(*deployment.messages.warnings())
+    print_warnings(*deployment.messages.warnings(), "not used")
     for name, bus in config.buses.items():
         echo(f"  bus {name}: {bus.interface} {bus.channel}{_load(deployment, name)}")
         if bus.match:
@@ -75,16 +73,6 @@ def check(file: str = FILE) -> None:
     print_stopping(deployment, SafeConsole())
     for place, text in unstated(deployment):
         echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
-
-
-def _print_warnings(count: int, warnings: list[Problem]) -> None:
-    """What is wrong with messages of the DBC files that the deployment does not use."""
-    if count:
-        echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages that are not used:")
-    for warning in warnings[:MOST_WARNINGS]:
-        echo(f"    {warning}")
-    if (more := count - MOST_WARNINGS) > 0:
-        echo(f"    and {more} more")
 
 
 def _match(bus: Bus) -> str:

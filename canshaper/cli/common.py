@@ -11,6 +11,7 @@ from canshaper.config.source import DeploymentError, Problem
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
+MOST_WARNINGS = 10  # of DBC files; the others are counted
 EXIT_BAD_DEPLOYMENT = 2
 EXIT_WITHOUT_TOOLS = 2
 EXIT_NO_BUS = 3  # the file is good; the service manager tries again until the interface is there
@@ -106,3 +107,13 @@ def fail(error: Exception, code: int = EXIT_BAD_DEPLOYMENT) -> typer.Exit:
     """Print an error as it is and give the exit, that of a bad deployment unless told."""
     echo(str(error), err=True)
     return typer.Exit(code)
+
+
+def print_warnings(count: int, warnings: list[Problem], are: str) -> None:
+    """Show the first faults of DBC files in messages that ``are`` in this way, and how many."""
+    if count:
+        echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages that are {are}:")
+    for warning in warnings[:MOST_WARNINGS]:
+        echo(f"    {warning}")
+    if (more := count - MOST_WARNINGS) > 0:
+        echo(f"    and {more} more")

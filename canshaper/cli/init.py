@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
-from canshaper.cli.common import data_directory, fail
+from canshaper.cli.common import data_directory, fail, print_warnings
 from canshaper.cli.console import echo
 
 if TYPE_CHECKING:
@@ -75,7 +75,9 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
     for path in files:
         file, wrong = load_dbc(path)
         problems += wrong
-        found += file.messages if file else []
+        if file:
+            found += file.messages
+            print_warnings(file.count, file.warnings, "left out")
     if problems:
         raise DeploymentError(problems)
     return found

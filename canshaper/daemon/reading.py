@@ -20,7 +20,7 @@ from canshaper.config.source import DeploymentError
 from canshaper.machine.deployment import Deployment
 
 # Ten times what the largest deployment takes that is allowed (canshaper.config.source and
-# canshaper.machine.database say how large), on a PC that is ten times as slow as today's.
+# canshaper.machine say how large), on a PC that is ten times as slow as today's.
 MOST_CPU_S = 20
 MOST_S = 60.0  # by the clock: it runs behind the loop and all else
 MOST_BYTES = 140 << 20  # more than the daemon has, which it shares with it

@@ -1,18 +1,17 @@
 """DBC files of a deployment: loading them, finding messages, problems with file and line."""
 
-import logging
 import re
 from collections.abc import Collection, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import sha256
 from pathlib import Path
 
-import cantools
-from cantools.database.can import Database, Message
+from cantools.database.can import Message
 
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.bounded import read_bounded
 from canshaper.config.source import MOST_LETTERS, MOST_PROBLEMS, Problem
+from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
     EXTENDED,
     MOST_MESSAGES,
@@ -24,20 +23,6 @@ from canshaper.machine.dbc_text import (
 
 # Of all DBC files of a deployment: five times those of a machine.
 MOST_BYTES = 16 << 20
-# What cantools gets of a file: the messages that are used, and what belongs to no message.
-MOST_PARSED = 400_000
-# Words of a file that is full of signals; what is no signal takes cantools as long for fewer bytes.
-MOST_WORDS = 90_000
-# Bytes of all messages: cantools takes 10 us for each, whatever is in it.
-MOST_PAYLOAD = 100_000
-_LENGTH = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{1,5})")
-# Bytes of a message, first bit and bits of a signal: cantools makes a list of as many, and the
-# memory would not last. The longest of J1939 has 1785 bytes.
-_TOO_LARGE = re.compile(
-    r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{6,})|\bSG_\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{6,})"
-)
-_SYNTAX = "Invalid syntax"
-UNUSABLE = "not a DBC file that can be used"
 _DEFINITION = re.compile(r"\s*BO_\s+(\d{1,10})\s+(\w+)")
 
 
@@ -52,6 +37,7 @@ class DbcFile:
         warnings: what is wrong with the others, the first of it.
         count: how many warnings there are.
         statements: how many of its statements belong to messages.
+        used_bytes: of what cantools got of it.
     """
 
     path: Path
@@ -61,6 +47,7 @@ class DbcFile:
     warnings: list[Problem]
     count: int
     statements: int
+    used_bytes: int
 
     def problem(self, message: Message, text: str) -> Problem:
         """A problem of this file at the line where the message is defined."""
@@ -107,20 +94,26 @@ def load_dbc(
     bounded = names is not None
     if text.entries is None:
         content = text.whole()
-        parsed = _parsed(path, content, bounded=bounded)
+        parsed = parsed_messages(path, content, bounded=bounded)
         if isinstance(parsed, Problem):
             return None, [parsed]
-        return _checked(DbcFile(path, digest, _entries(parsed, content), parsed, [], 0, 0))
+        count = letters(content)
+        file = DbcFile(path, digest, _entries(parsed, content), parsed, [], 0, 0, count)
+        return _checked(file, named=bounded)
     entries = text.entries
-    used = {e.number for e in entries if (e.fault is None if names is None else e.name in names)}
+    used = {e.number for e in entries if names is None or e.name in names}
+    if names is None:
+        used -= {e.number for e in entries if e.fault} | text.leftover_numbers()
+        used -= {entry.number for entry, _ in _same_id(entries)}
     rest = text.of(used)
     # Of a file of messages alone nothing may be left, which cantools would not have as a file.
-    parsed = _parsed(path, rest, bounded=bounded) if rest.strip() or not entries else []
+    parsed = parsed_messages(path, rest, bounded=bounded) if rest.strip() or not entries else []
     if isinstance(parsed, Problem):
-        # A statement without its end is seen at the next one, which a file that is whole has.
-        whole = _parsed(path, text.whole(), bounded=True) if _SYNTAX in parsed.message else None
-        if isinstance(whole, Problem) and _SYNTAX in whole.message:
-            parsed = whole
+        if SYNTAX in parsed.message and len(rest) < len(text.data):
+            # A statement without its end is seen at the next one, which may be left out here.
+            whole = parsed_messages(path, text.whole(), bounded=True)
+            if isinstance(whole, Problem) and SYNTAX in whole.message:
+                parsed = whole
         return None, [parsed]
     warnings = list(_faults(path, entries, used))
     leftover = text.leftover(used)
@@ -128,8 +121,8 @@ def load_dbc(
     for line, fault in text.leftover_faults(leftover[:MOST_PROBLEMS]):
         warnings.append(Problem(str(path), line, "", fault))
     del warnings[MOST_PROBLEMS:]
-    file = DbcFile(path, digest, entries, parsed, warnings, count, text.statements)
-    return _checked(file)
+    file = DbcFile(path, digest, entries, parsed, warnings, count, text.statements, letters(rest))
+    return _checked(file, named=bounded)
 
 
 def too_many(files: Sequence[DbcFile]) -> str | None:
@@ -137,39 +130,18 @@ def too_many(files: Sequence[DbcFile]) -> str | None:
     for what, count, most in (
         ("messages", sum(len(file.entries) for file in files), MOST_MESSAGES),
         ("statements of messages", sum(file.statements for file in files), MOST_STATEMENTS),
+        ("bytes in what is used of them", sum(file.used_bytes for file in files), MOST_PARSED),
     ):
         if count > most:
             return f"found {count} {what} in all, allowed are {most} at most"
     return None
 
 
-def _parsed(path: Path, text: str, *, bounded: bool) -> list[Message] | Problem:
-    """Messages that cantools finds, or why it can find none."""
-    if large := _too_large(text, bounded=bounded):
-        line, why = large
-        return Problem(str(path), line, "", f"{UNUSABLE}: {why}")
-    # cantools only logs that of two messages with one id the first is lost; found below.
-    logging.getLogger("cantools").setLevel(logging.ERROR)
-    try:
-        database = cantools.database.load_string(text, database_format="dbc")
-    except Exception as error:  # whatever a broken file makes the parser raise
-        cause = getattr(error, "e_dbc", None) or error  # without the names of other formats
-        why = " ".join(str(cause).split()) or type(cause).__name__
-        if "more than 11 bits" in why:
-            why += f" ({WIDE_ID})"
-        if at := re.search(r"at line (\d+)", why):
-            line = int(at.group(1))
-        elif at := re.search(r"in message (\w+)|unused \w+ entries in DBC: (\w+ \d+ \w+)", why):
-            line = _line_of(text, rf"BO_\s+\d+\s+{at[1]}\b" if at[1] else re.escape(at[2]))
-        else:
-            line = None
-        return Problem(str(path), line, "", f"{UNUSABLE}: {why}")
-    assert isinstance(database, Database)
-    return database.messages
+def _checked(file: DbcFile, *, named: bool) -> tuple[DbcFile | None, list[Problem]]:
+    """The file, and what is wrong with its messages that cantools does not see.
 
-
-def _checked(file: DbcFile) -> tuple[DbcFile | None, list[Problem]]:
-    """The file, and what is wrong with its messages that cantools does not see."""
+    Where nobody has named the messages those that cannot be used are left out.
+    """
     problems = []
     loaded = {(message.frame_id, message.is_extended_frame) for message in file.messages}
     for entry, other in _same_id(file.entries):
@@ -177,8 +149,14 @@ def _checked(file: DbcFile) -> tuple[DbcFile | None, list[Problem]]:
             text = _same_text(entry, other)
             problems.append(Problem(str(file.path), entry.line, entry.name, text))
     faults = [(m, fault) for m in file.messages if (fault := layout_fault(m) or _id_fault(m))]
-    problems += [file.problem(*fault) for fault in faults]
-    return None if faults else file, problems
+    found = [file.problem(*fault) for fault in faults]
+    if named:
+        return None if faults else file, [*problems, *found]
+    wrong = {id(message) for message, _ in faults}
+    messages = [message for message in file.messages if id(message) not in wrong]
+    warnings = [*file.warnings, *found][:MOST_PROBLEMS]
+    count = file.count + len(found)
+    return replace(file, messages=messages, warnings=warnings, count=count), problems
 
 
 def _faults(path: Path, entries: list[Entry], used: set[int]) -> Iterator[Problem]:
@@ -202,31 +180,6 @@ def _same_id(entries: list[Entry]) -> Iterator[tuple[Entry, Entry]]:
 
 def _same_text(entry: Entry, other: Entry) -> str:
     return f"has the id {entry.key[0]:#x} of {other.name}"
-
-
-def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
-    """Line and reason, where a file would take cantools more time or memory than there is."""
-    if large := _TOO_LARGE.search(text):
-        line = text.count("\n", 0, large.end()) + 1
-        return line, f"found {large[1] or large[2]} bytes or bits, allowed are 99999 at most"
-    if not bounded:
-        return None
-    if (parsed := len(text) - text.count("\n")) > MOST_PARSED:
-        return (
-            None,
-            f"found {parsed} bytes in what is used of it, allowed are {MOST_PARSED} at most",
-        )
-    if (words := len(text.split())) > MOST_WORDS:
-        return None, f"found {words} words, allowed are {MOST_WORDS} at most"
-    if (payload := sum(map(int, _LENGTH.findall(text)))) > MOST_PAYLOAD:
-        return None, f"found {payload} bytes in its messages, allowed are {MOST_PAYLOAD} at most"
-    return None
-
-
-def _line_of(text: str, pattern: str) -> int | None:
-    """Number of the first line of a text that starts with a pattern."""
-    start = re.search(rf"^[^\S\n]*{pattern}", text, re.MULTILINE)
-    return text.count("\n", 0, start.start()) + 1 if start else None
 
 
 def _entries(messages: list[Message], text: str) -> list[Entry]:

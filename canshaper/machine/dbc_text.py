@@ -134,6 +134,10 @@ class DbcText:
         """How many belong to messages, definitions included."""
         return len(self._starts)
 
+    def leftover_numbers(self) -> set[int]:
+        """Messages with tables or types of values that have no signal."""
+        return {self._numbers[i] for i in self._leftover}
+
     def leftover(self, numbers: Collection[int]) -> list[int]:
         """Tables and types of values that have no signal, but for those of these messages."""
         return [i for i in self._leftover if self._numbers[i] not in numbers]

@@ -18,6 +18,7 @@ from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Place, Problem, Source
 from canshaper.machine.database import MOST_BYTES, DbcFile, Messages, load_dbc, too_many
+from canshaper.machine.dbc_parse import MOST_PARSED
 
 
 @dataclass
@@ -52,6 +53,7 @@ class Lookup:
         if (size := sum(_size(directory / name) for name in self.config.dbc)) > MOST_BYTES:
             self.add(("dbc",), f"found {size} bytes in all, allowed are {MOST_BYTES} at most")
             return None
+        wrong = 0
         names = set(_messages(self.config))
         for i, name in enumerate(self.config.dbc):
             try:
@@ -62,6 +64,10 @@ class Lookup:
             self.problems += problems
             if file:
                 files.append(file)
+            else:
+                wrong += _size(directory / name)
+            if wrong > MOST_PARSED:
+                break  # as much as all of them together may take; the others are not looked at
             if fault := too_many(files):
                 self.add(("dbc",), fault)
                 return None

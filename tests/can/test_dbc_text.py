@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.machine import database, dbc_text
+from canshaper.machine import database, dbc_parse, dbc_text, lookup
 from canshaper.machine.database import Messages, load_dbc
 from tests.can.conftest import ROOT, Machine
 
@@ -350,6 +350,19 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     assert Messages([loaded]).find("None") == (
         "found 'None', messages of the DBC files are Bad_other, Other"
     )
+    for row in (
+        OTHER,  # two of one id
+        'VAL_ 5 None 1 "on" ;\n',
+        "SIG_VALTYPE_ 5 One : 1;\n",  # a float of 8 bits
+        'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","J1939PG";\n'
+        'BA_DEF_DEF_ "VFrameFormat" "StandardCAN";\nBA_ "VFrameFormat" BO_ 5 1;\n',
+    ):
+        file.write_text(f"{OTHER}{OTHER.replace('5 Other', '6 Next')}{row}", "cp1252")
+        loaded, problems = load_dbc(file)
+        assert loaded
+        assert not problems
+        assert [m.name for m in loaded.messages] == ["Next"]
+        assert loaded.count == len(loaded.warnings) == 1, row
     loaded, _ = load_dbc(file, ())
     assert loaded
     assert loaded.messages == []
@@ -387,37 +400,63 @@ def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.Monk
     )
     for name in ("MOST_PARSED", "MOST_WORDS", "MOST_PAYLOAD"):
         most = {"MOST_PARSED": count, "MOST_WORDS": count // 3, "MOST_PAYLOAD": 200}[name]
-        monkeypatch.setattr(database, name, most)
+        monkeypatch.setattr(dbc_parse, name, most)
     machine.load()
     machine.in_dbc("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft: 208")
     (problem,) = machine.problems()
     assert problem.endswith("bytes in its messages, allowed are 200 at most")
-    monkeypatch.setattr(database, "MOST_WORDS", 10)
+    monkeypatch.setattr(dbc_parse, "MOST_WORDS", 10)
     (problem,) = machine.problems()
     assert problem.endswith("words, allowed are 10 at most")
-    monkeypatch.setattr(database, "MOST_PARSED", 100)
+    monkeypatch.setattr(dbc_parse, "MOST_PARSED", 100)
     (problem,) = machine.problems()
     assert problem.endswith("bytes in what is used of it, allowed are 100 at most")
 
 
-@pytest.mark.parametrize("most", ["MOST_MESSAGES", "MOST_STATEMENTS"])
+@pytest.mark.parametrize("most", ["MOST_MESSAGES", "MOST_STATEMENTS", "MOST_PARSED"])
 def test_more_than_any_machine_has(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, most: str
 ) -> None:
     machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]")
     rows = "".join(OTHER.replace("5 O", f"{i} O{i}") for i in range(50))
-    (machine.directory / "other.dbc").write_text(rows, encoding="cp1252")
-    deployment = machine.load()
-    files = deployment.messages.files
-    counts = [len(f.entries) if most == "MOST_MESSAGES" else f.statements for f in files]
+    (machine.directory / "other.dbc").write_text(f'VERSION "1"\n{rows}', encoding="cp1252")
+    files = machine.load().messages.files
+    counts = {
+        "MOST_MESSAGES": [len(file.entries) for file in files],
+        "MOST_STATEMENTS": [file.statements for file in files],
+        "MOST_PARSED": [file.used_bytes for file in files],
+    }[most]
+    assert counts[1] == {"MOST_MESSAGES": 50, "MOST_STATEMENTS": 50, "MOST_PARSED": 11}[most]
     monkeypatch.setattr(database, most, sum(counts) - 1)
     (problem,) = machine.problems()
     assert f"dbc: found {sum(counts)} " in problem
     assert problem.endswith(f"in all, allowed are {sum(counts) - 1} at most")
     monkeypatch.setattr(database, most, sum(counts))
     machine.load()
-    monkeypatch.setattr(dbc_text, most, max(counts))
-    machine.load()
-    monkeypatch.setattr(dbc_text, most, max(counts) - 1)
-    (problem,) = machine.problems()
-    assert "not a DBC file that can be used: more than" in problem
+
+
+@pytest.mark.parametrize(("most", "count"), [("MOST_MESSAGES", 50), ("MOST_STATEMENTS", 51)])
+def test_more_than_any_file_has(
+    file: Path, monkeypatch: pytest.MonkeyPatch, most: str, count: int
+) -> None:
+    rows = "".join(OTHER.replace("5 O", f"{i} O{i}") for i in range(50))
+    file.write_text(rows + 'CM_ BO_ 5 "text";', encoding="cp1252")
+    monkeypatch.setattr(dbc_text, most, count)
+    assert load_dbc(file, ())[0]
+    monkeypatch.setattr(dbc_text, most, count - 1)
+    loaded, (problem,) = load_dbc(file, ())
+    assert not loaded
+    assert "not a DBC file that can be used: more than" in str(problem)
+
+
+def test_wrong_files_take_no_more_than_good_ones(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    machine.in_yaml("[machine.dbc]", "[a.dbc, b.dbc, c.dbc]")
+    for name in ("a.dbc", "b.dbc", "c.dbc"):
+        (machine.directory / name).write_text("no DBC", encoding="cp1252")
+    assert len(machine.problems()) == 3
+    monkeypatch.setattr(lookup, "MOST_PARSED", 12)
+    assert len(machine.problems()) == 3
+    monkeypatch.setattr(lookup, "MOST_PARSED", 11)
+    assert [p.split(":")[0] for p in machine.problems()] == ["a.dbc", "b.dbc"]

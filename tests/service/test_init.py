@@ -78,6 +78,18 @@ def test_enter_throughout_gives_a_machine_with_what_was_found(tmp_path: Path) ->
     assert f"canshaper check {file}" in result.output
 
 
+def test_messages_that_cannot_be_used_are_shown_and_left_out(tmp_path: Path) -> None:
+    other = tmp_path / "other.dbc"
+    signal = 'SG_ S : 0|9@1+ (1,0) [0|0] "" A'
+    other.write_text(f'VERSION ""\n\nBO_ 5 Other: 1 A\n {signal}\n', encoding="cp1252")
+    file = tmp_path / "machine.yaml"
+    shown = init(file, None, "--dbc", str(other))
+    assert shown.exit_code == 0, shown.output
+    assert "  1 WARNING in messages that are left out:\n" in shown.output
+    assert f"    {other}:3: Other: has 1 bytes, and the signal S is not" in shown.output
+    load_deployment(file)
+
+
 def test_the_stopwatch_becomes_sway_data_and_a_filter(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     given = {"slew ten": "30", "slew first": "20", "slew last": "5", "slew speed": "2.5"}
