@@ -51,7 +51,7 @@ def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
         assert state(gateway) == "vcan0 vcan1: 40 rules, running"
         wait_for(far, "SlewStatus", lambda v: v["Reason"] == "STICK_NOT_NEUTRAL")
         gateway.systemctl("stop")
-        assert state(gateway) == "vcan0 vcan1: 44 rules, away"
+        assert state(gateway) == "vcan0 vcan1: 42 rules, away"
         while far.recv(0) is not None:
             pass
         for _ in range(10):
