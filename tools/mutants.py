@@ -26,6 +26,7 @@ from mutmut.workers import isolation
 PROCESSES = 2
 # Exit codes of mutmut's workers: a test failed, or its time was up (a loop that never ends).
 KILLED, TIMED_OUT, SURVIVED, TYPES = (1, 3), (-27, -24, 24, 36, 152, 255), 0, 37
+UNREACHED = 33  # none of the chosen tests calls the function
 
 Change = tuple[str, tuple[str, ...]]  # function, and the lines of the difference
 
@@ -160,7 +161,8 @@ def judge(known: dict[Change, str], patterns: list[str]) -> int:
             alive.add(change)
         else:
             failures += 1
-            what = "survived" if code == SURVIVED else f"came to nothing ({code})"
+            words = {SURVIVED: "survived", UNREACHED: "reached by no test"}
+            what = words.get(code, f"came to nothing ({code})")
             counts[what] += 1
             print(f"\n# {what}: {name}", change[0], *change[1], sep="\n")
     for change in (known.keys() & seen) - alive:  # a function may have the same line twice

@@ -36,7 +36,13 @@ TESTS = {
     "bus": ["tests/can"],
 }
 CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
-CORE_TESTS = ["test_axis*.py", "test_limits.py", "test_sets.py", "test_valve_curve.py"]
+CORE_TESTS = [
+    "test_added.py",
+    "test_axis*.py",
+    "test_limits.py",
+    "test_sets.py",
+    "test_valve_curve.py",
+]
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
 
 

@@ -152,8 +152,12 @@ def test_the_bounds_are_what_they_are_set_to() -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_a_joystick_that_is_pushed_the_other_way_ends_it_in_that_tick(sign: float) -> None:
-    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=125)
+@pytest.mark.parametrize("fall_per_s", [5.0, 0.2])
+def test_a_joystick_that_is_pushed_the_other_way_ends_it_in_that_tick(
+    fall_per_s: float, sign: float
+) -> None:
+    limits = OutputLimits(fall_per_s=fall_per_s)
+    axis = Axis(TICK_S, limits, sway=None, shaper=Off(), grid_steps=125)
     axis.tick(StickInput())
     for _ in range(10):
         axis.tick(StickInput(), -sign * 0.2)
@@ -182,14 +186,94 @@ def test_the_operators_own_part_may_still_be_on_its_way_back(sign: float) -> Non
     """A reversal falls by the rate as ever; only what was added is gone at once."""
     limits = OutputLimits(fall_per_s=1.0)
     axis, plain = pair(limits, Off)
-    for _ in range(30):
+    for _ in range(5):
         axis.tick(StickInput(sign * 0.5), sign * 0.2)
         plain.tick(StickInput(sign * 0.5))
+    assert sign * axis.sent == pytest.approx(0.7, abs=SLACK)
     for _ in range(8):
         axis.tick(StickInput(-sign * 0.5), sign * 0.2)
         plain.tick(StickInput(-sign * 0.5))
         assert axis.sent == pytest.approx(plain.sent, abs=SLACK)
         assert sign * axis.sent > 0.0
+
+
+@pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.1, -1.1])
+def test_no_velocity_trips_with_bounds_too(bad: float) -> None:
+    """It is an error of the axis that adds: bounds do not turn it into something to carry out."""
+    axis, _ = pair(OutputLimits(), Off)
+    axis.tick(StickInput(), 0.1)
+    axis.tick(StickInput(), bad)
+    assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
+
+
+def test_rounding_of_the_operators_own_part_uses_up_no_bound() -> None:
+    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
+    axis.bounds = bounds()
+    axis.tick(StickInput())
+    for _ in range(100):
+        axis.tick(StickInput(0.149))
+        assert axis.sent == pytest.approx(0.1)
+    assert (axis.bounds.kept(1.0), axis.bounds.kept(-1.0)) == (LARGEST, -LARGEST)
+
+
+def test_missed_ticks_use_up_way_and_time() -> None:
+    way, time = (Axis(TICK_S, OutputLimits(), sway=None, shaper=Off()) for _ in range(2))
+    way.bounds, time.bounds = bounds(), bounds(path_s=math.inf)
+    for axis in (way, time):
+        axis.tick(StickInput())
+        axis.tick(StickInput(), 0.2)
+    way.hold(19)  # 20 ticks with 0.2: all of the way
+    time.hold(29)
+    for axis in (way, time):
+        axis.tick(StickInput(), 0.2)
+        assert axis.raw == 0
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("command", [0.0, 0.3])
+def test_when_the_time_is_over_nothing_is_added_whatever_the_rates(
+    command: float, sign: float
+) -> None:
+    limits = OutputLimits(rise_per_s=20.0, fall_per_s=0.2)
+    axis, plain = pair(limits, Off)
+    axis.bounds = bounds(path_s=math.inf)
+    for _ in range(30):  # 1.5 s
+        axis.tick(StickInput(sign * command), sign * 0.2)
+        plain.tick(StickInput(sign * command))
+        assert sign * axis.sent == pytest.approx(command + 0.2, abs=SLACK)
+    axis.tick(StickInput(sign * command), sign * 0.2)
+    plain.tick(StickInput(sign * command))
+    assert axis.sent == pytest.approx(plain.sent, abs=SLACK)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_the_carry_makes_it_no_faster_than_its_bound(sign: float) -> None:
+    """A rise that lags carries a step over; the filter's run-on goes the other way meanwhile."""
+    run_on = Fir([0.0, 0.0, 0.0, 0.0, 1.0])
+    axis = Axis(TICK_S, OutputLimits(rise_per_s=2.5), sway=None, shaper=run_on, grid_steps=16)
+    largest = 0.25 + 1 / 64
+    axis.bounds = bounds(largest=largest, path_s=math.inf)
+    axis.tick(StickInput())
+    axis.tick(StickInput(sign / 32))
+    sent = []
+    for own in (0.0, 0.0, 0.0, 1 / 32, 0.0):
+        axis.tick(StickInput(), -sign * largest)
+        sent.append(sign * axis.sent)
+        assert abs(sent[-1] - own) <= largest + 0.5 / 16  # half a step of the grid
+    assert sent == [-2 / 16, -4 / 16, -4 / 16, -4 / 16, -4 / 16]
+
+
+def test_who_adds_and_loses_the_right_to_leaves_no_carry() -> None:
+    axis, fresh = (Axis(TICK_S, OutputLimits(), sway=None, shaper=Off()) for _ in range(2))
+    for one in (axis, fresh):
+        one.tick(StickInput())
+    axis.tick(StickInput(), 0.5)  # more than the rise: some is carried over
+    axis.drop_added()
+    for _ in range(3):
+        axis.tick(StickInput(), 0.1)
+        fresh.tick(StickInput(), 0.1)
+        assert axis.state is fresh.state is State.ACTIVE
+        assert axis.raw == fresh.raw
 
 
 def test_who_adds_and_loses_the_right_to_leaves_nothing() -> None:
