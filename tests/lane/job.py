@@ -12,10 +12,12 @@ VXCAN = ("vxcan0", "vxcan1")  # one pair: a queue (tc) works on it, unlike on vc
 CAN_BITRATE = 250_000  # J1939 on mobile machinery
 SBIN = ("/usr/sbin", "/sbin")  # ip, modprobe, tc; absent from an ordinary user's PATH
 
-# Variables that speak of this host's session: terminals, desktops, service managers.
+# Variables that speak of this host's session: terminals, desktops, service managers; and of its
+# processor, which is not the emulated one: code for another ends with an illegal instruction.
 HOST_ONLY = re.compile(
     r"_|SHLVL|OLDPWD|PWD|DISPLAY|WAYLAND_DISPLAY|XAUTHORITY|SSH_.*|DBUS_.*|XDG_RUNTIME_DIR"
     r"|XDG_SESSION.*|NOTIFY_SOCKET|WATCHDOG_.*|LISTEN_.*|INVOCATION_ID|JOURNAL_STREAM|TMUX.*"
+    r"|OPENBLAS_CORETYPE|NPY_DISABLE_CPU_FEATURES"
 )
 SHELL_NAME = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
 

@@ -246,6 +246,7 @@ def test_rt_is_another_package(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_host_only_variables_stay_outside() -> None:
     host = {"PATH": "/a:/sbin", "NOTIFY_SOCKET": "x", "BASH_FUNC_f%%": "() {", "HOME": "/h"}
+    host["OPENBLAS_CORETYPE"] = "Haswell"
     env = job.environment(host, "tcg", ("can0", "can1"))
     assert env == {
         "PATH": "/a:/sbin:/usr/sbin",
