@@ -62,7 +62,7 @@ PORTS = arrival multicast open_sockets python_can raw raw_faults raw_interface
 coverage: .venv/test-ready
 	@mkdir -p out
 	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \
-		tests/shaping tests/service $(AROUND:%=--ignore-glob='*/test_%*.py') \
+		tests/shaping tests/service tests/guard $(AROUND:%=--ignore-glob='*/test_%*.py') \
 		$(PORTS:%=tests/can/test_%.py)
 	.venv/bin/python -m coverage report
 

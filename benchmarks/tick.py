@@ -119,7 +119,9 @@ def main() -> None:
     pure: list[int] = []
     for i in range(ticks):
         frames: list[Frame] = levers.frames(i * 20)
-        for name, body in bodies.items():
+        for name, body in [*bodies.items()][
+            :: 1 if i % 2 else -1
+        ]:  # none is always behind the same
             for f in frames:
                 hands[name].send(
                     can.Message(arbitration_id=f.can_id, is_extended_id=f.extended, data=f.data)
@@ -156,7 +158,10 @@ def main() -> None:
     ratio = statistics.median(spent["ours"]) / statistics.median(spent["bare"])
     print(f"daemon body / bare loop: {ratio:.2f}")
     guard = statistics.median(spent["ours"]) / statistics.median(spent["open"])
-    print(f"with / without the output guard: {guard:.2f}")
+    more = statistics.median(a - b for a, b in zip(spent["ours"], spent["open"], strict=True))
+    print(
+        f"with / without the output guard: {guard:.2f}, {more / 1e3:.1f} us more in the same tick"
+    )
 
 
 if __name__ == "__main__":

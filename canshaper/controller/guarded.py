@@ -21,11 +21,16 @@ class Guarded:
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
         self._guard = OutputGuard(controller.deployment)
+        self._inputs, self._valves = self._guard.inputs, self._guard.valves
         self._quiet_until_ns: dict[tuple[str, int, bool], int] = {}
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus; see ``Controller``. What it says binds the next frame out."""
-        self._guard.note(frame, now_ns)
+        entry = self._inputs.get(frame[:3])
+        if entry is not None:
+            entry.note(frame[3], now_ns)
+        else:
+            self._guard.note(frame, now_ns)
         passed = self._controller.receive(frame, now_ns)
         if passed is None:
             return None
@@ -44,17 +49,20 @@ class Guarded:
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send now; see ``Controller``."""
-        guard = self._guard
+        guard, valves = self._guard, self._valves
         guard.begin(missed)
-        valves, at = guard.valves, guard.at
+        at = guard.at
         for frame in self._controller.tick(now_ns, missed):
-            valve = valves.get(frame[1])
+            valve = valves.get(frame[:3])
             if valve is None:
                 yield frame
-            elif frame[3][valve.span] == valve.part and now_ns < valve.good_ns:
+                continue
+            data = frame[3]
+            part = data[valve.span]
+            if part == valve.part and now_ns < valve.good_ns:
                 valve.at = at  # the same command as before, and nothing forbids it since
                 yield frame
-            elif not (why := self._refusal(frame, now_ns)):
+            elif not (why := valve.refusal(data, part, now_ns, at)):
                 yield frame
             elif (neutral := self._instead(frame, why, now_ns)) is not None:
                 yield neutral
@@ -73,13 +81,12 @@ class Guarded:
         return [frame for frame in frames if not self._moves(frame)]
 
     def _moves(self, frame: Frame) -> bool:
-        valve = self._guard.valve(frame)
+        valve = self._valves.get(frame[:3])
         return valve is not None and valve.moves(frame.data)
 
     def _refusal(self, frame: Frame, now_ns: int) -> str:
-        guard = self._guard
-        valve = guard.valve(frame)
-        return valve.refusal(frame.data, now_ns, guard.at) if valve else ""
+        valve, data = self._valves[frame[:3]], frame.data
+        return valve.refusal(data, data[valve.span], now_ns, self._guard.at)
 
     def _instead(self, frame: Frame, why: str, now_ns: int) -> Frame | None:
         """Neutral in the place of a frame that is refused; silence where even that moves."""

@@ -2,8 +2,17 @@
 
 import math
 
-from canshaper.guard.bits import CommandBits, StickBits
-from canshaper.guard.inputs import Asked, GuardedJoystick, GuardedStop, largest
+from canshaper.guard.bits import MOST_KNOWN, CommandBits, StickBits
+from canshaper.guard.inputs import (
+    BACK,
+    FOREVER,
+    FORTH,
+    NEUTRAL,
+    Asked,
+    GuardedJoystick,
+    GuardedStop,
+    largest,
+)
 from canshaper.guard.opening import openings
 from canshaper.machine.deployment import BoundAxis, Deployment
 
@@ -14,9 +23,9 @@ UP, DOWN = 0.5, 1.0
 # Periods by which an output may be late: tail and stop are whole periods, the last one included,
 # and a compensation follows what asks for it.
 LATE_PERIODS = 3
-FOREVER = 10**19  # ns
-# Commands whose velocity is kept, so that a fine one does not fill the memory.
-MOST_VELOCITIES = 4096
+At = tuple[int, int]
+Command = tuple[int, float, float, float]
+"""Direction, size, that at most before it was rounded, and the size that may follow at once."""
 
 
 class GuardedAxis(Asked):
@@ -33,7 +42,7 @@ class GuardedAxis(Asked):
     __slots__ = (
         "_added",
         "_adding",
-        "_bound",
+        "_commands",
         "_cut",
         "_cut_ns",
         "_cut_until_ns",
@@ -44,6 +53,7 @@ class GuardedAxis(Asked):
         "_full",
         "_joystick",
         "_kept_ns",
+        "_last",
         "_length",
         "_maximum",
         "_more",
@@ -54,10 +64,9 @@ class GuardedAxis(Asked):
         "_reverse",
         "_rise",
         "_silent_ns",
+        "_step",
         "_stop",
         "_up",
-        "_velocities",
-        "_velocity",
         "at",
         "bits",
         "name",
@@ -72,8 +81,10 @@ class GuardedAxis(Asked):
         joystick: GuardedJoystick,
         stop: GuardedStop | None,
     ) -> None:
-        super().__init__()
         config, limits = bound.config, bound.config.limits
+        message = deployment.levers[config.stick.lever].message
+        super().__init__(StickBits(message, config.stick))
+        joystick.drives(self)
         period_ns = deployment.config.tick_ms * 1_000_000 * bound.period_ticks
         period_s = period_ns * 1e-9
         self.name = bound.name
@@ -87,9 +98,7 @@ class GuardedAxis(Asked):
         self._adding: list[GuardedAxis] = []
         self._added = 0.0
         self._cut, self._cut_ns, self._cut_until_ns = 0.0, 0, 0
-        self._own = [0.0, 0.0]  # speed at most without what is added, negative and positive
-        message = deployment.levers[config.stick.lever].message
-        joystick.drives(StickBits(message, config.stick), self)
+        self._own = [0.0] * 3  # speed at most without what is added, by direction
         if stop is not None:
             stop.stops.append(self)
         self._maximum = _ends(deployment, bound, "max_pct")[1] / 100.0
@@ -105,59 +114,73 @@ class GuardedAxis(Asked):
         self._openings = openings(limits, self.bits.full)
         step = max(slope for one in self._openings for slope in one.slopes)
         self._up, self._down = UP * step, DOWN * step
+        # From one frame to the next, which in a gateway may leave in the same period.
+        self._step = self._up if bound.rewrites else self._rise + self._up
         # At full command a valve may give less than was meant.
         full = self.bits.full
         self._full = min(one.velocity(full) for one in self._openings) - EPSILON
-        self._velocities: dict[bytes, float] = {}
+        self._commands: dict[bytes, Command] = {}
         self._period, self._period_ns = bound.period_ticks, period_ns
-        self._velocity = 0.0  # of the last frame
-        self._bound = self._down  # its size at most, before it was rounded
+        self._last: Command = NEUTRAL, 0.0, self._down, self._down + self._step
 
     def moves(self, data: bytes) -> bool:
         """Whether a frame is anything but neutral."""
         return len(data) != self._length or self.bits.steps(data) != 0
 
-    def refusal(self, data: bytes, now_ns: int, at: tuple[int, int]) -> str:
+    def refusal(self, data: bytes, part: bytes, now_ns: int, at: At) -> str:
         """Why a frame may not leave; empty where it may.
 
         Args:
             data: the frame.
+            part: the bytes of it that tell the command.
             now_ns: monotonic time.
             at: number of this deadline, and of this tick, which does not count those missed.
         """
-        part, (number, tick) = data[self.span], at
-        velocity = self._velocities.get(part)
-        if velocity is None or len(data) != self._length:
-            velocity = self._learn(data)
-        good_ns, bound = FOREVER, self._down
-        if velocity != 0.0:
-            reach, good_ns = self._asked_for(velocity, now_ns)
-            last, period, size = self._velocity, self._period, abs(velocity)
-            before = self._up - abs(last) if velocity * last < 0.0 else self._bound
-            periods = number // period - self.at[0] // period
-            highest = self._highest(before, periods)
-            cut = own = 0.0
-            if now_ns < self._cut_until_ns:
-                # What was added against the axis' own part may end at once, and leaves that.
-                cut, own = self._cut, self._own[velocity > 0.0]
-                highest = max(highest, min(own, self._highest(before + cut, periods)))
-            allowed = reach if reach < highest else highest
-            bound = size + self._down
-            if size > allowed and good_ns and velocity * last > 0.0:
-                # On its way back. The rates do not catch up on deadlines that were missed, so for
-                # the fall they do not count; and it has to be lower with each frame.
-                fallen = self._bound - (tick - self.at[1]) // period * self._fall_least
-                fallen = max(fallen, min(own, fallen + cut))
-                if fallen > allowed:
-                    allowed, good_ns = fallen, 0
-                    bound = min(bound, fallen)
-            elif size >= self._full:
-                bound = allowed
-            if size > allowed + EPSILON:
-                return self._why(velocity, reach, allowed, now_ns)
-        self.part, self.good_ns, self.at = part, good_ns, at
-        self._velocity, self._bound = velocity, bound
+        command = self._commands.get(part)
+        if command is None or len(data) != self._length:
+            command = self._learn(data)
+        direction, size, _, _ = command
+        sure, good_ns = self.sure[direction]
+        last = self._last
+        # The usual one: within what is sure to be asked for, and one step of the rates.
+        if size >= sure or now_ns >= good_ns or direction != last[0] or size > last[3]:
+            command, good_ns, why = self._look(command, now_ns, at)
+            if why:
+                return why
+        self.part, self.good_ns, self.at, self._last = part, good_ns, at, command
         return ""
+
+    def _look(self, command: Command, now_ns: int, at: At) -> tuple[Command, int, str]:
+        """A command with its bound, until when that is good, and why it may not leave."""
+        direction, size, bound, _ = command
+        if direction == NEUTRAL:
+            return command, FOREVER, ""
+        last, last_size, last_bound, _ = self._last
+        number, tick = at
+        reach, good_ns = self._asked_for(direction, now_ns)
+        period = self._period
+        before = self._up - last_size if direction + last == BACK + FORTH else last_bound
+        periods = number // period - self.at[0] // period
+        highest = self._highest(before, periods)
+        cut = own = 0.0
+        if now_ns < self._cut_until_ns:
+            # What was added against the axis' own part may end at once, and leaves that.
+            cut, own = self._cut, self._own[direction]
+            highest = max(highest, min(own, self._highest(before + cut, periods)))
+        allowed = reach if reach < highest else highest
+        if size > allowed and good_ns and direction == last:
+            # On its way back. The rates do not catch up on deadlines that were missed, so for
+            # the fall they do not count; and it has to be lower with each frame.
+            fallen = last_bound - (tick - self.at[1]) // period * self._fall_least
+            fallen = max(fallen, min(own, fallen + cut))
+            if fallen > allowed:
+                allowed, good_ns = fallen, 0
+                bound = min(bound, fallen)
+        elif size >= self._full:
+            bound = allowed
+        refused = size > allowed + EPSILON
+        why = self._why(command, reach, allowed, now_ns) if refused else ""
+        return (direction, size, bound, bound + self._step), good_ns, why
 
     def _highest(self, before: float, periods: int) -> float:
         """Speed that the rates allow after one in the same direction, negative in the other."""
@@ -166,8 +189,8 @@ class GuardedAxis(Asked):
             return (left * self._rise if left > 0.0 else 0.0) + self._up
         return before + periods * self._rise + self._up
 
-    def _asked_for(self, velocity: float, now_ns: int) -> tuple[float, int]:
-        """Speed that was asked for in the direction of a velocity, and until when that holds.
+    def _asked_for(self, direction: int, now_ns: int) -> tuple[float, int]:
+        """Speed that was asked for in a direction, and until when that holds.
 
         Both are 0 where nothing may move at all.
         """
@@ -180,7 +203,7 @@ class GuardedAxis(Asked):
             free_ns = min(free_ns, self._stop.free_ns())
             if free_ns < now_ns:
                 return 0.0, 0
-        if velocity > 0.0:
+        if direction == FORTH:
             reach, sizes = self.now, self.positive
         else:
             reach, sizes = -self.now, self.negative
@@ -188,53 +211,57 @@ class GuardedAxis(Asked):
             reach = 0.0
         if sizes and (before := largest(sizes, since_ns)) > reach:
             reach, from_ns = before, sizes[0][1]
-        if self._more:
-            reach, from_ns = self._reach(reach, now_ns, velocity > 0.0), since_ns  # for this moment
-        until_ns = from_ns + self._kept_ns
-        reach = min(reach, self._maximum)
-        return reach, until_ns if until_ns < free_ns else free_ns
+        reach, until_ns = min(reach, self._maximum), min(from_ns + self._kept_ns, free_ns)
+        if not self._cut:  # else what is its own part has to be followed
+            self.sure[direction] = min(reach, self._full), until_ns
+        if self._more:  # for this moment
+            reach, until_ns = self._reach(reach, now_ns, direction), now_ns
+        return reach, until_ns
 
-    def _learn(self, data: bytes) -> float:
-        """Velocity of a command; infinite where its signals contradict each other."""
+    def _learn(self, data: bytes) -> Command:
+        """Read a command; of endless speed where its signals contradict each other."""
         steps = self.bits.steps(data) if len(data) == self._length else None
         if steps is None:
-            return math.inf
-        if steps > 0:  # a command is one, however small
-            velocity = max(self._openings[0].velocity(steps), 2 * EPSILON)
-        else:
-            velocity = min(-self._openings[1].velocity(-steps), -2 * EPSILON if steps else 0.0)
-        if len(self._velocities) >= MOST_VELOCITIES:
-            self._velocities.clear()
-        self._velocities[data[self.span]] = velocity
-        return velocity
+            return self._last[0] or FORTH, math.inf, math.inf, math.inf
+        direction = (NEUTRAL if steps == 0 else FORTH) if steps >= 0 else BACK
+        size = 0.0
+        if steps:  # a command is one, however small
+            size = max(self._openings[direction - FORTH].velocity(abs(steps)), 2 * EPSILON)
+        if len(self._commands) >= MOST_KNOWN:
+            self._commands.clear()
+        bound = size + self._down
+        command = self._commands[data[self.span]] = direction, size, bound, bound + self._step
+        return command
 
-    def _why(self, velocity: float, reach: float, allowed: float, now_ns: int) -> str:
+    def _why(self, command: Command, reach: float, allowed: float, now_ns: int) -> str:
         """What a frame is beyond, for the log."""
+        direction, size, _, _ = command
         if self._stop is not None and now_ns > self._stop.free_ns():
             limit = "emergency-stop"
         elif self._joystick.released:
             limit = "enable"
         elif now_ns - self._joystick.heard_ns > self._silent_ns:
             limit = "silence"
-        elif velocity == math.inf:
+        elif size == math.inf:
             limit = "command"
         else:
             limit = "maximum" if allowed == self._maximum else "asked"
             limit = limit if allowed == reach else "rate"
-        return f"axis={self.name} limit={limit} speed={velocity:.3f} allowed={allowed:.3f}"
+        speed = size if direction == FORTH else -size
+        return f"axis={self.name} limit={limit} speed={speed:.3f} allowed={allowed:.3f}"
 
-    def _reach(self, reach: float, now_ns: int, up: bool) -> float:
+    def _reach(self, reach: float, now_ns: int, direction: int) -> float:
         """What may be, beyond what was asked in the direction of the output."""
         if self._reverse:
             reach = max(reach, self._most(now_ns))
         if self._faster and reach:
             reach = 1.0
-        self._own[up] = max(reach + self._up, self._own[up] - self._fall_least)
+        self._own[direction] = max(reach + self._up, self._own[direction] - self._fall_least)
         if any(axis._most(now_ns) for axis in self._adding):
             self._cut_until_ns = now_ns + self._cut_ns  # when asked for no more, it falls
             # A step is paid that rounding has left out before, and rounding comes on top.
             reach += self._added + 1.0 / self.bits.full + self._up
-        return reach
+        return min(reach, self._maximum)
 
     def compensates(self, slew: "GuardedAxis", most: float) -> None:
         """The operator of a slewing axis moves this one too, up to a part of full speed."""

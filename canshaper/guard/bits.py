@@ -21,6 +21,8 @@ from canshaper.config.schema import Stick, Valve
 ROUNDING = 1e-6
 # What rounding may take from a command in another resolution, in its steps.
 HALF = 0.5 + ROUNDING
+# Values of a signal that are kept once read, so that a fine one does not fill the memory.
+MOST_KNOWN = 4096
 _FLOATS = {16: "<e", 32: "<f", 64: "<d"}
 
 
@@ -84,6 +86,7 @@ class StickBits:
 
     Attributes:
         fields: every field that it is read from.
+        span: the bytes with all of them.
     """
 
     def __init__(self, message: Message, stick: Stick) -> None:
@@ -97,6 +100,7 @@ class StickBits:
         self._band = stick.neutral_pct / 100.0 - ROUNDING
         self.fields = [self._part.field, *self._flags]
         self.fields += [self._negative.field] if self._negative else []
+        self.span = span_of(reduce(or_, (field.bits for field in self.fields)))
 
     def ask(self, data: bytes) -> float:
         """Part of full speed, [-1, 1]; 0 in neutral and where nothing is asked."""

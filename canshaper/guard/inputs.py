@@ -5,12 +5,14 @@ right. Its alive counter is not looked at, so that a frame which the controller 
 raise what the guard allows, never what the controller does.
 """
 
+from abc import ABC, abstractmethod
 from collections import deque
 
-from canshaper.guard.bits import Field, StickBits, span_of
+from canshaper.guard.bits import MOST_KNOWN, Field, StickBits, span_of
 from canshaper.machine.inputs import BoundInput
 
-NEVER = -(10**18)  # ns
+NEVER, FOREVER = -(10**18), 10**19  # ns
+NEUTRAL, FORTH, BACK = range(3)
 Sizes = deque[tuple[float, int]]
 """Each with the time when it was asked for last, the largest first, each later one smaller."""
 
@@ -20,33 +22,58 @@ class Asked:
 
     Attributes:
         now: what its last frame asks, [-1, 1].
-        positive, negative: sizes that it asked before in each direction.
+        positive, negative: sizes that it asked before in each direction, where it then asked less.
+        stick: how its frames are read.
+        asks: what it asked, by the bytes of that.
         good_ns: until when the last command may leave again, if nothing forbids it meanwhile.
+        sure: by direction the speed that was asked for at least, and until when that holds, if
+            nothing forbids it meanwhile.
     """
 
-    __slots__ = ("good_ns", "negative", "now", "positive")
+    __slots__ = (
+        "asks",
+        "good_ns",
+        "negative",
+        "now",
+        "positive",
+        "stick",
+        "sure",
+    )
 
-    def __init__(self) -> None:
+    def __init__(self, stick: StickBits) -> None:
+        self.stick = stick
+        self.asks: dict[bytes, float] = {}
         self.now = 0.0
-        self.good_ns = 0
         self.positive: Sizes = deque()
         self.negative: Sizes = deque()
+        self.sure: list[tuple[float, int]] = [(0.0, 0)] * 3
+        self.good_ns = 0
 
-    def change(self, ask: float, until_ns: int) -> None:
-        """Something else is asked; what was asked before, was until then."""
-        before, self.now = self.now, ask
-        if before in (0.0, ask):
-            return
-        size, sizes = (before, self.positive) if before > 0.0 else (-before, self.negative)
-        while sizes and sizes[-1][0] <= size:
-            sizes.pop()
-        sizes.append((size, until_ns))
+    def learn(self, data: bytes) -> float:
+        """Read what a frame asks."""
+        if len(self.asks) >= MOST_KNOWN:
+            self.asks.clear()
+        ask = self.asks[data[self.stick.span]] = self.stick.ask(data)
+        return ask
+
+    def forbid(self) -> None:
+        """Nothing holds that was looked up before."""
+        self.good_ns = 0
+        self.sure = [(0.0, 0)] * 3
 
     def clear(self) -> None:
         """Nothing was asked."""
-        self.now, self.good_ns = 0.0, 0
+        self.now = 0.0
         self.positive.clear()
         self.negative.clear()
+        self.forbid()
+
+
+def keep(sizes: Sizes, size: float, until_ns: int) -> None:
+    """So much was asked until then."""
+    while sizes and sizes[-1][0] <= size:
+        sizes.pop()
+    sizes.append((size, until_ns))
 
 
 def largest(sizes: Sizes, since_ns: int) -> float:
@@ -56,7 +83,7 @@ def largest(sizes: Sizes, since_ns: int) -> float:
     return sizes[0][0] if sizes else 0.0
 
 
-class GuardedInput:
+class GuardedInput(ABC):
     """Frames of one message: right length, right checksum, and from one sender.
 
     Attributes:
@@ -83,9 +110,9 @@ class GuardedInput:
         self._source_ns = now_ns
         return False
 
+    @abstractmethod
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        raise NotImplementedError
 
 
 class GuardedStop(GuardedInput):
@@ -96,12 +123,12 @@ class GuardedStop(GuardedInput):
         stops: what it forbids.
     """
 
-    __slots__ = ("_field", "pressed", "stops")
+    __slots__ = ("_bits", "pressed", "stops")
 
     def __init__(self, bound: BoundInput, signal: str) -> None:
         super().__init__(bound)
         message = bound.message
-        self._field = Field(message.get_signal_by_name(signal), message.length)
+        self._bits = Field(message.get_signal_by_name(signal), message.length).bits
         self.pressed = False
         self.stops: list[Asked] = []
 
@@ -109,10 +136,10 @@ class GuardedStop(GuardedInput):
         """Take a frame."""
         if len(data) == self._length and not (self._check and not self._check.right(data)):
             self.heard_ns = now_ns
-            self.pressed = self._field.raw(data) != 0
+            self.pressed = int.from_bytes(data, "little") & self._bits != 0
             if self.pressed:
                 for asked in self.stops:
-                    asked.good_ns = 0
+                    asked.forbid()
 
     def free_ns(self) -> int:
         """Until when something may move: it is free, and was heard within its timeout."""
@@ -126,41 +153,63 @@ class GuardedJoystick(GuardedInput):
         released: whether its last frame says that enable is released.
     """
 
-    __slots__ = ("_bits", "_bytes", "_enable", "_part", "_sticks", "released")
+    __slots__ = (
+        "_asked",
+        "_bits",
+        "_enable",
+        "_part",
+        "_span",
+        "_switch",
+        "_switched",
+        "released",
+    )
 
     def __init__(self, bound: BoundInput, enable: str) -> None:
         super().__init__(bound)
         message = bound.message
         self._enable = Field(message.get_signal_by_name(enable), message.length)
         self._bits = self._enable.bits
-        self._bytes = span_of(self._bits)
+        self._switch, self._switched = span_of(self._bits), b""
+        self._span = span_of(self._bits)
         self._part = b""
-        self._sticks: list[tuple[StickBits, Asked]] = []
+        self._asked: list[tuple[slice, dict[bytes, float], Asked]] = []
         self.released = False
 
-    def drives(self, stick: StickBits, asked: Asked) -> None:
+    def drives(self, asked: Asked) -> None:
         """A stick of it commands an axis."""
-        self._sticks.append((stick, asked))
-        for field in stick.fields:
+        self._asked.append((asked.stick.span, asked.asks, asked))
+        for field in asked.stick.fields:
             self._bits |= field.bits
-        self._bytes = span_of(self._bits)
+        self._span = span_of(self._bits)
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
         if len(data) != self._length or (self._check and not self._check.right(data)):
             return
-        part = data[self._bytes]
+        part = data[self._span]
         if part != self._part:
             self._part = part
-            self.released = self._enable.raw(data) == 0
-            for stick, asked in self._sticks:
-                asked.change(stick.ask(data), self.heard_ns)
-                if self.released:
-                    asked.good_ns = 0
+            switched = data[self._switch]
+            if switched != self._switched:
+                self._switched = switched
+                self.released = self._enable.raw(data) == 0
+            released = self.released
+            for span, asks, asked in self._asked:
+                ask, before = asks.get(data[span]), asked.now
+                if ask is None:
+                    ask = asked.learn(data)
+                # Where it asks for more than before in the same direction, that is all it asked.
+                if ask < before > 0.0:
+                    keep(asked.positive, before, self.heard_ns)
+                elif ask > before < 0.0:
+                    keep(asked.negative, -before, self.heard_ns)
+                asked.now = ask
+                if released:
+                    asked.forbid()
         self.heard_ns = now_ns
 
     def clear(self) -> None:
         """Nothing was asked until now."""
         self._part = b""
-        for _, asked in self._sticks:
+        for _, _, asked in self._asked:
             asked.clear()

@@ -19,7 +19,7 @@ from collections.abc import Sequence
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import group_of
-from canshaper.guard.axis import GuardedAxis
+from canshaper.guard.axis import At, GuardedAxis
 from canshaper.guard.inputs import GuardedInput, GuardedJoystick, GuardedStop
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -42,10 +42,10 @@ class GuardedAxes:
         """Whether a frame is anything but neutral."""
         return any(axis.moves(data) for axis in self._axes)
 
-    def refusal(self, data: bytes, now_ns: int, at: tuple[int, int]) -> str:
+    def refusal(self, data: bytes, _part: bytes, now_ns: int, at: At) -> str:
         """Why a frame may not leave; empty where it may: see ``GuardedAxis``."""
         for axis in self._axes:
-            if why := axis.refusal(data, now_ns, at):
+            if why := axis.refusal(data, data[axis.span], now_ns, at):
                 return why
         return ""
 
@@ -54,7 +54,8 @@ class OutputGuard:
     """All valves of a deployment.
 
     Attributes:
-        valves: by id alone, where no two buses have a valve with the same; else see ``valve``.
+        inputs: joysticks and emergency stop, by bus, id and format; see ``note``.
+        valves: what looks at a frame, by bus, id and format.
         at: number of this deadline, and of this tick, which does not count those missed.
     """
 
@@ -70,35 +71,25 @@ class OutputGuard:
         self.at = -1, -1
         self._stood_still = False
         self._joysticks = list(joysticks.values())
-        self._inputs: dict[Key, GuardedInput] = {}
+        self.inputs: dict[Key, GuardedInput] = {}
         self._groups: dict[tuple[str, int], GuardedInput] = {}
         for one, entry in inputs:
             if one.any_source:
                 self._groups[one.key[0], group_of(one.key[1])] = entry
             else:
-                self._inputs |= dict.fromkeys(one.keys, entry)
+                self.inputs |= dict.fromkeys(one.keys, entry)
         self._own = {name: bus.j1939.address for name, bus in config.buses.items() if bus.j1939}
-        self._valves = _valves(deployment, joysticks, stop)
-        self.valves = {key[1]: valve for key, valve in self._valves.items()}
-        if len(self.valves) < len(self._valves):
-            self.valves = dict.fromkeys(self.valves, GuardedAxes([]))
+        self.valves = _valves(deployment, joysticks, stop)
 
     def note(self, frame: Frame, now_ns: int) -> None:
-        """Take a frame that has come in."""
-        entry = self._inputs.get(frame[:3])
-        if entry is not None:
-            entry.note(frame[3], now_ns)
-        elif self._groups and frame[2]:
+        """Take a frame that has come in, and is none of ``inputs``."""
+        if self._groups and frame[2]:
             group = self._groups.get((frame.bus, group_of(frame.can_id)))
             source = frame.can_id & 0xFF
             if group is None or source == self._own.get(frame.bus):
                 return
             if not group.from_other(source, now_ns):
                 group.note(frame.data, now_ns)
-
-    def valve(self, frame: Frame) -> GuardedAxis | GuardedAxes | None:
-        """What looks at a frame; None where it is not one of a valve."""
-        return self._valves.get(frame[:3])
 
     def stalled(self) -> None:
         """The loop stood still: nothing that was asked before its next tick holds."""

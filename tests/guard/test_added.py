@@ -2,41 +2,13 @@
 
 import pytest
 
-from canshaper.guard.output import OutputGuard
 from canshaper.machine.binding import load_deployment
-from canshaper_sim.hand import Hand, Held
 from tests.faults import shipped
-
-TICK_NS = 20_000_000
-STEPS = 125
+from tests.guard.bench import Bench
 
 
-class Bench:
-    """The guard of the robust forwarder; a near-far command in every tick."""
-
-    def __init__(self) -> None:
-        self.deployment = load_deployment(shipped.CONFIG / "forwarder-robust.yaml")
-        self.guard, self.hand = OutputGuard(self.deployment), Hand(self.deployment)
-        self.valve = self.deployment.axes["near_far"].valve
-        self.number = 0
-
-    def sends(self, steps: int, **sticks: float) -> str:
-        """One tick; why near-far's command may not leave."""
-        now_ns = self.number * TICK_NS
-        for frame in self.hand.frames(self.number * 20, Held(sticks, enable=True)):
-            self.guard.note(frame, now_ns)
-        self.number += 1
-        self.guard.begin(0)
-        self.valve.put(steps)
-        frame = self.valve.message.frame()
-        valve = self.guard.valve(frame)
-        assert valve is not None
-        return valve.refusal(frame.data, now_ns, self.guard.at)
-
-    def ramp(self, steps: int, **sticks: float) -> None:
-        """Up to there by less than the rates, and on for a while."""
-        for part in (0.25, 0.5, 0.75, *[1.0] * 10):
-            assert not self.sends(round(steps * part), **sticks)
+def robust() -> Bench:
+    return Bench(load_deployment(shipped.CONFIG / "forwarder-robust.yaml"), "near_far")
 
 
 # Before, sticks, and the most that may follow. Velocity of n of 125 steps behind 5 % dead band:
@@ -56,14 +28,14 @@ def test_what_may_follow_at_once(sign: int, case: str) -> None:
     before, sticks, most = CASES[case]
     sticks = {name: sign * value for name, value in sticks.items()}
     for steps in (most, most + 1):
-        bench = Bench()
+        bench = robust()
         bench.ramp(sign * before, **sticks)
         refusal = bench.sends(sign * steps, **sticks)
         assert ("limit=rate" in refusal) == (steps > most), (steps, refusal)
 
 
 def test_what_was_added_gives_the_own_part_no_longer_tail() -> None:
-    bench = Bench()
+    bench = robust()
     bench.ramp(119, near_far=1.0, slew=1.0)
     refused = [bool(bench.sends(119, slew=1.0)) for _ in range(200)]
     # tail_s, timeout_ms, the longest standstill and three periods

@@ -1,0 +1,52 @@
+"""The output guard alone: joystick frames in, one command of one axis in every tick."""
+
+from canshaper.codec.frame import Frame
+from canshaper.guard.output import OutputGuard
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.hand import Hand, Held
+
+
+class Bench:
+    """The guard of a deployment, and what an axis of it is sent."""
+
+    def __init__(self, deployment: Deployment, axis: str) -> None:
+        self.deployment = deployment
+        self.guard, self.hand = OutputGuard(deployment), Hand(deployment)
+        self.valve = deployment.axes[axis].valve
+        self.tick_ms = deployment.config.tick_ms
+        self.number = 0
+
+    @property
+    def now_ns(self) -> int:
+        return self.number * self.tick_ms * 1_000_000
+
+    def joysticks(self, *, enable: bool = True, **sticks: float) -> list[Frame]:
+        """Their frames of this tick."""
+        return self.hand.frames(self.number * self.tick_ms, Held(sticks, enable=enable))
+
+    def takes(self, frames: list[Frame]) -> None:
+        """They come in."""
+        for frame in frames:
+            self.guard.inputs[frame[:3]].note(frame.data, self.now_ns)
+
+    def sent(self, steps: int) -> str:
+        """The command of this tick; why it may not leave."""
+        self.guard.begin(0)
+        self.valve.put(steps)
+        frame = self.valve.message.frame()
+        self.valve.put(0)
+        valve, data = self.guard.valves[frame[:3]], frame.data
+        why = valve.refusal(data, data[valve.span], self.now_ns, self.guard.at)
+        self.number += 1
+        return why
+
+    def sends(self, steps: int, **sticks: float) -> str:
+        """A tick with joysticks and command; why that may not leave."""
+        self.takes(self.joysticks(**sticks))
+        return self.sent(steps)
+
+    def ramp(self, steps: int, **sticks: float) -> None:
+        """Up to there by less than the rates, and on for a while."""
+        sign = 1 if steps > 0 else -1
+        for size in [*range(10, abs(steps), 10), *[abs(steps)] * 10]:
+            assert not self.sends(sign * size, **sticks)

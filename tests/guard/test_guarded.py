@@ -1,0 +1,98 @@
+"""The controller behind the guard: what goes through, and what is left where even neutral moves."""
+
+import pytest
+
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import QUIET_NS, Guarded
+from canshaper.machine.binding import load_deployment
+from canshaper.shaping.states import Reason
+from canshaper_sim.hand import Hand, Held
+from tests.faults import shipped
+
+TICK_NS = 20_000_000
+
+
+class Stuck(Controller):
+    """Whose neutral moves."""
+
+    def refused(self, frame: Frame) -> Frame:
+        super().refused(frame)
+        return frame
+
+
+class Wrong:
+    """The forwarder at rest, whose slew command is wrong in every tick."""
+
+    def __init__(self, kind: type[Controller] = Controller) -> None:
+        deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+        self.controller = kind(deployment)
+        self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
+        self.valve = deployment.axes["slew"].valve
+        self.sound, self.valve.put = self.valve.put, lambda _steps: self.sound(99)  # type: ignore[method-assign]
+        self.number = 0
+
+    def tick(self) -> list[Frame]:
+        """The slew frames of a tick."""
+        now_ns = self.number * TICK_NS
+        for frame in self.hand.frames(self.number * 20, Held(enable=True)):
+            self.guarded.receive(frame, now_ns)
+        self.number += 1
+        key = self.valve.message.sender.key
+        return [frame for frame in self.guarded.tick(now_ns) if frame[:3] == key]
+
+
+def test_where_even_neutral_moves_nothing_leaves() -> None:
+    wrong = Wrong(Stuck)
+    assert not any(wrong.tick() for _ in range(5))
+    assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
+
+
+def test_one_that_goes_on_is_logged_once_a_second() -> None:
+    wrong = Wrong(Stuck)
+    for _ in range(QUIET_NS // TICK_NS):
+        wrong.tick()
+    refused = [e for e in wrong.controller.events if "output=refused" in e.text]
+    assert len(refused) == 1
+    wrong.tick()
+    assert sum("output=refused" in e.text for e in wrong.controller.events) == 2
+
+
+@pytest.mark.parametrize("name", shipped.NAMES)
+def test_the_last_frames_are_neutral(name: str) -> None:
+    deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
+    controller = Controller(deployment)
+    guarded = Guarded(controller)
+    keys = {axis.valve.message.sender.key for axis in deployment.axes.values()}
+    # J1939 has to have an address, and a gateway that rests sends nothing of its own.
+    hand, tick_ms = Hand(deployment), deployment.config.tick_ms
+    for number in range(1000 // tick_ms):
+        now_ns = number * tick_ms * 1_000_000
+        speed = 0.5 if number * tick_ms > 500 else 0.0
+        held = Held(dict.fromkeys(deployment.axes, speed), enable=True)
+        for frame in hand.frames(number * tick_ms, held):
+            guarded.receive(frame, now_ns)
+        assert all(guarded.tick(now_ns))
+    left = [frame[:3] for frame in guarded.neutral_frames()]
+    assert keys == set(left)
+    assert left == [frame[:3] for frame in controller.neutral_frames()]
+    bound = next(iter(deployment.axes.values()))
+    valve, put = bound.valve, bound.valve.put
+    valve.put = lambda _steps: put(99)  # type: ignore[method-assign]
+    missing = keys - {f[:3] for f in guarded.neutral_frames()}
+    put(0)
+    assert missing == {valve.message.sender.key}
+
+
+def test_what_the_loop_says_reaches_the_controller() -> None:
+    wrong = Wrong()
+    wrong.valve.put = wrong.sound  # type: ignore[method-assign]
+    (frame,) = wrong.tick()
+    assert not wrong.guarded.moves
+    assert not wrong.guarded.withhold(frame)
+    wrong.guarded.send_failed(frame)
+    assert wrong.controller.counters.last_fault is FrameFault.SEND_FAILED
+    wrong.tick()
+    wrong.guarded.stalled()
+    wrong.tick()
+    assert wrong.controller.axes["slew"].axis.reason is Reason.STICK_TIMEOUT
