@@ -89,6 +89,14 @@ def test_what_was_asked_in_a_direction_holds_for_the_tail(sign: int) -> None:
     assert [bool(why) for why in held].index(True) == (2000 + 100 + 100 + 60) // 20 - 6 + 1
 
 
+@pytest.mark.parametrize(("steps", "passes"), [(38, True), (39, False)])
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_rates_hold_for_what_was_asked(sign: int, steps: int, passes: bool) -> None:
+    one = bench()
+    one.ramp(sign * 25, near_far=float(sign))  # 0.158 of full speed; the rise is 0.1 in a tick
+    assert ("limit=rate" in one.sends(sign * steps, near_far=float(sign))) is not passes
+
+
 def test_faster_and_the_other_way_where_the_file_allows_it() -> None:
     one = Bench(variants.machine("allowing")[1], "near_far")
     one.ramp(125, near_far=0.2)
