@@ -29,6 +29,7 @@ from canshaper.daemon.reading import Reading
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.identity import program_sha256
 
 log = logging.getLogger("canshaper")
 
@@ -73,6 +74,7 @@ class Daemon:
         self._told_ns = 0
         self._latest_ns = 0
         deployment = load()
+        program_sha256()  # kept from now on: to read the program takes longer than a tick
         self._ports = open_ports(deployment, {}, self._on_fault)
         self._line = self._in_line(deployment)
         self._standstill = Standstill(deployment)

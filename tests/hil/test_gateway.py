@@ -21,7 +21,7 @@ from tests.hil.machine import wait_for as wait
 
 GATEWAY = FILE.with_name("gateway-forwarder.yaml")
 NEAR, FAR = "vcan0", "vcan1"
-OURS = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310}  # levers and status messages
+OURS = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310, 0x311}  # levers and status messages
 LAST = 0x7FD
 BATCH = 40  # a bus carries so many in 20 ms, a receive queue some more
 

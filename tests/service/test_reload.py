@@ -458,3 +458,14 @@ def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
         bench.run(script)
     assert "reload=applied" in caplog.text
     assert caplog.text.count("dbc-warnings=1 of messages in the DBC files that are not used") == 1
+
+
+def test_the_program_is_read_before_a_bus_is_open(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What waits in the sockets grows old while it is read."""
+    order: list[str] = []
+    monkeypatch.setattr(module, "program_sha256", lambda: order.append("program"))
+    bench.opening = lambda channel: order.append("bus")
+    bench.run(lambda number: bench.stop())
+    assert order == ["program", "bus"]
