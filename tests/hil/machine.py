@@ -44,6 +44,29 @@ def wait_for(bus: can.BusABC, name: str, accept: Accept) -> dict:
     return wait_for_one(bus, {name: accept})[1]
 
 
+def drive(bus: can.BusABC, levers: "Levers", faster_than: float = 30.0) -> float:
+    """Bring slew into motion and return the command, %.
+
+    Where this machine held up a lever's frames and the axis stopped, once more from neutral.
+    """
+    until = time.monotonic() + ANSWER_S
+    state = ""
+    while time.monotonic() < until:
+        message = bus.recv(1.0)
+        name = message_name(message) if message is not None else None
+        if message is None or name not in ("SlewStatus", "SlewCommand"):
+            continue
+        signals = dict(DBC.decode_message(name, message.data))
+        if name == "SlewStatus":
+            state = str(signals["State"])
+            levers.values["Slew"] = 100.0 if state in ("READY", "ACTIVE") else 0.0
+            levers.switches["Reset"] = int(state == "TRIPPED")
+        # before that it may be the end of a stop that began before this test
+        elif state == "ACTIVE" and signals["Velocity"] > faster_than:
+            return float(signals["Velocity"])
+    raise AssertionError(f"slew never above {faster_than} %")
+
+
 def wait_for_one(bus: can.BusABC, wanted: dict[str, Accept]) -> tuple[str, dict]:
     """The first message of these names that is accepted: its name and its decoded signals."""
     until = time.monotonic() + ANSWER_S

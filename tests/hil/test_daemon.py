@@ -17,6 +17,7 @@ from tests.hil.machine import (
     Levers,
     Service,
     candump,
+    drive,
     levers_on,
     logged,
     message_name,
@@ -58,13 +59,6 @@ def daemon(tmp_path: Path) -> Iterator[Service]:
 
 def state(name: str) -> Callable[[dict], bool]:
     return lambda status: str(status["State"]) == name
-
-
-def drive(bus: can.BusABC, levers: Levers) -> None:
-    """Bring slew into full motion."""
-    wait_for(bus, "SlewStatus", state("READY"))
-    levers.values["Slew"] = 100.0
-    wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 30.0)
 
 
 def test_stick_moves_valve_and_everything_ends_neutral(

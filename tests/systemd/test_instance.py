@@ -9,10 +9,10 @@ from pathlib import Path
 import can
 
 from tests.hil.machine import (
-    DBC,
     VALVES,
     Levers,
     candump,
+    drive,
     logged,
     message_name,
     open_bus,
@@ -21,29 +21,6 @@ from tests.hil.machine import (
 from tests.systemd.unit import ANSWER_S, Unit, add_vcan, run
 
 MOST_EXPOSURE = 1.5
-
-
-def drive(bus: can.BusABC, levers: Levers, faster_than: float = 30.0) -> float:
-    """Bring slew into motion and return the command, %.
-
-    Where this machine held up a lever's frames and the axis stopped, once more from neutral.
-    """
-    until = time.monotonic() + ANSWER_S
-    state = ""
-    while time.monotonic() < until:
-        message = bus.recv(1.0)
-        name = message_name(message) if message is not None else None
-        if message is None or name not in ("SlewStatus", "SlewCommand"):
-            continue
-        signals = dict(DBC.decode_message(name, message.data))
-        if name == "SlewStatus":
-            state = str(signals["State"])
-            levers.values["Slew"] = 100.0 if state in ("READY", "ACTIVE") else 0.0
-            levers.switches["Reset"] = int(state == "TRIPPED")
-        # before that it may be the end of a stop that began before this test
-        elif state == "ACTIVE" and signals["Velocity"] > faster_than:
-            return float(signals["Velocity"])
-    raise AssertionError(f"slew never above {faster_than} %")
 
 
 def test_started_means_that_the_valves_are_told_neutral(installed: None, tmp_path: Path) -> None:
