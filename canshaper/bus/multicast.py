@@ -11,10 +11,12 @@ import struct
 import can
 from can.interfaces.udp_multicast.bus import GeneralPurposeUdpMulticastBus, UdpMulticastBus
 
+from canshaper.bus.arrival import SO_TIMESTAMPNS
+
 LOOPBACK = "lo"
 PORT = 43113  # that of python-can
-# linux/in.h, linux/in6.h, asm/socket.h; Python has no names for these.
-IP_MULTICAST_ALL, IPV6_MULTICAST_ALL, SO_TIMESTAMPNS = 49, 29, 35
+# linux/in.h, linux/in6.h; Python has no names for these.
+IP_MULTICAST_ALL, IPV6_MULTICAST_ALL = 49, 29
 # struct ip_mreqn: group, address of an interface, its index
 _MEMBERSHIP = struct.Struct("@4s4si")
 
