@@ -8,11 +8,11 @@ from collections.abc import Iterator
 from canshaper.codec.canopen import service_of
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.valve import ValveMessage
+from canshaper.controller.compensator import Compensator
 from canshaper.controller.counters import Counters
 from canshaper.controller.events import Event, FeedbackEvent, Told
 from canshaper.controller.parts import parts
-from canshaper.controller.runner import AxisRunner, Compensator
-from canshaper.controller.sets import SetChooser
+from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.carry_over import Key, Part, carry_over
 from canshaper.inputs.feedback import Feedback, Following
 from canshaper.inputs.input import EmergencyStopInput, Input
@@ -90,7 +90,7 @@ class Controller:
                     taken.append((measured, radius))
                     self._inputs |= dict.fromkeys(measured.keys, radius)
                 target = self.axes[radial.config.axis]
-                runner.compensator = Compensator(runner.axis, radial.config, target, radius)
+                runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
         used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._sent)}
         self._others = deployment.messages.ids() - used
@@ -166,7 +166,7 @@ class Controller:
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
             for runner in self._by_message.get(key, ()):
-                runner.contest(arrived_ns)
+                runner.foreign_sender(arrived_ns)
         elif frame.extended and (group := self._network.entry(key[0], key[1])):
             fault = group.receive(frame, arrived_ns)
         elif key[1:] in self._others or self._usual(frame):
@@ -265,7 +265,7 @@ class Controller:
         codes = self.deployment.config.feel.codes if self.deployment.config.feel else {}
         for runner in self.axes.values():
             if runner.bound.config.sets or runner.bound.config.feels:
-                runner.chooser = SetChooser(runner.bound, runner.axis, grapple, feel, codes)
+                runner.add_chooser(grapple, feel, codes)
         return [(b, one) for b, one in zip(bound, (grapple, feel), strict=True) if b and one]
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
@@ -314,9 +314,8 @@ class Controller:
         self._stood_still = True
         self._network.stalled()
         for runner in self.axes.values():
-            runner.lost = True
-            if not runner.axis.neutral:
-                runner.trip = Reason.LOOP_STALLED
+            runner.invalidate()
+            runner.trip_in_motion(Reason.LOOP_STALLED)
 
     def _forget(self, bus: str | None = None) -> None:
         """Every input has to come again before it counts: those of one bus, or all."""
@@ -334,8 +333,7 @@ class Controller:
         self.counters.add(FrameFault.SEND_FAILED)
         self._network.send_failed(frame)
         for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
-            if not runner.axis.neutral:
-                runner.trip = Reason.SEND_FAILED
+            runner.trip_in_motion(Reason.SEND_FAILED)
 
     def withhold(self, frame: Frame) -> bool:
         """A valve frame comes too late: whether it moves one, and so must not leave.
@@ -357,7 +355,7 @@ class Controller:
         self.counters.add(FrameFault.OUTPUT_REFUSED)
         runners = self._by_message[frame[:3]]
         for runner in runners:
-            runner.trip = Reason.OUTPUT_REFUSED
+            runner.trip(Reason.OUTPUT_REFUSED)
             runner.bound.valve.put(0)
         return runners[0].bound.valve.message.instead(frame)
 

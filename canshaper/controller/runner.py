@@ -1,28 +1,29 @@
-"""One axis of a deployment at work, and the compensation that one axis asks of another."""
+"""One axis of a deployment at work."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from typing import Protocol, Self
+from typing import TYPE_CHECKING, Protocol, Self
 
 from canshaper.codec.frame import Frame
-from canshaper.config.schema import AxisConfig, RadialConfig
+from canshaper.config.schema import AxisConfig
 from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
-from canshaper.inputs.radius import RadiusInput
+from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import BoundAxis
 from canshaper.protocols.canopen.cia408 import ValveControl
-from canshaper.shaping.added import AddedBounds
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.radial import RadialCompensation
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 
+if TYPE_CHECKING:
+    from canshaper.controller.compensator import Compensator
+
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
-CONTESTED_NS = 1_000_000_000
+FOREIGN_NS = 1_000_000_000
 # Called with whether the axis is neutral, and the time; why it may not move, or None.
 Gate = Callable[[bool, int], Reason | None]
 # Reasons from here on are for neutral at once.
@@ -48,14 +49,10 @@ class AxisRunner:
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
-        trip: a cause for neutral at once, noted since the last tick.
-        lost: the input was lost since the last tick, though it may be back: neutral comes first.
-        contested_ns: when the last frame of another sender with the id of this valve arrived.
         added: velocity that another axis asks of this one, fraction of full speed.
         control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
-        gates: what else has to agree before the axis may move.
         compensator: what this axis asks of another one, where it slews.
     """
 
@@ -85,29 +82,77 @@ class AxisRunner:
             grid_steps=bound.valve.steps,
         )
         self._full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
-        self.trip: Reason | None = None
-        self.lost = False
-        self.contested_ns: int | None = None
+        self._trip: Reason | None = None  # noted since the last tick
+        self._invalid = False  # the input was lost since the last tick, though it may be back
+        self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added = 0.0
-        self.gates: list[Gate] = []
+        self._gates: list[Gate] = []
         self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
         self.control: ValveControl | None = None
         if bound.status_word and config.valve.cia408:
             control = config.valve.cia408.control
             self.control = ValveControl(bound.status_word, control, bound.valve.message)
-            self.gates.append(self.control.gate)
+            self._gates.append(self.control.gate)
         self.compensator: Compensator | None = None
 
-    def contest(self, arrived_ns: int) -> None:
-        """Another sender has sent the id of this valve: neutral at once, however long ago."""
-        self.trip = self.trip or Reason.SECOND_SENDER
-        self.contested_ns = arrived_ns
+    @property
+    def tripping(self) -> bool:
+        """Whether the next tick trips the axis: what it sent last no longer holds."""
+        return self._trip is not None
+
+    def trip(self, reason: Reason) -> None:
+        """Neutral at once and latched with the next tick; a later cause replaces one before."""
+        self._trip = reason
+
+    def trip_in_motion(self, reason: Reason) -> None:
+        """The same, for what does not matter to an axis that is neutral."""
+        if not self.axis.neutral:
+            self._trip = reason
+
+    def invalidate(self) -> None:
+        """The input was lost, though it may be back by the next tick: neutral comes first."""
+        self._invalid = True
+
+    def foreign_sender(self, now_ns: int) -> None:
+        """A frame with the id of this valve came from another sender: neutral at once."""
+        self._trip = self._trip or Reason.SECOND_SENDER
+        self._foreign_ns = now_ns
+
+    def add(self, velocity: float) -> None:
+        """Another axis asks for so much more from the next tick on, fraction of full speed."""
+        self.added = velocity
+
+    def add_interlock(self, gate: Gate, *, first: bool = False) -> None:
+        """Let something else agree before the axis may move; ``first`` is asked before others."""
+        self._gates.insert(0 if first else len(self._gates), gate)
+
+    def add_compensator(self, compensator: "Compensator") -> None:
+        """Let the axis ask something of another one."""
+        self.compensator = compensator
+
+    def add_chooser(
+        self, grapple: ValueInput | None, feel: ValueInput | None, codes: Mapping[str, int]
+    ) -> None:
+        """Let grapple and operator choose sway data and filter."""
+        self.chooser = SetChooser(self.bound, self.axis, grapple, feel, codes)
+
+    def isolate(self, lever: StickSource, axis: Axis | None = None) -> None:
+        """For a measurement: another stick, perhaps another state machine, nothing of other axes.
+
+        Args:
+            lever: where the stick comes from now.
+            axis: what drives the valve now; by default the same as before.
+        """
+        self._lever = lever
+        self.compensator = None
+        if axis is not None:
+            self.axis, self.chooser = axis, None
 
     def see(self, emergency: EmergencyStopInput) -> None:
         """Trip for a press that came since the last tick, though it may be over by now."""
         if emergency.presses != self._presses:
-            self.trip = self.trip or Reason.EMERGENCY_STOP
+            self._trip = self._trip or Reason.EMERGENCY_STOP
 
     def copy_state(self, before: Self) -> None:
         """Stay latched, and trip for what the same axis has not acted on: a reload is no reset.
@@ -116,13 +161,9 @@ class AxisRunner:
         """
         latched = before.axis
         if latched.state is State.TRIPPED and latched.reason is not Reason.ADDRESS_LOST:
-            self.axis.state, self.axis.reason = latched.state, latched.reason
-        self.trip = before.trip or self.trip
-        self.contested_ns = before.contested_ns or self.contested_ns
-
-    def replace_lever(self, lever: StickSource) -> None:
-        """Take the stick from somewhere else."""
-        self._lever = lever
+            self.axis.restore(latched.state, latched.reason)
+        self._trip = before._trip or self._trip
+        self._foreign_ns = before._foreign_ns or self._foreign_ns
 
     def adjust(self, config: AxisConfig) -> None:
         """Go on with another configuration of sway, filter and limits, all else as before.
@@ -160,9 +201,9 @@ class AxisRunner:
             overrun: too many deadlines were missed lately.
         """
         fault = None
-        if emergency or self.gates or self.lost or self.contested_ns is not None:
+        if emergency or self._gates or self._invalid or self._foreign_ns is not None:
             fault = self._objections(now_ns, emergency)
-        trip, self.trip = self.trip, None
+        trip, self._trip = self._trip, None
         stick = self._lever.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
         self._releases = self._lever.releases
         # A release is more than a fault.
@@ -188,14 +229,14 @@ class AxisRunner:
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
         """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""
-        trip = self.trip
-        if self.contested_ns is not None:
-            if now_ns - self.contested_ns <= CONTESTED_NS:
+        trip = self._trip
+        if self._foreign_ns is not None:
+            if now_ns - self._foreign_ns <= FOREIGN_NS:
                 trip = trip or Reason.SECOND_SENDER
             else:
-                self.contested_ns = None
+                self._foreign_ns = None
         neutral, fault = self.axis.neutral, None
-        for gate in self.gates:
+        for gate in self._gates:
             found = gate(neutral, now_ns)
             if found is not None and found >= TRIPS:
                 trip = trip or found
@@ -208,10 +249,10 @@ class AxisRunner:
                 trip = trip or stop
             else:  # not heard of yet: nothing to trip, but nothing may begin
                 fault = fault or stop
-        if self.lost:
-            self.lost = False
+        if self._invalid:
+            self._invalid = False
             fault = fault or Reason.STICK_TIMEOUT
-        self.trip = trip
+        self._trip = trip
         return fault
 
     def status_frame(self) -> Frame | None:
@@ -225,79 +266,3 @@ class AxisRunner:
         return self.bound.status.frame(
             axis.state, axis.reason, axis.command, axis.sent, sway_deg, active_set=number
         )
-
-
-class Compensator:
-    """Radial compensation from a slew axis to its near-far axis.
-
-    It does not know the runner that has it: a cycle would outlive a reload, see ``Collector``.
-
-    Args:
-        slew: the axis that slews.
-        radial: its compensation.
-        near_far: the axis that moves the tip in and out.
-        radius: where the radius of the tip comes from.
-    """
-
-    def __init__(
-        self, slew: Axis, radial: RadialConfig, near_far: AxisRunner, radius: RadiusInput
-    ) -> None:
-        self._slew = slew
-        self._config = radial
-        self._near_far = near_far
-        self._radius = radius
-        self._share = 1.0
-        near_far.axis.bounds = self._bounds = AddedBounds(
-            near_far.period_s,
-            largest=radial.max_pct / 100.0,
-            path_s=math.inf,
-            time_s=radial.max_s,
-            least=0.5 / near_far.bound.valve.steps,
-        )
-        self.adjust()
-
-    def adjust(self) -> None:
-        """Take the sway data of the near-far axis as it is now."""
-        radial, sway = self._config, self._near_far.bound.config.sway
-        assert sway is not None  # checked with the deployment
-        self._radial = RadialCompensation(
-            sway.mode(),
-            radial.full_speed_rad_s,
-            sway.full_speed_m_s,
-            radial.max_pct / 100.0,
-        )
-        self._bounds.path_s = radial.max_path_m / sway.full_speed_m_s
-
-    def before_slew(self) -> float:
-        """What the slew axis is to add in this tick."""
-        sway, told = self._sway(), self._slew.told
-        self._share = self._radial.tip_share(sway, told)
-        return self._radial.slew(sway, told) if self._moving() else 0.0
-
-    def after_slew(self, now_ns: int) -> None:
-        """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
-        self._near_far.added = 0.0
-        if self._moving():
-            sway = self._sway()
-            share = self._radial.tip_share(sway, self._slew.told)
-            circle_m = self._radius.circle_m(now_ns, share)
-            if circle_m is not None:
-                added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
-                self._near_far.added = added
-        elif self._slew.state is State.TRIPPED:
-            self._near_far.axis.drop_added()
-        if not self._slew.asked:
-            self._bounds.begin()
-
-    def _sway(self) -> SwayModel:
-        """Sway model of the slew axis now; a change of its sway data makes another one."""
-        sway = self._slew.sway
-        assert sway is not None  # checked with the deployment
-        return sway
-
-    def _moving(self) -> bool:
-        """While the slew joystick is valid and enabled, and at most for the tail after release.
-
-        Not for ever after a swing that nobody damps: nothing may move without an operator.
-        """
-        return self._slew.asked and self._slew.state is State.ACTIVE

@@ -31,16 +31,16 @@ class AddedBounds:
         "_least",
         "_left",
         "_now",
+        "_path_s",
         "_tick_s",
         "_ticks",
         "_way_s",
-        "path_s",
     )
 
     def __init__(
         self, tick_s: float, *, largest: float, path_s: float, time_s: float, least: float
     ) -> None:
-        self.path_s = path_s
+        self._path_s = path_s
         self._tick_s = tick_s
         self._largest = largest
         self._least = least
@@ -53,6 +53,10 @@ class AddedBounds:
         self._asked_s = self._way_s = 0.0
         self._now = 0.0
 
+    def limit_path(self, path_s: float) -> None:
+        """Change the farthest from where the act began; what is left of an act counts on."""
+        self._path_s = path_s
+
     def wanted(self, wish: float, fall_per_s: float) -> float:
         """What may be asked for in this tick, so that the way is long enough to fall to rest.
 
@@ -60,7 +64,7 @@ class AddedBounds:
             wish: what the other axis asks.
             fall_per_s: rate by which it falls at the end of the way, full speeds per second.
         """
-        path_s, largest = self.path_s, self._largest
+        path_s, largest = self._path_s, self._largest
         wish = min(max(wish, -largest), largest)
         self._asked_s += wish * self._tick_s
         ahead_s = self._way_s - min(max(self._asked_s, -path_s), path_s)
@@ -78,8 +82,8 @@ class AddedBounds:
         """What may be added in this tick after the rates of the axis, which may hold it up."""
         if self._left <= 0:
             return 0.0
-        lowest = max(-self._largest, min(0.0, -self.path_s - self._way_s) / self._tick_s)
-        highest = min(self._largest, max(0.0, self.path_s - self._way_s) / self._tick_s)
+        lowest = max(-self._largest, min(0.0, -self._path_s - self._way_s) / self._tick_s)
+        highest = min(self._largest, max(0.0, self._path_s - self._way_s) / self._tick_s)
         return min(max(added, lowest), highest)
 
     def applied(self, velocity: float) -> None:

@@ -53,7 +53,6 @@ class Axis:
         sent: the velocity that gives, [-1, 1].
         told: what the sway model was told: ``sent`` without what another axis asked.
         command: the operator's command that was in force at the last tick, [-1, 1].
-        bounds: bounds of what another axis adds, where one does.
     """
 
     def __init__(
@@ -74,7 +73,7 @@ class Axis:
         self.told = 0.0
         self.command = 0.0
         self.sway = sway
-        self.bounds: AddedBounds | None = None
+        self._bounds: AddedBounds | None = None
         self._shaper = shaper
         self._tick_s = tick_s
         self._limits = limits
@@ -118,7 +117,7 @@ class Axis:
         Args:
             stick: the checked input.
             added: velocity that another moving axis asks of this one, [-1, 1] of full speed. Its
-                operator answers for it; it is carried out within ``bounds``, while this axis is
+                operator answers for it; it is carried out within its bounds, while this axis is
                 enabled, its stick valid, and anti-sway on, and never against a joystick that is
                 held: what would go against it is left out at once. The sway model is not told of
                 it: it is there to cause no swing. One that is no velocity trips the axis.
@@ -126,7 +125,7 @@ class Axis:
         Returns:
             The change of state of this tick, or None.
         """
-        old, bounds = self.state, self.bounds
+        old, bounds = self.state, self._bounds
         if stick.bypass:
             added = 0.0
         elif bounds is not None and abs(added) <= 1.0:
@@ -170,8 +169,8 @@ class Axis:
         """
         self._recent.age(ticks)
         self._stopping += ticks
-        if self.bounds is not None:
-            self.bounds.held(ticks)
+        if self._bounds is not None:
+            self._bounds.held(ticks)
         maximum = self._limits.maximum
         command = within(self.command, -maximum, maximum, 0.0)
         try:
@@ -200,6 +199,20 @@ class Axis:
         self._shaper = shaper
         self.sway = sway
         self._rebump = True
+
+    def bound_added(self, bounds: AddedBounds) -> None:
+        """Bound what another axis may add to this one; without bounds all of it is added."""
+        self._bounds = bounds
+
+    def restore(self, state: State, reason: Reason) -> None:
+        """Continue in a state in which the output is neutral, as another axis was in it.
+
+        Raises:
+            ValueError: in that state the output need not be neutral.
+        """
+        if state in MOVING:
+            raise ValueError(f"state: expected one with neutral output, got {state.name}")
+        self.state, self.reason = state, reason
 
     def drop_added(self) -> None:
         """Who added has lost the right to: nothing of it is in the next output."""
@@ -361,8 +374,10 @@ class Axis:
             command < 0.0 and limited > own and limited > 0.0
         ):
             limited = own if own * command < 0.0 else 0.0
-        if self.bounds is not None and (kept := self.bounds.kept(limited - own)) != limited - own:
-            limited = own + kept
+        if self._bounds is not None:
+            kept = self._bounds.kept(limited - own)
+            if kept != limited - own:
+                limited = own + kept
         self._limited = limited
         self.raw, self.sent = on_grid(
             limited,

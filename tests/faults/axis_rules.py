@@ -4,7 +4,7 @@ from collections import deque
 
 from canshaper.codec.frame import Frame
 from tests.faults.heard import LONG_AGO, HeardLever
-from tests.faults.judge import CONTESTED_NS, OWED, ROUNDING
+from tests.faults.judge import FOREIGN_NS, OWED, ROUNDING
 from tests.faults.machine import Axis
 
 # Where the daemon may be a tick, and the wait for it, behind what is on the bus.
@@ -49,7 +49,7 @@ class AxisRules:
             self._stop_until_ns = None
         if lever.releases > self._releases or lever.enable() == 0:
             causes.add(RELEASED)
-        if now_ns - self.contested_ns < CONTESTED_NS - 2 * self._tick_ns:
+        if now_ns - self.contested_ns < FOREIGN_NS - 2 * self._tick_ns:
             causes.add("another sender")
         presses = lever.presses[axis.name] + lever.resets
         pressed = presses > self._presses or self._pressed_again

@@ -14,7 +14,7 @@ from tests.faults.guarded import guarded
 from tests.faults.hand import path
 from tests.faults.inject import Fault
 from tests.faults.inputs import Lever
-from tests.faults.judge import CONTESTED_NS, Judge, Violation
+from tests.faults.judge import FOREIGN_NS, Judge, Violation
 from tests.faults.machine import Machine
 from tests.faults.senders import Sender, radius_frames
 from tests.faults.variants import NAMES, machine
@@ -245,7 +245,7 @@ class Drive:
         if kinds & {"loop: late once", "loop: late often", "loop: late, told later"}:
             self._healthy(OVERRUN_TICKS, enable=1)
         if "others: our valve" in kinds:
-            self._healthy(CONTESTED_NS // machine.tick_ns, enable=1)
+            self._healthy(FOREIGN_NS // machine.tick_ns, enable=1)
         resets = patient and all(v.reset for v in machine.levers.values())
         if resets and rng.random() < 0.5:
             self._healthy(some, enable=1, reset=0)

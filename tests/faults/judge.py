@@ -41,7 +41,7 @@ OWED = 0.1
 # Steps that rounding to the grid may make between two frames, down by one and up by half of one.
 ROUNDING = 1.5
 # How long another sender of a valve's id must be silent before a trip for it can be reset.
-CONTESTED_NS = 1_000_000_000
+FOREIGN_NS = 1_000_000_000
 # Ticks after which a filter that answers the last swing of the stick is done with it.
 SETTLED = {"off": 3, "first_order": 3, "s_curve": 3}
 SETTLED_OTHERS = 25
@@ -100,7 +100,7 @@ class AxisJudge:
         causes, self.causes = self.causes, set()
         self._pressed_since = pressed or (self._pressed_since and not causes)
         in_motion = self.state in MOVING  # as it told last; ``agrees`` holds that against the valve
-        if now_ns - self.contested_ns <= CONTESTED_NS:
+        if now_ns - self.contested_ns <= FOREIGN_NS:
             causes.add(heard.SECOND_SENDER)
         if not in_motion:
             causes.discard(heard.SEND_FAILED)

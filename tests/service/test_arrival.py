@@ -10,7 +10,7 @@ import pytest
 
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import CanopenNode
-from canshaper.controller.runner import CONTESTED_NS
+from canshaper.controller.runner import FOREIGN_NS
 from canshaper.daemon.exchange import exchange
 from canshaper.daemon.standstill import Standstill
 from canshaper.protocols.canopen.nodes import RemoteNode
@@ -229,7 +229,7 @@ def test_every_axis_of_a_lever_sees_a_release_once(changed_rig: Make) -> None:
     assert [runners[n]._releases for n in ("slew", "near_far")] == [1, 1]
 
 
-@pytest.mark.parametrize("age_ns", [0, TICK_NS, CONTESTED_NS, CONTESTED_NS + 1, 5 * CONTESTED_NS])
+@pytest.mark.parametrize("age_ns", [0, TICK_NS, FOREIGN_NS, FOREIGN_NS + 1, 5 * FOREIGN_NS])
 def test_a_second_sender_trips_however_long_ago_it_sent(rig: Rig, age_ns: int) -> None:
     rig.moving()
     port = Waiting()
@@ -238,7 +238,7 @@ def test_a_second_sender_trips_however_long_ago_it_sent(rig: Rig, age_ns: int) -
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")
 
 
-@pytest.mark.parametrize(("age_ns", "over"), [(0, False), (CONTESTED_NS - 2 * TICK_NS, True)])
+@pytest.mark.parametrize(("age_ns", "over"), [(0, False), (FOREIGN_NS - 2 * TICK_NS, True)])
 def test_the_second_of_its_silence_counts_from_its_arrival(
     rig: Rig, age_ns: int, over: bool
 ) -> None:

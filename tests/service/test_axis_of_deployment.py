@@ -101,7 +101,7 @@ def test_an_axis_takes_its_stick_from_where_it_is_told(rig: Rig) -> None:
             return StickInput(self.command)
 
     source = Elsewhere()
-    rig.controller.axes["slew"].replace_lever(source)
+    rig.controller.axes["slew"].isolate(source)
     rig.run(3)
     source.command = 0.5
     sent = rig.run(120)  # the real stick stands in neutral

@@ -341,7 +341,8 @@ def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench)
 
 def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:
     axes = rig.controller.axes
-    axes["slew"].trip, axes["near_far"].trip = Reason.EMERGENCY_STOP, Reason.ADDRESS_LOST
+    axes["slew"].trip(Reason.EMERGENCY_STOP)
+    axes["near_far"].trip(Reason.ADDRESS_LOST)
     rig.run(3)
     assert [rig.state(axis) for axis in axes] == [State.TRIPPED, State.TRIPPED, State.READY]
     before, rig.controller = rig.controller, Controller(rig.deployment)
@@ -356,7 +357,7 @@ def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:
 
 
 def test_a_reset_that_is_held_through_a_reload_is_no_press(rig: Rig) -> None:
-    rig.controller.axes["slew"].trip = Reason.EMERGENCY_STOP
+    rig.controller.axes["slew"].trip(Reason.EMERGENCY_STOP)
     rig.run(3, Reset=1)
     before, rig.controller = rig.controller, Controller(rig.deployment)
     rig.controller.follow(before)

@@ -44,7 +44,7 @@ def pair(limits: OutputLimits, shaper: Callable[[], Shaper]) -> tuple[Axis, Axis
     one, plain = (
         Axis(TICK_S, limits, sway=None, shaper=shaper(), grid_steps=STEPS) for _ in range(2)
     )
-    one.bounds = bounds()
+    one.bound_added(bounds())
     one.tick(StickInput())
     plain.tick(StickInput())
     return one, plain
@@ -144,7 +144,7 @@ def test_the_bounds_are_what_they_are_set_to() -> None:
     one.applied(0.05)
     assert one.kept(1.0) == pytest.approx(0.05)
     assert one.kept(-1.0) == pytest.approx(-0.1)
-    one.path_s = 0.0
+    one.limit_path(0.0)
     assert one.kept(1.0) == 0.0  # beyond a way that was made shorter: nothing more
     assert one.kept(-1.0) == pytest.approx(-0.05 - 0.0, abs=0.051)
     assert one.wanted(1.0, 2.0) == 0.0
@@ -208,17 +208,19 @@ def test_no_velocity_trips_with_bounds_too(bad: float) -> None:
 
 def test_rounding_of_the_operators_own_part_uses_up_no_bound() -> None:
     axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
-    axis.bounds = bounds()
+    limited = bounds()
+    axis.bound_added(limited)
     axis.tick(StickInput())
     for _ in range(100):
         axis.tick(StickInput(0.149))
         assert axis.sent == pytest.approx(0.1)
-    assert (axis.bounds.kept(1.0), axis.bounds.kept(-1.0)) == (LARGEST, -LARGEST)
+    assert (limited.kept(1.0), limited.kept(-1.0)) == (LARGEST, -LARGEST)
 
 
 def test_missed_ticks_use_up_way_and_time() -> None:
     way, time = (Axis(TICK_S, OutputLimits(), sway=None, shaper=Off()) for _ in range(2))
-    way.bounds, time.bounds = bounds(), bounds(path_s=math.inf)
+    way.bound_added(bounds())
+    time.bound_added(bounds(path_s=math.inf))
     for axis in (way, time):
         axis.tick(StickInput())
         axis.tick(StickInput(), 0.2)
@@ -236,7 +238,7 @@ def test_when_the_time_is_over_nothing_is_added_whatever_the_rates(
 ) -> None:
     limits = OutputLimits(rise_per_s=20.0, fall_per_s=0.2)
     axis, plain = pair(limits, Off)
-    axis.bounds = bounds(path_s=math.inf)
+    axis.bound_added(bounds(path_s=math.inf))
     for _ in range(30):  # 1.5 s
         axis.tick(StickInput(sign * command), sign * 0.2)
         plain.tick(StickInput(sign * command))
@@ -252,7 +254,7 @@ def test_the_carry_makes_it_no_faster_than_its_bound(sign: float) -> None:
     run_on = Fir([0.0, 0.0, 0.0, 0.0, 1.0])
     axis = Axis(TICK_S, OutputLimits(rise_per_s=2.5), sway=None, shaper=run_on, grid_steps=16)
     largest = 0.25 + 1 / 64
-    axis.bounds = bounds(largest=largest, path_s=math.inf)
+    axis.bound_added(bounds(largest=largest, path_s=math.inf))
     axis.tick(StickInput())
     axis.tick(StickInput(sign / 32))
     sent = []

@@ -149,7 +149,7 @@ def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: f
 
 
 def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(drive: Drive) -> None:
-    drive.axis.state, drive.axis.reason = State.TRIPPED, Reason.EMERGENCY_STOP
+    drive.axis.restore(State.TRIPPED, Reason.EMERGENCY_STOP)
     drive.run(StickInput(), 0.2)
     assert drive.state is State.TRIPPED
 
@@ -159,3 +159,10 @@ def test_with_the_enable_off_a_stick_that_tells_nothing_is_no_news(drive: Drive)
     assert drive.axis.reason is Reason.ENABLE_OFF
     drive.tick(StickInput(fault=Reason.STICK_NOT_AVAILABLE))
     assert drive.axis.reason is Reason.STICK_NOT_AVAILABLE
+
+
+@pytest.mark.parametrize("state", [State.ACTIVE, State.BYPASS_ON, State.STOPPING])
+def test_no_axis_continues_in_motion(drive: Drive, state: State) -> None:
+    with pytest.raises(ValueError, match=f"expected one with neutral output, got {state.name}"):
+        drive.axis.restore(state, Reason.STICK_MOVED)
+    assert (drive.state, drive.axis.reason) == (State.NEUTRAL_WAIT, Reason.START)

@@ -81,8 +81,7 @@ class CalibrationDrive:
         self._controller = Controller(deployment)
         self._runner = runner = self._controller.axes[axis]
         period_s = deployment.config.tick_ms / 1000.0 * runner.bound.period_ticks
-        runner.chooser = None
-        runner.axis = Axis(
+        measured = Axis(
             period_s,
             OutputLimits(maximum=1.0, rise_per_s=FALL_PER_S, fall_per_s=FALL_PER_S, tail_s=0.0),
             sway=None,
@@ -95,8 +94,7 @@ class CalibrationDrive:
         self._levers: dict[str, _RampLever] = {}
         for name, one in self._controller.axes.items():
             lever = _RampLever(self._controller.levers[one.bound.config.stick.lever])
-            one.compensator = None
-            one.replace_lever(lever)
+            one.isolate(lever, measured if one is runner else None)
             self._levers[name] = lever
         self._lever = self._levers.pop(axis)
         self._ramp = ramp

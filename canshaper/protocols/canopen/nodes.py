@@ -238,8 +238,9 @@ def canopen_buses(
         lever, valve = deployment.config.levers[config.stick.lever], config.valve
         if lever.node:
             node = buses[lever.bus].nodes[lever.node]
-            runner.gates.insert(0, NodeGate(node, Reason.NODE_FAULT))
+            runner.add_interlock(NodeGate(node, Reason.NODE_FAULT), first=True)
         if valve.cia408 and valve.cia408.node:
             node = buses[valve.bus].nodes[valve.cia408.node]
-            runner.gates.insert(0, NodeGate(node, Reason.VALVE_FAULT, runner.control))
+            gate = NodeGate(node, Reason.VALVE_FAULT, runner.control)
+            runner.add_interlock(gate, first=True)
     return buses

@@ -61,7 +61,7 @@ class Line:
         self._passed_ns = arrived_ns
         stopped = stopped or self._lever.released  # the axes trip with the next tick only
         for runner in self._runners:
-            if stopped or runner.trip is not None:  # the loop stood still, or the like: this is old
+            if stopped or runner.tripping:  # the loop stood still, or the like: this is old
                 runner.bound.valve.put(0)
         self.moved = self._moves() and not stopped
         return self._message.onto(data)
@@ -82,4 +82,4 @@ class Line:
         return [self._message.own(enabled=False)] if self.moved else []
 
     def _moves(self) -> bool:
-        return any(runner.axis.raw and runner.trip is None for runner in self._runners)
+        return any(runner.axis.raw and not runner.tripping for runner in self._runners)

@@ -83,7 +83,7 @@ class AnySource:
                 # No tick need have seen the silence in between.
                 self._input.forget()
                 for runner in self._runners:
-                    runner.lost = True
+                    runner.invalidate()
             self._source = source
             self._ignored.clear()
             self.events.append(SourceEvent(self._bus, self._message, source, source))
@@ -145,7 +145,7 @@ class CommandedByOthers:
         to, fault = _destination(frame.can_id), FrameFault.NONE
         for runner, destination in self._runners:
             if to in (destination, GLOBAL):
-                runner.contest(arrived_ns)
+                runner.foreign_sender(arrived_ns)
                 fault = FrameFault.SECOND_SENDER
         return fault
 

@@ -77,7 +77,7 @@ class Network:
             ]
             for runner in there:
                 if not deployment.listen_only:  # it reckons, whoever has the address
-                    runner.gates.append(node.gate)
+                    runner.add_interlock(node.gate)
             for group in deployment.sent_groups(bus):
                 runners = [
                     r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group
