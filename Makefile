@@ -54,16 +54,13 @@ lint: .venv/test-ready
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
-# Tests that take seconds of pure reckoning add no line, nor do those of the daemon around the
-# controller, which start processes and threads; few examples will do.
-AROUND = cli init journal live notify reading realtime
-# Of the buses: what is tried without CAN.
-PORTS = arrival multicast open_sockets python_can raw raw_faults raw_interface
+# Tests that take seconds of pure reckoning add no line, nor do those that start processes and
+# threads; few examples will do.
+GATE = tests/shaping tests/inputs tests/guard tests/bus tests/protocols tests/controller tests/daemon
 coverage: .venv/test-ready
 	@mkdir -p out
-	.venv/bin/python -m coverage run -m pytest -q -m "not long" --hypothesis-profile=few \
-		tests/shaping tests/service tests/guard $(AROUND:%=--ignore-glob='*/test_%*.py') \
-		$(PORTS:%=tests/can/test_%.py)
+	.venv/bin/python -m coverage run -m pytest -q -m "not long and not processes" \
+		--hypothesis-profile=few $(GATE)
 	.venv/bin/python -m coverage report
 
 mutation: .venv/test-ready

@@ -14,9 +14,9 @@ import time
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
-from tests.can.large_dbc import large
 from tests.hostile.inputs import with_dbc
 from tests.hostile.run import run
+from tests.machine.large_dbc import large
 
 PEER = """
 import re, sys

@@ -19,9 +19,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
 SURVIVORS = ROOT / "tests/mutation/survivors.txt"
-# Not of the controller: tests of the daemon around it, which start processes and threads.
-AROUND = ("cli", "journal", "live", "notify", "reading", "realtime")
-SERVICE = ["tests/service", *(f"--ignore-glob=*/test_{name}*.py" for name in AROUND)]
+DAEMON = [f"tests/{room}" for room in ("inputs", "guard", "protocols", "controller", "daemon")]
 # Groups: the rooms of the modules, and the tests that reach them.
 ROOMS = {
     "shaping": ("shaping",),
@@ -31,9 +29,9 @@ ROOMS = {
 }
 TESTS = {
     "shaping": ["tests/shaping"],
-    "controller": [*SERVICE, "tests/guard"],
-    "daemon": SERVICE,
-    "bus": ["tests/can"],
+    "controller": DAEMON,
+    "daemon": DAEMON,
+    "bus": ["tests/bus"],
 }
 CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
 CORE_TESTS = [
@@ -70,7 +68,7 @@ only_mutate = {only}
 also_copy = {COPIED[1:]}
 pytest_add_cli_args_test_selection = {tests}
 pytest_add_cli_args = [
-    "-m", "not long", "--hypothesis-profile=few", "-p", "no:cacheprovider",
+    "-m", "not long and not processes", "--hypothesis-profile=few", "-p", "no:cacheprovider",
     "-p", "no:unraisableexception",  # collects garbage at the end of every run
 ]
 timeout_multiplier = 2.0

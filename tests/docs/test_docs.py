@@ -48,3 +48,10 @@ def test_troubleshooting_names_real_states_and_reasons() -> None:
     found = set(re.findall(r"\b[A-Z]{2,}(?:_[A-Z]+)+\b|\b(?:TRIPPED|STOPPING|READY|START)\b", text))
     assert found
     assert found <= NAMES
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+def test_tests_are_where_a_page_says(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    named = set(re.findall(r"(?<![\w/])(?:tests/)?((?:[a-z0-9_]+/)+test_[a-z0-9_]+)", text))
+    assert [name for name in sorted(named) if not (ROOT / "tests" / f"{name}.py").exists()] == []

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from tests.faults.machine import Machine, Node
-from tests.service.canopen_rig import (
+from tests.rigs.canopen import (
     ACTIVE,
     BOOT_UP,
     HOLD,

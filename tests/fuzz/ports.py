@@ -8,7 +8,7 @@ from unittest.mock import patch
 
 from canshaper.bus import raw
 from canshaper.codec.frame import BusState, Frame
-from tests.can.raw_line import IDS, OTHER, STATUS, VALVE, Line
+from tests.bus.raw_line import IDS, OTHER, STATUS, VALVE, Line
 from tests.fuzz.frames import Bytes
 
 ERRORS = ("ENODEV", "ENXIO", "EBADF", "ENETDOWN", "ENOBUFS", "EAGAIN", "EINVAL", "EIO", "EPERM")

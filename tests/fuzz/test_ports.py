@@ -6,7 +6,7 @@ from hypothesis import event, example, given, settings
 from hypothesis import strategies as st
 
 from canshaper.codec.frame import BusState
-from tests.can.raw_line import MARK_AT, SENT_BACK
+from tests.bus.raw_line import MARK_AT, SENT_BACK
 from tests.fuzz import ports
 
 # Kinds of steps that the first byte of each tells apart (``ports.run``).

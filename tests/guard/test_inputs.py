@@ -8,7 +8,7 @@ from canshaper.guard.output import OutputGuard
 from canshaper.machine.binding import load_deployment
 from tests.faults import shipped, variants
 from tests.guard.bench import Bench
-from tests.service.j1939_rig import OWN, bjm
+from tests.rigs.j1939 import OWN, bjm
 
 
 def bench(name: str = "forwarder", axis: str = "near_far") -> Bench:

@@ -15,7 +15,7 @@ import can
 import pytest
 
 from canshaper.checksums import CHECKSUMS
-from tests.can.checksum_reference import REFERENCE
+from tests.codec.checksum_reference import REFERENCE
 from tests.hil.machine import ANSWER_S, DBC, FILE, Service, levers_on, open_bus, service
 from tests.hil.machine import wait_for as wait
 

@@ -16,8 +16,8 @@ import pytest
 
 from tests.hil.j1939_drive import FILE, as_wireshark_sees, drive, not_decoded
 from tests.hil.machine import ANSWER_S, Service, candump, logged, open_bus, service
-from tests.service.j1939_rig import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
-from tests.service.test_dm1 import codes
+from tests.protocols.j1939.test_dm1 import codes
+from tests.rigs.j1939 import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
 
 # Industry group 2, function 129, manufacturer 2047, serial number 1: as the file has it.
 NAME = 0x20008100FFE00001

@@ -14,7 +14,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import SCRIPTS, random_script
-from tests.can.checksum_reference import PLACES, with_checksum
+from tests.codec.checksum_reference import PLACES, with_checksum
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = random_script(1)

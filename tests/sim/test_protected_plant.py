@@ -14,7 +14,7 @@ from canshaper.shaping.states import State
 from canshaper_sim.levers import LeverNode
 from canshaper_sim.operator import random_script
 from canshaper_sim.plant import PlantNode
-from tests.can import protected_machine
+from tests.machine import protected_machine
 
 ROOT = Path(__file__).parents[2]
 IDS = list(range(1, 17))

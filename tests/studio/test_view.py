@@ -16,7 +16,7 @@ from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
-from tests.service.j1939_rig import bjm
+from tests.rigs.j1939 import bjm
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]

@@ -1,0 +1,293 @@
+"""The port on raw sockets when frames do not get onto the bus."""
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import pytest
+
+from canshaper.bus import raw
+from canshaper.bus.raw import PROBE_NS, SIZE
+from canshaper.codec.frame import BusState, FrameFault
+from tests.bus.raw_line import (
+    IDS,
+    MARK_AT,
+    OTHER,
+    SENT_BACK,
+    STATUS,
+    TICK_NS,
+    VALVE,
+    Line,
+    message,
+)
+
+# linux/can/error.h
+BUS_OFF, RESTARTED, CONTROLLER = 0x40, 0x100, 0x4
+RX_OVERFLOW, TX_OVERFLOW, TX_WARNING = 0x01, 0x02, 0x08
+RX_PASSIVE, TX_PASSIVE, ACTIVE = 0x10, 0x20, 0x40
+
+
+@pytest.fixture
+def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
+    made: list[Line] = []
+
+    def make(*arguments: Any, **options: Any) -> Line:
+        made.append(Line(*arguments, **options))
+        monkeypatch.setattr(raw, "time", made[-1])
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.end()
+
+
+@pytest.fixture
+def line(make_line: Callable[..., Line]) -> Line:
+    return make_line()
+
+
+# -- confirmations ---------------------------------------------------------------------------------
+
+
+def test_own_frames_are_not_handed_on_but_those_of_another_sender_are(line: Line) -> None:
+    line.port.send(VALVE)
+    line.confirm(VALVE)
+    assert line.heard() == []
+    line.put(message(VALVE.can_id, VALVE.data), SENT_BACK)
+    assert line.heard() == [VALVE]
+
+
+@pytest.mark.parametrize("size", [MARK_AT + 1, SIZE - 1])
+def test_a_confirmation_that_is_not_whole_is_counted_and_confirms_nothing(
+    line: Line, size: int
+) -> None:
+    for _ in range(3):
+        line.now_ns += TICK_NS
+        line.port.send(VALVE)
+        line.confirm(VALVE, size)
+    assert line.heard() == []
+    assert line.faults == [FrameFault.WRONG_LENGTH] * 3
+    assert line.unconfirmed() == 0
+
+
+def test_frames_of_another_sender_confirm_nothing(line: Line) -> None:
+    for _ in range(3):
+        line.now_ns += TICK_NS
+        line.port.send(VALVE)
+        line.put(message(VALVE.can_id, VALVE.data), SENT_BACK)
+        line.heard()
+    assert line.unconfirmed() == 0
+    assert line.port.state is BusState.NOT_CONFIRMED
+
+
+def test_confirmed_frames_can_be_sent_for_ever(line: Line) -> None:
+    for _ in range(500):
+        line.now_ns += TICK_NS
+        for frame in (VALVE, OTHER):
+            assert line.port.send(frame)
+            line.confirm(frame)
+        assert line.heard() == []
+        assert len(line.sent()) == 2
+    assert line.port.state is BusState.UP
+    assert line.faults == []
+
+
+def test_a_confirmation_may_come_two_ticks_late(line: Line) -> None:
+    for tick in range(500):
+        line.now_ns += TICK_NS
+        assert line.port.send(VALVE)
+        line.sent()
+        if tick >= 2:
+            line.confirm(VALVE)
+        assert line.heard() == []
+    assert line.faults == []
+
+
+def test_a_fast_loop_on_a_slow_bus_is_no_fault(line: Line) -> None:
+    """A tick of 1 ms, and confirmations that take 15."""
+    for tick in range(500):
+        line.now_ns += 1_000_000
+        assert line.port.send(VALVE)
+        line.sent()
+        if tick >= 15:
+            line.confirm(VALVE)
+        assert line.heard() == []
+    assert line.faults == []
+
+
+def test_a_bus_that_takes_no_frames_gets_no_more(line: Line) -> None:
+    assert line.unconfirmed() == 3
+    assert line.port.state is BusState.NOT_CONFIRMED
+    assert line.faults == [FrameFault.NOT_CONFIRMED]
+    until_ns = line.now_ns + PROBE_NS - 2 * TICK_NS
+    while line.now_ns < until_ns:
+        assert line.unconfirmed() == line.unconfirmed(OTHER) == line.unconfirmed(STATUS) == 0
+    assert line.sent() == []
+    assert line.faults == [FrameFault.NOT_CONFIRMED]
+
+
+def test_a_confirmation_of_another_id_confirms_nothing(line: Line) -> None:
+    extended = VALVE._replace(extended=True)
+    for _ in range(2):
+        line.now_ns += TICK_NS
+        assert line.port.send(VALVE)
+        line.confirm(OTHER)
+        line.confirm(extended)
+        line.heard()
+    assert line.unconfirmed() == 1
+    assert line.port.state is BusState.NOT_CONFIRMED
+
+
+def test_confirmations_without_a_frame_are_no_credit(line: Line) -> None:
+    """They come for what was sent before it was given up."""
+    for _ in range(5):
+        line.confirm(VALVE)
+    line.heard()
+    assert line.unconfirmed() == 3
+
+
+def test_a_blocked_bus_is_tried_with_one_frame_at_a_time(line: Line) -> None:
+    line.unconfirmed()
+    for _ in range(5):
+        line.now_ns += PROBE_NS
+        tries = [line.port.send(f) for f in (VALVE, OTHER, STATUS, VALVE)]
+        assert tries == [True, False, False, False]
+        assert len(line.sent()) == 1
+        assert line.port.state is BusState.NOT_CONFIRMED
+    assert set(line.faults) == {FrameFault.NOT_CONFIRMED}
+
+
+def test_a_probe_that_comes_back_opens_the_bus(line: Line) -> None:
+    line.unconfirmed()
+    line.now_ns += PROBE_NS
+    assert line.port.send(VALVE)
+    line.confirm(VALVE)
+    line.heard()
+    assert line.port.state is BusState.UP
+    assert line.unconfirmed() == line.unconfirmed(OTHER) + 3 == 3
+
+
+def test_a_late_confirmation_opens_the_bus_before_the_next_probe(line: Line) -> None:
+    line.unconfirmed()
+    line.confirm(VALVE)
+    line.heard()
+    assert line.port.state is BusState.UP
+    assert line.unconfirmed() == 3
+
+
+def test_a_status_message_that_starves_holds_up_no_valve(line: Line) -> None:
+    """It has the lowest priority; on a bus that is full of others the valves still get through."""
+    assert line.unconfirmed(STATUS) == 3
+    assert line.faults == [FrameFault.NOT_CONFIRMED]
+    for _ in range(10):
+        line.now_ns += TICK_NS
+        assert line.port.send(VALVE)
+        line.confirm(VALVE)
+        assert not line.port.send(STATUS)  # and no more of them wait
+        line.heard()
+    assert line.port.state is BusState.UP
+    line.confirm(STATUS)
+    line.heard()
+    line.now_ns += TICK_NS
+    assert line.port.send(STATUS)
+
+
+def test_a_status_message_that_a_driver_has_dropped_is_tried_again(line: Line) -> None:
+    """Without an echo it would wait for ever."""
+    line.unconfirmed(STATUS)
+    refused = 0
+    while not line.port.send(STATUS):
+        line.now_ns += TICK_NS
+        refused += 1
+        assert refused < 100
+    assert (refused - 2) * TICK_NS <= PROBE_NS
+
+
+def test_another_deployment_begins_without_the_frames_of_the_last(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Their confirmations may be filtered away. Filters need CAN: they are set in tests/hil."""
+    monkeypatch.setattr(raw, "set_filters", lambda _sockets, _ids: None)
+    for _ in range(10):
+        line.now_ns += TICK_NS
+        assert line.port.send(VALVE)
+        line.port.watch("other", IDS)
+    line.put(message(0x110))
+    assert [f.bus for f in line.heard()] == ["other"]
+
+
+# -- the controller --------------------------------------------------------------------------------
+
+
+def test_bus_off_sends_nothing_more(line: Line) -> None:
+    line.error(BUS_OFF)
+    assert line.heard() == []
+    assert line.port.state is BusState.BUS_OFF
+    assert line.faults == [FrameFault.BUS_OFF]
+    for _ in range(24):
+        assert line.unconfirmed() == 0
+    assert line.sent() == []
+
+
+@pytest.mark.parametrize(("kind", "data"), [(RESTARTED, 0), (CONTROLLER, ACTIVE)])
+def test_a_restarted_controller_sends_at_once(line: Line, kind: int, data: int) -> None:
+    line.error(BUS_OFF)
+    line.error(kind, data)
+    assert line.heard() == []
+    assert line.port.state is BusState.UP
+    assert line.unconfirmed() == 3
+
+
+def test_bus_off_stays_bus_off_while_probes_do_not_come_back(line: Line) -> None:
+    line.error(BUS_OFF)
+    line.heard()
+    for _ in range(5):
+        line.now_ns += PROBE_NS
+        assert line.unconfirmed() == 1
+        assert line.port.state is BusState.BUS_OFF
+    line.confirm(VALVE)  # the controller was restarted, unseen
+    line.heard()
+    assert line.port.state is BusState.UP
+
+
+@pytest.mark.parametrize("passive", [RX_PASSIVE, TX_PASSIVE, RX_PASSIVE | TX_PASSIVE])
+@pytest.mark.parametrize("better", [ACTIVE, TX_WARNING])
+def test_a_passive_controller_still_sends(line: Line, passive: int, better: int) -> None:
+    line.error(CONTROLLER, passive)
+    line.heard()
+    assert line.port.state is BusState.PASSIVE
+    assert line.faults == [FrameFault.BUS_PASSIVE]
+    assert line.port.send(VALVE)
+    line.confirm(VALVE)
+    line.heard()
+    assert line.port.state is BusState.PASSIVE  # a frame got through all the same
+    line.error(CONTROLLER, better)
+    line.heard()
+    assert line.port.state is BusState.UP
+
+
+def test_passive_is_less_than_bus_off_and_than_not_confirmed(line: Line) -> None:
+    """A node that is alone on its bus is passive because nobody acknowledges its frames."""
+    line.unconfirmed()
+    line.error(CONTROLLER, TX_PASSIVE)
+    line.heard()
+    assert line.port.state is BusState.NOT_CONFIRMED
+    line.error(BUS_OFF)
+    line.error(CONTROLLER, TX_PASSIVE)
+    line.heard()
+    assert line.port.state is BusState.BUS_OFF
+    assert line.unconfirmed() == 0
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [(RX_OVERFLOW, FrameFault.FRAMES_LOST), (TX_OVERFLOW, FrameFault.ERROR_FRAME)],
+)
+def test_an_overflow_of_the_controller_is_no_recovery(
+    line: Line, data: int, fault: FrameFault
+) -> None:
+    line.unconfirmed()
+    line.error(CONTROLLER, data)
+    line.heard()
+    assert line.port.state is BusState.NOT_CONFIRMED
+    assert line.faults[-1] is fault
+    assert line.unconfirmed() == 0

@@ -1,0 +1,328 @@
+"""Identifiers of J1939, and what a deployment may ask of them."""
+
+import errno
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.bus.socketcan import MOST_FILTERS, set_filters
+from canshaper.checksums import Checksum
+from canshaper.codec.frame import BusState, Frame
+from canshaper.codec.j1939 import (
+    CLAIMED,
+    DM1,
+    claims_of,
+    group_mask,
+    group_of,
+    has_destination,
+    identifier,
+    pgn_of,
+    with_source,
+)
+from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.ids import Ids
+from tests.bus.raw_line import IDS, VALVE, Line, message
+
+ROOT = Path(__file__).parents[2]
+CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
+DBC = ROOT / "dbc" / "j1939-bjm-avc.dbc"
+OWN = 0x9C
+BJM1 = "2365445886"
+BYTE = st.integers(0, 255)
+
+
+class Machine:
+    """The J1939 machine with changes, on disk."""
+
+    def __init__(self, directory: Path) -> None:
+        self.directory = directory
+        self.yaml = CONFIG.read_text().replace("../dbc/j1939-bjm-avc.dbc", "machine.dbc")
+        self.dbc = DBC.read_text(encoding="cp1252")
+
+    def in_yaml(self, old: str, new: str) -> int:
+        """Replace the first ``old``; its line."""
+        assert old in self.yaml, old
+        line = self.yaml[: self.yaml.index(old)].count("\n") + 1
+        self.yaml = self.yaml.replace(old, new, 1)
+        return line
+
+    def in_dbc(self, old: str, new: str) -> int:
+        assert old in self.dbc, old
+        line = self.dbc[: self.dbc.index(old)].count("\n") + 1
+        self.dbc = self.dbc.replace(old, new, 1)
+        return line
+
+    def load(self) -> Deployment:
+        (self.directory / "machine.yaml").write_text(self.yaml)
+        (self.directory / "machine.dbc").write_text(self.dbc, encoding="cp1252")
+        return load_deployment(self.directory / "machine.yaml")
+
+    def problems(self) -> list[str]:
+        with pytest.raises(DeploymentError) as caught:
+            self.load()
+        return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Machine:
+    return Machine(tmp_path)
+
+
+# -- identifiers -----------------------------------------------------------------------------------
+
+
+@given(st.integers(0, 7), st.integers(0, 3), BYTE, BYTE, BYTE)
+def test_a_group_is_known_from_any_source_at_any_priority(
+    priority: int, pages: int, pf: int, ps: int, source: int
+) -> None:
+    can_id = priority << 26 | pages << 24 | pf << 16 | ps << 8 | source
+    pgn = pages << 16 | pf << 8 | (ps if pf >= 240 else 0)
+    assert pgn_of(can_id) == pgn
+    assert has_destination(can_id) == (pf < 240)
+    assert identifier(pgn, source, ps, priority) == can_id
+    assert group_of(with_source(can_id, source ^ 0x5A)) == group_of(can_id)
+    assert group_of(can_id) & ~group_mask(can_id) == 0
+
+
+def test_identifiers_of_the_standards() -> None:
+    assert identifier(CLAIMED, OWN) == 0x18EEFF9C
+    assert identifier(DM1, OWN) == 0x18FECA9C
+    assert claims_of(OWN) == [0x18EEFF9C, 0x18EEFFFE]
+    assert pgn_of(0x0CFDD633) == 64982  # BJM1 from 0x33
+    assert pgn_of(0x18EAFFFE) == 59904  # a request to all
+
+
+# -- binding ---------------------------------------------------------------------------------------
+
+
+def test_what_is_sent_goes_out_under_our_address(machine: Machine) -> None:
+    deployment = machine.load()
+    ids = deployment.ids("crane")
+    assert {i & 0xFF for i, _ in ids.sent} == {OWN}
+    assert {pgn_of(i) for i, _ in ids.valves} == {0xFE30, 0xFE31, 0xFE32}
+    assert ids.j1939
+    assert {group >> 8 for group in ids.taken_groups} >= {0xFDD6, 0xFDD8, 0xEE00, 0xEA00}
+
+
+def test_a_valve_on_a_bus_without_our_address(machine: Machine) -> None:
+    start = machine.yaml.index("    j1939:")
+    machine.yaml = machine.yaml[:start] + machine.yaml[machine.yaml.index("\ndbc:") :]
+    valve = machine.yaml.index("    valve:\n      bus: crane")
+    line = machine.yaml[:valve].count("\n") + 2
+    text = "AVC0 is a message of J1939, and bus crane has no address for us"
+    assert (
+        f"machine.yaml:{line}: axes.slew.valve.bus: {text}: allowed is one with a section j1939"
+    ) in machine.problems()
+
+
+@pytest.mark.parametrize("number", [int(BJM1) - 0x80000000, 272])
+def test_a_dbc_id_of_29_bits_without_bit_31(machine: Machine, number: int) -> None:
+    line = machine.in_dbc(f"BO_ {BJM1} BJM1", f"BO_ {number} BJM1")
+    machine.dbc = machine.dbc.replace(BJM1, str(number))
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{line}: ")
+    assert "BJM1" in problem
+    assert "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 more" in problem
+
+
+def test_signals_that_overlap(machine: Machine) -> None:
+    machine.in_dbc("State : 16|4@1+", "State : 7|4@1+")
+    line = machine.dbc[: machine.dbc.index("BO_ 2365468926")].count("\n") + 1
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{line}: ")
+    assert "are overlapping in message AVC0" in problem
+
+
+def test_a_factor_with_which_full_flow_cannot_be_reached(machine: Machine) -> None:
+    machine.in_dbc("PortFlow : 0|8@1+ (0.4,0)", "PortFlow : 0|8@1+ (0.2,0)")
+    line = machine.dbc[: machine.dbc.index("BO_ 2365468926")].count("\n") + 1
+    (problem,) = machine.problems()
+    text = "PortFlow cannot reach its range [0|100] with 8 bits at 0.2 per bit"
+    assert problem == f"machine.dbc:{line}: AVC0: {text}"
+
+
+def test_our_address_is_no_joysticks(machine: Machine) -> None:
+    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x9C\n")
+    line = machine.yaml[: machine.yaml.index("source: 0x9C")].count("\n") + 1
+    text = "BJM1 comes from address 156, which is ours on bus crane"
+    assert machine.problems() == [f"machine.yaml:{line}: levers.left.source: {text}"]
+
+
+def second_bus(machine: Machine, name: str) -> int:
+    """A second bus of J1939; the line of its NAME."""
+    node = f"j1939: {{ address: 0x9D, name: {name} }}"
+    bus = f"  other:\n    interface: socketcan\n    channel: vcan1\n    {node}\n"
+    return machine.in_yaml("\ndbc:", f"{bus}\ndbc:") + 3
+
+
+def test_one_name_on_two_buses(machine: Machine) -> None:
+    line = second_bus(machine, "{ identity_number: 1, manufacturer_code: 2047 }")
+    (problem,) = machine.problems()
+    assert problem == (
+        f"machine.yaml:{line}: buses.other.j1939.name: is the NAME of bus crane; each node needs"
+        " one of its own: another ecu_instance will do"
+    )
+
+
+def test_two_names_on_two_buses(machine: Machine) -> None:
+    second_bus(machine, "{ identity_number: 1, manufacturer_code: 2047, ecu_instance: 1 }")
+    assert set(machine.load().config.buses) == {"crane", "other"}
+
+
+def test_numbers_of_faults_that_do_not_end_in_the_range(machine: Machine) -> None:
+    line = machine.in_yaml("      address: 0x9C", "      first_spn: 524286\n      address: 0x9C")
+    (problem,) = machine.problems()
+    assert problem == (
+        f"machine.yaml:{line}: buses.crane.j1939.first_spn: found 524286, which makes the last one"
+        " 524291; allowed is 524287"
+    )
+
+
+def test_a_source_for_a_message_that_is_none_of_j1939(machine: Machine) -> None:
+    machine.in_dbc(f'BA_ "VFrameFormat" BO_ {BJM1} 3;\n', "")
+    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
+    text = "BJM1 is no message of J1939 (VFrameFormat in the DBC)"
+    assert any(p.endswith(f"levers.left.source: {text}") for p in machine.problems())
+
+
+def test_a_message_to_one_node_needs_its_sender(machine: Machine) -> None:
+    # proprietary A, PGN 61184, to us
+    machine.dbc = machine.dbc.replace(BJM1, str(0x98EF9CFE))
+    (problem,) = machine.problems()
+    assert "levers.left.source: missing: BJM1 is sent from one node to another" in problem
+    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
+    assert (0x18EF9C33, True) in machine.load().ids("crane").taken
+
+
+def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
+    stop = "emergency_stop: { bus: crane, message: BJM3, signal: Button1, timeout_ms: 200 }\n"
+    machine.yaml += stop
+    line = machine.yaml.count("\n")
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.yaml:{line}: emergency_stop.source: missing: in the DBC")
+    machine.yaml = machine.yaml.replace("message: BJM3,", "message: BJM3, source: 0x40,")
+    assert machine.load().emergency_stop is not None
+
+
+# -- our claims on the socket that hears others' ---------------------------------------------------
+
+
+CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
+CLAIMING = Ids(
+    IDS.taken,
+    IDS.sent,
+    IDS.valves,
+    IDS.known,
+    taken_groups=frozenset((CLAIMED << 8,)),
+    claims=frozenset((i, True) for i in claims_of(OWN)),
+    j1939=True,
+)
+
+
+@pytest.fixture
+def line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
+    opened = Line(CLAIMING)
+    monkeypatch.setattr("canshaper.bus.raw.time.monotonic_ns", opened.monotonic_ns)
+    yield opened
+    opened.end()
+    opened.port.close()
+
+
+def come(line: Line, frame: Frame) -> None:
+    line.put(message(frame.can_id, frame.data, extended=True))
+
+
+def test_our_own_claim_seen_back_is_taken_in_and_that_of_a_twin_is_not(line: Line) -> None:
+    for _ in range(5):
+        assert line.port.send(CLAIM)
+        come(line, CLAIM)
+        assert line.heard() == []
+    come(line, CLAIM)  # six, and we have sent five: a node that was set up alike
+    assert line.heard() == [CLAIM]
+    assert line.faults == []
+
+
+def test_the_claim_of_another_name_is_handed_out(line: Line) -> None:
+    assert line.port.send(CLAIM)
+    other = CLAIM._replace(data=bytes(8))
+    come(line, other)
+    come(line, CLAIM)
+    assert line.heard() == [other]
+
+
+def test_a_blocked_bus_is_up_again_when_a_claim_got_through(line: Line) -> None:
+    """While the address is not ours, claims are all that is sent."""
+    assert line.unconfirmed(VALVE) < 10
+    assert line.port.state is BusState.NOT_CONFIRMED
+    line.now_ns += 600_000_000
+    assert line.port.send(CLAIM)
+    assert line.heard() == []
+    assert line.port.state is BusState.NOT_CONFIRMED
+    come(line, CLAIM)
+    assert line.heard() == []
+    assert line.port.state is BusState.UP
+
+
+def test_claims_emptied_from_the_queue_do_not_hide_a_twin(line: Line) -> None:
+    assert line.port.send(CLAIM)
+    line.near[1].fail = OSError(errno.ENETDOWN, "")
+    assert not line.port.send(CLAIM)
+    line.near[1].fail = None
+    come(line, CLAIM)
+    assert line.heard() == [CLAIM]
+
+
+def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:
+    class Options:
+        def __init__(self) -> None:
+            self.filters = b""
+
+        def setsockopt(self, _level: int, _name: int, value: bytes) -> None:
+            self.filters = value
+
+    known = frozenset((i, False) for i in range(505)) | frozenset((i, True) for i in range(600))
+    sockets: Any = [Options() for _ in range(3)]
+    groups = frozenset(0xFE0000 + (i << 8) for i in range(20))
+    ids = Ids(frozenset(), frozenset(), frozenset(), known, groups, groups, j1939=True)
+    set_filters(sockets, ids)
+    for one in sockets:
+        assert len(one.filters) // 8 <= MOST_FILTERS
+
+
+def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
+    """Its address is in the id: that of the joystick, and ours in what we send."""
+    lever = ' SG_ Check : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 2365446398'
+    for name in ("Button9", "Button10", "Button11", "Button12"):
+        machine.dbc = re.sub(rf" SG_ {name} : .*\n", "", machine.dbc, count=1)
+        machine.dbc = re.sub(rf"VAL_ {BJM1} {name} .*\n", "", machine.dbc)
+    machine.in_dbc("\nBO_ 2365446398", lever)
+    flow = ' SG_ ExtendedFlow : 24|16@1+ (0.0015625,0) [0|100] "%" VALVES\n'
+    machine.in_dbc(flow, flow + ' SG_ Check : 40|8@1+ (1,0) [0|255] "" VALVES\n')
+    check = "checksum: { signal: Check, kind: sum_id }"
+    line = machine.in_yaml("    message: BJM1\n", f"    message: BJM1\n    {check}\n") + 1
+    machine.in_yaml("      message: AVC0\n", f"      message: AVC0\n      {check}\n")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: levers.left.checksum.kind: found 'sum_id', which depends on the id,"
+        " and BJM1 may come from any source; allowed is it with a known one"
+    ]
+    machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x21\n")
+    deployment = machine.load()
+    protections = {
+        "lever": (deployment.levers["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
+        "valve": (deployment.axes["slew"].valve.message.sender.protection, 0x0CFE3000 | OWN),
+    }
+    for protection, can_id in protections.values():
+        assert isinstance(protection.check, Checksum)
+        assert protection.check.can_id == can_id
+    frame = deployment.axes["slew"].valve.message.frame()
+    assert frame.can_id == protections["valve"][1]
+    assert (
+        frame.data[5] == sum(frame.can_id.to_bytes(4, "big") + frame.data[:5] + b"\xff\xff") % 256
+    )

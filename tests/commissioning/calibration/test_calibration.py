@@ -1,0 +1,253 @@
+"""A valve whose dead band, gain and asymmetry are known is measured, in lock-step."""
+
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.fit import Calibration, CalibrationError, Sample, fit
+from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.levers import LeverNode
+from canshaper_sim.operator import Script, Stroke
+from canshaper_sim.parameters import changed_parameters
+
+ROOT = Path(__file__).parents[3]
+FILE = ROOT / "config" / "forwarder.yaml"
+RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
+SPEED = ("TipVelocity", "SlewRate")
+TICK_NS = 20_000_000
+
+
+@pytest.fixture
+def deployment() -> Deployment:
+    return load_deployment(FILE)
+
+
+def nothing(_drive: CalibrationDrive) -> None:
+    pass
+
+
+def measured(deployment: Deployment, *changes: str, ramp: Ramp = RAMP) -> Calibration:
+    drive = CalibrationDrive(deployment, "slew", SPEED, ramp)
+    run_simulated(drive, deployment, changed_parameters(list(changes)), nothing)
+    assert drive.ended == "done"
+    return drive.result()
+
+
+@pytest.mark.parametrize(
+    ("deadband", "more", "gain", "dead_time"),
+    [
+        (0.05, 0.0, 1.0, 0.0),
+        (0.08, -0.04, 0.8, 0.15),
+        (0.03, 0.06, 0.6, 0.05),
+        (0.0, 0.0, 1.0, 0.1),
+    ],
+)
+def test_a_known_valve_is_found(
+    deployment: Deployment, deadband: float, more: float, gain: float, dead_time: float
+) -> None:
+    found = measured(
+        deployment,
+        f"slew.deadband={deadband}",
+        f"slew.negative_more_deadband={more}",
+        f"slew.negative_gain={gain}",
+        f"slew.dead_time_s={dead_time}",
+    )
+    # A step of the frame is 0.8 % of the command.
+    assert found.positive.opens == pytest.approx(deadband, abs=0.008)
+    assert found.negative.opens == pytest.approx(deadband + more, abs=0.008)
+    assert found.positive.full == pytest.approx(0.5, rel=0.04)
+    assert found.negative.full / found.positive.full == pytest.approx(gain, rel=0.04)
+    # A longer dead time is a later opening on the way up, and no other curve.
+    assert found.positive.delay == pytest.approx(2 * RAMP.rate_per_s * (0.1 + dead_time), abs=0.01)
+
+
+@pytest.mark.parametrize(("rate_per_s", "top"), [(0.1, 0.15), (0.1, 0.4), (0.05, 0.15)])
+def test_a_quick_or_low_ramp_finds_the_same_valve(
+    deployment: Deployment, rate_per_s: float, top: float
+) -> None:
+    ramp = Ramp(rate_per_s=rate_per_s, top=top, rest_s=1.0)
+    found = measured(deployment, "slew.deadband=0.08", ramp=ramp)
+    for direction in (found.positive, found.negative):
+        assert direction.opens == pytest.approx(0.08, abs=0.008)
+        assert direction.full == pytest.approx(0.5, rel=0.1)
+        assert direction.delay == pytest.approx(2 * rate_per_s * 0.1, abs=0.01)
+
+
+def test_a_ramp_too_quick_for_the_feedback_is_told() -> None:
+    def samples(commands: list[float]) -> list[Sample]:
+        return [Sample(command, max(0.0, command - 0.1)) for command in commands]
+
+    steps = [0.04 * n for n in range(11)]
+    with pytest.raises(CalibrationError, match="too few samples of the feedback on the ramp"):
+        fit(samples(steps), samples([0.4] * 20), samples(steps[::-1]), 0.0)
+
+
+def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    file.write_text(FILE.read_text().replace("../dbc", str(ROOT / "dbc")))
+    options = ["calibrate", str(file), "--axis", "slew", "--top", "25", "--rate", "5", "--write"]
+    told = CliRunner().invoke(app, [*options, "--set", "slew.negative_more_deadband=0.05"])
+    assert told.exit_code == 0, told.output
+    assert "negative: opens at" in told.output
+    assert "above 25 % of the command this is a straight line, not measured" in told.output
+    limits = load_deployment(file).axes["slew"].config.limits
+    curve = limits.curve()
+    assert curve is not None
+    assert limits.deadband_pct == 0.0
+    assert curve.velocity(0.04) == 0.0 == curve.velocity(-0.09)
+    assert curve.velocity(0.06) > 0.0 > curve.velocity(-0.115)
+
+
+def hands(deployment: Deployment, **stroke: float) -> LeverNode:
+    strokes = tuple(Stroke("slew", 3.0, 1.0, v, ramp_s=0.0) for v in stroke.values())
+    return LeverNode(deployment, Script("hand", strokes, 60.0))
+
+
+def run(
+    drive: CalibrationDrive, levers: LeverNode, seconds: float, *, spoil: str = ""
+) -> list[Frame]:
+    """The daemon's side alone: feedback stands at zero."""
+    speed = Frame("crane", 0x402, False, bytes(6))
+    sent: list[Frame] = []
+    for tick in range(round(seconds / 0.02)):
+        now_ns = tick * TICK_NS
+        for frame in levers.frames(tick * 20):
+            if spoil == "silent" and tick > 150:
+                continue
+            if spoil == "enable" and tick > 150:
+                data = frame.data[:4] + bytes((frame.data[4] & ~0x3,)) + frame.data[5:]
+                frame = frame._replace(data=data)  # noqa: PLW2901
+            drive.receive(frame, now_ns)
+        if spoil != "unseen" or tick <= 200:
+            drive.receive(speed, now_ns)
+        sent += drive.tick(now_ns)
+    return [f for f in sent if f.can_id == 0x200]
+
+
+@pytest.mark.parametrize(
+    ("spoil", "moved", "why"),
+    [
+        ("silent", {}, "stopped: STOP_DONE"),
+        ("enable", {}, "stopped: ENABLE_LOST"),
+        ("unseen", {}, "stopped: the feedback fell silent, or tells an error"),
+        ("", {"hand": 0.3}, "stopped: STOP_DONE"),
+    ],
+)
+def test_what_stops_the_daemon_ends_it_in_neutral(
+    deployment: Deployment, spoil: str, moved: dict[str, float], why: str
+) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    sent = run(drive, hands(deployment, **moved), 6.0, spoil=spoil)
+    assert any(frame.data[0] for frame in sent)
+    assert drive.ended == why
+    assert [frame.data[0] for frame in sent[-30:]] == [0] * 30
+    with pytest.raises(CalibrationError, match=f"not taken to its end: {why}"):
+        drive.result()
+
+
+def test_it_does_not_begin_without_feedback(deployment: Deployment) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    levers = hands(deployment)
+    for tick in range(100):
+        for frame in levers.frames(tick * 20):
+            drive.receive(frame, tick * TICK_NS)
+        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
+    assert drive.waiting_for == "feedback"
+
+
+def test_it_does_not_begin_with_feedback_of_long_ago(deployment: Deployment) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    drive.receive(Frame("crane", 0x402, False, bytes(6)), 0)
+    levers = hands(deployment)
+    for tick in range(50, 150):
+        for frame in levers.frames(tick * 20):
+            drive.receive(frame, tick * TICK_NS)
+        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
+    assert (drive.waiting_for, drive.ended) == ("feedback", "")
+
+
+def test_no_other_valve_moves(deployment: Deployment) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    levers = hands(deployment)
+    for tick in range(300):
+        for frame in levers.frames(tick * 20):
+            drive.receive(frame, tick * TICK_NS)
+        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
+        for frame in drive.tick(tick * TICK_NS):
+            assert frame.can_id not in (0x201, 0x202) or frame.data[0] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "says"),
+    [
+        (["--axis", "boom"], "found 'boom', axes are slew, near_far, lift"),
+        (["--axis", "slew", "--speed", "TipVelocity.Rate"], "found 'Rate', signals of TipVelocity"),
+        (["--axis", "slew", "--speed", "Tip.Rate"], "found 'Tip', messages of the DBC files are"),
+        (["--axis", "slew", "--speed", "Rate"], "--speed: found Rate, allowed is MESSAGE.SIGNAL"),
+    ],
+)
+def test_wrong_options_are_told(arguments: list[str], says: str) -> None:
+    told = CliRunner().invoke(app, ["calibrate", str(FILE), *arguments])
+    assert told.exit_code == 2
+    assert says in told.output
+
+
+def test_a_signal_that_is_none_of_the_axis_is_told(deployment: Deployment) -> None:
+    drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "VerticalSpeed"), RAMP)
+    run_simulated(drive, deployment, None, nothing)
+    with pytest.raises(CalibrationError, match="positive commands: the axis did not move"):
+        drive.result()
+
+
+def test_no_signal_at_all_is_refused(deployment: Deployment) -> None:
+    with pytest.raises(DeploymentError, match="found 'Nothing'"):
+        CalibrationDrive(deployment, "slew", ("TipVelocity", "Nothing"), RAMP)
+
+
+def test_an_axis_that_stands_at_its_end_is_told() -> None:
+    up = [Sample(c / 1000, min(max(0.0, c / 1000 - 0.05), 0.1)) for c in range(400)]
+    with pytest.raises(CalibrationError, match="does not rise with the command"):
+        fit(up, up[-20:], list(reversed(up)), 0.0)
+
+
+def test_noise_does_not_open_the_valve() -> None:
+    up = [Sample(c / 1000, 0.01 * ((c * 7919) % 13 - 6) / 6) for c in range(400)]
+    with pytest.raises(CalibrationError, match="did not move up to 40%"):
+        fit(up, up[-20:], list(reversed(up)), 0.006)
+
+
+def test_the_ramp_is_as_quick_up_as_down_and_ends_at_zero() -> None:
+    tops = [RAMP.command(t + RAMP.rest_s + RAMP.up_s + 0.5) for t in (0.0, RAMP.half_s)]
+    assert tops == pytest.approx([0.3, -0.3])
+    assert RAMP.command(0.5) == 0.0 == RAMP.command(RAMP.half_s + 0.5)
+    assert RAMP.command(RAMP.duration_s) == 0.0 == RAMP.command(1e6)
+    times = [i * 0.02 for i in range(round(RAMP.duration_s / 0.02))]
+    steps = [abs(RAMP.command(t + 0.02) - RAMP.command(t)) for t in times]
+    assert max(steps) <= 0.04 * 0.02 + 1e-9
+
+
+@pytest.mark.parametrize(("what", "reason"), [("send", "SEND_FAILED"), ("stall", "LOOP_STALLED")])
+def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
+    deployment: Deployment, what: str, reason: str
+) -> None:
+    drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
+    levers = hands(deployment)
+    (*_, moving) = run(drive, levers, 4.0)
+    assert moving.data[0]
+    if what == "send":
+        drive.send_failed(moving)
+    else:
+        drive.stalled()
+    for tick in range(200, 203):
+        for frame in levers.frames(tick * 20):
+            drive.receive(frame, tick * TICK_NS)
+        assert [f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200] == [0]
+    assert drive.ended == f"stopped: {reason}"

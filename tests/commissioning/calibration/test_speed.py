@@ -1,0 +1,166 @@
+"""Whose speed a measurement listens to: one bus, one sender, numbers that are speeds."""
+
+import struct
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.hand import Hand, Held
+
+ROOT = Path(__file__).parents[3]
+RAMP = Ramp(rate_per_s=0.04, top=0.3, rest_s=1.0)
+TICK_NS = 20_000_000
+MESSAGES = """
+BO_ 1000 Floating: 8 PLANT
+ SG_ Speed : 0|32@1- (1,0) [0|0] "" SHAPER
+
+BO_ 1001 Chosen: 8 PLANT
+ SG_ Which M : 0|8@1+ (1,0) [0|255] "" SHAPER
+ SG_ Speed m0 : 8|16@1- (1,0) [0|0] "" SHAPER
+
+BO_ 1002 Long: 20 PLANT
+ SG_ Speed : 0|32@1- (1,0) [0|0] "" SHAPER
+
+BO_ 1003 Ranged: 8 PLANT
+ SG_ Speed : 0|16@1- (1,0) [-100|100] "" SHAPER
+
+"""
+
+
+def with_messages(folder: Path) -> Deployment:
+    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
+    at = dbc.index("BO_ ")
+    changed = dbc[:at] + MESSAGES.lstrip() + dbc[at:] + "\nSIG_VALTYPE_ 1000 Speed : 1;\n"
+    (folder / "machine.dbc").write_text(changed, "cp1252")
+    file = folder / "machine.yaml"
+    text = (ROOT / "config" / "forwarder.yaml").read_text()
+    file.write_text(text.replace("../dbc/forwarder.dbc", "machine.dbc"))
+    return load_deployment(file)
+
+
+def drive_on(
+    deployment: Deployment, axis: str, speed: tuple[str, str], heard: list[Frame], ticks: int = 400
+) -> CalibrationDrive:
+    """Levers held in neutral with their enable; the speed is ``heard``, the last for ever."""
+    drive, hand = CalibrationDrive(deployment, axis, speed, RAMP), Hand(deployment)
+    for tick in range(ticks):
+        now_ns = tick * TICK_NS
+        for frame in hand.frames(tick * 20, Held({}, enable=True)):
+            drive.receive(frame, now_ns)
+        list(drive.tick(now_ns))
+        drive.receive(heard[min(tick, len(heard) - 1)], now_ns)
+    return drive
+
+
+@pytest.mark.parametrize(("bus", "begins"), [("front", True), ("rear", False)])
+def test_the_speed_of_another_bus_is_that_of_another_crane(bus: str, begins: bool) -> None:
+    deployment = load_deployment(ROOT / "config" / "two-cranes.yaml")
+    speed = Frame(bus, 0x402, False, bytes(6))
+    drive = drive_on(deployment, "front_slew", ("TipVelocity", "SlewRate"), [speed])
+    assert (drive.waiting_for == "") is begins
+    assert begins or drive.waiting_for == "feedback"
+
+
+def test_another_valve_that_speaks_does_not_stand_for_one_that_fell_silent() -> None:
+    deployment = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+    own, other = (
+        Frame("crane", 0x0CFE1000 | source, True, b"\x7d\x7d" + b"\xff" * 6)
+        for source in (0x80, 0x55)
+    )
+    heard = [own] * 200 + [other]
+    drive = drive_on(deployment, "slew", ("AVEF0", "ExtendFlow"), heard)
+    assert drive.ended == "stopped: the feedback fell silent, or tells an error"
+    assert 0.0 < drive.progress < 1.0
+
+
+@pytest.mark.parametrize(
+    ("message", "data"),
+    [
+        ("Floating", struct.pack("<f", float("nan")) + bytes(4)),
+        ("Floating", struct.pack("<f", float("inf")) + bytes(4)),
+        ("Ranged", struct.pack("<h", 101) + bytes(6)),
+    ],
+)
+def test_what_is_no_speed_counts_as_silence(tmp_path: Path, message: str, data: bytes) -> None:
+    deployment = with_messages(tmp_path)
+    can_id = deployment.messages.find(message)[1].frame_id  # type: ignore[union-attr]
+    good, bad = Frame("crane", can_id, False, bytes(8)), Frame("crane", can_id, False, data)
+    drive = drive_on(deployment, "slew", (message, "Speed"), [bad])
+    assert drive.waiting_for == "feedback"
+    drive = drive_on(deployment, "slew", (message, "Speed"), [good] * 200 + [bad])
+    assert drive.ended == "stopped: the feedback fell silent, or tells an error"
+
+
+@pytest.mark.parametrize(
+    ("message", "why"), [("Chosen", "is multiplexed"), ("Long", "has 20 bytes, allowed are 8")]
+)
+def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why: str) -> None:
+    with pytest.raises(DeploymentError, match=f"--speed: {message} {why}"):
+        CalibrationDrive(with_messages(tmp_path), "slew", (message, "Speed"), RAMP)
+
+
+def test_the_stick_of_another_axis_ends_it_and_moves_nothing() -> None:
+    deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
+    drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
+    hand, sent = Hand(deployment), []
+    for tick in range(300):
+        sticks = {"near_far": 1.0} if tick > 200 else {}
+        for frame in hand.frames(tick * 20, Held(sticks, enable=True)):
+            drive.receive(frame, tick * TICK_NS)
+        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
+        sent += [f for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201)]
+    assert drive.ended == "stopped: the stick of near_far was moved"
+    assert any(f.data[0] for f in sent if f.can_id == 0x200)
+    assert not any(f.data[0] for f in sent if f.can_id == 0x201)
+    assert [f.data[0] for f in sent[-40:]] == [0] * 40
+
+
+def test_it_waits_for_every_stick() -> None:
+    deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
+    drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
+    hand = Hand(deployment)
+    for tick in range(100):
+        for frame in hand.frames(tick * 20, Held({"near_far": 1.0}, enable=True)):
+            drive.receive(frame, tick * TICK_NS)
+        drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
+        assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201))
+    assert drive.waiting_for == "the stick of near_far"
+
+
+def test_in_a_gateway_the_frames_of_the_lever_move_the_crane() -> None:
+    deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
+    drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
+    run_simulated(drive, deployment, None, lambda _: None)
+    assert drive.result().positive.opens == pytest.approx(0.05, abs=0.008)
+    assert drive.neutral_frames() == []  # the last frame of the lever was
+
+
+def test_the_end_in_a_gateway_can_be_told_more_than_once() -> None:
+    deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
+    heard = [Frame("machine", 0x402, False, bytes(6))]
+    drive = drive_on(deployment, "slew", ("TipVelocity", "SlewRate"), heard, 150)
+    assert drive.waiting_for == ""
+    told = [drive.neutral_frames() for _ in range(3)]
+    assert [[frame.data[:2] for frame in frames] for frames in told] == [[bytes(2)]] * 3
+
+
+@pytest.mark.parametrize("verb", [["calibrate"], ["robust"], ["set"], ["tune"]])
+def test_a_shipped_deployment_is_not_written(
+    verb: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    before = (ROOT / "config" / "forwarder.yaml").read_text()
+    axis = [] if verb == ["set"] else ["--axis", "slew"]
+    told = CliRunner().invoke(app, [*verb, "forwarder.yaml", *axis, "--write"])
+    assert told.exit_code == 2, told.output
+    assert "shipped with the package; copy it, then write to the copy" in told.output
+    assert (ROOT / "config" / "forwarder.yaml").read_text() == before

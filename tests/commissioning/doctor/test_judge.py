@@ -1,0 +1,125 @@
+"""What was measured against the tick: every limit from both sides."""
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from canshaper.commissioning.doctor.finding import Finding, Level, fit
+from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
+from canshaper.commissioning.doctor.measure import Run
+from canshaper.machine.binding import load_deployment
+from tests.commissioning.doctor.conftest import SHIPPED, TICK_NS
+
+Make = Callable[..., Run]
+DEPLOYMENT = load_deployment(SHIPPED)
+
+
+def judged(runs: dict[str, Run]) -> dict[str, Finding]:
+    return {f.subject: f for f in measured_findings(DEPLOYMENT, runs)}
+
+
+def tail(part: float, rare: int = 2) -> list[int]:
+    """A thousand times, of which so many are this part of the tick."""
+    return [50_000] * (1000 - rare) + [round(part * TICK_NS)] * rare
+
+
+def test_a_good_pc(run: Make) -> None:
+    found = judged({IDLE: run(), LOADED: run()})
+    assert {f.level for f in found.values()} == {Level.OK}
+    subjects = ["lateness", "deadlines", "whole tick", "joystick to valve", "axes"]
+    assert list(found) == ["scheduling", "memory"] + [
+        f"{subject} {name}" for name in (IDLE, LOADED) for subject in subjects
+    ]
+
+
+@pytest.mark.parametrize(
+    ("field", "subject", "good"), [("late_ns", "lateness", 0.1), ("tick_ns", "whole tick", 0.25)]
+)
+@pytest.mark.parametrize("name", [IDLE, LOADED])
+def test_parts_of_the_tick(run: Make, name: str, field: str, subject: str, good: float) -> None:
+    def level(times: list[int]) -> Level:
+        return judged({name: run(**{field: times})})[f"{subject} {name}"].level
+
+    assert level(tail(good)) is Level.OK
+    assert level(tail(good + 0.001)) is Level.WARNING
+    assert level(tail(0.5)) is Level.WARNING
+    assert level(tail(0.501)) is Level.BAD
+    assert level(tail(0.501, rare=1)) is Level.OK  # one in a thousand
+
+
+@pytest.mark.parametrize(
+    ("name", "missed", "level"),
+    [
+        (IDLE, 0, Level.OK),
+        (IDLE, 1, Level.BAD),
+        (LOADED, 0, Level.OK),
+        (LOADED, 1, Level.WARNING),
+        (LOADED, 2, Level.BAD),
+    ],
+)
+def test_missed_deadlines(run: Make, name: str, missed: int, level: Level) -> None:
+    late = [50_000] * (1000 - 2 * missed) + [21_000_000] * missed
+    found = judged({name: run(missed=missed, late_ns=late)})[f"deadlines {name}"]
+    assert found.level is level
+    assert f"{missed} of 1000 missed" in found.found
+
+
+def test_remedies_begin_with_the_priority_that_was_not_there(run: Make) -> None:
+    late = {"late_ns": tail(0.6), "missed": 3, "tick_ns": tail(0.6)}
+    without = judged({IDLE: run(policy="Operation not permitted", **late)})
+    with_it = judged({IDLE: run(**late)})
+    for subject in ("lateness idle", "deadlines idle", "whole tick idle"):
+        assert "measure as root" in without[subject].remedy
+        assert "measure as root" not in with_it[subject].remedy
+    slow = judged({IDLE: run(tick_ns=[TICK_NS] * 1000)})["whole tick idle"]
+    assert "a faster processor" in slow.remedy
+
+
+def test_what_was_not_permitted(run: Make) -> None:
+    found = judged({IDLE: run(policy="Operation not permitted", memory="no memory")})
+    assert found["scheduling"].level is Level.WARNING
+    assert "Operation not permitted" in found["scheduling"].found
+    assert "canshaper@.service" in found["scheduling"].remedy
+    assert found["memory"].level is Level.WARNING
+    assert "no memory" in found["memory"].found
+
+
+@pytest.mark.parametrize(
+    ("late_ms", "level"), [(20.0, Level.OK), (29.9, Level.OK), (30.1, Level.WARNING)]
+)
+def test_joystick_to_valve(run: Make, late_ms: float, level: Level) -> None:
+    found = judged({IDLE: run(joystick_ns=[round(late_ms * 1e6)] * 1000)})
+    assert found["joystick to valve idle"].level is level
+
+
+def test_no_answer_is_not_fit(run: Make) -> None:
+    found = judged({IDLE: run(joystick_ns=[])})
+    assert found["joystick to valve idle"].level is Level.BAD
+
+
+@pytest.mark.parametrize(
+    ("changes", "level", "says"),
+    [
+        ({"events": [("slew", "TRIPPED", "LOOP_STALLED")]}, Level.BAD, "slew TRIPPED LOOP_STALLED"),
+        ({"events": [("lift", "STOPPING", "LOOP_OVERRUN")]}, Level.BAD, "lift STOPPING"),
+        (
+            {"events": [("lift", "STOPPING", "STICK_TIMEOUT")] * 2},
+            Level.WARNING,
+            "lift STOPPING STICK_TIMEOUT (2)",
+        ),
+        ({"moved": ["slew", "lift"]}, Level.WARNING, "not in motion: near_far"),
+        ({"events": [("slew", "READY", "AT_REST")]}, Level.OK, "all in motion"),
+    ],
+)
+def test_axes_that_stop(run: Make, changes: dict[str, Any], level: Level, says: str) -> None:
+    found = judged({LOADED: run(**changes)})[f"axes {LOADED}"]
+    assert found.level is level
+    assert says in found.found
+
+
+def test_the_verdict_is_that_of_the_worst() -> None:
+    levels = (Level.OK, Level.NOTE, Level.WARNING)
+    good = [Finding("x", level, "found") for level in levels]
+    assert fit(good)
+    assert not fit([*good, Finding("y", Level.BAD, "found")])

@@ -1,0 +1,139 @@
+"""What was heard of the levers, against their cycle and their timeout."""
+
+import errno
+import os
+import socket
+import struct
+from collections.abc import Iterable
+from itertools import accumulate
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.bus.arrival import SO_TIMESTAMPNS
+from canshaper.bus.device import WrongDeviceError
+from canshaper.bus.raw import CAN_FRAME
+from canshaper.cli.doctor import _listened
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.doctor import listen as listening
+from canshaper.commissioning.doctor.finding import Finding, Level
+from canshaper.commissioning.doctor.listen import heard_findings
+from canshaper.machine.binding import load_deployment
+from tests.commissioning.doctor.conftest import ROOT, SHIPPED
+from tests.rigs.j1939 import bjm
+
+MS = 1_000_000
+DEPLOYMENT = load_deployment(SHIPPED)  # cycle 20 ms, timeout 100 ms
+
+
+def at(gaps_ms: Iterable[float]) -> list[int]:
+    return [round(t * MS) for t in accumulate(gaps_ms)]
+
+
+def judged(gaps_ms: Iterable[float]) -> Finding:
+    heard = {"lever left": at(gaps_ms), "lever right": at([20.0] * 50)}
+    left, right = heard_findings(DEPLOYMENT, heard)
+    assert (right.subject, right.level) == ("lever right", Level.OK)
+    return left
+
+
+@pytest.mark.parametrize(
+    ("gaps_ms", "level"),
+    [
+        ([20.0] * 100, Level.OK),
+        ([20.0] * 99 + [49.0], Level.OK),
+        ([20.0] * 99 + [50.0], Level.WARNING),
+        ([20.0] * 99 + [99.0], Level.WARNING),
+        ([20.0] * 99 + [100.0], Level.BAD),
+        ([9.0] * 100, Level.WARNING),
+        ([31.0] * 100, Level.WARNING),
+        ([], Level.BAD),
+        ([20.0], Level.BAD),
+    ],
+)
+def test_levels(gaps_ms: list[float], level: Level) -> None:
+    found = judged(gaps_ms)
+    assert found.level is level
+    assert bool(found.remedy) == (level is not Level.OK)
+
+
+def test_what_is_said() -> None:
+    text = "100 frames, a period of 20.0 ms (DBC: 20 ms), the longest 60.0 ms"
+    assert judged([20.0] * 99 + [60.0]).found == text
+    assert judged([]).found == "0 frames heard"
+
+
+def test_other_buses_are_not_listened_to(two_buses: Path) -> None:
+    heard = {"lever left": at([20.0] * 50)}
+    found = heard_findings(load_deployment(two_buses), heard)
+    assert [(f.subject, f.level) for f in found] == [
+        ("lever left", Level.OK),
+        ("lever right", Level.NOTE),
+        ("emergency stop", Level.NOTE),
+    ]
+
+
+class Packets:
+    """A socket with frames of every 20 ms, and something to read as long as there is one."""
+
+    def __init__(self, frames: list[tuple[Frame, int]]) -> None:
+        self._frames = frames
+        self._end, other = os.pipe()
+        os.close(other)
+
+    def fileno(self) -> int:
+        return self._end
+
+    def setsockopt(self, *_options: int) -> None:
+        """It always tells the time."""
+
+    def recvmsg(self, *_sizes: int) -> tuple[bytes, list[tuple[int, int, bytes]], int, None]:
+        if not self._frames:
+            return CAN_FRAME.pack(socket.CAN_ERR_FLAG, 8, bytes(8)), [], 0, None
+        frame, flags = self._frames.pop(0)
+        flags |= socket.CAN_EFF_FLAG if frame.extended else 0
+        packet = CAN_FRAME.pack(frame.can_id | flags, len(frame.data), frame.data)
+        stamp = struct.pack("=qq", 0, 1_000_000_000 - 5 * MS * len(self._frames))
+        return packet, [(socket.SOL_SOCKET, SO_TIMESTAMPNS, stamp)], 0, None
+
+    def close(self) -> None:
+        os.close(self._end)
+
+
+def test_levers_of_j1939_are_heard_from_whatever_address(monkeypatch: pytest.MonkeyPatch) -> None:
+    frames = []
+    for _ in range(20):
+        frames += [(bjm("BJM1", 0x33, 6), 0), (bjm("BJM2", 0x34), 0)]
+        frames += [(bjm("BJM1", 0x35), 0), (bjm("BJM1", 0x33), socket.CAN_RTR_FLAG)]
+
+    def sockets(*_names: Any) -> list[Packets]:
+        return [Packets(frames)]
+
+    monkeypatch.setattr(listening, "open_sockets", sockets)
+    deployment = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+    heard = listening.listen(deployment, 0.1, lambda _passed: None)
+    assert {name: len(times) for name, times in heard.items()} == {
+        "lever left": 20,
+        "lever right": 20,
+    }
+    assert {f.level for f in heard_findings(deployment, heard)} == {Level.OK}
+
+
+@pytest.mark.parametrize(
+    ("error", "why"),
+    [
+        (OSError(errno.ENODEV, "No such device"), "No such device"),
+        (WrongDeviceError("expected driver a, but vcan0 has driver b"), "expected driver a, but"),
+    ],
+)
+def test_an_interface_that_cannot_be_listened_to_is_a_finding(
+    monkeypatch: pytest.MonkeyPatch, error: Exception, why: str
+) -> None:
+    def refuse(*_arguments: Any) -> list[Any]:
+        raise error
+
+    monkeypatch.setattr(listening, "open_sockets", refuse)
+    (finding,) = _listened(DEPLOYMENT, 0.1)
+    assert (finding.subject, finding.level) == ("levers", Level.BAD)
+    assert finding.found.startswith(f"cannot listen: {why}")

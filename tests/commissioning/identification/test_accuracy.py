@@ -1,0 +1,236 @@
+"""Period, damping and full speed of machines whose truth is known, from noisy data."""
+
+import math
+
+import mujoco
+import numpy as np
+import pytest
+
+from canshaper.commissioning.identification.judge import Finding, identify
+from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.design.crane.config import load_crane
+from canshaper_sim.grapple import Grapple, Sway
+from tests.commissioning.identification.machine import (
+    EMPTY,
+    LOADED,
+    ROOT,
+    Coloured,
+    Push,
+    driven,
+    period_of,
+)
+from tests.design.crane.mujoco_crane import model_of, simulate
+
+DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
+SLEW, NEAR_FAR = 0, 1
+
+
+def noisy(time: Array, angle: Array, seed: int, noise_deg: float, memory: float = 0.8) -> Series:
+    noise = Coloured(seed, math.radians(noise_deg), memory)
+    return Series(f"log {seed}", "", DEGREES, time, angle + np.array([noise() for _ in time]))
+
+
+def swung(
+    grapple: Grapple, degrees: float, direction: int, seconds: float = 30.0
+) -> tuple[Array, Array]:
+    """Times and swing of the tool let go at an angle, then hanging on."""
+    start = math.radians(degrees)
+    sway = Sway(start) if direction == SLEW else Sway(0.0, start)
+    told = [state for state, _ in driven(seconds, grapple=grapple, sway=sway)]
+    angles = [(s.theta5_rad, s.theta6_rad)[direction] for s in told]
+    return np.array([s.time_s for s in told]), np.array(angles)
+
+
+def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
+    """Period of small swings and damping ratio."""
+    mode = (grapple.mode5, grapple.mode6)[direction]
+    return period_of(mode), mode.zeta
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("direction", [SLEW, NEAR_FAR])
+@pytest.mark.parametrize("grapple", [EMPTY, LOADED], ids=["empty", "loaded"])
+def test_two_degrees_in_noise(grapple: Grapple, direction: int, seed: int) -> None:
+    time, angle = swung(grapple, 2.0, direction)
+    found = identify("slew", "", [noisy(time, angle, seed, 0.15)])
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio
+    period, ratio = truth(grapple, direction)
+    assert found.period_s.value == pytest.approx(period, rel=0.01)
+    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+
+
+@pytest.mark.long
+def test_the_interval_holds_the_truth() -> None:
+    """Of sixty logs with noise whose neighbours are alike, nineteen in twenty, with some luck."""
+    time, angle = swung(EMPTY, 3.0, NEAR_FAR, 20.0)
+    period, ratio = truth(EMPTY, NEAR_FAR)
+    held = np.zeros(2)
+    halves = []
+    for seed in range(60):
+        found = identify("near_far", "", [noisy(time, angle, seed, 0.25, memory=0.9)])
+        assert found.period_s and found.damping_ratio
+        held += [
+            abs(found.period_s.value - period) < found.period_s.half,
+            abs(found.damping_ratio.value - ratio) < found.damping_ratio.half,
+        ]
+        halves.append(found.period_s.relative)
+    assert (held >= 54).all(), held
+    assert float(np.median(halves)) < 0.01  # an interval as wide as the world would hold it too
+
+
+def test_a_large_swing_is_slower_and_told_as_a_small_one() -> None:
+    time, angle = swung(EMPTY, 40.0, SLEW)
+    found = identify("slew", "", [noisy(time, angle, 1, 0.2)])
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio
+    period, ratio = truth(EMPTY, SLEW)
+    assert found.period_s.value == pytest.approx(period, rel=0.003)
+    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.05)
+    # In a unit that tells no angle there is nothing to correct by, and it comes out too long.
+    bars = noisy(time, angle, 1, 0.2)
+    plain = identify("slew", "", [Series("p", "", Unit(Kind.OTHER, 1.0, "bar"), time, bars.value)])
+    assert plain.period_s
+    assert plain.period_s.value > 1.004 * period
+
+
+def test_the_interval_holds_what_the_model_leaves_out() -> None:
+    """Large swings, hardly any noise: the tool on two joints is not quite a pendulum."""
+    time, angle = swung(EMPTY, 30.0, SLEW)
+    found = identify("slew", "", [noisy(time, angle, 1, 0.02)])
+    assert found.period_s and found.damping_ratio
+    period, ratio = truth(EMPTY, SLEW)
+    assert abs(found.period_s.value - period) < found.period_s.half < 0.003 * period
+    assert abs(found.damping_ratio.value - ratio) < found.damping_ratio.half < 0.05 * ratio
+
+
+@pytest.mark.parametrize("direction", [SLEW, NEAR_FAR])
+def test_a_crane_in_mujoco(direction: int) -> None:
+    crane = load_crane(ROOT / "config" / "crane-forwarder.yaml")[0]
+    step_s = 0.01
+    rest = np.array([0.0, 0.3, -0.6, 0.5])
+    count = round(25.0 / step_s) * 2 + 1
+    still = np.tile(rest, (count, 1)), np.zeros((count, 4)), np.zeros((count, 4))
+    start = np.zeros(2)
+    start[direction] = math.radians(6.0)
+    model: mujoco.MjModel = model_of(crane)
+    swings, _ = simulate(model, step_s, still, start)
+    time = np.arange(len(swings)) * step_s
+    found = identify("slew", "", [noisy(time, swings[:, direction], 3, 0.2)])
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio
+    g = crane.grapple
+    grapple = Grapple(g.l1_m, g.l2_m, g.m1_kg, g.m2_kg, g.c5_n_m_s_rad, g.c6_n_m_s_rad)
+    period, ratio = truth(grapple, direction)
+    assert found.period_s.value == pytest.approx(period, rel=0.005)
+    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.1)
+
+
+def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
+    """The near-far axis driven, with its commands, as an angle or its rate."""
+    told = driven(seconds, pushes)
+    time = np.array([s.time_s for s, _ in told])
+    rate = kind is Kind.RATE
+    swing = np.array([s.theta6_rate_rad_s if rate else s.theta6_rad for s, _ in told])
+    noise = Coloured(seed, math.radians(0.2), 0.8)
+    commands = np.array([c["near_far"] for _, c in told])
+    speed = np.sign(commands) * np.maximum(0.0, (np.abs(commands) - 0.05) / 0.95)
+    unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
+    value = swing + np.array([noise() for _ in time])
+    return Series("log", "", unit, time, value, Command(time - 0.02, speed), _idle(time, commands))
+
+
+def _idle(time: Array, commands: Array) -> list[tuple[float, float]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], (commands != 0.0).astype(int), [1]])))
+    return [
+        (float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]
+
+
+STROKES = [Push("near_far", 2, 0.7, 0.4), Push("near_far", 22, 0.7, -0.3)]
+BUSY = [Push("near_far", 2.0 * k, 1.0, 0.3 * (-1) ** k) for k in range(20)]
+
+
+@pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
+def test_full_speed_by_single_strokes(kind: Kind) -> None:
+    found = identify("near_far", "", [drive(STROKES, 45.0, kind, 1)])
+    check(found)
+    assert found.free and found.free.swings > 10
+    assert found.free.segments[0].segment.start_s > 2.7 + 0.5  # not while it was driven
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
+def test_never_free_but_driven(kind: Kind) -> None:
+    found = identify("near_far", "", [drive(BUSY, 41.0, kind, 2)])
+    check(found)
+    assert found.free is None
+    assert any("from driven motion" in note for note in found.notes)
+
+
+def check(found: Finding) -> None:
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio and found.full_speed_m_s
+    period, ratio = truth(EMPTY, NEAR_FAR)
+    assert found.period_s.value == pytest.approx(period, rel=0.01)
+    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+    assert found.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)
+
+
+def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
+    """Without commands too: the shape tells where the free swing begins."""
+    told = driven(40.0, STROKES)
+    time = np.array([s.time_s for s, _ in told])
+    angle = np.array([s.theta6_rad for s, _ in told])
+    found = identify("near_far", "", [noisy(time, angle, 4, 0.05)])
+    assert found.usable, found.poor
+    assert found.free
+    assert len(found.free.segments) == 2
+    for part, stroke in zip(found.free.segments, STROKES, strict=True):
+        ended = stroke.start_s + stroke.duration_s
+        assert ended < part.segment.start_s < ended + 2.0
+    assert found.period_s
+    assert found.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.005)
+
+
+def test_a_slow_sensor_with_jitter_and_lost_values() -> None:
+    time, angle = swung(EMPTY, 5.0, SLEW)
+    random = np.random.default_rng(5)
+    keep = (np.arange(len(time)) % 7 == 0) & (random.random(len(time)) > 0.1)
+    shaken = time[keep] + random.uniform(0.0, 0.01, int(keep.sum()))
+    value = np.interp(shaken, time, angle)
+    found = identify("slew", "", [noisy(shaken, value, 6, 0.1)])
+    assert found.usable, found.poor
+    assert found.period_s
+    assert found.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.003)
+
+
+def test_a_hole_in_the_log_parts_a_swing() -> None:
+    time, angle = swung(EMPTY, 10.0, SLEW)
+    keep = (time < 8.0) | (time > 14.0)
+    found = identify("slew", "", [noisy(time[keep], angle[keep], 7, 0.05)])
+    assert found.usable, found.poor
+    assert found.free and len(found.free.segments) == 2
+    assert found.period_s
+    assert found.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.005)
+
+
+def test_several_logs_count_together() -> None:
+    time, angle = swung(EMPTY, 2.0, SLEW, 20.0)
+    logs = [noisy(time, angle, seed, 0.2, memory=0.9) for seed in range(4)]
+    one, all_ = identify("slew", "", logs[:1]), identify("slew", "", logs)
+    assert one.period_s and all_.period_s and all_.free
+    assert len(all_.free.segments) == 4
+    assert all_.period_s.half < 0.8 * one.period_s.half
+
+
+def test_swings_that_differ_widen_the_interval() -> None:
+    """Another pose, another rope, wind: what one log cannot know."""
+    grapples = [Grapple(l2_m=length) for length in (1.14, 1.2, 1.26)]
+    swings = [swung(g, 8.0, NEAR_FAR) for g in grapples]
+    logs = [noisy(time, angle, seed, 0.05) for seed, (time, angle) in enumerate(swings)]
+    found = identify("near_far", "", logs)
+    assert found.period_s
+    assert found.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.01)
+    periods = [truth(g, NEAR_FAR)[0] for g in grapples]
+    assert 0.5 * (periods[2] - periods[0]) < found.period_s.half < 4.0 * (periods[2] - periods[0])

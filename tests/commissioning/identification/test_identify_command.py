@@ -1,0 +1,262 @@
+"""``canshaper identify`` from the outside."""
+
+import json
+import math
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
+from canshaper_sim.grapple import Sway
+from tests.commissioning.identification.machine import (
+    EMPTY,
+    LOADED,
+    ROOT,
+    candump,
+    driven,
+    main,
+    period_of,
+    phone,
+)
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    directory = tmp_path_factory.mktemp("logs")
+    main(directory)
+    candump(directory / "still.log", driven(20.0))
+    phone(directory / "Gyroscope.csv", driven(30.0, sway=Sway(0.2)))
+    return directory
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "config").mkdir()
+    shutil.copytree(ROOT / "dbc", tmp_path / "dbc")
+    return Path(shutil.copy(ROOT / "config" / "forwarder.yaml", tmp_path / "config"))
+
+
+def run(tmp_path: Path, *options: str | Path) -> Result:
+    out = str(tmp_path / "out")
+    return CliRunner().invoke(app, ["identify", *map(str, options), "--out", out])
+
+
+def said(result: Result) -> str:
+    return " ".join(result.output.split())
+
+
+def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
+    tmp_path: Path, file: Path, logs: Path
+) -> None:
+    """The file would be refused at the next start."""
+    text = file.read_text().replace("full_speed_m_s: 1.0", "full_speed_m_s: 0.5")
+    file.write_text(text.replace("stop_distance_m: 2.2", "stop_distance_m: 1.1"))
+    before = file.read_text()
+    result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
+    assert result.exit_code == 2
+    assert "axis near_far: with sway: { period_s: 2.20" in said(result)
+    assert "limits.stop_distance_m: found 1.1 m; max_pct, tail_s" in said(result)
+    assert file.read_text() == before
+
+
+def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) -> None:
+    before = file.read_text().splitlines()
+    result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
+    assert result.exit_code == 0, result.output
+    assert "Slew: period 2.35" in result.output
+    assert "Near-far: period 2.20" in result.output
+    assert "Use sway: { period_s: 2.35" in said(result)
+    assert f"Written to {file}" in result.output
+    assert f"canshaper tune {file} --axis slew" in result.output
+    axes = load_deployment(file).axes
+    for name, mode in (("slew", EMPTY.mode5), ("near_far", EMPTY.mode6)):
+        sway = axes[name].config.sway
+        assert sway and sway.period_s and sway.damping_ratio
+        assert sway.length_m is None
+        assert sway.period_s == pytest.approx(period_of(mode), rel=0.005)
+        assert sway.damping_ratio == pytest.approx(mode.zeta, rel=0.1)
+    assert axes["slew"].config.sway.full_speed_m_s == pytest.approx(1.5, rel=0.15)  # type: ignore[union-attr]
+    # Two lines are others, and every comment is there.
+    after = file.read_text().splitlines()
+    assert sum(a != b for a, b in zip(before, after, strict=True)) == 2
+    check = CliRunner().invoke(app, ["check", str(file)])
+    assert check.exit_code == 0, check.output
+    picture = tmp_path / "out" / "identify.png"
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert picture.stat().st_size > 30_000
+
+
+def test_empty_and_loaded(tmp_path: Path, file: Path, logs: Path) -> None:
+    labelled = f"empty={logs / 'empty.log'}", f"loaded={logs / 'loaded.log'}"
+    result = run(tmp_path, *labelled, "--file", file, "--json", "--write")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert [(f["axis"], f["label"]) for f in found["findings"]] == [
+        ("slew", "empty"),
+        ("near_far", "empty"),
+        ("slew", "loaded"),
+        ("near_far", "loaded"),
+    ]
+    for finding in found["findings"]:
+        grapple = EMPTY if finding["label"] == "empty" else LOADED
+        mode = grapple.mode5 if finding["axis"] == "slew" else grapple.mode6
+        assert finding["usable"]
+        assert finding["period_s"]["low"] < period_of(mode) < finding["period_s"]["high"]
+    near = found["axes"]["near_far"]
+    lengths = [period_of(g.mode6) ** 2 for g in (EMPTY, LOADED)]
+    assert near["sway"]["period_s"] == pytest.approx(math.sqrt(sum(lengths) / 2), rel=0.003)
+    spread = 100.0 * (lengths[1] - lengths[0]) / sum(lengths)
+    assert near["spread_pct"] == pytest.approx(spread, abs=1.0)
+    assert (
+        f"robust shaper for ±{math.ceil(near['spread_pct'] + 3)} % length" in near["recommendation"]
+    )
+    assert found["written"] == ["slew", "near_far"]
+    sway = load_deployment(file).axes["near_far"].config.sway
+    assert sway and sway.period_s == near["sway"]["period_s"]
+
+
+def test_sets_where_the_deployment_knows_the_grapple(
+    tmp_path: Path, file: Path, logs: Path
+) -> None:
+    """Numbers as labels are the values of its signal."""
+    text = "grapple: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
+    file.write_text(file.read_text() + text)
+    labelled = f"300={logs / 'empty.log'}", f"1200={logs / 'loaded.log'}"
+    result = run(tmp_path, *labelled, "--file", file)
+    assert result.exit_code == 0, result.output
+    assert "give slew sets, one for each state" in said(result)
+    assert f"canshaper robust {file} --axis slew --range 1" in said(result)
+    assert "- at: 300 # 300 sway: { period_s: 2.35" in said(result)
+    assert "- at: 1200 # 1200 sway: { period_s: 2.7" in said(result)
+
+
+def test_a_log_without_a_deployment(tmp_path: Path, logs: Path) -> None:
+    dbc = ROOT / "dbc" / "forwarder.dbc"
+    options = "--dbc", dbc, "--signal", "boom=GrappleSway.SwayParallel"
+    result = run(tmp_path, logs / "empty.log", *options)
+    assert result.exit_code == 0, result.output
+    assert "Boom: period 2.20" in result.output
+
+
+def test_a_phone(tmp_path: Path, file: Path, logs: Path) -> None:
+    phone_ = logs / "Gyroscope.csv"
+    result = run(tmp_path, phone_, "--file", file, "--axis", "slew", "--write")
+    assert result.exit_code == 0, result.output
+    sway = load_deployment(file).axes["slew"].config.sway
+    assert sway and sway.period_s == pytest.approx(period_of(EMPTY.mode5), rel=0.002)
+    assert sway.full_speed_m_s == 1.5  # what was there
+    column = "near_far=Gyroscope x (rad/s)"
+    result = run(tmp_path, phone_, "--file", file, "--signal", column)
+    assert result.exit_code == 0, result.output
+    assert "Near-far: period 2.35" in result.output
+
+
+def test_a_stopwatch(tmp_path: Path, file: Path) -> None:
+    timed = "--swings", "10", "--seconds", "23.6", "--first", "20", "--last", "5"
+    result = run(tmp_path, *timed)
+    assert result.exit_code == 0, result.output
+    assert "Use sway: { period_s: 2.3" in said(result)
+    result = run(tmp_path, *timed, "--file", file, "--axis", "near_far", "--write")
+    assert result.exit_code == 0, result.output
+    sway = load_deployment(file).axes["near_far"].config.sway
+    assert sway and (sway.period_s, sway.damping_ratio) == (2.3539, 0.0221)
+    assert not (tmp_path / "out").exists()  # nothing to draw
+
+
+def test_too_poor_is_told_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:
+    before = file.read_bytes()
+    result = run(tmp_path, logs / "still.log", "--file", file, "--write")
+    assert result.exit_code == 1
+    assert "too poor" in result.output
+    assert "drive the axis shortly, let go of the levers" in result.output
+    assert "Written" not in result.output
+    assert file.read_bytes() == before
+
+
+def test_one_state_that_is_too_poor_keeps_the_axis_from_being_written(
+    tmp_path: Path, file: Path, logs: Path
+) -> None:
+    before = file.read_bytes()
+    labelled = f"empty={logs / 'empty.log'}", f"loaded={logs / 'still.log'}"
+    result = run(tmp_path, *labelled, "--file", file, "--write")
+    assert result.exit_code == 1
+    assert "1 of 2 states could not be used" in said(result)
+    assert file.read_bytes() == before
+
+
+BAD = {
+    "nothing": ([], "found no log and no stopwatch"),
+    "no such log": (["nowhere.log"], "nowhere.log"),
+    "no such table": (["nowhere.csv"], "nowhere.csv"),
+    "no suffix": (["{logs}/empty"], "no suffix"),
+    "no such file": (["{logs}/empty.log", "--file", "nowhere.yaml"], "nowhere.yaml"),
+    "write to nothing": (["{logs}/empty.log", "--write"], "--write: allowed with --file"),
+    "no equals": (["{logs}/empty.log", "--signal", "slew"], "allowed is AXIS=NAME"),
+    "no such axis": (
+        ["{logs}/empty.log", "--file", "{file}", "--signal", "crab=A.B"],
+        "found 'crab', axes are slew, near_far, lift",
+    ),
+    "twice": (
+        ["{logs}/empty.log", "--signal", "slew=A.B", "--signal", "slew=A.C"],
+        "two signals of slew",
+    ),
+    "no such message": (["{logs}/empty.log", "--signal", "slew=A.B"], "found 'A', messages"),
+    "phone without axis": (
+        ["{logs}/Gyroscope.csv", "--file", "{file}"],
+        "--axis: found none, axes are slew, near_far, lift",
+    ),
+    "axis without sway": (
+        ["{logs}/Gyroscope.csv", "--file", "{file}", "--axis", "lift", "--write"],
+        "axis lift: found no section sway to write to; put in sway: { period_s: 2.35",
+    ),
+    "half a stopwatch": (["--swings", "10", "--seconds", "23"], "without --first, --last"),
+    "stopwatch and log": (
+        ["{logs}/empty.log", "--swings", "9", "--seconds", "20", "--first", "9", "--last", "5"],
+        "stopwatch with the log",
+    ),
+    "bad stopwatch": (
+        ["--swings", "1", "--seconds", "2", "--first", "9", "--last", "5"],
+        "--swings: found 1",
+    ),
+    "dbc": (["{logs}/empty.log", "--dbc", "{file}"], "not a DBC file"),
+    "one of two axes without sway": (
+        [
+            "{logs}/empty.log",
+            "--file",
+            "{file}",
+            "--write",
+            "--signal",
+            "slew=GrappleSway.SwayPerpendicular",
+            "--signal",
+            "lift=GrappleSway.SwayParallel",
+        ],
+        "axis lift: found no section sway to write to",
+    ),
+    "no signal of an axis": (
+        ["{logs}/empty.log", "--file", "{file}", "--axis", "lift"],
+        "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_what_is_wrong_is_told(tmp_path: Path, file: Path, logs: Path, name: str) -> None:
+    before = file.read_bytes()
+    options, text = BAD[name]
+    result = run(tmp_path, *(o.format(logs=logs, file=file) for o in options))
+    assert result.exit_code == 2, result.output
+    assert text in result.output
+    assert "Traceback" not in result.output
+    assert file.read_bytes() == before
+
+
+def test_a_shipped_file_is_not_written_to(
+    tmp_path: Path, logs: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = run(tmp_path, logs / "empty.log", "--file", "forwarder.yaml", "--write")
+    assert result.exit_code == 2
+    assert "copy it" in result.output

@@ -1,0 +1,257 @@
+"""Data that is too poor is told so, with what to do; nothing is made of it."""
+
+import math
+
+import numpy as np
+import pytest
+
+from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.judge import Finding, identify
+from canshaper.commissioning.identification.series import (
+    Array,
+    IdentificationError,
+    Kind,
+    Series,
+    Unit,
+    ordered,
+    unit_of,
+)
+from canshaper.commissioning.identification.stopwatch import stopwatch
+from tests.commissioning.identification.machine import Coloured
+
+DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
+BAR = Unit(Kind.OTHER, 1.0, "bar")
+PERIOD, RATIO = 2.3, 0.04
+
+
+def decay(
+    time: Array, degrees: float = 10.0, period: float = PERIOD, ratio: float = RATIO
+) -> Array:
+    omega = 2.0 * math.pi / period
+    sigma = ratio * omega / math.sqrt(1.0 - ratio**2)
+    return math.radians(degrees) * np.exp(-sigma * time) * np.cos(omega * time)
+
+
+def noise(count: int, degrees: float, seed: int = 1) -> Array:
+    source = Coloured(seed, math.radians(degrees), 0.7)
+    return np.array([source() for _ in range(count)])
+
+
+def series(time: Array, value: Array, unit: Unit = DEGREES, **known: object) -> Series:
+    return Series("a.log: Sway.Angle", "", unit, time, value, **known)  # type: ignore[arg-type]
+
+
+def times(seconds: float, step_s: float = 0.02) -> Array:
+    return np.arange(0.0, seconds, step_s)
+
+
+def refused(one: Series, text: str) -> Finding:
+    found = identify("slew", "", [one])
+    assert not found.usable
+    assert any(text in fault for fault in found.poor), found.poor
+    return found
+
+
+def test_the_same_data_is_good_enough() -> None:
+    """What the refusals below are held against."""
+    time = times(25.0)
+    found = identify("slew", "", [series(time, decay(time) + noise(len(time), 0.1))])
+    assert found.usable, found.poor
+    assert not found.notes
+
+
+def test_too_few_swings() -> None:
+    time = times(2.7 * PERIOD)
+    refused(series(time, decay(time) + noise(len(time), 0.1)), "swings, allowed are 3 or more")
+
+
+def test_too_few_values() -> None:
+    time = times(0.3)
+    refused(series(time, decay(time)), "only 15 values")
+
+
+def test_a_signal_that_stands() -> None:
+    time = times(20.0)
+    refused(series(time, np.full(len(time), 0.1)), "is it the right signal, and the sensor on?")
+
+
+def test_only_noise() -> None:
+    time = times(60.0)
+    for seed in range(10):
+        found = identify("slew", "", [series(time, noise(len(time), 1.0, seed))])
+        assert not found.usable
+        assert any("touch nothing for ten swings" in fault for fault in found.poor)
+
+
+def test_a_swing_below_the_noise() -> None:
+    time = times(25.0)
+    found = refused(series(time, decay(time, 0.5) + noise(len(time), 0.6)), "touch nothing")
+    assert found.poor
+
+
+def test_too_slow_a_log() -> None:
+    time = times(30.0, 0.5)
+    refused(series(time, decay(time)), "a value every 0.5 s; allowed are 8 or more a swing")
+
+
+def test_a_clipped_sensor() -> None:
+    time = times(25.0)
+    clipped = np.clip(decay(time, 20.0, ratio=0.02), -math.radians(8.0), math.radians(8.0))
+    found = refused(series(time, clipped), "the sensor is at the end of its range")
+    assert "stands at 8 deg" in found.poor[0]
+
+
+def test_too_coarse_a_signal() -> None:
+    time = times(25.0)
+    coarse = np.round(decay(time, 3.0) / math.radians(1.0)) * math.radians(1.0)
+    refused(series(time, coarse), "steps only; use a finer signal")
+
+
+def test_one_step_of_a_coarse_signal_is_no_clipping() -> None:
+    time = times(25.0)
+    fine = np.round(decay(time) / math.radians(0.2)) * math.radians(0.2)
+    found = identify("slew", "", [series(time, fine)])
+    assert found.usable, found.poor
+
+
+def test_degrees_that_are_called_radians() -> None:
+    time = times(25.0)
+    value = np.degrees(decay(time) + noise(len(time), 0.1))
+    refused(series(time, value, Unit(Kind.ANGLE, 1.0, "rad")), "is the unit of the signal right?")
+
+
+def test_what_does_not_decay() -> None:
+    time = times(40.0)
+    steady = decay(time, ratio=0.0) + noise(len(time), 0.3)
+    refused(series(time, steady), "no decay is seen")
+
+
+def test_two_directions_in_one_signal() -> None:
+    time = times(25.0)
+    both = decay(time) + decay(time, 5.0, period=2.05)
+    refused(series(time, both + noise(len(time), 0.05)), "two swings are mixed, of 2.0")
+
+
+def test_the_levers_were_never_left_alone() -> None:
+    time = times(30.0)
+    idle = [(3.0 * k, 3.0 * k + 1.5) for k in range(10)]
+    found = refused(series(time, decay(time), idle=idle), "never left to swing freely")
+    assert found.free is None
+
+
+def test_dry_friction_is_told() -> None:
+    """Amplitude falls in a straight line, not exponentially."""
+    time = times(25.0)
+    omega = 2.0 * math.pi / PERIOD
+    envelope = np.maximum(math.radians(10.0) - math.radians(0.45) * time, 0.0)
+    value = envelope * np.cos(omega * time) + noise(len(time), 0.05)
+    found = identify("slew", "", [series(time, value)])
+    assert found.usable, found.poor
+    assert any("dry friction" in note for note in found.notes), found.notes
+
+
+def test_viscous_damping_is_not_taken_for_friction() -> None:
+    time = times(25.0)
+    for seed in range(20):
+        found = identify("slew", "", [series(time, decay(time) + noise(len(time), 1.0, seed))])
+        assert not any("damping ratio changes" in note for note in found.notes), found.notes
+
+
+def test_a_pressure_serves_too() -> None:
+    time = times(25.0)
+    bars = 120.0 + 0.05 * time + 300.0 * decay(time) + 100.0 * noise(len(time), 0.3)
+    found = identify("slew", "", [series(time, bars, BAR)])
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio
+    assert found.period_s.value == pytest.approx(PERIOD, rel=0.005)
+    assert found.damping_ratio.value == pytest.approx(RATIO, rel=0.1)
+
+
+def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
+    """A stronger oscillation, of the pump or the boom, is passed over."""
+    time = times(25.0)
+    value = decay(time, 2.0) + decay(time, 6.0, period=0.7, ratio=0.02) + noise(len(time), 0.05)
+    found = identify("slew", "", [series(time, value)], about_s=2.2)
+    assert found.usable, found.poor
+    assert found.period_s
+    assert found.period_s.value == pytest.approx(PERIOD, rel=0.01)
+    alone = identify("slew", "", [series(time, value)])
+    assert alone.period_s
+    assert alone.period_s.value == pytest.approx(0.7, rel=0.01)
+
+
+def test_a_useless_log_does_not_spoil_a_good_one() -> None:
+    time = times(25.0)
+    good = series(time, decay(time) + noise(len(time), 0.1))
+    found = identify("slew", "", [series(time, np.zeros(len(time))), good])
+    assert found.usable, found.poor
+    assert any("it stands at 0" in note for note in found.notes)
+
+
+def test_a_clock_that_goes_back() -> None:
+    time = np.concatenate([times(5.0), times(5.0)])
+    with pytest.raises(IdentificationError, match=r"a: the time goes back by 4\.98 s"):
+        ordered("a", time, np.zeros(len(time)))
+
+
+def test_neighbours_that_were_logged_the_wrong_way_round() -> None:
+    time, value = ordered("a", np.array([0.0, 0.02, 0.01, 0.03]), np.array([0.0, 2.0, 1.0, 3.0]))
+    assert list(time) == [0.0, 0.01, 0.02, 0.03]
+    assert list(value) == [0.0, 1.0, 2.0, 3.0]
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "factor"),
+    [
+        ("deg", Kind.ANGLE, math.radians(1.0)),
+        ("°", Kind.ANGLE, math.radians(1.0)),
+        ("rad", Kind.ANGLE, 1.0),
+        ("deg/s", Kind.RATE, math.radians(1.0)),
+        ("°/s", Kind.RATE, math.radians(1.0)),
+        ("dps", Kind.RATE, math.radians(1.0)),
+        ("rad/s", Kind.RATE, 1.0),
+        ("bar", Kind.OTHER, 1.0),
+        ("", Kind.OTHER, 1.0),
+    ],
+)
+def test_units(text: str, kind: Kind, factor: float) -> None:
+    unit = unit_of(text)
+    assert (unit.kind, unit.factor) == (kind, pytest.approx(factor))
+
+
+@pytest.mark.parametrize("text", ["m/s²", "m/s^2", "g", "mg", "m/s/s"])
+def test_an_acceleration_is_refused(text: str) -> None:
+    with pytest.raises(IdentificationError, match="gyroscope"):
+        unit_of(text)
+
+
+def test_stopwatch() -> None:
+    """Ten swings of a pendulum from 20 to 5 degrees, whose mean square makes it 0.3 % slower."""
+    period, ratio = stopwatch(10, 23.6, 20.0, 5.0)
+    assert ratio.value == pytest.approx(math.log(4.0) / (20.0 * math.pi), rel=0.001)
+    assert 2.36 * 0.995 < period.value < 2.36 * 0.998
+    assert isinstance(period, Value)
+    assert 0.02 < period.half < 0.06
+
+
+def test_a_stopwatch_with_next_to_no_amplitude_left() -> None:
+    assert 0.9 < stopwatch(10, 23.6, 20.0, 1e-320)[1].value < 1.0
+
+
+@pytest.mark.parametrize(
+    ("swings", "seconds", "first", "last", "text"),
+    [
+        (2, 5.0, 20, 10, "--swings"),
+        (float("nan"), 5.0, 20, 10, "--swings"),
+        (10, 1.0, 20, 10, "--seconds"),
+        (10, 200.0, 20, 10, "--seconds"),
+        (10, 23.0, 10, 20, "--first, --last"),
+        (10, 23.0, 90, 20, "--first, --last"),
+        (10, 23.0, 20, 0, "--first, --last"),
+    ],
+)
+def test_a_stopwatch_that_makes_no_swing(
+    swings: float, seconds: float, first: float, last: float, text: str
+) -> None:
+    with pytest.raises(IdentificationError, match=text):
+        stopwatch(swings, seconds, first, last)

@@ -1,0 +1,237 @@
+"""Tables of phones and loggers, right and wrong ones."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from canshaper.commissioning.identification.judge import identify
+from canshaper.commissioning.identification.phone import series_of
+from canshaper.commissioning.identification.series import IdentificationError, Kind
+from canshaper.commissioning.identification.table import is_table, read_table
+from canshaper_sim.grapple import Grapple, Sway
+from tests.commissioning.identification.machine import driven, period_of, phone
+
+PERIOD = period_of(Grapple().mode5)
+SWUNG = driven(30.0, sway=Sway(0.15))
+
+LAYOUTS = {
+    "phyphox": (
+        '"Time (s)","Gyroscope x (rad/s)","Gyroscope y (rad/s)","Gyroscope z (rad/s)"',
+        "{t:.9f},{x:.6e},{y:.6e},{z:.6e}",
+    ),
+    "phyphox with semicolon and decimal comma": (
+        '"Time (s)";"Gyroscope x (rad/s)";"Gyroscope y (rad/s)";"Gyroscope z (rad/s)"',
+        "{t:.6f};{x:.9f};{y:.9f};{z:.9f}",
+    ),
+    "with tabs": (
+        "Time (s)\tGyroscope x (rad/s)\tGyroscope y (rad/s)\tGyroscope z (rad/s)",
+        "{t:.6f}\t{x:.9f}\t{y:.9f}\t{z:.9f}",
+    ),
+    "Sensor Logger": (
+        "time,seconds_elapsed,z,y,x",
+        "16999{t:014.9f},{t:.6f},{z:.6f},{y:.6f},{x:.6f}",
+    ),
+    "milliseconds by name": (
+        "timestamp_ms,gyro_x,gyro_y,gyro_z",
+        "{t:.6f}e3,{x:.6f},{y:.6f},{z:.6f}",
+    ),
+    "nanoseconds without a unit": ("time,gyrX,gyrY,gyrZ", "{t:.6f}e9,{x:.6f},{y:.6f},{z:.6f}"),
+}
+
+
+@pytest.mark.parametrize("name", LAYOUTS)
+def test_what_apps_write(tmp_path: Path, name: str) -> None:
+    """A phone turned by 30 degrees: both columns show the swing, and its direction is found."""
+    header, row = LAYOUTS[name]
+    file = tmp_path / ("Gyroscope.csv" if name == "Sensor Logger" else "swing.csv")
+    phone(file, SWUNG, header=header, row=row)
+    if "comma" in name:
+        file.write_text(file.read_text().replace(".", ","))
+    assert is_table(file)
+    series = series_of(read_table(file), "", None)
+    assert series.unit.kind is Kind.RATE
+    assert series.time_s[-1] == pytest.approx(30.0, abs=0.05)
+    # All of the swing is in the direction that was found: rate amplitude by angle and frequency.
+    highest = 0.15 * Grapple().mode5.omega_rad_s
+    assert np.abs(series.value).max() == pytest.approx(highest, rel=0.08)
+    found = identify("slew", "", [series])
+    assert found.usable, found.poor
+    assert found.period_s and found.damping_ratio
+    assert found.period_s.value == pytest.approx(PERIOD, rel=0.002)
+    assert found.damping_ratio.value == pytest.approx(Grapple().mode5.zeta, rel=0.05)
+
+
+def test_a_named_column_is_taken_as_it_is(tmp_path: Path) -> None:
+    table = read_table(phone(tmp_path / "a.csv", SWUNG))
+    for name in ("Gyroscope y (rad/s)", "gyroscope Y"):
+        series = series_of(table, "", name)
+        assert np.array_equal(series.value, table.columns["Gyroscope y (rad/s)"])
+
+
+def test_degrees_a_second(tmp_path: Path) -> None:
+    text = phone(tmp_path / "a.csv", SWUNG).read_text().replace("rad/s", "deg/s")
+    (tmp_path / "a.csv").write_text(text)
+    table = read_table(tmp_path / "a.csv")
+    series = series_of(table, "", "Gyroscope x")
+    assert series.value[5] == pytest.approx(math.radians(table.columns["Gyroscope x (deg/s)"][5]))
+
+
+def test_a_round_swing_is_told(tmp_path: Path) -> None:
+    told = driven(30.0, sway=Sway(0.15, 0.0, 0.0, 0.3))
+    series = series_of(read_table(phone(tmp_path / "a.csv", told)), "", None)
+    assert any("swing it in one direction only" in note for note in series.notes)
+
+
+def test_a_table_that_is_cut_off(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    text = file.read_text()
+    file.write_text(text[: len(text) - 25])
+    table = read_table(file)
+    assert len(table.time_s) == len(SWUNG) - 1
+    assert table.notes == [f"{file}:1501: the last line is cut off and left out"]
+
+
+def test_some_wrong_lines_are_left_out_and_told(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[100] = "battery low"
+    lines[300] = "1.0,,,"
+    lines[400] = '"' + lines[400]
+    file.write_text("\n".join(lines))
+    table = read_table(file)
+    assert table.notes == [f"{file}:101: 2 lines are wrong and left out"]
+    assert len(table.time_s) == len(SWUNG) - 2
+    assert identify("slew", "", [series_of(table, "", None)]).usable
+
+
+@pytest.mark.parametrize("number", ["", "nan", "inf", "1e12"])
+@pytest.mark.parametrize("at", [2, 700, 1501])
+def test_a_line_without_a_time_is_left_out_and_told(tmp_path: Path, at: int, number: str) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[at - 1] = number + "," + lines[at - 1].partition(",")[2]
+    file.write_text("\n".join([*lines, ""]))
+    table = read_table(file)
+    assert table.notes == [f"{file}:{at}: 1 lines are without a time and left out"]
+    assert table.time_s[0] == 0.0
+    finding = identify("slew", "", [series_of(table, "", None)])
+    assert finding.usable, finding.poor
+
+
+def test_a_value_that_none_can_be_makes_a_line_wrong(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[100] = lines[100].rpartition(",")[0] + ",1e308"
+    file.write_text("\n".join([*lines, ""]))
+    table = read_table(file)
+    assert table.notes == [f"{file}:101: 1 lines are wrong and left out"]
+    assert identify("slew", "", [series_of(table, "", None)]).usable
+
+
+def test_an_infinite_value_is_as_good_as_none(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    lines[100] = lines[100].partition(",")[0] + ",inf,-inf,inf"
+    file.write_text("\n".join([*lines, ""]))
+    series = series_of(read_table(file), "", None)
+    assert len(series.time_s) == len(SWUNG) - 1
+    assert identify("slew", "", [series]).usable
+
+
+def test_a_gyroscope_with_an_empty_column(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    header, *rows = file.read_text().splitlines()
+    file.write_text("\n".join([header, *(row.rpartition(",")[0] + "," for row in rows), ""]))
+    assert identify("slew", "", [series_of(read_table(file), "", None)]).usable
+    file.write_text("\n".join([header, *(row.partition(",")[0] + ",,," for row in rows), ""]))
+    with pytest.raises(IdentificationError, match=r"a\.csv: found no number in Gyroscope x"):
+        series_of(read_table(file), "", None)
+
+
+def test_a_clock_that_goes_back(tmp_path: Path) -> None:
+    file = phone(tmp_path / "a.csv", SWUNG)
+    lines = file.read_text().splitlines()
+    file.write_text("\n".join([*lines, *lines[1:200]]))
+    with pytest.raises(IdentificationError, match=r"a\.csv: .*the time goes back by 30 s"):
+        series_of(read_table(file), "", None)
+
+
+WRONG = {
+    "empty": ("", "found no text"),
+    "no header": ("0.0,1.0\n0.1,2.0\n", "found numbers, allowed is a header"),
+    "one column": ("Time (s)\n0.0\n", "at least two columns"),
+    "no times": ("x,y\n0.0,1.0\n0.1,2.0\n", "found no column with times, columns are x, y"),
+    "only times": ("time (s),timestamp\n0.0,1.0\n0.1,2.0\n", "found no column but times"),
+    "one line": ("time (s),x\n0.0,1.0\n", "found 1 lines of numbers"),
+    "text": (
+        "time (s),x\n" + "\n".join(f"{k},hello" for k in range(100)),
+        ":2: 100 of 100 lines are not 2 numbers",
+    ),
+    "dates": (
+        "time,x\n" + "\n".join(f"2026-01-01T00:00:{k:02},{k}" for k in range(50)),
+        "are not 2 numbers",
+    ),
+    "bytes": ("\0\1\2,\0", "found no text"),
+    "an endless field": (
+        "time (s),x\n0.0,1.0\n0.1," + "2" * 140_000,
+        ":3: found field larger than field limit (131072), allowed is a table of numbers",
+    ),
+    "an endless header": ("a," + "b" * 140_000, ":1: found field larger than field limit"),
+    "times of no clock": (
+        "time (s),x\n" + "1e12,1.0\n" * 50,
+        ":2: 50 lines of 50 have no number in column time (s) that is a time",
+    ),
+    "no unit of time": ("time,x\n0.0,1.0\n1e12,2.0\n", "which are no sampling in s, ms"),
+}
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_wrong_tables(tmp_path: Path, name: str) -> None:
+    text, message = WRONG[name]
+    file = tmp_path / "a.csv"
+    file.write_text(text)
+    with pytest.raises(IdentificationError) as error:
+        read_table(file)
+    assert message in str(error.value)
+    assert str(file) in str(error.value)
+
+
+def test_a_column_that_is_not_there(tmp_path: Path) -> None:
+    table = read_table(phone(tmp_path / "a.csv", SWUNG))
+    with pytest.raises(IdentificationError, match=r"no column 'Gyro w', columns are Gyroscope x"):
+        series_of(table, "", "Gyro w")
+
+
+@pytest.mark.parametrize(
+    "header", ["Time (s),Acceleration x (m/s^2)", "time,accel_x", "Time (s),ax (g)"]
+)
+def test_an_acceleration_is_refused(tmp_path: Path, header: str) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text(header + "\n" + "\n".join(f"{0.01 * k},{k % 3}" for k in range(50)))
+    with pytest.raises(IdentificationError, match="does not show the swing"):
+        series_of(read_table(file), "", header.partition(",")[2])
+
+
+def test_no_gyroscope_and_no_name(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("Time (s),p (bar)\n" + "\n".join(f"{0.01 * k},{k % 3}" for k in range(50)))
+    with pytest.raises(IdentificationError, match="name the column"):
+        series_of(read_table(file), "", None)
+
+
+def test_a_can_log_is_no_table(tmp_path: Path) -> None:
+    file = tmp_path / "a.csv"
+    file.write_text("timestamp,arbitration_id,extended,remote,error,dlc,data\n")
+    assert not is_table(file)
+    assert not is_table(tmp_path / "a.log")
+
+
+def test_progress(tmp_path: Path) -> None:
+    told: list[float] = []
+    file = tmp_path / "a.csv"
+    file.write_text("Time (s),x\n" + "".join(f"{0.01 * k:.2f},{k % 7}\n" for k in range(100_000)))
+    read_table(file, told.append)
+    assert told == sorted(told)
+    assert 0.0 < told[0] < told[-1] <= 1.0

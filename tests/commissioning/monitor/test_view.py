@@ -1,0 +1,202 @@
+"""What the monitor shows: in 80 columns and 24 lines, and never by colour alone."""
+
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from canshaper.cli.common import loader
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.monitor.state import Monitor
+from canshaper.commissioning.monitor.view import bar, screen, status_line
+from canshaper.machine.deployment import Deployment
+from canshaper.recording.listen import Heard
+from canshaper.shaping.states import Reason, State
+from tests.rigs.j1939 import bjm
+
+NOW = 1_763_750_000_000_000_000
+MS = 1_000_000
+COUNTERS = {
+    "LastFault": 6,
+    "MissedDeadlines": 3,
+    "WrongLength": 0,
+    "UnknownId": 0,
+    "ErrorFrames": 0,
+    "InvalidSignals": 0,
+    "SendFailures": 0,
+}
+
+
+@pytest.fixture
+def deployment() -> Deployment:
+    return loader("forwarder.yaml")()
+
+
+def heard(frame: Frame | None, time_ns: int) -> Heard:
+    assert frame is not None
+    return Heard(time_ns, frame.bus, "vcan0", frame.can_id, frame.extended, frame.data, "")
+
+
+def told(
+    deployment: Deployment,
+    time_ns: int = NOW,
+    state: State = State.ACTIVE,
+    reason: Reason = Reason.STICK_MOVED,
+) -> list[Heard]:
+    """Status of all axes and of the service."""
+    frames = [
+        heard(axis.status.frame(state, reason, 0.5, -0.25, 3.4), time_ns)
+        for axis in deployment.axes.values()
+        if axis.status
+    ]
+    assert deployment.status
+    return [*frames, heard(deployment.status.frame(COUNTERS), time_ns)]
+
+
+def j1939(source: str, folder: Path) -> Deployment:
+    """The machine of J1939, its left joystick with another line."""
+    file = loader("j1939-forwarder.yaml")().path
+    lines = file.read_text(encoding="utf-8").replace("../dbc/", f"{file.parents[1]}/dbc/")
+    (folder / "machine.yaml").write_text(
+        lines.replace("    message: BJM1\n", f"    message: BJM1\n{source}"), encoding="utf-8"
+    )
+    return loader(str(folder / "machine.yaml"))()
+
+
+@pytest.mark.parametrize("source", ["", "    source: 0x33\n"])
+def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: str) -> None:
+    deployment = j1939(source, tmp_path)
+    monitor = Monitor(deployment)
+    for n, priority in enumerate((3, 6, 0)):
+        monitor.take(heard(bjm("BJM1", 0x33, priority), NOW + n * MS))
+    monitor.take(heard(bjm("BJM1", 0x35), NOW + 9 * MS))
+    rate = monitor.messages[deployment.levers["left"].key]
+    assert (len(rate.times), rate.last_ns) == (3, NOW + 2 * MS)
+
+
+def text(monitor: Monitor, now_ns: int, width: int = 80, height: int = 24) -> list[str]:
+    """The picture as a terminal without colours shows it."""
+    console = Console(width=width, height=height, no_color=True, record=True, file=open_null())
+    console.print(screen(monitor, now_ns, width, height, plain=False))
+    return console.export_text().splitlines()
+
+
+def open_null() -> "object":
+    import io
+
+    return io.StringIO()
+
+
+def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for frame in told(deployment):
+        monitor.take(frame)
+    lines = text(monitor, NOW + 100 * MS)
+    assert lines[1].startswith("slew        ACTIVE               stick ··········│█████·····  +50%")
+    assert lines[2].startswith(
+        "            STICK_MOVED          valve ········██│··········  -25%  sway +3.4"
+    )
+    assert "sway" not in lines[6]  # lifting swings nothing
+    assert any("missed 3" in line for line in lines)
+    assert any("last fault MISSED_DEADLINE" in line for line in lines)
+
+
+def test_it_fits_the_terminal(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for i in range(300):
+        reason = Reason.EMERGENCY_STOP_LOST if i % 2 else Reason.STICK_CONTRADICTORY
+        for frame in told(deployment, NOW + i * 100 * MS, State(i % 6), reason):
+            monitor.take(frame)
+    for width, height in ((80, 24), (60, 12), (200, 60), (40, 8)):
+        lines = text(monitor, NOW + 30_000 * MS, width, height)
+        assert len(lines) <= height
+        assert max(map(len, lines)) <= width
+    assert len(text(monitor, NOW + 30_000 * MS, 80, 60)) > 50  # as many events as there is room
+
+
+def test_before_anything_is_heard_it_says_so(deployment: Deployment) -> None:
+    lines = text(Monitor(deployment), NOW)
+    assert "SILENT" in lines[0]
+    assert sum("no status heard" in line for line in lines) == 3
+    assert any("no counters heard" in line for line in lines)
+    assert any("LeverLeft 0 (50) NEVER" in line for line in lines)
+
+
+def test_what_is_stale_says_stale(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for frame in told(deployment):
+        monitor.take(frame)
+    fresh = "\n".join(text(monitor, NOW + 290 * MS))
+    assert "STALE" not in fresh
+    lines = text(monitor, NOW + 2_500 * MS)
+    assert sum("STALE 2.5 s" in line for line in lines) == 4  # three axes and the counters
+    assert any("SlewStatus 0 (10) SILENT 2.5s" in line for line in lines)
+    assert "SILENT" in lines[0]
+    assert "STALE 2.5s" in status_line(monitor, NOW + 2_500 * MS)
+
+
+def test_rates_are_told_beside_those_of_the_dbc(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for i in range(200):
+        monitor.take(Heard(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), ""))
+        if i % 2:
+            monitor.take(Heard(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), ""))
+    lines = "\n".join(text(monitor, NOW + 199 * 20 * MS))
+    assert "LeverLeft 50 (50)  " in lines
+    assert "LeverRight 25 (50) SLOW" in lines
+    assert monitor.frames_per_s("crane", NOW + 199 * 20 * MS) == pytest.approx(75, abs=1)
+    assert monitor.frames_per_s("crane", NOW + 10**10) == 0.0
+
+
+def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for frame in told(deployment, state=State.READY, reason=Reason.STICK_NEUTRAL):
+        monitor.take(frame)
+    for frame in told(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
+        monitor.take(frame)
+    lines = "\n".join(text(monitor, NOW + 200 * MS))
+    assert "axis=slew state=TRIPPED from=READY reason=ENABLE_LOST" in lines
+    assert len(monitor.events) == 6
+    assert monitor.history.changes == []  # for a day there are many
+
+
+def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    monitor.take(Heard(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
+    monitor.take(Heard(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
+    monitor.take(Heard(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, ""))  # unknown numbers
+    for frame in told(deployment)[1:]:
+        monitor.take(frame)
+    lines = "\n".join(text(monitor, NOW))
+    assert "1 error frames" in lines
+    assert "unknown (15)" in lines
+    assert "unknown (255)" in lines
+
+
+def test_a_deployment_without_status_messages(deployment: Deployment) -> None:
+    axes = {n: replace(axis, status=None) for n, axis in deployment.axes.items()}
+    lines = text(Monitor(replace(deployment, axes=axes, status=None)), NOW)
+    assert sum("the deployment gives it no status message" in line for line in lines) == 3
+    assert any("gives the service no status message" in line for line in lines)
+
+
+def test_a_bar_shows_side_and_size() -> None:
+    assert bar(0.0, plain=True) == "..........|.........."
+    assert bar(100.0, plain=True) == "..........|##########"
+    assert bar(-130.0, plain=True) == "##########|.........."
+    assert bar(1.0, plain=True) == "..........|#........."
+    assert bar(0.4, plain=True) == "..........|.........."
+    assert bar(-52.0, plain=False) == "·····█████│··········"
+
+
+def test_a_line_for_pipes(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for frame in told(deployment):
+        monitor.take(frame)
+    line = status_line(monitor, NOW)
+    assert "slew=ACTIVE(STICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
+    assert "missed=3" in line
+    assert "crane=2/s" in line
+    assert not math.isnan(float(line.split("sway=")[1].split("deg")[0]))

@@ -1,0 +1,59 @@
+"""How much of near-far's speed the radial compensation may take."""
+
+import random
+from collections import deque
+from collections.abc import Callable
+
+import pytest
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.states import StickInput
+from tests.rigs.forwarder import Rig
+
+FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
+RADIAL = "    radial_compensation: {{ axis: near_far, {}, radius_m: 6.0, max_pct: {} }}\n"
+SPEED = "full_speed_rad_s: 0.5"
+
+
+@pytest.mark.parametrize("max_pct", [2, 3.5])
+def test_it_is_bounded_as_configured(changed_rig: Callable[..., Rig], max_pct: float) -> None:
+    rig = changed_rig({FILTER: FILTER + RADIAL.format(SPEED, max_pct)})
+    rig.run(3)
+    asked = []
+    for tick in range(300):
+        rig.run(1, Slew=1000 if tick < 150 else 0)
+        asked.append(rig.controller.axes["near_far"].added)
+    assert min(asked) == pytest.approx(-max_pct / 100.0, abs=1e-12)  # inwards while it gets going
+    assert max(asked) == pytest.approx(max_pct / 100.0, abs=1e-12)  # and back
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
+    """Stick and compensation jump about; rates and rounding leave a debt behind."""
+    chance = random.Random(seed)
+    most, steps = chance.choice([0.02, 0.05, 0.25]), 125
+    limits = OutputLimits(
+        maximum=chance.choice([0.5, 1.0]),
+        rise_per_s=chance.choice([1.0, 5.0, 20.0]),
+        fall_per_s=chance.choice([1.0, 5.0, 20.0]),
+        deadband=chance.choice([0.0, 0.05]),
+    )
+    axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=steps)
+    axis.tick(StickInput())
+    command = added = 0.0
+    recent: deque[float] = deque([0.0], maxlen=round(limits.tail_s / 0.02) + 1)
+    for _ in range(200):
+        if chance.random() < 0.05:
+            command = chance.choice([0.0, 0.0, 0.05, -0.05, 0.3, -0.3, 1.0, -1.0])
+        if chance.random() < 0.05:
+            added = chance.uniform(-most, most)
+        before = axis.sent
+        axis.tick(StickInput(command), added)
+        recent.append(command)
+        # One step is paid, half of one is rounding; from outside it comes back by the rates.
+        room = 1.6 / steps / (1.0 - limits.deadband)
+        high, low = max(0.0, *recent) + most + room, min(0.0, *recent) - most - room
+        assert axis.sent <= max(high, before)
+        assert axis.sent >= min(low, before)

@@ -1,0 +1,77 @@
+"""Tools that listen find inputs as the daemon does: by group and source, at any priority."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.codec.frame import Frame
+from canshaper.commissioning.identification.commands import Commands
+from canshaper.controller.finder import InputFinder
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput
+from tests.rigs.j1939 import JOYSTICK, OTHER, OWN, ROOT, bjm
+
+MS = 1_000_000
+PLAIN = ROOT / "config" / "forwarder.yaml"
+
+
+@pytest.fixture
+def any_source() -> Deployment:
+    return load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+
+
+@pytest.fixture
+def one_source(tmp_path: Path) -> Deployment:
+    """The left joystick is taken from one address only."""
+    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
+    lever = "    message: BJM1\n"
+    assert lever in text
+    text = text.replace(lever, f"{lever}    source: {JOYSTICK}\n")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("../dbc/", f"{ROOT}/dbc/"), encoding="utf-8")
+    return load_deployment(file)
+
+
+def finder(deployment: Deployment) -> InputFinder[BoundInput]:
+    return InputFinder(deployment.config.buses, deployment.inputs())
+
+
+@pytest.mark.parametrize("priority", [0, 3, 7])
+def test_from_any_source_the_first_counts_until_it_is_silent(
+    any_source: Deployment, priority: int
+) -> None:
+    left, one = any_source.levers["left"], finder(any_source)
+    late = (left.config.timeout_ms + 1) * MS
+    assert one.find(bjm("BJM1", JOYSTICK, priority), 0) is left
+    assert one.find(bjm("BJM1", OTHER, priority), MS) is None
+    assert one.find(bjm("BJM1", JOYSTICK, priority), 2 * MS) is left
+    assert one.find(bjm("BJM1", OTHER, priority), 2 * MS + late) is left
+    assert one.find(bjm("BJM1", OWN, priority), 9 * late) is None
+
+
+@pytest.mark.parametrize("priority", [0, 3, 7])
+def test_from_one_source_no_other_counts(one_source: Deployment, priority: int) -> None:
+    one = finder(one_source)
+    assert one.find(bjm("BJM1", JOYSTICK, priority), 0) is one_source.levers["left"]
+    assert one.find(bjm("BJM1", OTHER, priority), 1000 * MS) is None
+
+
+def test_without_j1939_the_whole_identifier_counts() -> None:
+    deployment = load_deployment(PLAIN)
+    one, left = finder(deployment), deployment.levers["left"]
+    _, can_id, extended = left.key
+    assert one.find(Frame("crane", can_id, extended, b""), 0) is left
+    assert one.find(Frame("crane", can_id, not extended, b""), 0) is None
+    assert one.find(Frame("crane", can_id + 0x100, extended, b""), 0) is None
+    assert one.find(Frame("boom", can_id, extended, b""), 0) is None
+
+
+def test_commands_of_a_log_are_those_of_the_levers(any_source: Deployment) -> None:
+    commands = Commands(any_source)
+    for n in range(100):
+        frame = bjm("BJM1", JOYSTICK, 6, X=50.0 if n >= 50 else 0.0)
+        commands.take(n * 0.02, (frame.can_id, frame.extended), frame.data)
+    command = commands.of("slew")
+    assert command is not None
+    assert [*command.speed[[0, 49, 50, 99]]] == [0.0, 0.0, 0.5, 0.5]

@@ -1,0 +1,410 @@
+"""The daemon around its loop: buses that fail, the control socket, reads, a gateway, its end."""
+
+import json
+import logging
+import signal
+import socket
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.bus.port import BusError, WrongBusError
+from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.daemon import daemon as module
+from canshaper.daemon.daemon import Daemon
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from tests.daemon.test_reload import Bench, FakePort, Read
+from tests.rigs.forwarder import ROOT
+
+RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+    caplog.set_level(logging.INFO, "canshaper")
+    return lambda: [f"{r.levelname} {r.getMessage()}" for r in caplog.records]
+
+
+def at(bench: Bench, acts: dict[int, Callable[[], Any]], last: int = 20) -> None:
+    """Run, and do something before these ticks."""
+
+    def script(number: int) -> None:
+        bench.levers()
+        if number in acts:
+            acts[number]()
+        if number == last:
+            bench.stop()
+
+    bench.run(script)
+
+
+def test_the_state_of_a_bus_is_logged_when_it_changes(
+    bench: Bench, log: Callable[[], list[str]]
+) -> None:
+    def becomes(state: BusState) -> Callable[[], None]:
+        return lambda: setattr(bench.ports[0], "state", state)
+
+    at(bench, {5: becomes(BusState.DOWN), 10: becomes(BusState.UP)})
+    assert [line for line in log() if "bus=" in line] == [
+        "WARNING bus=crane state=down",
+        "INFO bus=crane state=up",
+    ]
+
+
+@pytest.mark.parametrize(
+    "state", [BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE]
+)
+def test_of_a_bus_that_we_are_not_on_the_controller_knows(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
+) -> None:
+    off: list[str] = []
+    monkeypatch.setattr(module.Controller, "unheard", lambda _, bus: off.append(bus))
+    at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
+    assert set(off) == {"crane"}
+
+
+@pytest.mark.parametrize("state", [BusState.UP, BusState.PASSIVE, BusState.FAILED])
+def test_a_bus_that_only_has_trouble_is_one_that_we_are_on(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
+) -> None:
+    off: list[str] = []
+    monkeypatch.setattr(module.Controller, "unheard", lambda _, bus: off.append(bus))
+    at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
+    assert off == []
+
+
+def test_a_fault_of_a_bus_is_counted(bench: Bench, log: Callable[[], list[str]]) -> None:
+    faults: list[Callable[[FrameFault], None]] = []
+    opened = bench._open
+
+    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
+        faults.append(fault)
+        return opened(name, bus, fault, ids)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("canshaper.daemon.ports.open_port", opens)
+        at(bench, {5: lambda: faults[0](FrameFault.ERROR_FRAME)})
+    assert any("fault=ERROR_FRAME" in line and "'ErrorFrames': 1" in line for line in log())
+
+
+def test_who_only_listens_says_so(bench: Bench, log: Callable[[], list[str]]) -> None:
+    bench.script = lambda number: bench.stop() if number == 3 else None
+    Daemon(lambda: replace(load_deployment(bench.file), listen_only=True)).run()
+    lines = log()
+    assert "WARNING listen-only=yes valves=none: nothing is sent but status" in lines
+    assert lines[-1] == "INFO stopped valves=not-sent"
+    assert not any(frame.can_id in range(0x200, 0x203) for frame in bench.sent)
+
+
+# -- the last frames -------------------------------------------------------------------------------
+
+
+def test_neutral_that_is_not_sent_is_tried_again_and_then_reported(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    tries: list[Frame] = []
+
+    def full(_port: FakePort, frame: Frame) -> bool:
+        tries.append(frame)
+        return frame.can_id != 0x201
+
+    at(bench, {20: lambda: monkeypatch.setattr(FakePort, "send", full)})
+    assert [line for line in log() if "not-sent" in line] == [
+        "ERROR neutral=not-sent bus=crane id=0x201"
+    ]
+    last = [frame.can_id for frame in tries[-10:]]
+    assert last == [0x201] * 10  # the others only once
+    assert log()[-1] == "INFO stopped valves=neutral"
+
+
+def test_neutral_is_sent_as_soon_as_the_queue_has_room(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    full_until_ns: list[int] = []
+    send = FakePort.send
+
+    def full(port: FakePort, frame: Frame) -> bool:
+        full_until_ns[:] = full_until_ns or [bench.now_ns + 50_000_000]
+        return bench.now_ns >= full_until_ns[0] and send(port, frame)
+
+    at(bench, {20: lambda: monkeypatch.setattr(FakePort, "send", full)})
+    assert not [line for line in log() if "not-sent" in line]
+    assert [f.can_id for f in bench.sent[-3:]] == [0x200, 0x201, 0x202]
+
+
+# -- the control socket ----------------------------------------------------------------------------
+
+
+def control(bench: Bench, path: Path) -> None:
+    bench.text += f"control:\n  socket: {path}\n  adjustable:\n    {RANGE}\n"
+    bench.file.write_text(bench.text, encoding="utf-8")
+
+
+def ask(path: Path, request: object) -> Callable[[], socket.socket]:
+    def asks() -> socket.socket:
+        client = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        client.settimeout(5)
+        client.connect(str(path))
+        client.send(json.dumps(request).encode())
+        clients.append(client)
+        return client
+
+    clients.clear()
+    return asks
+
+
+clients: list[socket.socket] = []
+
+
+def answered(bench: Bench, path: Path, request: object) -> dict[str, Any]:
+    found: list[bytes] = []
+    asks = ask(path, request)
+    at(bench, {3: asks, 15: lambda: found.append(clients[0].recv(65536))})
+    clients[0].close()
+    answer: dict[str, Any] = json.loads(found[0])
+    return answer
+
+
+def test_a_number_is_set_and_the_log_has_it(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 0.75}})
+    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.75
+    assert next(line for line in log() if " set " in line).startswith(
+        "INFO set axes.slew.filter.a1=0.75 was=0.708 "
+    )
+    assert not path.exists()  # at the end it is closed
+
+
+def test_the_table_is_asked_for_and_nothing_is_set(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {})
+    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.708
+    assert not [line for line in log() if " set " in line or "set=" in line]
+
+
+def test_a_number_that_is_refused_is_in_the_log(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 2}})
+    assert "0.5 to 1" in answer["error"]
+    refused = [line for line in log() if "set=refused" in line]
+    assert len(refused) == 1
+    assert refused[0].startswith("WARNING ")
+
+
+@pytest.mark.parametrize("request_", [{"get": 1}, {"set": 1}, {"set": {}, "more": 1}])
+def test_a_request_that_is_none(bench: Bench, tmp_path: Path, request_: object) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    assert "allowed is {} or" in answered(bench, path, request_)["error"]
+
+
+def test_without_a_place_for_the_socket_the_machine_works(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "nowhere" / "c.sock"
+    control(bench, path)
+    at(bench, {})
+    assert [line for line in log() if "control=none" in line] == [
+        f"ERROR control=none socket={path} No such file or directory"
+    ]
+    assert log()[-1] == "INFO stopped valves=neutral"
+
+
+def test_a_reload_opens_the_control_socket_of_the_new_file(bench: Bench, tmp_path: Path) -> None:
+    first, second = tmp_path / "1.sock", tmp_path / "2.sock"
+    control(bench, first)
+    there: list[tuple[bool, bool]] = []
+    at(
+        bench,
+        {
+            5: lambda: bench.reload(str(first), str(second)),
+            15: lambda: there.append((first.exists(), second.exists())),
+        },
+    )
+    assert there == [(False, True)]
+
+
+# -- reading the file again ------------------------------------------------------------------------
+
+
+class Slow(Read):
+    """One that takes its time."""
+
+    all: list["Slow"] = []  # noqa: RUF012
+
+    def __init__(self, load: Callable[[], Deployment]) -> None:
+        super().__init__(load)
+        self.ended = False
+        Slow.all.append(self)
+
+    def result(self) -> Deployment | None:  # type: ignore[override]
+        return None
+
+    def end(self) -> None:
+        self.ended = True
+
+
+def test_a_read_that_is_overtaken_is_ended_and_so_is_the_last_one(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    Slow.all.clear()
+    monkeypatch.setattr(module, "Reading", Slow)
+    at(bench, {5: bench.reload, 10: bench.reload})
+    assert [one.ended for one in Slow.all] == [True, True]
+
+
+def test_without_a_process_to_read_in_a_reload_is_refused(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    def none(_load: object) -> None:
+        raise BlockingIOError(11, "no more processes")
+
+    monkeypatch.setattr(module, "Reading", none)
+    at(bench, {5: bench.reload})
+    assert [line for line in log() if "reload=" in line] == [
+        "ERROR reload=refused cannot read: no more processes"
+    ]
+
+
+def test_what_cannot_be_read_is_refused_line_by_line(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    class Broken(Slow):
+        def result(self) -> str:  # type: ignore[override]
+            return "machine.yaml:1: one\nmachine.yaml:2: two"
+
+    monkeypatch.setattr(module, "Reading", Broken)
+    at(bench, {5: bench.reload})
+    assert [line for line in log() if "reload=" in line] == [
+        "ERROR reload=refused machine.yaml:1: one",
+        "ERROR reload=refused machine.yaml:2: two",
+    ]
+
+
+def test_a_reload_in_motion_waits_and_the_log_says_so_once(
+    bench: Bench, log: Callable[[], list[str]]
+) -> None:
+    def script(number: int) -> None:
+        bench.levers(Slew=1000 if 5 <= number < 20 else 0)
+        if number == 10:
+            bench.reload()
+        if number == 200:
+            bench.stop()
+
+    bench.run(script)
+    lines = [line for line in log() if "reload=" in line]
+    assert lines[0] == "INFO reload=waiting until every axis is neutral"
+    assert [line.split()[1] for line in lines[1:]] == ["reload=applied"]
+
+
+# -- in the line -----------------------------------------------------------------------------------
+
+
+class Beside:
+    """What a gateway does between its ticks, counted."""
+
+    def __init__(self, bench: Bench) -> None:
+        self.waits = self.passes = self.checks = 0
+        self.closed = 0
+        self._bench = bench
+
+    def wait(self, seconds: float, *_: object) -> None:
+        self.waits += 1
+        self._bench.sleep(seconds)
+
+    def pass_others(self) -> int:
+        self.passes += 1
+        return 0
+
+    def check(self, _now_ns: int, *, neutral: bool) -> None:
+        assert neutral
+        self.checks += 1
+
+    def close(self) -> None:
+        self.closed += 1
+
+
+def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text(encoding="utf-8")
+    bench.text = text.replace("../dbc", str(ROOT / "dbc"))
+    bench.file.write_text(bench.text, encoding="utf-8")
+    lines: list[Beside] = []
+
+    def in_line(*_: object) -> Beside:
+        lines.append(Beside(bench))
+        return lines[-1]
+
+    monkeypatch.setattr(module, "InLine", in_line)
+    at(bench, {5: bench.reload})
+    assert [one.closed for one in lines] == [1, 1]  # the old one, and the last one at the end
+    assert sum(one.passes for one in lines) == sum(one.checks for one in lines) == 21
+    assert sum(one.waits for one in lines) == 19  # a reload begins with a tick
+
+
+def test_signals_are_those_of_a_service(bench: Bench) -> None:
+    at(bench, {})
+    assert {signal.SIGTERM, signal.SIGINT, signal.SIGHUP, signal.SIGCHLD} == bench._handlers.keys()
+    assert bench._handlers[signal.SIGCHLD] == signal.SIG_DFL
+
+
+def test_the_digest_that_does_not_go_out_is_counted(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = load_deployment(bench.file).identity_status
+    assert status is not None
+    failed: list[Frame] = []
+    monkeypatch.setattr(module.Controller, "send_failed", lambda _, frame: failed.append(frame))
+    send = FakePort.send
+    monkeypatch.setattr(
+        FakePort, "send", lambda port, f: f[:3] != status.sender.key and send(port, f)
+    )
+    at(bench, {}, last=60)
+    assert [frame[:3] for frame in failed] == [status.sender.key] * 2
+
+
+def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    status = load_deployment(bench.file).identity_status
+    assert status is not None
+    silent = property(lambda _: frozenset({"crane"}))
+    monkeypatch.setattr(module.Controller, "silent_buses", silent)
+    at(bench, {}, last=60)
+    assert not [frame for frame in bench.sent if frame[:3] == status.sender.key]
+
+
+# -- a bus that is another device ------------------------------------------------------------------
+
+
+def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def wrong(*_: object) -> None:
+        raise WrongBusError("crane", "expected serial number 1, found 2")
+
+    monkeypatch.setattr("canshaper.daemon.ports.open_port", wrong)
+    with pytest.raises(BusError) as error:
+        Daemon(lambda: load_deployment(bench.file))
+    assert str(error.value).startswith(f"{bench.file}:")
+    assert "buses.crane" in str(error.value)
+    assert str(error.value).endswith("expected serial number 1, found 2")

@@ -1,0 +1,246 @@
+"""Values written into a deployment file: everything else stays, byte for byte."""
+
+import os
+import shutil
+import stat
+from collections.abc import Mapping
+from pathlib import Path
+
+import pytest
+import yaml
+
+from canshaper.config.edit import Value, edited, set_values
+from canshaper.config.load import load_config
+from canshaper.config.source import DeploymentError
+
+FILE = Path(__file__).resolve().parents[3] / "config" / "forwarder.yaml"
+SLEW = ("axes", "slew", "filter")
+NEW: dict[str, Value] = {"a1": 0.7, "a2": 0.12233, "third_pole_rad_s": None, "poles_rad_s": None}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return Path(shutil.copy(FILE, tmp_path / "machine.yaml"))
+
+
+def gff_line(text: str, line: str) -> str:
+    old = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
+    assert text.count(old) == 1
+    return text.replace(old, line)
+
+
+def test_flow_style(file: Path) -> None:
+    before = file.read_bytes()
+    set_values(file, SLEW, NEW)
+    assert file.read_bytes() == before.replace(
+        b"{ kind: gff, a1: 0.708, a2: 0.12 }\n", b"{ kind: gff, a1: 0.7, a2: 0.12233 }\n"
+    )
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_a_comment_behind_the_section_stays(file: Path) -> None:
+    set_values(file, ("axes", "near_far", "filter"), NEW)
+    text = file.read_text()
+    assert "{ kind: gff, a1: 0.7, a2: 0.12233 } # near-far tuning of the paper\n" in text
+
+
+BLOCK = """\
+    filter:
+      # tuned in May
+      kind: gff # the paper's
+      poles_rad_s: [-3.5, -2.5] # by hand
+
+      # nothing below
+"""
+BLOCK_AFTER = """\
+    filter:
+      # tuned in May
+      kind: gff # the paper's
+      a1: 0.7
+      a2: 0.12233 # by hand
+
+      # nothing below
+"""
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+def test_block_style_poles_become_coefficients(file: Path, newline: str) -> None:
+    text = gff_line(file.read_text(), BLOCK).replace("\n", newline)
+    file.write_bytes(text.encode())
+    set_values(file, SLEW, NEW)
+    after = text.replace(BLOCK.replace("\n", newline), BLOCK_AFTER.replace("\n", newline))
+    assert file.read_bytes() == after.encode()
+    assert load_config(file)[0].axes["slew"].filter.parameters() == {"a1": 0.7, "a2": 0.12233}
+
+
+# section before, values, section after
+CASES: dict[str, tuple[str, Mapping[str, Value], str]] = {
+    "poles in flow style": (
+        "{ kind: gff, poles_rad_s: [-3, -2] } # c",
+        NEW,
+        "{ kind: gff, a1: 0.7, a2: 0.12233 } # c",
+    ),
+    "poles before kind": (
+        "{poles_rad_s: [-3,\n  -2], kind: gff}",
+        NEW,
+        "{a1: 0.7, a2: 0.12233, kind: gff}",
+    ),
+    "add a third pole": (
+        "{ kind: gff, a1: 1, a2: 0.1, }",
+        {"third_pole_rad_s": -4.0},
+        "{ kind: gff, a1: 1, a2: 0.1, third_pole_rad_s: -4.0, }",
+    ),
+    "take the third pole out": (
+        "{ kind: gff, a1: 1, third_pole_rad_s: -4, a2: 0.1 }",
+        NEW,
+        "{ kind: gff, a1: 0.7, a2: 0.12233 }",
+    ),
+    "take the last one out": (
+        "{ kind: gff, a1: 1, a2: 0.1, third_pole_rad_s: -4 }",
+        NEW,
+        "{ kind: gff, a1: 0.7, a2: 0.12233 }",
+    ),
+    "another filter": (
+        "{ kind: first_order, time_constant_s: 0.3 } # c",
+        {"kind": "gff", "time_constant_s": None, "a1": 1.0, "a2": 0.1},
+        "{ kind: gff, a1: 1.0, a2: 0.1 } # c",
+    ),
+    "block, add behind a comment": (
+        "\n  kind: gff\n  a1: 1 # s\n  a2: 0.1 # s^2\n# end",
+        {"third_pole_rad_s": -4.0},
+        "\n  kind: gff\n  a1: 1 # s\n  a2: 0.1 # s^2\n  third_pole_rad_s: -4.0\n# end",
+    ),
+    "block, take out with its line": (
+        "\n  kind: gff\n  third_pole_rad_s: -4\n  a1: 1\n  a2: 0.1\n",
+        NEW,
+        "\n  kind: gff\n  a1: 0.7\n  a2: 0.12233\n",
+    ),
+    "block, take out beside a comment": (
+        "\n  kind: gff\n  third_pole_rad_s: -4 # why\n  a1: 1\n  a2: 0.1\n",
+        NEW,
+        "\n  kind: gff\n  # why\n  a1: 0.7\n  a2: 0.12233\n",
+    ),
+    "block, poles as a block": (
+        "\n  poles_rad_s:\n    - -3\n    - -2\n\n  # c\n  kind: gff\n",
+        NEW,
+        "\n  a1: 0.7\n  a2: 0.12233\n\n  # c\n  kind: gff\n",
+    ),
+    "block without a last line end": (
+        "\n  kind: gff\n  a1: 1\n  a2: 0.1",
+        {"third_pole_rad_s": -4.0},
+        "\n  kind: gff\n  a1: 1\n  a2: 0.1\n  third_pole_rad_s: -4.0",
+    ),
+    "quoted key, small number": (
+        "{ kind: gff, 'a1': 1, a2: 0.1 }",
+        {"a2": 0.00001},
+        "{ kind: gff, 'a1': 1, a2: 0.00001 }",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_spans(name: str) -> None:
+    before, values, after = CASES[name]
+    head = "# ä €: 😀\nother: { filter: [1, 2] } # filter\nfilter: "
+    result = edited(head + before, ("filter",), values)
+    assert result == head + after
+    section = yaml.safe_load(result)["filter"]
+    for key, value in values.items():
+        assert section.get(key) == value
+
+
+REFUSED = {
+    "shared by an anchor": ("x: &f { kind: gff, a1: 1, a2: 0.1 }\nfilter: *f\n", "anchor"),
+    "a value from elsewhere": ("x: &f 1\nfilter: { kind: gff, a1: *f, a2: 0.1 }\n", "anchor"),
+    "a comment in the poles": (
+        "filter:\n  kind: gff\n  poles_rad_s: # both\n    - -3\n    - -2\n",
+        "comment stands inside poles_rad_s",
+    ),
+    "no such section": ("other: 1\n", "no section filter"),
+    "not a section": ("filter: 3\n", "allowed is a section with keys"),
+    "not YAML": ("filter: [1\n", "not YAML"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_changed_alone_is_refused(name: str) -> None:
+    text, message = REFUSED[name]
+    with pytest.raises(DeploymentError, match=message):
+        edited(text, ("filter",), NEW, "machine.yaml")
+
+
+def test_a_result_that_is_no_deployment_is_not_written(file: Path) -> None:
+    before = file.read_bytes()
+    with pytest.raises(DeploymentError, match=r"machine.yaml:\d+: axes.slew.filter: a1 is 0.1"):
+        set_values(file, SLEW, {"a1": 0.1, "a2": 0.12})
+    assert file.read_bytes() == before
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_mode_and_link_stay(file: Path) -> None:
+    file.chmod(0o640)
+    link = file.with_name("link.yaml")
+    link.symlink_to(file.name)
+    set_values(link, SLEW, NEW)
+    assert link.is_symlink()
+    assert stat.S_IMODE(file.stat().st_mode) == 0o640
+    assert "a1: 0.7" in file.read_text()
+
+
+def test_a_directory_that_cannot_be_written(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As root every directory can be written, so the refusal is put in where it would come up."""
+    before = file.read_bytes()
+    file.parent.chmod(0o555)
+    if os.geteuid() == 0:
+
+        def refuse(**_options: object) -> None:
+            raise PermissionError(13, "Permission denied")
+
+        monkeypatch.setattr("canshaper.config.edit.tempfile.mkstemp", refuse)
+    try:
+        with pytest.raises(DeploymentError, match="not written, the file is as it was: Permission"):
+            set_values(file, SLEW, NEW)
+    finally:
+        file.parent.chmod(0o755)
+    assert file.read_bytes() == before
+
+
+@pytest.mark.parametrize("step", ["os.fsync", "Path.replace"])
+def test_a_disk_that_fails_on_the_way(
+    file: Path, monkeypatch: pytest.MonkeyPatch, step: str
+) -> None:
+    before = file.read_bytes()
+
+    def fail(*_arguments: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(f"canshaper.config.edit.{step}", fail)
+    with pytest.raises(DeploymentError, match="No space left on device"):
+        set_values(file, SLEW, NEW)
+    assert file.read_bytes() == before
+    assert list(file.parent.iterdir()) == [file]
+
+
+def test_a_file_changed_meanwhile_is_left_alone(
+    file: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fsync = os.fsync
+
+    def someone_else(number: int) -> None:
+        fsync(number)
+        file.write_text("tick_ms: 10\n")
+
+    monkeypatch.setattr("canshaper.config.edit.os.fsync", someone_else)
+    with pytest.raises(DeploymentError, match="changed by someone else"):
+        set_values(file, SLEW, NEW)
+    assert file.read_text() == "tick_ms: 10\n"
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError, match="No such file"):
+        set_values(tmp_path / "none.yaml", SLEW, NEW)
+
+
+def test_only_words_and_numbers_are_written() -> None:
+    with pytest.raises(ValueError, match="allowed is a word"):
+        edited("filter: { kind: gff }", ("filter",), {"kind": "a: b"})

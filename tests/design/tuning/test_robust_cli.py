@@ -1,0 +1,78 @@
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from canshaper.machine.binding import load_deployment
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "machine.yaml"
+    text = (ROOT / "config" / "forwarder.yaml").read_text()
+    path.write_text(text.replace("../dbc", str(ROOT / "dbc")))
+    return path
+
+
+def run(*words: str) -> tuple[int, str]:
+    done = CliRunner().invoke(app, ["robust", *words])
+    return done.exit_code, done.output
+
+
+def test_the_printed_line_is_a_filter_that_check_accepts(file: Path) -> None:
+    status, output = run(str(file), "--axis", "near_far", "--duration", "1.8")
+    assert status == 0
+    assert "at most 6.7 % of the" in output
+    line = output.strip().splitlines()[-1]
+    old = next(row for row in file.read_text().splitlines() if "# near-far tuning" in row)
+    file.write_text(file.read_text().replace(old, "    " + line))
+    chosen = load_deployment(file).axes["near_far"].config.filter
+    assert chosen.kind == "robust"
+    assert len(chosen.parameters()["taps"]) == 91
+
+
+def test_write_changes_the_filter_and_nothing_else(file: Path) -> None:
+    before = file.read_text().splitlines()
+    status, output = run(str(file), "--axis", "slew", "--range", "30", "--write")
+    assert (status, "Written to" in output) == (0, True)
+    after = file.read_text().splitlines()
+    changed = [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
+    assert len(changed) == 1
+    assert before[changed[0]].split("#")[1:] == after[changed[0]].split("#")[1:]
+    assert load_deployment(file).axes["slew"].config.filter.kind == "robust"
+
+
+def test_a_tail_too_short_is_told(file: Path) -> None:
+    assert "tail_s is 2 s" in run(str(file), "--axis", "near_far", "--duration", "2.4")[1]
+    assert "tail_s" not in run(str(file), "--axis", "near_far", "--duration", "1.6")[1]
+
+
+def test_it_tells_how_far_the_tip_travels_and_what_a_longer_tail_would_need(file: Path) -> None:
+    words = (str(file), "--axis", "near_far", "--duration")
+    good, long = (" ".join(run(*words, seconds)[1].split()) for seconds in ("1.8", "2.4"))
+    assert "near_far travels 0.85 m with it; its limits allow 2.13 m." in good
+    assert "stop_distance_m" not in good
+    assert "For tail_s: 2.5, stop_distance_m: found 2.2 m; max_pct" in long
+    assert "allow 2.63 m." in long
+
+
+@pytest.mark.parametrize(
+    "words, message",
+    [
+        (["--axis", "lift"], "allowed are axes with sway data: slew, near_far"),
+        (["--axis", "boom"], "allowed are axes with sway data: slew, near_far"),
+        (["--axis", "slew", "--range", "90"], "range of length is 90 %, allowed is 0 to 60 %"),
+        (["--axis", "slew", "--duration", "0.1"], "allowed is 0.2 s or more"),
+        (["--axis", "slew", "--duration", "1", "--residual", "5"], "one of --duration and"),
+        (["--axis", "slew", "--residual", "-1"], "or more"),
+    ],
+)
+def test_what_cannot_be_leaves_the_file_alone(file: Path, words: list[str], message: str) -> None:
+    before = file.read_bytes()
+    status, output = run(str(file), *words, "--write")
+    assert status == 2
+    assert message in " ".join(output.split())
+    assert file.read_bytes() == before

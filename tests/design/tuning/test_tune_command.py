@@ -1,0 +1,188 @@
+"""``canshaper tune`` from the outside."""
+
+import json
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner, Result
+
+from canshaper.cli.app import app
+from canshaper.config.load import load_config
+from canshaper.design.tuning.deploy import deployed, setting
+from canshaper.design.tuning.evaluate import Machine
+from canshaper.design.tuning.manual import manual
+from canshaper.design.tuning.optimal import Tuning
+from canshaper.shaping.sway import SwayMode
+
+ROOT = Path(__file__).resolve().parents[3]
+MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    (tmp_path / "config").mkdir()
+    shutil.copytree(ROOT / "dbc", tmp_path / "dbc")
+    return Path(shutil.copy(ROOT / "config" / "forwarder.yaml", tmp_path / "config"))
+
+
+def run(file: Path, *options: str) -> Result:
+    out = file.parent / "out"
+    return CliRunner().invoke(app, ["tune", str(file), "--out", str(out), *options])
+
+
+def test_result_and_picture(file: Path) -> None:
+    before = file.read_bytes()
+    result = run(file, "--axis", "near_far")
+    assert result.exit_code == 0, result.output
+    for text in (
+        "in the file",
+        "0.6995",
+        "0.122325",
+        "length -30 %",
+        "Held by: real poles (14d), within the command",
+        "cost at most 1 % more",
+        "3 of 3 starts ended here",
+        "Use a1: 0.6995, a2: 0.122325 for near_far",
+        "Released at full speed, near_far travels 0.7",
+    ):
+        assert text in re.sub(r"\s*\n", " ", result.output) or text in result.output
+    picture = file.parent / "out" / "near_far.png"
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+    assert picture.stat().st_size > 20_000
+    assert file.read_bytes() == before
+
+
+def test_json(file: Path) -> None:
+    result = run(file, "--axis", "slew", "--json", "--third-pole", "--max-run-on", "2.2")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert found["axis"] == "slew"
+    assert found["converged"] == 3
+    assert found["third_pole_rad_s"] < 0.0
+    assert found["run_on_s"] <= 2.2
+    assert found["first_jump"] <= 0.1 + 1e-6
+    assert [r["length_pct"] for r in found["residuals"]] == [-30, -20, -10, 0, 10, 20, 30]
+    assert found["in_file"]["first_jump"] == pytest.approx(1.11, abs=0.01)
+    assert found["written"] is None
+
+
+def test_write_and_write_back(file: Path) -> None:
+    before = file.read_text()
+    result = run(file, "--axis", "slew", "--third-pole", "--write")
+    assert result.exit_code == 0, result.output
+    assert "Written to" in result.output
+    with_third = load_config(file)[0].axes["slew"].filter.parameters()
+    assert set(with_third) == {"a1", "a2", "third_pole_rad_s"}
+    changed = [
+        a for a, b in zip(file.read_text().splitlines(), before.splitlines(), strict=True) if a != b
+    ]
+    assert len(changed) == 1
+    result = run(file, "--axis", "slew", "--write", "--json", "--starts", "1")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    after = load_config(file)[0].axes["slew"].filter.parameters()
+    assert after == {"a1": found["a1"], "a2": found["a2"]}
+    expected = before.replace(
+        "a1: 0.708, a2: 0.12 }\n", f"a1: {found['a1']}, a2: {found['a2']} }}\n"
+    )
+    assert file.read_text() == expected
+
+
+def test_another_filter_is_replaced_on_write(file: Path) -> None:
+    file.write_text(
+        file.read_text().replace("{ kind: gff, a1: 0.708, a2: 0.12 }\n", "{ kind: zv }\n")
+    )
+    result = run(file, "--axis", "slew", "--method", "manual", "--write")
+    assert result.exit_code == 0, result.output
+    assert "in the file" not in result.output
+    assert load_config(file)[0].axes["slew"].filter.kind == "gff"
+
+
+def test_length_range_takes_the_tail_as_run_on(file: Path) -> None:
+    result = run(file, "--axis", "near_far", "--length-range", "15", "--json")
+    assert result.exit_code == 0, result.output
+    found = json.loads(result.stdout)
+    assert "run-on" in found["active"]
+    assert 1.9 < found["run_on_s"] <= 2.0
+
+
+BAD = {
+    "no such axis": (["--axis", "crab"], "allowed are slew, near_far, lift"),
+    "no sway": (["--axis", "lift"], "no sway data"),
+    "negative weight": (["--axis", "slew", "--p", "-1"], "weight P is -1, allowed is 0 to"),
+    "no number": (["--axis", "slew", "--q", "nan"], "weight Q is nan, allowed is 0 to"),
+    "no aim": (["--axis", "slew", "--r", "0", "--s", "0"], "weights R and S are both 0"),
+    "length range": (
+        ["--axis", "slew", "--length-range", "150"],
+        "length range is 150 %, allowed is 1 to 60 %",
+    ),
+    "method": (["--axis", "slew", "--method", "best"], "allowed are optimal, manual"),
+    "distance": (["--axis", "slew", "--pole-distance", "far"], "allowed are text, printed, off"),
+    "states": (["--axis", "slew", "--states", "all"], "allowed are sway"),
+    "starts": (["--axis", "slew", "--starts", "0"], "allowed is 1 to 1000"),
+    "manual with limits": (
+        ["--axis", "slew", "--method", "manual", "--max-jump", "1"],
+        "are for --method optimal",
+    ),
+    "conflict": (
+        ["--axis", "near_far", "--max-run-on", "1.2"],
+        "attainable with the others kept: run-on at most 1.8",
+    ),
+    "slow valve": (
+        ["--axis", "near_far", "--max-rate", "0.1", "--beyond-command", "--max-jump", "0.01"],
+        "first jump",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_errors_leave_the_file_alone(file: Path, name: str) -> None:
+    before = file.read_bytes()
+    options, text = BAD[name]
+    result = run(file, *options, "--write")
+    assert result.exit_code == 2, result.output
+    assert text in result.output.replace("\n", " ")
+    assert f"axis {options[1]}" in result.output
+    assert file.read_bytes() == before
+
+
+def test_a_shipped_file_is_not_written_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = CliRunner().invoke(app, ["tune", "forwarder.yaml", "--axis", "slew", "--write"])
+    assert result.exit_code == 2
+    assert "copy it" in result.output
+
+
+def test_the_daemon_never_imports_the_tuner() -> None:
+    code = (
+        "import sys, canshaper.cli.app, canshaper.daemon.daemon\n"
+        "heavy = ('casadi', 'scipy', 'numpy', 'matplotlib')\n"
+        "bad = [m for m in sys.modules if m.split('.')[0] in heavy"
+        " or m.startswith('canshaper.design.tuning')]\n"
+        "assert not bad, bad\n"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+@pytest.mark.parametrize("pole", [-0.71234567, -2.8591956, -3.3333333333, -17.77777777])
+def test_digits_of_a_file_keep_poles_real_and_the_jump_small(pole: float) -> None:
+    a1, a2 = -2.0 / pole, 1.0 / pole**2
+    found = deployed(Tuning((pole, pole), pole, a1, a2, "optimal"), MODE, 0.02, Machine())
+    assert found.a2 >= a2
+    assert found.a1**2 >= 4.0 * found.a2
+    assert found.poles_rad_s == pytest.approx((pole, pole), rel=5e-3)
+    assert found.third_pole_rad_s == pytest.approx(pole, rel=1e-5)
+    assert len(f"{found.a1}".replace(".", "").lstrip("0")) <= 6
+
+
+def test_manual_setting_is_measured() -> None:
+    found = deployed(manual(MODE), MODE, 0.02, Machine())
+    assert found.measures.run_on_s > 5.0
+    same = setting(
+        a1=found.a1, a2=found.a2, third_pole_rad_s=None, mode=MODE, tick_s=0.02, machine=Machine()
+    )
+    assert same == found

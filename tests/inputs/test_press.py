@@ -1,0 +1,123 @@
+"""What is no press of reset or enable: nobody touched a switch, and a trip must stay."""
+
+from collections.abc import Callable
+
+from canshaper.codec.frame import Frame
+from canshaper.shaping.states import State
+from tests.rigs.emergency import Machine
+from tests.rigs.forwarder import Rig
+
+
+def tripped(machine: Rig | Machine, **switches: int) -> Rig:
+    """Latched by a frame that was not sent, with the stick back in neutral."""
+    rig = machine.rig if isinstance(machine, Machine) else machine
+    machine.run(3, **switches)
+    machine.run(10, Slew=1000, **switches)
+    rig.controller.send_failed(Frame("crane", 0x200, False, bytes(2)))
+    machine.run(1, Slew=1000, **switches)
+    machine.run(5, **switches)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
+    return rig
+
+
+def test_a_reset_that_was_pressed_while_another_switch_is_broken(rig: Rig) -> None:
+    tripped(rig).run(10, Enable=2, Reset=1)
+    rig.run(5, Reset=1)
+    assert rig.state() is State.TRIPPED
+    rig.run(1)
+    rig.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def test_a_reset_that_was_pressed_in_silence(rig: Rig) -> None:
+    tripped(rig)
+    for _ in range(20):
+        rig.tick()
+    rig.run(5, Reset=1)
+    assert rig.state() is State.TRIPPED
+
+
+def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
+    """A glitch, or somebody else with the lever's id."""
+    tripped(rig)
+    count = rig.counts["LeverLeft"]
+    rig.counts["LeverLeft"] = (count + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    rig.counts["LeverLeft"] = count
+    rig.tick()
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
+def test_a_reset_that_is_stuck_and_an_enable_off_beside_a_broken_stick(rig: Rig) -> None:
+    tripped(rig, Reset=1).run(1, Slew=32766, Enable=0, Reset=1)
+    rig.run(2, Enable=0, Reset=1)
+    assert rig.state() is State.TRIPPED
+
+
+def test_an_enable_that_comes_back_with_the_measurement_of_its_stick_is_one(rig: Rig) -> None:
+    """A joystick that has no measurement while it is not enabled."""
+    tripped(rig).run(5, Slew=32767, Enable=0)
+    assert rig.state() is State.TRIPPED
+    rig.run(1)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
+
+
+def test_an_enable_that_was_off_out_of_sequence_and_on_again_in_one_tick(rig: Rig) -> None:
+    tripped(rig)
+    count = rig.counts["LeverLeft"]
+    rig.counts["LeverLeft"] = (count + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    rig.counts["LeverLeft"] = count
+    rig.run(1)  # the good frame of this tick has it on
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
+def test_an_enable_that_was_off_in_a_frame_after_which_the_counter_goes_on_in_its_tick(
+    rig: Rig,
+) -> None:
+    """Frames of a sender that starts anew: the first is out of sequence, the next ones are not."""
+    tripped(rig)
+    rig.counts["LeverLeft"] = (rig.counts["LeverLeft"] + 100) % 256
+    rig.receive(rig.lever("LeverLeft", Enable=0))
+    for _ in range(5):
+        rig.receive(rig.lever("LeverLeft"))
+    rig.run(1)
+    rig.run(5)
+    assert rig.state() is State.TRIPPED
+
+
+def test_a_reset_that_is_held_while_the_loop_is_late(rig: Rig) -> None:
+    tripped(rig)
+    for _ in range(12):
+        rig.receive(rig.lever("LeverLeft"), rig.lever("LeverRight"))
+        rig.tick(1)
+    rig.run(80, Reset=1)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
+    rig.run(1)
+    rig.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
+    changed_rig: Callable[..., Rig],
+) -> None:
+    machine = Machine(changed_rig)
+    rig = tripped(machine)
+    for _ in range(10):
+        rig.run(1)  # without the emergency stop
+    rig.run(5, Reset=1)
+    for _ in range(5):
+        machine.run(1, Reset=1)
+    assert rig.state() is State.TRIPPED
+    machine.run(1)
+    machine.run(1, Reset=1)
+    assert rig.state() is State.NEUTRAL_WAIT
+
+
+def test_what_trips_is_told_before_a_released_enable(rig: Rig) -> None:
+    rig.run(3)
+    rig.receive(Frame("crane", 0x200, False, bytes(2)))
+    rig.run(1, Enable=0)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")

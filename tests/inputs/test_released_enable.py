@@ -1,0 +1,82 @@
+"""An enable that was seen released: no fault, and not forgotten while frames cannot be trusted."""
+
+from collections.abc import Callable
+
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.shaping.states import State
+from tests.rigs.forwarder import SLOW_VALVE, Rig
+
+
+def test_a_released_enable_is_no_fault_of_the_frame(rig: Rig) -> None:
+    rig.run(10, Enable=0)
+    rig.run(10)
+    assert rig.count("InvalidSignals") == 0
+    assert rig.controller.counters.last_fault is FrameFault.NONE
+    rig.run(1, Enable=2)
+    assert rig.count("InvalidSignals") == 2  # both levers
+    assert rig.controller.counters.last_fault is FrameFault.INVALID_SIGNAL
+
+
+def test_a_release_counts_in_one_tick_only(rig: Rig) -> None:
+    rig.run(3)
+    rig.run(10, Slew=1000)
+    rig.receive(rig.lever(Enable=0))
+    rig.run(1)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
+    rig.run(1)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
+
+
+def test_of_a_lever_that_is_silent_since_then_silence_is_told(
+    changed_rig: Callable[..., Rig],
+) -> None:
+    """A valve of 200 ms on a lever that is old after 100 ms."""
+    rig = changed_rig(dbc=SLOW_VALVE)
+    rig.run(30)
+    assert rig.state() is State.READY
+    rig.run(1, Enable=0)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
+    for _ in range(10):
+        assert rig.reason() == "ENABLE_OFF"
+        rig.tick()
+    assert rig.reason() == "STICK_TIMEOUT"
+
+
+def test_a_reset_counts_with_the_enable_released(rig: Rig) -> None:
+    rig.run(3)
+    rig.run(10, Slew=1000)
+    rig.run(2, Enable=0)
+    assert rig.state() is State.TRIPPED
+    rig.run(1, Enable=0, Reset=1)
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
+
+
+def test_a_reset_needs_the_stick_in_neutral_with_the_enable_released_too(rig: Rig) -> None:
+    rig.run(3)
+    rig.run(10, Slew=1000)
+    rig.run(2, Enable=0, Slew=1000)
+    rig.run(1, Enable=0, Slew=1000, Reset=1)
+    assert rig.state() is State.TRIPPED
+
+
+def test_with_a_broken_stick_and_the_enable_released_a_trip_is_still_told(rig: Rig) -> None:
+    rig.run(3)
+    rig.receive(Frame("crane", 0x200, False, bytes(2)))
+    rig.run(1, Slew=32766, Enable=0)
+    assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")
+
+
+def test_it_stays_released_while_the_frames_after_it_cannot_be_trusted(rig: Rig) -> None:
+    """A counter that stands still says nothing new, and least of all that somebody enabled."""
+    rig.run(5)
+    rig.receive(rig.lever(Enable=0), rig.lever("LeverRight"))
+    rig.tick()
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
+    rig.counts["LeverLeft"] -= 1
+    frozen = rig.lever(Enable=1)
+    for _ in range(20):
+        rig.receive(frozen, rig.lever("LeverRight"))
+        rig.tick()
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
+    rig.run(1)
+    assert rig.state() is State.READY

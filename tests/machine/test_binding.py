@@ -1,0 +1,193 @@
+"""Deployment against DBC: what does not fit is one problem, with file and line."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from canshaper.controller.controller import Controller
+from tests.rigs.files import Machine
+
+VALVE = """VERSION ""
+
+BU_: A
+
+BO_ 1536 Valve: 2 A
+ SG_ Velocity : 0|8@1- (0.8,0) [-100|100] "%" A
+ SG_ AliveCounter : 8|8@1+ (1,0) [0|255] "" A
+
+BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
+BA_DEF_DEF_ "GenMsgCycleTime" 0;
+BA_ "GenMsgCycleTime" BO_ 1536 20;
+"""
+SHIPPED = (Path(__file__).parents[2] / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
+MESSAGES = ", ".join(sorted(re.findall(r"^BO_ \d+ (\w+)", SHIPPED, re.MULTILINE)))
+
+
+def test_the_shipped_machine_binds(machine: Machine) -> None:
+    deployment = machine.load()
+    assert {n: lever.key for n, lever in deployment.levers.items()} == {
+        "left": ("crane", 0x110, False),
+        "right": ("crane", 0x111, False),
+    }
+    assert [(a.period_ticks, a.status_ticks) for a in deployment.axes.values()] == [(1, 5)] * 3
+    assert deployment.status_ticks == 25
+    assert {a.valve.steps for a in deployment.axes.values()} == {125}
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        # names that are not there, with those that are
+        (
+            "message: LeverLeft",
+            "message: LeverLeeft",
+            f"levers.left.message: found 'LeverLeeft', messages of the DBC files are {MESSAGES}",
+        ),
+        (
+            "signal: Slew,",
+            "signal: Sleww,",
+            "axes.slew.stick.signal: found 'Sleww', signals of LeverLeft are"
+            " Slew, NearFar, Enable, AntiSwayOff, Reset, AliveCounter",
+        ),
+        (
+            "message: SlewCommand, signal: Velocity",
+            "message: SlewCommand, signal: Speed",
+            "axes.slew.valve.signal: found 'Speed', signals of SlewCommand are"
+            " Velocity, AliveCounter",
+        ),
+        (
+            "message: SlewStatus",
+            "message: Nothing",
+            f"axes.slew.status.message: found 'Nothing', messages of the DBC files are {MESSAGES}",
+        ),
+        ("bus: crane", "bus: boom", "levers.left.bus: found 'boom', buses are crane"),
+        ("lever: left", "lever: mid", "axes.slew.stick.lever: found 'mid', levers are left, right"),
+        ("enable: Enable", "enable: On", "levers.left.enable: found 'On', signals of LeverLeft"),
+        ("reset: Reset", "reset: R", "levers.left.reset: found 'R', signals of LeverLeft"),
+        ("anti_sway_off: AntiSwayOff", "anti_sway_off: O", "anti_sway_off: found 'O', signals"),
+        # one id for two purposes
+        (
+            "message: NearFarCommand",
+            "message: SlewCommand",
+            "axes.near_far.valve.signal: found 'Velocity', which is axes.slew.valve.signal already",
+        ),
+        (
+            "message: SlewStatus",
+            "message: LeverRight",
+            "axes.slew.status.message: LeverRight has the id 0x111 on bus crane, which is used"
+            " already by levers.right",
+        ),
+        # one signal for two purposes: each of these would move the axis by itself
+        (
+            "alive_counter: AliveCounter }",
+            "alive_counter: Velocity }",
+            "axes.slew.valve.signal: found 'Velocity', which is alive_counter already",
+        ),
+        (
+            "anti_sway_off: AntiSwayOff",
+            "anti_sway_off: Enable",
+            "levers.left.anti_sway_off: found 'Enable', which is enable already",
+        ),
+        # times and filters
+        (
+            "timeout_ms: 100",
+            "timeout_ms: 39",
+            "levers.left.timeout_ms: found 39, allowed is 40 ms or more: twice the cycle of"
+            " LeverLeft",
+        ),
+        (
+            "a1: 0.708, a2: 0.12",
+            "poles_rad_s: [-3, -51]",
+            "axes.slew.filter: pole is -51 rad/s, allowed is -50 to below 0 rad/s at a tick of"
+            " 0.02 s",
+        ),
+    ],
+)
+def test_what_the_dbc_does_not_have(machine: Machine, old: str, new: str, says: str) -> None:
+    line = machine.in_yaml(old, new)
+    (problem,) = [p for p in machine.problems() if says in p]
+    assert problem.startswith(f"machine.yaml:{line}: ")
+
+
+def test_one_name_gone_is_one_problem(machine: Machine) -> None:
+    machine.in_yaml("message: SlewCommand", "message: Slew")
+    machine.in_yaml("message: LeverRight", "message: Right")
+    assert [p.split(": ")[1] for p in machine.problems()] == [
+        "levers.right.message",
+        "axes.slew.valve.message",
+    ]
+
+
+def test_a_stick_that_is_the_enable_switch_too(machine: Machine) -> None:
+    machine.in_yaml("enable: Enable", "enable: Slew")
+    line = machine.in_yaml("signal: Slew,", "signal: Slew,")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.slew.stick.signal: found 'Slew', which is enable already"
+    ]
+
+
+def test_two_levers_that_are_one_message(machine: Machine) -> None:
+    line = machine.in_yaml("message: LeverRight", "message: LeverLeft")
+    assert machine.problems()[0] == (
+        f"machine.yaml:{line}: levers.right.message: LeverLeft has the id 0x110 on bus crane,"
+        " which is used already by levers.left"
+    )
+
+
+def test_a_lever_and_a_valve_of_one_id(machine: Machine) -> None:
+    machine.in_yaml("[machine.dbc]", "[machine.dbc, valve.dbc]")
+    line = machine.in_yaml("message: SlewCommand", "message: Valve")
+    (machine.directory / "valve.dbc").write_text(VALVE.replace("1536", "273"), encoding="cp1252")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.slew.valve.message: Valve has the id 0x111 on bus crane,"
+        " which is used already by levers.right"
+    ]
+
+
+def test_the_same_id_on_two_buses_or_extended_is_another_message(machine: Machine) -> None:
+    machine.in_yaml(
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
+        "  boom: { interface: socketcan, channel: vcan1 }",
+    )
+    machine.in_yaml("bus: crane, message: SlewCommand", "bus: boom, message: SlewCommand")
+    machine.dbc = machine.dbc.replace(" 513 ", " 2147484160 ")  # 0x200, extended
+    axes = machine.load().axes
+    assert axes["near_far"].valve_message.frame_id == axes["slew"].valve_message.frame_id == 0x200
+    assert axes["near_far"].valve_message.is_extended_frame
+
+
+def test_two_buses_on_one_channel(machine: Machine) -> None:
+    line = machine.in_yaml(
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n"
+        "  boom: { interface: socketcan, channel: vcan0, bitrate: 250000 }",
+    )
+    assert machine.problems() == [
+        f"machine.yaml:{line + 1}: buses.boom: has the channel vcan0 of bus crane"
+    ]
+
+
+def test_a_bus_that_is_no_multicast_is_not_shared(machine: Machine) -> None:
+    line = machine.in_yaml(
+        "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
+        "{ interface: socketcan, channel: vcan0, bitrate: 250000, network: true }",
+    )
+    assert machine.problems() == [
+        f"machine.yaml:{line}: buses.crane.network: found true with socketcan, allowed is it with"
+        " udp_multicast only"
+    ]
+
+
+def test_no_binding_problem_reaches_the_controller(machine: Machine) -> None:
+    Controller(machine.load())
+
+
+def test_an_age_limit_of_less_than_two_ticks_would_make_each_tick_a_standstill(
+    machine: Machine,
+) -> None:
+    machine.in_yaml("tick_ms: 20", "tick_ms: 50")
+    line = machine.in_yaml("timeout_ms: 100", "timeout_ms: 99")
+    says = "levers.left.timeout_ms: found 99, allowed is 100 ms or more: twice tick_ms"
+    assert [p for p in machine.problems() if p.endswith(says)] == [f"machine.yaml:{line}: {says}"]

@@ -1,0 +1,98 @@
+"""Load of a bus by its messages, beside the table of frame times and a hand-made bit stuffing."""
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from canshaper.machine.bus_load import longest_frame_bits
+from tests.rigs.files import Machine
+
+
+# us at 250 kbit/s and 1 Mbit/s, 8 bytes: 11-bit id 540 and 135, 29-bit id 640 and 160.
+@pytest.mark.parametrize(("extended", "bits"), [(False, 135), (True, 160)])
+def test_longest_frames_of_eight_bytes(extended: bool, bits: int) -> None:
+    assert longest_frame_bits(extended, 8) == bits
+
+
+@pytest.mark.parametrize(("extended", "stuffed", "other"), [(False, 34, 13), (True, 54, 13)])
+@pytest.mark.parametrize("length", range(9))
+def test_stuff_bits_are_as_many_as_a_worst_frame_has(
+    extended: bool, stuffed: int, other: int, length: int
+) -> None:
+    """Start to CRC is stuffed; after five equal bits one is put in, which begins the next run."""
+    bits = [0] * 5
+    while len(bits) < stuffed + 8 * length:
+        bits += [1 - bits[-1]] * 4
+    stuff = run = 0
+    last: int | None = None
+    for bit in bits[: stuffed + 8 * length]:
+        run, last = (run + 1, bit) if bit == last else (1, bit)
+        if run == 5:
+            stuff, run, last = stuff + 1, 1, 1 - bit
+    assert longest_frame_bits(extended, length) == stuffed + 8 * length + stuff + other
+
+
+def test_every_message_of_the_deployment_counts_and_no_other(machine: Machine) -> None:
+    deployment = machine.load()
+    load = deployment.load("crane")
+    assert load is not None
+    used = ("Lever", "Command", "Status", "Identity")
+    cycles = [
+        (m.length, m.cycle_time)
+        for m in deployment.messages.all()
+        if m.cycle_time and any(word in m.name for word in used)
+    ]
+    assert load.messages == len(cycles) == 10
+    bits = sum(longest_frame_bits(False, n) * 1000 / ms for n, ms in cycles)
+    assert load.share == pytest.approx(bits / 250_000)
+
+
+def test_of_two_buses_each_has_its_own_messages(machine: Machine) -> None:
+    machine.in_yaml(
+        "  crane: {", "  valves: { interface: virtual, channel: v, bitrate: 125000 }\n  crane: {"
+    )
+    machine.yaml = machine.yaml.replace("valve: { bus: crane", "valve: { bus: valves")
+    load = machine.load().load("valves")
+    assert load is not None
+    assert load.messages == 3
+    assert load.share == pytest.approx(3 * 50 * longest_frame_bits(False, 2) / 125_000)
+
+
+def test_check_tells_it_and_warns(machine: Machine) -> None:
+    check = ["check", str(machine.directory / "machine.yaml")]
+    machine.load()
+    told = CliRunner().invoke(app, check)
+    assert told.exit_code == 0
+    assert "% of 250 kbit/s" in told.output
+    assert "WARNING" not in told.output
+    machine.in_yaml("bitrate: 250000", "bitrate: 40000")
+    machine.load()
+    told = CliRunner().invoke(app, check)
+    assert told.exit_code == 0
+    assert "WARNING: above 50 %" in told.output
+    machine.in_yaml(", bitrate: 40000", "")
+    machine.load()
+    assert "load is not known" in CliRunner().invoke(app, check).output
+
+
+@pytest.mark.parametrize(("timeout", "fits"), [(60, True), (59, False)])
+def test_a_valve_hears_three_frames_within_its_timeout(
+    machine: Machine, timeout: int, fits: bool
+) -> None:
+    machine.yaml = machine.yaml.replace(
+        "Velocity, timeout_ms: 200", f"Velocity, timeout_ms: {timeout}"
+    )
+    if fits:
+        machine.load()
+        return
+    found = machine.problems()
+    assert len(found) == 3
+    assert (
+        "axes.slew.valve.timeout_ms: found 59, allowed is 60 ms or more: three cycles of"
+        " SlewCommand, so that two lost frames do not close it" in found[0]
+    )
+
+
+def test_a_valve_without_timeout_is_refused(machine: Machine) -> None:
+    machine.in_yaml("signal: Velocity, timeout_ms: 200", "signal: Velocity")
+    assert "axes.slew.valve.timeout_ms: missing: silence after which" in machine.problems()[0]

@@ -1,0 +1,76 @@
+"""CANopen in a deployment: what does not fit is one problem, with file and line."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.config.source import DeploymentError
+from canshaper.machine.binding import load_deployment
+from tests.rigs.canopen import DBC_FILE, ROOT, write_variant
+
+LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        (LAST_NODE, LAST_NODE.replace("0x22", "0x21"), "found 33, which is the node id of"),
+        (LAST_NODE, LAST_NODE.replace("0x22", "0x7E"), "found 126, which is the node id of node"),
+        ("node: lift\n", "node: lifft\n", "found 'lifft', nodes of bus crane are left, right"),
+        ("    node: right\n", "    node: wright\n", "found 'wright', nodes of bus crane"),
+        ("control: ControlWord\n        status: { bus: crane, message: Lift", "control: Nothing\n"
+         "        status: { bus: crane, message: Lift", "signals of LiftCommand are ControlWord"),
+        ("control: ControlWord\n        status: { bus: crane, message: Lift", "control: SetPoint\n"
+         "        status: { bus: crane, message: Lift", "found 'SetPoint', which is"),
+        ("message: LiftValve, signal: StatusWord, timeout_ms: 300",
+         "message: LiftValve, signal: StatusWord, timeout_ms: 150", "allowed is 200 ms or more"),
+        ("message: LiftValve, signal", "message: SlewValve,  signal",
+         "SlewValve has the id 0x1a0 on bus crane"),
+    ],
+)  # fmt: skip
+def test_problems_of_the_deployment_have_their_line(
+    tmp_path: Path, old: str, new: str, says: str
+) -> None:
+    file = write_variant(tmp_path, (old, new))
+    line = file.read_text()[: file.read_text().index(new)].count("\n") + 1
+    found = problems(file)
+    assert any(says in one for one in found), found
+    (told,) = (one for one in found if says in one)
+    number = int(told.split("machine.yaml:")[1].split(":")[0])
+    assert line <= number <= line + new.count("\n")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("SG_ SetPoint : 16|16@1- (0.006103515625,0) [-100|100]",
+         "SG_ SetPoint : 16|16@1- (0.0030518509475997192,0) [-100|100]",
+         "SetPoint has 32767 steps to full command; a set point of CiA 408 has 16384"),
+        ("SG_ SetPoint : 16|16@1- (0.006103515625,0) [-100|100]",
+         "SG_ SetPoint : 16|16@1- (0.006103515625,0.006103515625) [-100|100]",
+         "SetPoint has the offset"),
+        ("SG_ ControlWord : 0|16@1+", "SG_ ControlWord : 0|3@1+", "ControlWord has 3 bits"),
+        ("SG_ StatusWord : 0|16@1+", "SG_ StatusWord : 0|3@1+", "StatusWord has 3 bits"),
+        ("BO_ 1696 SlewStatus", "BO_ 1586 SlewStatus", "SlewStatus has the id 0x632, which is one "
+         "of SDO in CANopen"),
+        ("BO_ 400 JoystickLeft", "BO_ 1809 JoystickLeft", "which is one of heartbeat in CANopen"),
+    ],
+)  # fmt: skip
+def test_problems_of_the_dbc(tmp_path: Path, old: str, new: str, says: str) -> None:
+    dbc = (ROOT / "dbc" / DBC_FILE).read_text()
+    assert old in dbc
+    number, other = old.split()[1], new.split()[1]
+    dbc = dbc.replace(old, new)
+    if old.startswith("BO_"):
+        dbc = dbc.replace(f"BO_ {number} ", f"BO_ {other} ").replace(
+            f"VAL_ {number} ", f"VAL_ {other} "
+        )
+    (tmp_path / "machine.dbc").write_text(dbc)
+    file = write_variant(tmp_path, (str(ROOT / "dbc" / DBC_FILE), "machine.dbc"))
+    assert any(says in one for one in problems(file)), problems(file)
+
+
+def problems(file: Path) -> list[str]:
+    with pytest.raises(DeploymentError) as caught:
+        load_deployment(file)
+    return [str(problem) for problem in caught.value.problems]

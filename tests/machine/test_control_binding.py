@@ -1,0 +1,94 @@
+"""What a deployment lets be changed, against its axes."""
+
+import pytest
+
+from tests.rigs.files import Machine
+
+STATUS = "status: { bus: crane, message: ShaperStatus }\n"
+
+
+def adjustable(machine: Machine, text: str) -> int:
+    """Put in a control section; the line of its first entry."""
+    return 3 + machine.in_yaml(STATUS, f"{STATUS}control:\n  adjustable:\n    {text}\n")
+
+
+def test_numbers_of_sway_filter_and_limits_may_be_changed(machine: Machine) -> None:
+    keys = "sway.period_s: [1.8, 3]", "filter.a2: [0.05, 0.2]", "limits.max_pct: [10, 100]"
+    adjustable(machine, "\n    ".join(f"axes.slew.{key}" for key in keys))
+    control = machine.load().config.control
+    assert control is not None
+    assert control.adjustable["axes.slew.sway.period_s"] == [1.8, 3.0]
+    path = machine.load().path
+    assert str(control.path(path)) == "/run/canshaper/machine/control.sock"
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("tick_ms: [1, 50]", "found no key of an axis; allowed is axes.AXIS.SECTION.NAME"),
+        ("axes.boom.sway.period_s: [1, 2]", "found axis 'boom', axes are slew, near_far, lift"),
+        ("axes.slew.sway.length_m: [1, 2]", "found no number of that name in the axis' sway, "),
+        ("axes.slew.valve.timeout_ms: [1, 2]", "found no number of that name"),
+        ("axes.lift.sway.period_s: [1, 2]", "found no number of that name"),
+        ("axes.slew.filter.kind: [1, 2]", "found no number of that name"),
+        ("axes.slew.limits.allow_reverse: [0, 1]", "found no number of that name"),
+        ("axes.slew.limits.tail_s: [0, 5]", "adjustable limits are max_pct, rise_per_s, fall_"),
+        ("axes.slew.sway.period_s: [2.4, 3]", "and the number itself is 2.356, outside of it"),
+        ("axes.slew.sway.period_s: [1, 13]", "found the end 13, which is out of the range"),
+        ("axes.slew.limits.max_pct: [0, 100]", "found the end 0, which is out of the range"),
+    ],
+)
+def test_what_cannot_be_changed_is_told(machine: Machine, text: str, why: str) -> None:
+    line = adjustable(machine, text)
+    (problem,) = machine.problems()
+    key = text.partition(":")[0]
+    assert problem.startswith(f"machine.yaml:{line}: control.adjustable.{key}: ")
+    assert why in problem
+
+
+def test_a_filter_without_sway_data_stays(machine: Machine) -> None:
+    machine.in_yaml(
+        "filter: { kind: off } # lifting excites no sway",
+        "filter: { kind: first_order, time_constant_s: 0.2 }",
+    )
+    adjustable(machine, "axes.lift.filter.time_constant_s: [0.1, 1]")
+    assert "axis lift has no sway data; adjustable are its limits" in machine.problems()[0]
+
+
+def test_an_axis_with_a_choice_of_filters_stays(machine: Machine) -> None:
+    machine.in_yaml(
+        STATUS,
+        f"{STATUS}feel: {{ bus: crane, message: LeverRight, timeout_ms: 100,\n"
+        "  signal: Rotate, codes: { calm: 1 } }\n",
+    )
+    machine.in_yaml(
+        "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n",
+        "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
+        "    feels: { calm: { filter: { kind: gff, a1: 0.9, a2: 0.2 } } }\n",
+    )
+    adjustable(machine, "axes.slew.filter.a1: [0.6, 1]")
+    assert any("axis slew has sets or feels" in problem for problem in machine.problems())
+
+
+@pytest.mark.parametrize(
+    ("text", "why"),
+    [
+        ("axes.slew.sway.period_s: [3, 1.8]", "found 3 to 1.8 for axes.slew.sway.period_s"),
+        ("axes.slew.sway.period_s: [3]", "allowed are 2 or more entries"),
+        ("axes.slew.sway.period_s: 3", "allowed is a list"),
+    ],
+)
+def test_a_range_is_two_numbers_in_order(machine: Machine, text: str, why: str) -> None:
+    adjustable(machine, text)
+    assert why in machine.problems()[0]
+
+
+def test_the_mode_is_octal_and_in_quotes(machine: Machine) -> None:
+    for mode, good in (('"0660"', True), ("0660", False), ('"rw"', False), ('"0999"', False)):
+        text = f"control: {{ mode: {mode}, adjustable: {{ axes.slew.sway.period_s: [2, 3] }} }}\n"
+        machine.in_yaml(STATUS, STATUS + text)
+        if good:
+            assert machine.load().config.control
+        else:
+            assert "control.mode: " in machine.problems()[0]
+        machine.in_yaml(text, "")

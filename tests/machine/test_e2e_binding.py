@@ -1,0 +1,277 @@
+"""Protection of every message of a deployment: what is bound, and every problem with its line."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.checksums import Checksum
+from canshaper.codec.e2e import Profile1, Profile2
+from canshaper.codec.protection import Protection
+from tests.machine.protected_machine import (
+    IDS,
+    LEVER,
+    RADIUS,
+    STATUS,
+    VALVES,
+    line_of,
+    load,
+    problems,
+)
+
+VALVE_OF = {
+    "slew": "signal: Slew\n      timeout_ms",
+    "near_far": "signal: NearFar\n      timeout_ms",
+}
+
+
+def test_every_message_has_its_protection(tmp_path: Path) -> None:
+    deployment = load(tmp_path)
+    lever = deployment.levers["hand"].protection
+    assert (lever.counter, lever.counts) == (None, 15)
+    assert isinstance(lever.check, Profile1)
+    slew, near_far = deployment.axes.values()
+    assert slew.valve.message is near_far.valve.message
+    valves = slew.valve.message.sender.protection
+    assert (valves.counts, type(valves.check)) == (16, Profile2)
+    assert slew.radial is not None
+    assert slew.radial.radius is not None
+    assert isinstance(slew.radial.radius.protection.check, Profile1)
+    assert deployment.emergency_stop is not None
+    assert deployment.emergency_stop.protection.counts == 15
+    assert deployment.status is not None
+    assert deployment.status.sender.protection == Protection(
+        "Alive", 8, Checksum("crc8_sae_j1850", 6)
+    )
+
+
+def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
+    """The upper half of byte 1 is State in the status, and Low in the valve message."""
+    assert not problems(tmp_path)
+    assert not problems(tmp_path, ("enable: Enable", "enable: Top"))
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        # the section itself
+        (LEVER, "{ profile: p05, data_id: 1 }", ".profile: found 'p05', allowed is 'p01' or 'p02'"),
+        (LEVER, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
+        (
+            LEVER,
+            "{ profile: p01, data_id: 1 }",
+            ": found data_id; profile p01 needs data_id and data_id_mode",
+        ),
+        (
+            LEVER,
+            "{ profile: p01, data_id_mode: low }",
+            ": found data_id_mode; profile p01 needs data_id and data_id_mode",
+        ),
+        (LEVER, "{ profile: p02 }", ": found no data ID; profile p02 needs data_ids"),
+        (
+            LEVER,
+            "{ profile: p02, data_id: 1, data_id_mode: low }",
+            ": found data_id and data_id_mode; profile p02 needs data_ids",
+        ),
+        (
+            LEVER,
+            f"{{ profile: p01, data_id: 1, data_id_mode: low, data_ids: {IDS} }}",
+            ": found data_id and data_id_mode and data_ids; profile p01 needs data_id and",
+        ),
+        (
+            LEVER,
+            f"{{ profile: p02, data_ids: {IDS[:15]} }}",
+            ".data_ids: found [16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30],"
+            " allowed are 16 or more entries",
+        ),
+        (
+            LEVER,
+            f"{{ profile: p02, data_ids: {[*IDS, 1]} }}",
+            "allowed are 16 entries at most",
+        ),
+        (
+            LEVER,
+            f"{{ profile: p02, data_ids: {[*IDS[:15], 256]} }}",
+            ".data_ids.15: found 256, allowed is a whole number, 0 to 255",
+        ),
+        (
+            "data_id: 0x123",
+            "data_id: 0x10000",
+            ".data_id: found 65536, allowed is a whole number, 0 to 65535",
+        ),
+        ("data_id: 0x123", "data_id: -1", ".data_id: found -1, allowed is a whole number"),
+        (
+            "data_id_mode: both",
+            "data_id_mode: high",
+            ".data_id_mode: found 'high', allowed is 'both', 'low', 'alternating' or 'nibble'",
+        ),
+        (
+            "0x123, data_id_mode: both",
+            "0x1234, data_id_mode: nibble",
+            ": data_id is 0x1234, allowed is up to 0xfff in mode nibble",
+        ),
+        (
+            "data_id_mode: both",
+            "data_id_mode: both, offset: 8",
+            ".offset: unknown key; allowed are profile, data_id, data_id_mode, data_ids",
+        ),
+    ],
+)
+def test_what_a_header_may_not_say(tmp_path: Path, old: str, new: str, says: str) -> None:
+    (problem,) = problems(tmp_path, (old, new))
+    assert problem.startswith(f"machine.yaml:{line_of('e2e:')}: levers.hand.e2e")
+    assert says in problem
+
+
+HEADER = "its header takes the first 12 bits of"
+
+
+@pytest.mark.parametrize(
+    ("changes", "at", "says"),
+    [
+        # a field of the header that serves something else
+        (
+            [("enable: Enable", "enable: Seq")],
+            "e2e:",
+            f"levers.hand.e2e: {HEADER} Lever, where Seq lies, which is enable",
+        ),
+        (
+            [("enable: Enable", "enable: Top"), ("both", "nibble")],
+            "e2e:",
+            "levers.hand.e2e: its header takes the first 16 bits of Lever, where Top lies",
+        ),
+        (
+            [
+                (
+                    "signal: Slew }",
+                    "signal: Crc, flags: { neutral: Top, negative: Seq, positive: Alive } }",
+                )
+            ],
+            "stick:",
+            "axes.slew.stick.signal: found 'Crc', which is in the header of e2e already",
+        ),
+        (
+            [("message: TipPosition", "message: Short")],
+            f"e2e: {RADIUS}",
+            "axes.slew.radial_compensation.radius.e2e: Short has 1 bytes, allowed are 2 or more",
+        ),
+        (
+            [(STATUS, STATUS.replace("alternating", "nibble"))],
+            f"e2e: {STATUS}",
+            "axes.slew.status.e2e: its header takes the first 16 bits of SlewStatus, where State"
+            " lies, which is a signal of the status",
+        ),
+        # both kinds at once
+        (
+            [("qualify: 2", "alive_counter: Alive")],
+            "qualify: 2",
+            "levers.hand.alive_counter: found besides e2e, which has its own; allowed is one",
+        ),
+        (
+            [("qualify: 2", "checksum: { signal: Alive, kind: xor }")],
+            "qualify: 2",
+            "levers.hand.checksum: found besides e2e, which has its own; allowed is one",
+        ),
+        # the counter of the header
+        (
+            [("qualify: 2", "alive_max_step: 8")],
+            "qualify: 2",
+            "levers.hand.alive_max_step: is 8, allowed is up to 7: its counter has 15 values",
+        ),
+        # axes that share a message
+        (
+            [(f"e2e: {VALVES}", "alive_counter: Alive")],
+            "",
+            "differs from that of the other axes of Valves, allowed is the same",
+        ),
+        (
+            [(f"e2e: {VALVES}", VALVES.replace("16, 17", "17, 16").join(("e2e: ", "")))],
+            "",
+            "axes.near_far.valve.e2e: differs from that of the other axes of Valves",
+        ),
+        # the other kind, of messages that are sent
+        (
+            [("alive_counter: Alive", "alive_counter: LastFault")],
+            "alive_counter",
+            "status.alive_counter: found 'LastFault', which is a signal of the status already",
+        ),
+        (
+            [("signal: Check", "signal: Reserve")],
+            "checksum:",
+            "status.checksum.signal: found 'Reserve', signals of ShaperStatus are LastFault,",
+        ),
+        (
+            [("signal: Check", "signal: Alive")],
+            "checksum:",
+            "status.checksum.signal: found 'Alive', which is alive_counter already",
+        ),
+        (
+            [("signal: Check", "signal: UnknownId")],
+            "checksum:",
+            "status.checksum.signal: found 'UnknownId', which is a signal of the status already",
+        ),
+        (
+            [("alive_counter: Alive", "alive_max_step: 2")],
+            "alive_counter",
+            "status.alive_max_step: unknown key; allowed are bus, message, alive_counter,",
+        ),
+    ],
+)
+def test_one_fault_is_told_with_its_line(
+    tmp_path: Path, changes: list[tuple[str, str]], at: str, says: str
+) -> None:
+    found = problems(tmp_path, *changes)
+    start = f"machine.yaml:{line_of(at)}: " if at else "machine.yaml:"
+    assert any(p.startswith(start) and says in p for p in found), found
+
+
+@pytest.mark.parametrize(
+    ("message", "overlaps"), [("Half", True), ("Big", True), ("Beside", False)]
+)
+def test_one_bit_of_a_signal_in_the_header_is_too_many(
+    tmp_path: Path, message: str, overlaps: bool
+) -> None:
+    """In either byte order."""
+    found = problems(tmp_path, ("message: TipPosition", f"message: {message}"))
+    where = f"machine.yaml:{line_of(f'e2e: {RADIUS}')}: axes.slew.radial_compensation.radius.e2e: "
+    says = f"{HEADER} {message}, where Radius lies, which is signal"
+    assert found == ([where + says] if overlaps else [])
+
+
+@pytest.mark.parametrize(
+    ("protection", "says"),
+    [
+        (
+            "checksum: { signal: Slew, kind: xor }",
+            "signal: found 'Slew', which is checksum already",
+        ),
+        ("alive_counter: NearFar", "alive_counter: NearFar has a sign, allowed is an unsigned"),
+        ("checksum: { signal: Low, kind: xor }", "Low is no unsigned byte of its own"),
+        (
+            f"e2e: {LEVER.replace('both', 'nibble')}\n"
+            "      direction: { signal: Low, neutral: 0, positive: 1, negative: 2 }",
+            "direction.signal: found 'Low', which is in the header of e2e already",
+        ),
+    ],
+)
+def test_a_valve_message_whose_protection_is_in_the_way(
+    tmp_path: Path, protection: str, says: str
+) -> None:
+    old = f"e2e: {VALVES}"
+    found = problems(tmp_path, (old, protection), (old, protection))
+    assert any(says in p for p in found), found
+
+
+def test_a_counter_and_checksum_on_a_shared_valve_message(tmp_path: Path) -> None:
+    old, new = (
+        f"e2e: {VALVES}",
+        "alive_counter: Alive\n      checksum: { signal: Check, kind: sum }",
+    )
+    axes = load(tmp_path, (old, new), (old, new)).axes
+    message = axes["slew"].valve.message
+    assert message.sender.protection == Protection("Alive", 32, Checksum("sum", 5))
+    counts = []
+    for _ in range(40):
+        data = message.frame().data
+        counts.append(data[4] & 0x1F)
+        assert data[5] == sum(data[:5]) & 0xFF
+    assert counts == [(n + 1) % 32 for n in range(40)]

@@ -1,0 +1,68 @@
+"""A DBC file of a whole machine: as many messages as there are, and a deployment of a few."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.database import DbcFile
+from tests.hostile.inputs import with_dbc
+from tests.hostile.run import run
+from tests.machine.large_dbc import large
+from tests.rigs.files import ROOT, Machine
+
+COUNT = 5000
+MOST_MB = 80
+
+
+@pytest.fixture(scope="module")
+def text() -> str:
+    return large(COUNT)
+
+
+def test_a_deployment_starts_in_little_memory(text: str) -> None:
+    """benchmarks/large_dbc.py shows what cantools takes for all of them."""
+    ran = run(with_dbc("a.dbc", text))
+    assert ran.code == 0, ran.text
+    assert "not used" not in ran.text
+    assert ran.peak_mb < MOST_MB
+
+
+def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
+    few = {m.name for m in machine.load().messages.all()}
+    machine.dbc = text
+    messages = machine.load().messages
+    assert {m.name for m in messages.all()} == few
+    assert len(messages.ids()) == COUNT + 15
+    assert (0x0CF00000 + COUNT - 1, True) in messages.ids()
+
+
+def test_a_fault_is_at_its_line(machine: Machine, text: str) -> None:
+    machine.dbc = text
+    line = machine.in_dbc("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft: 1")
+    assert line > COUNT * 10
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: The signal")
+    machine.dbc = text
+    machine.in_dbc("BO_ 512 20;", "BO_ 512 50;")
+    line = machine.in_dbc("BO_ 512 Slew", "BO_ 512 Slew")
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{line}: SlewCommand: has GenMsgCycleTime 50 ms")
+    machine.dbc = text
+    line = machine.in_dbc("VAL_ 272", "VAL_ 272 1")
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: Invalid")
+
+
+@pytest.mark.parametrize(
+    "path",
+    [p for p in sorted((ROOT / "config").glob("*.yaml")) if not p.name.startswith("crane-")],
+    ids=lambda path: path.name,
+)
+def test_each_message_that_a_deployment_names_is_parsed_at_once(
+    path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.delattr(DbcFile, "read")
+    deployment = load_deployment(path)
+    used = {m.name for messages in deployment.on_bus.values() for m in messages}
+    assert {m.name for m in deployment.messages.all()} == used

@@ -1,0 +1,114 @@
+"""Stopping distances of a file: speed of the tip, stated bound, and what has to be stated."""
+
+import pytest
+
+from canshaper.config.schema import AxisConfig
+from canshaper.machine.stopping import FullSpeed, allowed_m, full_speed, unstated
+from tests.rigs.files import Machine
+
+SLEWING = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
+SWAY = "    sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
+RADIAL = "    radial_compensation: { axis: near_far, full_speed_rad_s: 0.4, %s }\n"
+RADIUS = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200 }"
+STATED = ", stop_distance_m: 200"  # as the machine of these tests has it, slew first
+
+
+def slew(machine: Machine) -> AxisConfig:
+    return machine.load().axes["slew"].config
+
+
+def test_an_axis_that_slews_has_its_speed_at_the_largest_radius(machine: Machine) -> None:
+    assert full_speed(slew(machine)) == FullSpeed(0.5 * 9.6, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("radius", "speed_m_s"), [("radius_m: 6", 0.4 * 6.0), (RADIUS, 1.5)], ids=["fixed", "measured"]
+)
+def test_without_it_what_the_compensation_says_counts(
+    machine: Machine, radius: str, speed_m_s: float
+) -> None:
+    machine.in_yaml(SLEWING, "")
+    machine.in_yaml(SWAY, SWAY + RADIAL % radius)
+    assert full_speed(slew(machine)) == FullSpeed(pytest.approx(speed_m_s), 0.4)
+
+
+def test_else_the_speed_is_that_of_the_sway(machine: Machine) -> None:
+    machine.in_yaml(SLEWING, "")
+    axes = machine.load().axes
+    assert full_speed(axes["slew"].config) == FullSpeed(1.5, None)
+    assert full_speed(axes["lift"].config) == FullSpeed(None, None)
+    assert allowed_m(axes["lift"].config, timeout_ms=100, period_s=0.02) is None
+
+
+def test_two_angular_speeds_have_to_be_the_same(machine: Machine) -> None:
+    machine.in_yaml(SWAY, SWAY + RADIAL % "radius_m: 6")
+    assert machine.problems() == [
+        "machine.yaml:30: axes.slew: full_speed_rad_s is 0.5 in slewing and 0.4 in"
+        " radial_compensation; allowed is the same in both"
+    ]
+
+
+def test_allowed_is_the_speed_times_what_the_limits_allow(machine: Machine) -> None:
+    # 20 ms until it is seen, tail_s of 2 s and half a tick of rounding, 0.1 s to fall
+    assert allowed_m(slew(machine), timeout_ms=100, period_s=0.02) == pytest.approx(4.8 * 2.13)
+
+
+@pytest.mark.parametrize(
+    ("stated", "good"), [("10.22", False), ("10.23", True), ("11", True)], ids=str
+)
+def test_a_stated_distance_is_a_bound(machine: Machine, stated: str, good: bool) -> None:
+    line = machine.in_yaml(STATED, f", stop_distance_m: {stated}")
+    if good:
+        assert machine.load().axes["slew"].config.limits.stop_distance_m == float(stated)
+        return
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.slew.limits.stop_distance_m: found 10.22 m; max_pct, tail_s,"
+        " stop_s, fall_per_s and the speed of the tip allow 10.23 m"
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new"),
+    [
+        ("tail_s: 2.0", "tail_s: 2.1"),
+        ("fall_per_s: 5", "fall_per_s: 3"),
+        ("largest_radius_m: 9.6", "largest_radius_m: 10"),
+        ("full_speed_rad_s: 0.5", "full_speed_rad_s: 0.6"),
+        ("timeout_ms: 100", "timeout_ms: 180"),
+    ],
+)
+def test_everything_that_lengthens_a_stop_is_seen(machine: Machine, old: str, new: str) -> None:
+    machine.in_yaml(STATED, ", stop_distance_m: 10.23")
+    machine.load()
+    machine.in_yaml(old, new)
+    (problem,) = machine.problems()
+    assert "axes.slew.limits.stop_distance_m: found 10.23 m" in problem
+
+
+def test_a_distance_of_an_axis_without_a_speed_says_nothing(machine: Machine) -> None:
+    line = machine.in_yaml("stop_s: 0.5", "stop_s: 0.5, stop_distance_m: 2")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.lift.limits.stop_distance_m: found 2 m, and no speed of the"
+        " tip: it needs the section sway or slewing"
+    ]
+
+
+def test_a_long_way_has_to_be_stated(machine: Machine) -> None:
+    machine.in_yaml(STATED, "")
+    found = list(unstated(machine.load()))
+    assert found == [
+        (
+            ("axes", "slew", "limits", "stop_distance_m"),
+            "missing: to stop, the limits allow 10.23 m, which is more than 2 m; where that is"
+            " meant, state stop_distance_m: 10.23",
+        )
+    ]
+
+
+def test_a_short_way_need_not_be_stated(machine: Machine) -> None:
+    machine.in_yaml(STATED, "")
+    machine.in_yaml(STATED, "")
+    machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 1.8")  # 1.92 m
+    assert [place[1] for place, _ in unstated(machine.load())] == ["near_far"]  # 2.13 m
+    machine.in_yaml("full_speed_m_s: 1.0", "full_speed_m_s: 0.93")
+    assert list(unstated(machine.load())) == []

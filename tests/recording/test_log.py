@@ -1,0 +1,393 @@
+"""Every format gives the same frames; what is wrong with a log is told with its place."""
+
+import gzip
+import tracemalloc
+from itertools import islice
+from pathlib import Path
+
+import can
+import pytest
+
+from canshaper.recording.log import CutOffError, LogError, LogFile, TimedFrame, read_log
+from tests.recording.writing import messages, written
+
+FRAMES = [
+    TimedFrame(1_000_000_000, "1", 0x110, False, bytes(range(8))),
+    TimedFrame(1_000_250_000, "1", 0x110, True, b"\x01"),
+    TimedFrame(1_019_999_000, "2", 0x1ABCDEF0, True, b""),
+    TimedFrame(1_020_000_000, "1", 0x7FF, False, b"\xff\x00\xfe"),
+    TimedFrame(2_500_001_000, "2", 0x0, False, b"\x80" * 8),
+]
+LINES = [
+    "(1.000000) can0 110#0001020304050607\n",
+    "(1.000250) can0 00000110#01\n",
+    "(1.019999) can1 1ABCDEF0#\n",
+    "(1.020000) can0 7FF#FF00FE\n",
+    "(2.500001) can1 000#8080808080808080\n",
+]
+
+
+def log(tmp_path: Path, *lines: str, name: str = "a.log") -> Path:
+    path = tmp_path / name
+    path.write_text("".join(lines), encoding="utf-8", newline="")
+    return path
+
+
+def prefix(path: Path) -> tuple[list[TimedFrame], LogError | None]:
+    """Frames of a log until it ends or is wrong."""
+    frames: list[TimedFrame] = []
+    try:
+        frames.extend(read_log(path))  # keeps what came before the error
+    except LogError as error:
+        return frames, error
+    return frames, None
+
+
+def error_of(path: Path) -> str:
+    found = prefix(path)[1]
+    assert found is not None
+    return str(found)
+
+
+# -- formats -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("suffix", "first"), [("log", 0), ("asc", 1), ("blf", 1), ("csv", 0)])
+def test_every_format_gives_the_frames_that_were_written(
+    tmp_path: Path, suffix: str, first: int
+) -> None:
+    path = written(tmp_path / f"drive.{suffix}", messages(FRAMES, first))
+    wanted = FRAMES
+    if suffix == "log":
+        wanted = [f._replace(channel=f"can{f.channel}") for f in FRAMES]
+    if suffix == "csv":
+        wanted = [f._replace(channel="") for f in FRAMES]
+    if suffix in ("asc", "blf"):  # python-can's begin with their first frame
+        wanted = [f._replace(time_ns=f.time_ns - FRAMES[0].time_ns) for f in FRAMES]
+    assert list(read_log(path)) == wanted
+
+
+@pytest.mark.parametrize("suffix", ["log", "asc", "blf", "csv"])
+def test_a_packed_log_gives_the_same(tmp_path: Path, suffix: str) -> None:
+    path = written(tmp_path / f"drive.{suffix}", messages(FRAMES))
+    packed = tmp_path / f"other.{suffix}.gz"
+    packed.write_bytes(gzip.compress(path.read_bytes()))
+    assert list(read_log(packed)) == list(read_log(path))
+
+
+def test_mf4(tmp_path: Path) -> None:
+    frames = [f._replace(time_ns=f.time_ns + 1_763_000_000 * 10**9) for f in FRAMES]
+    path = tmp_path / "drive.mf4"
+    try:
+        written(path, messages(frames))
+    except NotImplementedError:
+        path.write_bytes(b"MDF     4.10")
+        assert "need asammdf, which is missing: pip install asammdf" in error_of(path)
+        return
+    assert list(read_log(path)) == frames
+
+
+def test_candump_as_it_stands(tmp_path: Path) -> None:
+    assert list(read_log(log(tmp_path, *LINES))) == [
+        f._replace(channel=f"can{int(f.channel) - 1}") for f in FRAMES
+    ]
+
+
+def test_candump_of_python_can_with_directions_and_of_nanoseconds(tmp_path: Path) -> None:
+    path = log(tmp_path, "(7.000001) vcan0 110#0A0b R\n", "(7.123456789) vcan0 110# T\n")
+    assert [f.time_ns for f in read_log(path)] == [7_000_001_000, 7_123_456_789]
+
+
+def test_times_are_exact_at_the_date_of_today(tmp_path: Path) -> None:
+    path = log(tmp_path, "(1763750000.249713) can0 110#\n", "(1763750000.249714) can0 110#\n")
+    assert [f.time_ns for f in read_log(path)] == [
+        1_763_750_000_249_713_000,
+        1_763_750_000_249_714_000,
+    ]
+    start = 1_763_750_000_000_000_000
+    frames = [f._replace(time_ns=start + i * 10_001_000) for i, f in enumerate(FRAMES)]
+    blf = written(tmp_path / "a.blf", messages(frames))
+    # The writer had floats; the reader adds no error of its own.
+    assert [round(f.time_ns, -3) for f in read_log(blf)] == [f.time_ns for f in frames]
+
+
+ASC = """date Sat Nov 21 10:15:30.400 am 2026
+base hex  timestamps absolute
+internal events logged
+// version 13.0.0
+Begin Triggerblock Sat Nov 21 10:15:30.400 am 2026
+   0.000000 Start of measurement
+   0.100123 1  110             Rx   d 2 0A 0B  Length = 234000 BitCount = 120 ID = 272
+   0.200000 1  1CFE3506x       Tx   d 1 FF
+   0.200000 1  1CFE3506x       TxRq d 1 FF
+   0.250000 1  ErrorFrame
+   0.255000 CANFD   2 Rx ErrorFrame   Not Acknowledge error, dominant error flag   fffe c7 31ca Rx
+   0.260000 2  7FF             Rx   r 3
+   0.300000 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.00%
+   0.300000 CANFD   2 Rx        111                       Lever 0 0 8  3 01 02 03   0    0   0 0 0 0
+   0.310000 CANFD   2 Rx        112                           0 0 2  2 01 02   120000  130   0 0 0 0
+   0.320000 CANFD   2 Rx        113                           1 0 2  2 01 02   120000  130   3000 0
+   0.330000 CANFD   2 Rx        113                  1 0 9 12 1 2 3 4 5 6 7 8 9 A B C  120 130 3000
+   0.400000 CAN 1 Status:chip status error active
+End TriggerBlock
+"""
+
+
+def test_asc_of_vectors_tools(tmp_path: Path) -> None:
+    file = LogFile(log(tmp_path, ASC, name="a.asc"))
+    assert list(file) == [
+        TimedFrame(100_123_000, "1", 0x110, False, b"\x0a\x0b"),
+        TimedFrame(200_000_000, "1", 0x1CFE3506, True, b"\xff"),
+        TimedFrame(300_000_000, "2", 0x111, False, b"\x01\x02\x03"),
+        TimedFrame(310_000_000, "2", 0x112, False, b"\x01\x02"),
+    ]
+    assert file.left_out == {"error": 2, "remote": 1, "CAN FD": 2}
+
+
+def test_asc_with_decimal_numbers(tmp_path: Path) -> None:
+    path = log(tmp_path, "base dec  timestamps absolute\n", "1.5 1 272 Rx d 2 10 255\n")
+    path = path.rename(path.with_suffix(".asc"))
+    assert list(read_log(path)) == [TimedFrame(1_500_000_000, "1", 272, False, b"\x0a\xff")]
+
+
+def test_what_is_no_classical_data_frame_is_left_out_and_counted(tmp_path: Path) -> None:
+    others = [
+        "(1.1) can0 20000080#0000000000000000\n",  # the error class is no id
+        "(1.1) can0 20000004#0004000000000000\n",
+        "(1.2) can0 110#R\n",
+        "(1.2) can0 110#R8\n",
+        "(1.3) can0 110##1AABB\n",
+    ]
+    file = LogFile(log(tmp_path, LINES[0], *others))
+    assert len(list(file)) == 1
+    assert file.left_out == {"error": 2, "remote": 2, "CAN FD": 1}
+    binary = [
+        can.Message(timestamp=1.0, arbitration_id=0x110, data=b"\x01"),
+        can.Message(timestamp=1.1, is_error_frame=True),
+        can.Message(timestamp=1.2, arbitration_id=0x110, is_remote_frame=True),
+        can.Message(timestamp=1.3, arbitration_id=0x110, is_fd=True, data=bytes(12)),
+    ]
+    file = LogFile(written(tmp_path / "b.blf", binary))
+    assert len(list(file)) == 1
+    assert file.left_out == {"error": 1, "remote": 1, "CAN FD": 1}
+    file = LogFile(written(tmp_path / "b.csv", binary[:3]))
+    assert len(list(file)) == 1
+    assert file.left_out == {"error": 1, "remote": 1}
+
+
+# -- logs that are wrong -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("suffix", ["log", "asc", "csv"])
+def test_a_text_cut_off_anywhere_gives_whole_frames_and_says_so(
+    tmp_path: Path, suffix: str
+) -> None:
+    whole = written(tmp_path / f"a.{suffix}", messages(FRAMES))
+    content, frames = whole.read_bytes(), list(read_log(whole))
+    cut = tmp_path / f"cut.{suffix}"
+    for size in range(1, len(content)):
+        cut.write_bytes(content[:size])
+        found, error = prefix(cut)
+        assert found == frames[: len(found)]
+        if content[size - 1] != ord("\n"):
+            assert isinstance(error, CutOffError), content[:size]
+            assert f"{cut}:" in str(error)
+        elif found:
+            assert error is None
+
+
+def test_a_blf_cut_off_anywhere_gives_whole_frames_and_says_so(tmp_path: Path) -> None:
+    whole = tmp_path / "a.blf"
+    with can.BLFWriter(whole, compression_level=0) as writer:
+        writer.max_container_size = 100
+        later = [f._replace(time_ns=f.time_ns + i * 10**10) for i in range(3) for f in FRAMES]
+        for message in messages(later):
+            writer.on_message_received(message)
+    content, frames = whole.read_bytes(), prefix(whole)[0]
+    cut = tmp_path / "cut.blf"
+    ends = 0
+    for size in range(144, len(content)):
+        cut.write_bytes(content[:size])
+        found, error = prefix(cut)
+        assert found == frames[: len(found)]
+        ends += not isinstance(error, CutOffError)
+    # Only just behind one of its parts is it whole; a byte of padding may still follow that.
+    assert ends <= 4 * len(content) // 100
+
+
+def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
+    path = tmp_path / "a.log.gz"
+    content = gzip.compress("".join(LINES * 1).encode())
+    path.write_bytes(content[:-4])
+    found, error = prefix(path)
+    assert isinstance(error, CutOffError)
+    assert len(found) == len(FRAMES)
+    path.write_bytes(content[:20] + b"\x00\xff\x00" + content[23:])
+    assert "damaged" in error_of(path) or "found" in error_of(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "text"),
+    [
+        ("a.log", LINES[0] + "  can0  110   [2]  01 02\n", "a.log:2: found '  can0  110   [2]"),
+        ("a.log", "(1.0) can0 110#012\n", "allowed is a line of candump -L, such as ("),
+        ("a.log", "(1.0) can0 110#010203040506070809\n", "allowed is a line of candump -L"),
+        ("a.log", "(1.0) can0 FFF#\n", "found id 0xfff, allowed is an id of 11 bits in 3 digits"),
+        ("a.log", "", "found no data frame, allowed is a log with frames"),
+        ("a.log", "(1.0) can0 110#R\n", "found no data frame"),
+        ("a.log", "x" * 70_000, "65536 bytes without a line end"),
+        ("a.asc", "base hex timestamps relative\n", "found times relative to the line before"),
+        ("a.asc", "1.0 1 Lever Rx d 1 01\n", "allowed is a line of an ASC log, such as"),
+        ("a.asc", "1.0 1 110 Rx d 3 01 02\n", "found 2 of 3 bytes"),
+        ("a.asc", "1.0 1 110 Rx d 1 1FF\n", "with numbers"),
+        ("a.asc", "1.0 1 900 Rx d 1 1F\n", "found id 0x900"),
+        ("a.asc", "1.0 1 110 Rx d -1 01 02\n", "a.asc:1: found '1.0 1 110 Rx d -1 01 02'"),
+        ("a.asc", "1.0 1 110 Rx d\n", "a.asc:1: found '1.0 1 110 Rx d', allowed is a line of"),
+        ("a.asc", "1.0 1 110 Rx d 2 0_1 02\n", "a.asc:1: found '1.0 1 110 Rx d 2 0_1 02'"),
+        ("a.asc", "1.0 1 110 Rx d \u0661 01\n", "a.asc:1: found '1.0 1 110 Rx d \u0661 01'"),
+        ("a.asc", "1.0 CANFD 1 Rx 110 1 0 2 ² 01 02 0 0 0\n", "a.asc:1: found '1.0 CANFD 1"),
+        ("a.asc", "1.0 CANFD 1 Rx 110 1 0 2 2 01 02 0 0 zz\n", "a.asc:1: found '1.0 CANFD 1"),
+        ("a.csv", "time;id;data\n", "found 'time;id;data', allowed is the header of python-can"),
+        ("a.blf", "LOGG", "found error"),
+        ("a.blf", "x" * 200, "found BLFParseError Unexpected file format"),
+        ("a.trc", "", "found the suffix '.trc', allowed are .log, .asc, .blf, .csv, .mf4"),
+        ("drive", "", "found no suffix"),
+    ],
+)
+def test_what_is_no_log_is_told_with_its_place(
+    tmp_path: Path, name: str, content: str, text: str
+) -> None:
+    message = error_of(log(tmp_path, content, name=name))
+    assert text in message
+    assert str(tmp_path / name) in message
+
+
+HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
+
+
+@pytest.mark.parametrize(
+    ("row", "text"),
+    [
+        ("1.0,0x110,0,0,0,2,AQI", "a.csv:2: found"),
+        ("1.0,0x110,0,0,0,3,AQI=", "found 2 of 3 bytes"),
+        ("1.0,0x800,0,0,0,2,AQI=", "found id 0x800"),
+        ("1.0.0,0x110,0,0,0,2,AQI=", "a row of timestamp,"),
+        ("1.0,272,0,0,0,2,AQI=", "a row of timestamp,"),
+        ("1e999,0x110,0,0,0,2,AQI=", "a.csv:2: found '1e999,0x110"),
+        (f"1.0,0x110,0,0,0,{'1' * 5000},AQI=", "a.csv:2: found '1.0,0x110"),
+        (f"1.0,0x{'f' * 5000},0,0,0,2,AQI=", "a.csv:2: found '1.0,0xfff"),
+    ],
+)
+def test_a_wrong_row_of_a_table(tmp_path: Path, row: str, text: str) -> None:
+    assert text in error_of(log(tmp_path, HEADER, row, "\n", name="a.csv"))
+
+
+def test_a_file_that_is_not_there(tmp_path: Path) -> None:
+    assert "found No such file or directory" in error_of(tmp_path / "no.log")
+    (tmp_path / "x.log").mkdir()
+    assert "found Is a directory" in error_of(tmp_path / "x.log")
+
+
+# -- clocks ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("digits", [11, 400, 5000])
+@pytest.mark.parametrize("before", [False, True])
+@pytest.mark.parametrize(
+    ("name", "line"),
+    [
+        ("a.log", "({}.000000) can0 110#0102\n"),
+        ("a.log", "({}.0) can0 110#0102\n"),
+        ("a.asc", "{}.0 1 110 Rx d 1 01\n"),
+        ("a.csv", "{}.0,0x110,0,0,0,2,AQI=\n"),
+    ],
+)
+def test_a_time_that_no_clock_can_have(
+    tmp_path: Path, name: str, line: str, before: bool, digits: int
+) -> None:
+    start = HEADER if name == "a.csv" else "base hex timestamps absolute\n" * (name == "a.asc")
+    start += line.format(1) * before
+    path = log(tmp_path, start, line.format("9" * digits), line.format(2), name=name)
+    found, error = prefix(path)
+    assert len(found) == before
+    assert f"{path}:{len(start.splitlines()) + 1}: found " in str(error)
+    assert "mixed clocks" not in str(error)
+
+
+@pytest.mark.parametrize(
+    ("at", "value", "text"),
+    [
+        (8, bytes(4), "frame 0: found ValueError an object of 0 bytes"),  # its length
+        (24, b"\xff" * 8, "frame 1: found a time further than 10000000000 s"),  # ns
+        (36, b"\x00\x08\x00\x00", "frame 1: found ValueError id 0x800"),
+        (45, b"\x00", "frame 1: found ValueError 12 bytes in a classical frame"),  # flags of FD
+    ],
+)
+def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: str) -> None:
+    path = tmp_path / "a.blf"
+    fd = at == 45
+    message = can.Message(
+        timestamp=1.0, arbitration_id=1, is_extended_id=False, is_fd=fd, data=bytes(12 if fd else 8)
+    )
+    with can.BLFWriter(path, compression_level=0) as writer:
+        writer.on_message_received(message)
+    content = bytearray(path.read_bytes())
+    at += content.rindex(b"LOBJ")
+    content[at : at + len(value)] = value
+    path.write_bytes(content)
+    with pytest.raises(LogError) as error:
+        list(islice(read_log(path), 5))  # without end where an object has no length
+    assert f"{path}: {text}" in str(error.value)
+
+
+def test_a_clock_that_was_set_is_told_with_its_place(tmp_path: Path) -> None:
+    back = log(tmp_path, "(100.5) can0 110#\n", "(100.4) can0 110#\n")
+    assert error_of(back) == (
+        f"{back}:2: found mixed clocks: a time 0.100 s before that of the frame before,"
+        " allowed is one clock for the whole log; split it here"
+    )
+    forth = log(tmp_path, "(100.5) can0 110#\n", "(1763750000.4) can0 110#\n")
+    assert ":2: found mixed clocks: a time 1763749899.900 s after" in error_of(forth)
+
+
+def test_frames_of_two_sockets_may_stand_in_the_wrong_order(tmp_path: Path) -> None:
+    path = log(tmp_path, "(1.5) can0 110#\n", "(1.499) can1 111#\n", "(1.501) can0 110#\n")
+    file = LogFile(path)
+    assert [(f.time_ns // 10**6, f.channel) for f in file] == [
+        (1500, "can0"),
+        (1500, "can1"),
+        (1501, "can0"),
+    ]
+    assert file.disordered == 1
+
+
+# -- large ones --------------------------------------------------------------------------------
+
+
+def test_a_large_log_takes_no_more_memory(tmp_path: Path) -> None:
+    def peak(count: int) -> int:
+        rows = (
+            f"({i // 1000}.{i % 1000:03d}000) can0 110#00112233445566{i % 256:02X}\n"
+            for i in range(count)
+        )
+        path = log(tmp_path, *rows)
+        tracemalloc.start()
+        try:
+            assert sum(1 for _ in read_log(path)) == count
+            return tracemalloc.get_traced_memory()[1]
+        finally:
+            tracemalloc.stop()
+
+    peak(100)
+    assert peak(100_000) < peak(5_000) + 50_000
+
+
+def test_progress_goes_from_nothing_to_all(tmp_path: Path) -> None:
+    path = log(tmp_path, *(f"({i}.0) can0 110#0011223344556677\n" for i in range(40_000)))
+    seen: list[float] = []
+    count = sum(1 for _ in read_log(path, seen.append))
+    assert count == 40_000
+    assert seen == sorted(seen)
+    assert 0.0 <= seen[0] < 0.2
+    assert seen[-1] == 1.0
+    assert len(seen) >= 5
