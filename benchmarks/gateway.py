@@ -1,6 +1,6 @@
 """What a gateway in the line adds to a frame, beside other gateways, in virtual time.
 
-A joystick on vcan0 sends both lever messages every 20 ms, an ECU listens on vcan1, and frames of
+A joystick on vcan0 sends both joystick messages every 20 ms, an ECU listens on vcan1, and frames of
 somebody else pass too. The joystick's period is a little longer than the daemon's tick, so that its
 frames come at every phase of it. Times are the kernel's, from the frame on one interface to the
 same message on the other.
@@ -46,8 +46,8 @@ from rig import (
 )
 from wire import (
     FRAME,
-    LEVER_LEFT,
-    LEVER_RIGHT,
+    JOYSTICK_LEFT,
+    JOYSTICK_RIGHT,
     receive_stamped,
     sleep_until,
     stamped_port,
@@ -70,19 +70,19 @@ class Line:
         self._hand = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self._hand.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"")
         self._hand.bind((NEAR,))
-        self._in = {i: stamped_port(NEAR, i) for i in (LEVER_LEFT, FOREIGN)}
-        self._out = {i: stamped_port(FAR, i) for i in (LEVER_LEFT, FOREIGN)}
+        self._in = {i: stamped_port(NEAR, i) for i in (JOYSTICK_LEFT, FOREIGN)}
+        self._out = {i: stamped_port(FAR, i) for i in (JOYSTICK_LEFT, FOREIGN)}
         database = cantools.database.load_file(DBC)
         self._left, self._right = (
-            database.get_message_by_frame_id(i) for i in (LEVER_LEFT, LEVER_RIGHT)
+            database.get_message_by_frame_id(i) for i in (JOYSTICK_LEFT, JOYSTICK_RIGHT)
         )
         self._number = 0
 
     def drive(self, count: int, pct: float) -> dict[int, list[float]]:
-        """So many cycles; us from interface to interface, of the lever and of the other frame."""
+        """So many cycles; us from interface to interface, of the joystick and of the others."""
         step = TICK_NS + TICK_NS // self._count
         at = time.monotonic_ns() + step
-        times: dict[int, list[float]] = {LEVER_LEFT: [], FOREIGN: []}
+        times: dict[int, list[float]] = {JOYSTICK_LEFT: [], FOREIGN: []}
         for port in (*self._in.values(), *self._out.values()):
             _empty(port)
         for _ in range(count):
@@ -93,9 +93,9 @@ class Line:
             left = self._left.encode(on | sticks)
             right = self._right.encode(on | {"Lift": 0, "Rotate": 0})
             sleep_until(at)
-            self._hand.send(FRAME.pack(LEVER_LEFT, 8, left))
+            self._hand.send(FRAME.pack(JOYSTICK_LEFT, 8, left))
             sleep_until(at + step // 4)
-            self._hand.send(FRAME.pack(LEVER_RIGHT, 8, right))
+            self._hand.send(FRAME.pack(JOYSTICK_RIGHT, 8, right))
             sleep_until(at + step // 2)
             self._hand.send(FRAME.pack(FOREIGN, 8, bytes(8)))
             sleep_until(at + step * 3 // 4)  # all have passed; nothing of this delays a gateway
@@ -138,7 +138,7 @@ def each_gateway(directory: Path) -> Iterator[tuple[str, int | None]]:
     log = directory / "log"
     subprocess.run(["modprobe", "can-gw"], check=True)
     passes = [["cangw", "-A", "-s", NEAR, "-d", FAR, "-e", "-f", f"{i:X}:C00007FF"]
-              for i in (LEVER_LEFT, FOREIGN)]  # fmt: skip
+              for i in (JOYSTICK_LEFT, FOREIGN)]  # fmt: skip
     with rules(*passes):
         yield "cangw, in the kernel", None
     bridge = [sys.executable, "-u", "-m", "can.bridge"]
@@ -150,7 +150,7 @@ def each_gateway(directory: Path) -> Iterator[tuple[str, int | None]]:
     for passing in ("kernel", "daemon"):
         text = CONFIG.read_text().replace("../dbc", str(ROOT / "dbc"))
         if passing == "daemon":
-            text = text.replace("passing: kernel", "passing: daemon")
+            text = text.replace("forwarding: kernel", "forwarding: daemon")
             text = text.replace("fallback: neutral", "fallback: stop")
         file = directory / f"{passing}.yaml"
         file.write_text(text)
@@ -164,7 +164,7 @@ def print_results(results: dict[str, tuple[dict[int, list[float]], float | None]
     """Print the table."""
     rows = []
     for title, (times, cpu) in results.items():
-        for can_id, of in ((LEVER_LEFT, "joystick"), (FOREIGN, "others")):
+        for can_id, of in ((JOYSTICK_LEFT, "joystick"), (FOREIGN, "others")):
             found = times[can_id]
             figures = [statistics.median(found), quantile(found, 0.99), quantile(found, 0.999)]
             cells = [f"{f:.1f}" for f in (*figures, max(found))]

@@ -48,9 +48,9 @@ from canshaper.config.schema import Bus
 from canshaper.machine.binding import load_deployment
 
 JOYSTICK_MS = 20
-LEVER, VALVE = 0x110, 0x200
-LEVER_TEXT = """
-BO_ {id} Lever{n}: 8 LEVERS
+JOYSTICK, VALVE = 0x110, 0x200
+JOYSTICK_TEXT = """
+BO_ {id} Joystick{n}: 8 JOYSTICKS
  SG_ Stick : 0|16@1- (0.1,0) [-100|100] "%" SHAPER
  SG_ Enable : 32|2@1+ (1,0) [0|1] "" SHAPER
  SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER
@@ -67,23 +67,23 @@ BA_DEF_DEF_ "GenMsgCycleTime" 0;
 
 
 def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
-    """A machine with a lever, a valve and G_FF for each axis; every valve in every tick."""
-    dbc = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: LEVERS SHAPER VALVES\n'
+    """A machine with a joystick, a valve and G_FF for each axis; every valve in every tick."""
+    dbc = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: JOYSTICKS SHAPER VALVES\n'
     cycles = CYCLES
     buses = {"crane": {"interface": bus.interface, "channel": bus.channel}}
     config: dict[str, Any] = {"tick_ms": tick_ms, "buses": buses, "dbc": ["many.dbc"]}
-    config |= {"levers": {}, "axes": {}}
+    config |= {"joysticks": {}, "axes": {}}
     for n in range(axes):
-        dbc += LEVER_TEXT.format(id=LEVER + n, n=n) + VALVE_TEXT.format(id=VALVE + n, n=n)
-        cycles += f'BA_ "GenMsgCycleTime" BO_ {LEVER + n} {JOYSTICK_MS};\n'
+        dbc += JOYSTICK_TEXT.format(id=JOYSTICK + n, n=n) + VALVE_TEXT.format(id=VALVE + n, n=n)
+        cycles += f'BA_ "GenMsgCycleTime" BO_ {JOYSTICK + n} {JOYSTICK_MS};\n'
         cycles += f'BA_ "GenMsgCycleTime" BO_ {VALVE + n} {tick_ms};\n'
-        config["levers"][f"lever{n}"] = {
-            **{"bus": "crane", "message": f"Lever{n}", "timeout_ms": 1000},
+        config["joysticks"][f"joystick{n}"] = {
+            **{"bus": "crane", "message": f"Joystick{n}", "timeout_ms": 1000},
             **{"enable": "Enable", "alive_counter": "AliveCounter"},
         }
         valve = {"bus": "crane", "message": f"Valve{n}", "signal": "Velocity", "timeout_ms": 200}
         config["axes"][f"axis{n}"] = {
-            "stick": {"lever": f"lever{n}", "signal": "Stick"},
+            "command": {"joystick": f"joystick{n}", "signal": "Stick"},
             "valve": {**valve, "alive_counter": "AliveCounter"},
             "sway": {"period_s": 2.0 + 0.1 * n, "damping_ratio": 0.05, "full_speed_m_s": 1.0},
             "filter": {"kind": "gff", "a1": 0.708, "a2": 0.12},
@@ -95,11 +95,13 @@ def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
 
 
 class Hands:
-    """All levers, enabled, moved slowly to and fro after a second in neutral."""
+    """All joysticks, enabled, moved slowly to and fro after a second in neutral."""
 
     def __init__(self, file: Path, port: Port) -> None:
         self._port = port
-        self._levers = [lever.message for lever in load_deployment(file).levers.values()]
+        self._joysticks = [
+            joystick.message for joystick in load_deployment(file).joysticks.values()
+        ]
         self._count = 0
 
     def drive(self, duration_s: float, *, neutral: bool = False) -> tuple[int, int]:
@@ -111,7 +113,7 @@ class Hands:
             phase = i / 100 % 2  # there and back in four seconds
             stick = 0.0 if neutral else 20.0 + 60.0 * min(phase, 2 - phase)
             values = {"Stick": stick, "Enable": 1, "AliveCounter": self._count % 256}
-            for message in self._levers:
+            for message in self._joysticks:
                 data = message.encode(values)
                 self._port.send(Frame("crane", message.frame_id, False, data))
             for _ in self._port.frames():  # or its queue would fill

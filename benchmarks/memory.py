@@ -1,4 +1,4 @@
-"""Memory of the daemon over time, with levers that move and faults now and then.
+"""Memory of the daemon over time, with joysticks that move and faults now and then.
 
 The daemon runs the shipped deployment as ``canshaper run`` does: on a multicast group of
 python-can, or with ``--vcan`` on SocketCAN in virtual time, where an hour takes a quarter. A
@@ -41,7 +41,7 @@ from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.machine.binding import load_deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 
 TICK_MS = 20
@@ -62,12 +62,12 @@ def sample(pid: int, log: Path) -> list[int]:
 
 
 def drive(
-    port: Port, levers: LeverNode, duration_ms: int, each_tick: Callable[[int], None]
+    port: Port, joysticks: JoystickNode, duration_ms: int, each_tick: Callable[[int], None]
 ) -> None:
-    """Move the levers and make the faults; ``each_tick`` is told the time, ms."""
+    """Move the joysticks and make the faults; ``each_tick`` is told the time, ms."""
     begin = time.monotonic_ns()
     for at_ms in range(0, duration_ms + 1, TICK_MS):
-        frames = levers.frames(at_ms) if at_ms % MINUTE_MS >= SILENCE_MS or not at_ms else []
+        frames = joysticks.frames(at_ms) if at_ms % MINUTE_MS >= SILENCE_MS or not at_ms else []
         if at_ms % MINUTE_MS == SILENCE_MS:
             frames = [*frames, TOO_SHORT, UNKNOWN]
         for frame in frames:
@@ -113,8 +113,10 @@ def main() -> None:
                 if at_ms and at_ms % (options.every * 1000) == 0:
                     samples.append((at_ms / MINUTE_MS, sample(process.pid, log)))
 
-            levers = LeverNode(load_deployment(file), random_script(1, duration_ms / 1000 + 1.0))
-            drive(port, levers, duration_ms, each_tick)
+            joysticks = JoystickNode(
+                load_deployment(file), random_script(1, duration_ms / 1000 + 1.0)
+            )
+            drive(port, joysticks, duration_ms, each_tick)
             share = (cpu_ns(process.pid) - before) / (time.monotonic_ns() - begin)
         port.close()
         text = log.read_text()

@@ -24,7 +24,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.recording.log import read_log
 from canshaper.recording.replay import Replay, look
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import script_named
 from canshaper_sim.plant import PlantNode
 
@@ -50,16 +50,16 @@ def write_drive(path: Path, seconds: float, config: str) -> int:
 
         for frame in controller.neutral_frames():
             log(0, frame)
-        levers: LeverNode | None = None
+        joysticks: JoystickNode | None = None
         ends_ms, seed = 0, count(1)
         for number in range(round(seconds * 1e9) // TICK_NS):
             now_ns = number * TICK_NS
             if number * 20 >= ends_ms:
                 script = script_named(f"random-{next(seed)}", list(deployment.axes))
-                levers, begin_ms = LeverNode(deployment, script), number * 20
+                joysticks, begin_ms = JoystickNode(deployment, script), number * 20
                 ends_ms += round(script.duration_s * 1000)
-            assert levers is not None
-            for frame in levers.frames(number * 20 - begin_ms):
+            assert joysticks is not None
+            for frame in joysticks.frames(number * 20 - begin_ms):
                 log(now_ns + 1_000, frame)
                 controller.receive(frame, now_ns)
             for i, frame in enumerate(controller.tick(now_ns)):

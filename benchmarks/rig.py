@@ -207,7 +207,7 @@ def slew_only(directory: Path, channel: str, tick_ms: int) -> Path:
     data["tick_ms"] = tick_ms
     data["dbc"] = [f"slew{tick_ms}.dbc"]
     data["buses"]["crane"]["channel"] = channel
-    data["levers"] = {"left": data["levers"]["left"]}
+    data["joysticks"] = {"left": data["joysticks"]["left"]}
     data["axes"] = {"slew": data["axes"]["slew"]}
     data["axes"]["slew"]["limits"] |= {"rise_per_s": 100, "fall_per_s": 100}
     file = directory / f"slew{tick_ms}.yaml"

@@ -26,7 +26,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 
 FOURTH_VALVE = """
@@ -36,7 +36,7 @@ BO_ 515 RotateCommand: 2 SHAPER
 
 CM_ "Example"""
 FOURTH_AXIS = """  rotate:
-    stick: { lever: right, signal: Rotate }
+    command: { joystick: right, signal: Rotate }
     valve:
       { bus: crane, message: RotateCommand, signal: Velocity, timeout_ms: 200,
         alive_counter: AliveCounter }
@@ -62,9 +62,11 @@ def four_axes(directory: Path) -> Deployment:
 
 def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
     """Bare recv, decode, encode, send."""
-    levers = {lever.message.frame_id: lever.message for lever in deployment.levers.values()}
+    joysticks = {
+        joystick.message.frame_id: joystick.message for joystick in deployment.joysticks.values()
+    }
     routes = [
-        (a.config.stick.signal, a.valve_message, a.config.valve.signal)
+        (a.config.command.signal, a.valve_message, a.config.valve.signal)
         for a in deployment.axes.values()
     ]
     values: dict[str, float] = {}
@@ -73,7 +75,7 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
     def body(_now_ns: int) -> None:
         nonlocal count
         while (message := bus.recv(0)) is not None:
-            decoded = levers[message.arbitration_id].decode(message.data, decode_choices=False)
+            decoded = joysticks[message.arbitration_id].decode(message.data, decode_choices=False)
             values.update(decoded)  # type: ignore[arg-type]
         count = (count + 1) % 256
         for stick, valve, signal in routes:
@@ -105,7 +107,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as directory:
         deployment, other = (four_axes(Path(directory)) for _ in range(2))
     controller = Controller(deployment)
-    levers = LeverNode(deployment, random_script(1, ticks * 0.02 + 1.0))
+    joysticks = JoystickNode(deployment, random_script(1, ticks * 0.02 + 1.0))
     hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "open", "bare")}
     port = open_port("crane", Bus(interface="virtual", channel="ours"), lambda _fault: None)
     unguarded = open_port("crane", Bus(interface="virtual", channel="open"), lambda _fault: None)
@@ -118,7 +120,7 @@ def main() -> None:
     spent: dict[str, list[int]] = {n: [] for n in bodies}
     pure: list[int] = []
     for i in range(ticks):
-        frames: list[Frame] = levers.frames(i * 20)
+        frames: list[Frame] = joysticks.frames(i * 20)
         for name, body in [*bodies.items()][
             :: 1 if i % 2 else -1
         ]:  # none is always behind the same
@@ -133,7 +135,7 @@ def main() -> None:
                 pass
     twin = Controller(deployment)
     for i in range(ticks):
-        for f in levers.frames(i * 20):
+        for f in joysticks.frames(i * 20):
             twin.receive(f, i * 20_000_000)
         start = time.perf_counter_ns()
         for _ in twin.tick(i * 20_000_000):

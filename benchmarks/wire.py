@@ -18,7 +18,7 @@ FRAME = struct.Struct("=IB3x8s")
 TIMESPEC = struct.Struct("=qq")
 ROOM = socket.CMSG_SPACE(TIMESPEC.size)
 SO_TIMESTAMPNS = 35
-LEVER_LEFT, LEVER_RIGHT, SLEW_COMMAND = 0x110, 0x111, 0x200
+JOYSTICK_LEFT, JOYSTICK_RIGHT, SLEW_COMMAND = 0x110, 0x111, 0x200
 HIGH_PCT, LOW_PCT = 52.0, 48.0
 # A filter passes a jump of 4 % on as 3 to 5 %: four steps of the valve frame or more. Less is its
 # own motion.
@@ -68,10 +68,10 @@ class Wire:
         self._hand = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
         self._hand.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, b"")
         self._hand.bind((far,))
-        self._in = stamped_port(near, LEVER_LEFT)
+        self._in = stamped_port(near, JOYSTICK_LEFT)
         self._out = stamped_port(far, SLEW_COMMAND)
         database = cantools.database.load_file(DBC)
-        left, right = (database.get_message_by_frame_id(i) for i in (LEVER_LEFT, LEVER_RIGHT))
+        left, right = (database.get_message_by_frame_id(i) for i in (JOYSTICK_LEFT, JOYSTICK_RIGHT))
         on = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
         counts = [on | {"AliveCounter": i} for i in range(256)]
         self._left = {
@@ -87,8 +87,8 @@ class Wire:
         self._count = (self._count + 1) % 256
         if right_before_ns:
             sleep_until(at_ns - right_before_ns)
-            self._hand.send(FRAME.pack(LEVER_RIGHT, 8, self._right[self._count]))
-        frame = FRAME.pack(LEVER_LEFT, 8, self._left[pct][self._count])
+            self._hand.send(FRAME.pack(JOYSTICK_RIGHT, 8, self._right[self._count]))
+        frame = FRAME.pack(JOYSTICK_LEFT, 8, self._left[pct][self._count])
         sleep_until(at_ns)
         now_ns = time.monotonic_ns()
         self._hand.send(frame)

@@ -10,7 +10,7 @@ import can
 import cantools
 
 database = cantools.database.load_file(sys.argv[2])
-lever = database.get_message_by_name("LeverLeft")
+joystick = database.get_message_by_name("JoystickLeft")
 valve = database.get_message_by_name("SlewCommand")
 
 
@@ -22,9 +22,9 @@ class Gateway(can.Listener):
         self.count = 0
 
     def on_message_received(self, msg: can.Message) -> None:
-        if msg.arbitration_id != lever.frame_id:
+        if msg.arbitration_id != joystick.frame_id:
             return
-        values = lever.decode(msg.data)
+        values = joystick.decode(msg.data)
         velocity = 0.9 * values["Slew"] if values["Enable"] == "On" else 0.0
         self.count = (self.count + 1) % 256
         data = valve.encode({"Velocity": velocity, "AliveCounter": self.count})

@@ -34,7 +34,7 @@ def open_sockets(bus: Bus, ids: Ids | None) -> list[socket.socket]:
 
     With ``ids`` there are three: for the messages that are taken; for those that we send, which
     hears our own frames back, other senders and the error frames; for ids that nobody knows. So
-    neither our own frames nor a flood of foreign ones stand before a lever's. Without ``ids``,
+    neither our own frames nor a flood of foreign ones stand before a joystick's. Without ``ids``,
     one for everything.
 
     Raises:

@@ -56,12 +56,12 @@ def check(file: str = FILE) -> None:
             echo(f"    match {_match(bus)}")
     if gateway := config.gateway:
         ends, away = " and ".join(gateway.between), FALLBACKS[gateway.fallback]
-        echo(f"  gateway between {ends}: others pass by the {gateway.passing}, {away}")
+        echo(f"  gateway between {ends}: others pass by the {gateway.forwarding}, {away}")
     for name, axis in deployment.axes.items():
-        valve, stick = axis.config.valve, axis.config.stick
+        valve, stick = axis.config.valve, axis.config.command
         period_ms = axis.period_ticks * config.tick_ms
         echo(
-            f"  axis {name}: {config.levers[stick.lever].message}.{stick.signal}"
+            f"  axis {name}: {config.joysticks[stick.joystick].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
         if radial := axis.config.radial_compensation:

@@ -28,7 +28,11 @@ def doctor(
     ),
     load: bool = typer.Option(True, "--load/--no-load", help="A second run on a busy PC."),
     listen_s: float | None = typer.Option(
-        None, "--listen", metavar="SECONDS", min=0.5, help="Listen to the levers on the real bus."
+        None,
+        "--listen",
+        metavar="SECONDS",
+        min=0.5,
+        help="Listen to the joysticks on the real bus.",
     ),
     as_json: Path | None = typer.Option(
         None, "--json", metavar="FILE", help="Write all numbers to this file."
@@ -36,7 +40,7 @@ def doctor(
 ) -> None:
     """Is this PC fit to run a deployment? Nothing is sent on its buses, nothing moves.
 
-    Runs the daemon's loop with moving levers on sockets of its own, once on the PC as it is and
+    Runs the daemon's loop with moving joysticks on sockets of its own, once on the PC as it is and
     once with every processor, memory and disk kept busy; shows how late the ticks come and how
     long a joystick takes to the valve; looks at kernel, processor and CAN interfaces, and says
     what to do about what it finds. Run it as root to measure with the service's real-time
@@ -97,7 +101,7 @@ def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
     except (OSError, WrongDeviceError) as error:
         remedy = "mend the interface first"
         why = error.strerror if isinstance(error, OSError) else error
-        return [Finding("levers", Level.BAD, f"cannot listen: {why}", remedy)]
+        return [Finding("joysticks", Level.BAD, f"cannot listen: {why}", remedy)]
     return heard_findings(deployment, heard)
 
 

@@ -17,7 +17,7 @@ def gateway(
     file: str = FILE,
     state: Literal["running", "away", "down", "show"] = typer.Argument(
         "show",
-        help="running: pass what is not ours; away: and the deployment's fallback for the levers;"
+        help="running: pass what is not ours; away: and the deployment's fallback for joysticks;"
         " down: nothing; show: tell what is there.",
     ),
     interface: str | None = INTERFACE,
@@ -48,7 +48,7 @@ def gateway(
         raise fail(error) from None
     if deployment.config.gateway is None:
         raise fail(ValueError(f"{deployment.path}: found no gateway; allowed is a file with one"))
-    kernel = deployment.config.gateway.passing == "kernel"
+    kernel = deployment.config.gateway.forwarding == "kernel"
     passing = passing_rules(deployment) if kernel else []
     fallback = fallback_rules(deployment) if kernel else []
     wanted = {"running": passing, "away": passing + fallback, "down": []}

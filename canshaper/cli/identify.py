@@ -110,7 +110,7 @@ def identify(
                 name,
                 [f for f in findings if f.axis == name],
                 _speed(deployment, name),
-                has_grapple=bool(deployment and deployment.grapple),
+                has_grapple=bool(deployment and deployment.load_state),
             )
             for name in names
         ]
@@ -198,7 +198,7 @@ def _tell(
     console = SafeConsole(soft_wrap=True)
     for one in advice:
         console.print(f"\n{one.text}", style="bold", highlight=False)
-        if one.sets:
+        if one.gain_schedule:
             echo("\n".join(set_lines(one)))
     if picture:
         echo(f"Picture: {picture}")
@@ -208,8 +208,8 @@ def _tell(
         echo(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     for one in advice:
         axis = deployment.axes[one.axis].config
-        if one.axis in written and axis.sets:
-            echo(f"{one.axis} has sets, which stay as they are: change them by hand.")
+        if one.axis in written and axis.gain_schedule:
+            echo(f"{one.axis} has a gain schedule, which stays as it is: change it by hand.")
         if one.sway and (command := KINDS[axis.filter.kind].designed_by):
             if one.cover_pct:
                 command = "robust"

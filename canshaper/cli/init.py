@@ -15,12 +15,12 @@ from canshaper.cli.console import echo
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
-    from canshaper.config.first import FirstAxis, FirstLever, FirstMachine, Stopwatch
+    from canshaper.config.first import FirstAxis, FirstJoystick, FirstMachine, Stopwatch
 
 MOST_OFFERED = 6
 # Axes that make nothing swing, by their names.
 CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
-FEWEST_CYCLES = 5  # of a lever's message in its timeout
+FEWEST_CYCLES = 5  # of a joystick's message in its timeout
 
 
 def init(
@@ -32,7 +32,7 @@ def init(
 ) -> None:
     """Ask a few questions about a machine and write its first deployment.
 
-    Looks through the DBC files for levers, valves and switches and offers what it finds; Enter
+    Looks through the DBC files for joysticks, valves and switches and offers what it finds; Enter
     takes what stands in brackets, "-" leaves a thing out. Written with reduced speed and with a
     filter to begin with. Ctrl-C writes nothing; should the check of the whole file find something
     after all, the answers stay in a draft beside it. Machines of J1939 and CANopen begin with a
@@ -90,7 +90,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     from canshaper.machine import suggest
 
     echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
-    possible = suggest.levers(messages)
+    possible = suggest.joysticks(messages)
     if not possible:
         raise fail(
             ValueError(
@@ -102,14 +102,14 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     interface = asked("CAN interface", channel, "can0")
     bitrate = asked("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
     names = [message.name for message in possible]
-    text = f"Messages of the levers, of {', '.join(names)}"
+    text = f"Messages of the joysticks, of {', '.join(names)}"
     likely = [m.name for m in possible if suggest.named(suggest.switches(m), suggest.ENABLE)]
     chosen = asked(text, several(names), " ".join(likely or names[:1]))
-    levers = [_lever(message) for message in possible if message.name in chosen]
+    joysticks = [_joystick(message) for message in possible if message.name in chosen]
     others = [message for message in messages if message.name not in chosen]
     axes: list[FirstAxis] = []
-    for lever, message in zip(levers, (m for m in possible if m.name in chosen), strict=True):
-        axes += _axes(lever, message, others, [axis.name for axis in axes])
+    for joystick, message in zip(joysticks, (m for m in possible if m.name in chosen), strict=True):
+        axes += _axes(joystick, message, others, [axis.name for axis in axes])
     if not axes:
         raise fail(ValueError("no axis was named; nothing is written"))
     status, identity = suggest.service_status(messages), suggest.identity(messages)
@@ -117,17 +117,17 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
         interface,
         bitrate,
         [_relative(path, folder) for path in files],
-        levers,
+        joysticks,
         axes,
         status.name if status else None,
         identity.name if identity else None,
     )
 
 
-def _lever(message: "Message") -> "FirstLever":
-    from canshaper.config.first import FirstLever
+def _joystick(message: "Message") -> "FirstJoystick":
+    from canshaper.config.first import FirstJoystick
     from canshaper.config.load import limits
-    from canshaper.config.schema import Lever
+    from canshaper.config.schema import Joystick
     from canshaper.machine import suggest
 
     left = suggest.switches(message)  # a switch has one meaning
@@ -141,11 +141,11 @@ def _lever(message: "Message") -> "FirstLever":
 
     enable = switch("enable switch", suggest.ENABLE, needed=True)
     assert enable is not None
-    least, most = limits(Lever, "timeout_ms")
+    least, most = limits(Joystick, "timeout_ms")
     reset = switch("switch that resets a trip", suggest.RESET)
     off = switch("switch for anti-sway off", suggest.ANTI_SWAY_OFF)
     counter = suggest.counter(message)
-    return FirstLever(
+    return FirstJoystick(
         suggest.axis_name(message.name),
         message.name,
         int(min(max(FEWEST_CYCLES * (message.cycle_time or 0), least), most)),
@@ -157,9 +157,9 @@ def _lever(message: "Message") -> "FirstLever":
 
 
 def _axes(
-    lever: "FirstLever", message: "Message", others: "list[Message]", taken: list[str]
+    joystick: "FirstJoystick", message: "Message", others: "list[Message]", taken: list[str]
 ) -> "list[FirstAxis]":
-    """Axes of a lever; ``others`` are messages that are left, ``taken`` names that are not."""
+    """Axes of a joystick; ``others`` are messages that are left, ``taken`` names that are not."""
     from canshaper.config.first import FirstAxis
     from canshaper.config.load import limits
     from canshaper.config.schema import Valve
@@ -172,7 +172,7 @@ def _axes(
         where = f"{message.name}.{stick.name}"
         names = [*taken, *(axis.name for axis in found)]
         likely = suggest.axis_name(stick.name)
-        default = f"{lever.name}_{likely}" if likely in names else likely
+        default = f"{joystick.name}_{likely}" if likely in names else likely
         axis = asked(f"Axis of {where}, - for none", name(names), default)
         if axis == NONE:
             continue
@@ -202,7 +202,7 @@ def _axes(
         found.append(
             FirstAxis(
                 axis,
-                lever.name,
+                joystick.name,
                 stick.name,
                 command,
                 signal,

@@ -168,7 +168,7 @@ def _one(
             for text in result.events:
                 done.events.append((tick.now_ns, text))
                 events.write(f"{(tick.now_ns - (done.trace.start_ns or 0)) / 1e9:.3f} {text}\n")
-    replay.check_levers()
+    replay.check_joysticks()
     return done
 
 

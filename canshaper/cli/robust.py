@@ -83,7 +83,7 @@ def robust(
         taps = [round(tap, _DIGITS) for tap in found.taps]
         machine = Machine(
             limits=limits.output_limits(),
-            neutral_band=bound.config.stick.neutral_pct / 100.0,
+            neutral_band=bound.config.command.neutral_pct / 100.0,
             stop_s=limits.stop_s,
             grid_steps=bound.valve.steps,
         )

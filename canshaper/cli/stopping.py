@@ -11,10 +11,10 @@ from rich.table import Table
 from rich.text import Text
 
 from canshaper.config.filters import Filter
+from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
-from canshaper.config.sets import Feel
 from canshaper.controller.runner import AxisRunner
-from canshaper.inputs.lever import LeverInput
+from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import BoundAxis, Deployment
 from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
 from canshaper.shaping.stopping import Travel, allowed_s, travel
@@ -54,7 +54,7 @@ def stopping(deployment: Deployment) -> list[Stopping]:
 def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: float | None) -> str:
     """What another filter of an axis, and a longer tail, make of its stopping distance."""
     bound = deployment.axes[name]
-    changes: dict[str, Any] = {"filter": chosen, "sets": [], "feels": {}}
+    changes: dict[str, Any] = {"filter": chosen, "gain_schedule": [], "profiles": {}}
     one = _stopping(deployment, replace(bound, config=bound.config.model_copy(update=changes)))
     text = (
         f"Released at full speed, {name} travels {one.cell(one.travel.release)} with it;"
@@ -68,13 +68,13 @@ def consequences(deployment: Deployment, name: str, chosen: Filter, tail_s: floa
 
 
 def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
-    lever = deployment.levers[bound.config.stick.lever]
+    joystick = deployment.joysticks[bound.config.command.joystick]
     limits = bound.config.limits
     tick_s = deployment.config.tick_ms / 1000.0
-    period_s, timeout_s = tick_s * bound.period_ticks, lever.config.timeout_ms / 1000.0
+    period_s, timeout_s = tick_s * bound.period_ticks, joystick.config.timeout_ms / 1000.0
     travels = [
         travel(
-            lambda one=one: AxisRunner(one, tick_s, LeverInput(lever)).axis,  # type: ignore[misc]
+            lambda one=one: AxisRunner(one, tick_s, JoystickInput(joystick)).axis,  # type: ignore[misc]
             timeout_s=timeout_s,
             period_s=period_s,
         )
@@ -96,9 +96,12 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
 def _variants(bound: BoundAxis) -> Iterator[BoundAxis]:
     """The axis with each sway and filter that its file names."""
     config = bound.config
-    parts: list[AxisConfig | Feel] = [config, *config.feels.values()]
+    parts: list[AxisConfig | Profile] = [config, *config.profiles.values()]
     for part in parts:
-        pairs = [(config.sway, part.filter), *((one.sway, one.filter) for one in part.sets)]
+        pairs = [
+            (config.sway, part.filter),
+            *((one.sway, one.filter) for one in part.gain_schedule),
+        ]
         for sway, chosen in pairs:
             changes = {"sway": sway, "filter": chosen}
             yield replace(bound, config=config.model_copy(update=changes))

@@ -216,7 +216,7 @@ def _report(
     config = bound.config
     machine = Machine(
         limits=config.limits.output_limits(),
-        neutral_band=config.stick.neutral_pct / 100.0,
+        neutral_band=config.command.neutral_pct / 100.0,
         stop_s=config.limits.stop_s,
         grid_steps=bound.valve.steps,
     )

@@ -1,4 +1,4 @@
-"""Codecs of a lever and of the status messages."""
+"""Codecs of a joystick and of the status messages."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,7 +21,7 @@ class WrongLengthError(Exception):
     """A frame is shorter or longer than its message in the DBC."""
 
 
-class LeverCodec:
+class JoystickCodec:
     """Joystick message to raw values and switches."""
 
     def __init__(

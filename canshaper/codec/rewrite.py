@@ -11,7 +11,7 @@ from canshaper.codec.valve import ValveMessage
 
 
 class RewrittenMessage(ValveMessage):
-    """The message of a lever as it leaves on the other bus.
+    """The message of a joystick as it leaves on the other bus.
 
     Args:
         sender: its place on that bus, and its protection, which is made anew.
@@ -56,7 +56,7 @@ class RewrittenMessage(ValveMessage):
         return int.from_bytes(self._layout.encode(self.raw), "little") & self.ours_mask
 
     def onto(self, data: bytes) -> Frame:
-        """The next frame: this one of the lever with our velocities, protected anew."""
+        """The next frame: this one of the joystick with our velocities, protected anew."""
         ours = int.from_bytes(self._protector.unsealed(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
         sealed = self._protector.seal(word.to_bytes(self._length, "little"))
@@ -68,7 +68,7 @@ class RewrittenMessage(ValveMessage):
         return self.onto(frame.data)
 
     def own(self, *, enabled: bool) -> Frame:
-        """The next frame without one of the lever: nothing in it is older than the axes."""
+        """The next frame without one of the joystick: nothing in it is older than the axes."""
         self.raw[self._enable] = 1 if enabled else self._start
         return self.frame()
 

@@ -66,8 +66,8 @@ def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[st
         yield "found no number of that name in the axis' sway, filter or limits"
     elif key.section == "limits" and key.name not in LIMITS:
         yield f"found {key.name}; adjustable limits are {', '.join(LIMITS)}"
-    elif config.sets or config.feels:
-        yield f"axis {key.axis} has sets or feels, which choose its numbers"
+    elif config.gain_schedule or config.profiles:
+        yield f"axis {key.axis} has a gain schedule or profiles, which choose its numbers"
     elif config.sway is None and key.section == "filter":
         yield f"axis {key.axis} has no sway data; adjustable are its limits"
     elif not low <= now <= high:

@@ -25,8 +25,8 @@ _PLAIN = re.compile(r"(?!(?:true|false|null)$)(?:\.*/)*[^\W\d][\w./-]*", re.IGNO
 
 
 @dataclass(frozen=True)
-class FirstLever:
-    """A lever: its name, message, switches and alive counter."""
+class FirstJoystick:
+    """A joystick: its name, message, switches and alive counter."""
 
     name: str
     message: str
@@ -76,7 +76,7 @@ class FirstAxis:
     """An axis: its stick, its valve, and its swing where it has one."""
 
     name: str
-    lever: str
+    joystick: str
     stick: str
     valve: str
     signal: str
@@ -93,7 +93,7 @@ class FirstMachine:
     channel: str
     bitrate: int
     dbc: Sequence[str]
-    levers: Sequence[FirstLever]
+    joysticks: Sequence[FirstJoystick]
     axes: Sequence[FirstAxis]
     status: str | None = None
     identity: str | None = None
@@ -112,18 +112,20 @@ def plain(text: str) -> str:
     return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
 
 
-def stop_distance_m(full_speed_m_s: float, lever_timeout_ms: int, valve_timeout_ms: int) -> float:
+def stop_distance_m(
+    full_speed_m_s: float, joystick_timeout_ms: int, valve_timeout_ms: int
+) -> float:
     """How far the first limits let the tip travel at full speed, rounded up to a tenth of a metre.
 
     Args:
         full_speed_m_s: speed of the tip.
-        lever_timeout_ms: age at which the joystick counts as lost.
+        joystick_timeout_ms: age at which the joystick counts as lost.
         valve_timeout_ms: that of the valve, of which its cycle is a third at most.
     """
     way_s = allowed_s(
         OutputLimits(tail_s=FIRST_TAIL_S),
         stop_s=FIRST_TAIL_S,
-        timeout_s=lever_timeout_ms / 1000.0,
+        timeout_s=joystick_timeout_ms / 1000.0,
         period_s=valve_timeout_ms / 3000.0,
     )
     return math.ceil(10.0 * full_speed_m_s * way_s) / 10.0
@@ -146,21 +148,21 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     yield ""
     yield f"dbc: [{', '.join(plain(path) for path in machine.dbc)}] # relative to this file"
     yield ""
-    yield "levers:"
-    for lever in machine.levers:
-        yield f"  {lever.name}:"
+    yield "joysticks:"
+    for joystick in machine.joysticks:
+        yield f"  {joystick.name}:"
         yield "    bus: crane"
-        yield f"    message: {lever.message}"
-        yield f"    timeout_ms: {lever.timeout_ms} # five lost messages"
-        yield f"    enable: {lever.enable}"
+        yield f"    message: {joystick.message}"
+        yield f"    timeout_ms: {joystick.timeout_ms} # five lost messages"
+        yield f"    enable: {joystick.enable}"
         for key in ("reset", "anti_sway_off", "alive_counter"):
-            if (signal := getattr(lever, key)) is not None:
+            if (signal := getattr(joystick, key)) is not None:
                 yield f"    {key}: {signal}"
     yield ""
     yield "axes:"
-    timeouts_ms = {lever.name: lever.timeout_ms for lever in machine.levers}
+    timeouts_ms = {joystick.name: joystick.timeout_ms for joystick in machine.joysticks}
     for axis in machine.axes:
-        yield from _axis(axis, timeouts_ms[axis.lever])
+        yield from _axis(axis, timeouts_ms[axis.joystick])
         yield ""
     for key in ("status", "identity"):
         if (message := getattr(machine, key)) is not None:
@@ -176,11 +178,11 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
             yield f"    axes.{axis.name}.sway.period_s: [{low}, {high}]"
 
 
-def _axis(axis: FirstAxis, lever_timeout_ms: int) -> Iterator[str]:
+def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
     valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
     yield f"  {axis.name}:"
-    yield f"    stick: {{ lever: {axis.lever}, signal: {axis.stick}, neutral_pct: 2 }}"
+    yield f"    command: {{ joystick: {axis.joystick}, signal: {axis.stick}, neutral_pct: 2 }}"
     yield f"    valve: {{ bus: crane, {valve} }}"
     if axis.status:
         yield f"    status: {{ bus: crane, message: {axis.status} }}"
@@ -198,7 +200,7 @@ def _axis(axis: FirstAxis, lever_timeout_ms: int) -> Iterator[str]:
     yield "    # To begin with; better is `canshaper robust FILE --axis NAME --write`."
     yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
     yield "    # First motion at reduced speed: raise max_pct when all is well."
-    distance = stop_distance_m(swing.full_speed_m_s, lever_timeout_ms, axis.timeout_ms)
+    distance = stop_distance_m(swing.full_speed_m_s, joystick_timeout_ms, axis.timeout_ms)
     yield "    # stop_distance_m: farthest that the tip may travel when it stops from max_pct: 100."
     yield "    # `canshaper check` shows what the filter needs; make tail_s, stop_s and it smaller."
     yield "    # Of an axis that turns check shows degrees, at the largest radius, with a line like"

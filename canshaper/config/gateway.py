@@ -11,7 +11,7 @@ class Gateway(Section):
     """Two buses with us between them: the joystick's frames leave with our velocity in them."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2, description="the two buses")]
-    passing: Literal["kernel", "daemon"] = Field(
+    forwarding: Literal["kernel", "daemon"] = Field(
         "kernel",
         description="who passes on all other frames: can-gw of the kernel, or the daemon itself",
     )
@@ -27,10 +27,10 @@ class Gateway(Section):
         first, second = self.between
         if first == second:
             raise ValueError(f"between has {first} twice, allowed are two different buses")
-        if self.passing == "daemon" and self.fallback != "stop":
+        if self.forwarding == "daemon" and self.fallback != "stop":
             raise ValueError(
-                f"fallback is {self.fallback}, which only passing: kernel can do; allowed is stop:"
-                " without the daemon nothing passes"
+                f"fallback is {self.fallback}, which only forwarding: kernel can do; allowed is"
+                " stop: without the daemon nothing passes"
             )
         return self
 

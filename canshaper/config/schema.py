@@ -10,22 +10,22 @@ from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
 from canshaper.config.protection import Protected
+from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
-from canshaper.config.sets import Feel, FeelSwitch, Grapple, SetConfig, sets_fault
 from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.valve_curve import ValveCurve
 
 
-class Lever(Input):
+class Joystick(Input):
     """A joystick message and the switches in it."""
 
     enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(None, description="signal that asks for the unshaped stick")
     node: str | None = Field(None, description="name of its node on a bus of CANopen")
-    frozen_s: Annotated[
+    stuck_s: Annotated[
         float, number(1, 3600, "s", "a stick deflected for so long without change is broken")
     ] = 20.0
 
@@ -58,10 +58,10 @@ class DirectionFlags(Section):
     positive: str = Field(description="signal that the velocity is positive")
 
 
-class Stick(Section):
+class Command(Section):
     """Where an axis gets its command from."""
 
-    lever: str = Field(description="name of a lever")
+    joystick: str = Field(description="name of a joystick")
     signal: str = Field(description="signal with the velocity; its DBC range is full stick")
     flags: DirectionFlags | None = None
     """Only where the velocity has no sign of its own."""
@@ -209,7 +209,7 @@ class Limits(Section):
         | None
     ) = None
     allow_faster: bool = Field(False, description="the output may exceed what the operator asks")
-    allow_reverse: bool = Field(False, description="the output may go against the lever")
+    allow_reverse: bool = Field(False, description="the output may go against the joystick")
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -253,15 +253,17 @@ class Limits(Section):
 class AxisConfig(Section):
     """One axis: from which stick, through which filter and limits, to which valve."""
 
-    stick: Stick = Field(description="the stick that commands the axis")
+    command: Command = Field(description="the joystick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")
     feedback: Feedback | None = None
     status: Status | None = None
     sway: Sway | None = None
     slewing: Slewing | None = None
     filter: Filter = Field(discriminator="kind", description="filter of the axis")
-    sets: list[SetConfig] = Field([], description="sway and filter by the state of the grapple")
-    feels: dict[str, Feel] = Field({}, description="other filters that the operator may choose")
+    gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
+    profiles: dict[str, Profile] = Field(
+        {}, description="other filters that the operator may choose"
+    )
     limits: Limits = Limits()
     radial_compensation: RadialConfig | None = None
 
@@ -271,7 +273,7 @@ class AxisConfig(Section):
             raise ValueError(
                 f"filter {self.filter.kind} needs the sway data of the axis; found no sway"
             )
-        if fault := sets_fault(self.filter.kind, self.sets):
+        if fault := schedule_fault(self.filter.kind, self.gain_schedule):
             raise ValueError(fault)
         return self
 
@@ -287,17 +289,17 @@ class AxisConfig(Section):
 
 
 class DeploymentConfig(Section):
-    """A machine: buses, DBC files, levers and axes."""
+    """A machine: buses, DBC files, joysticks and axes."""
 
     tick_ms: Annotated[int, number(1, 50, "ms", "period of the control loop")] = 20
     buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
-    levers: dict[str, Lever] = Field(min_length=1, description="joystick messages by name")
+    joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
     gateway: Gateway | None = None
     emergency_stop: EmergencyStop | None = None
-    grapple: Grapple | None = None
-    feel: FeelSwitch | None = None
+    load_state: LoadState | None = None
+    profile: ProfileSwitch | None = None
     status: Status | None = None
     identity: Status | None = Field(
         None, description="message, once a second, with the digest of what runs"

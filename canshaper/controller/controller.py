@@ -16,7 +16,7 @@ from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.carry_over import Key, Part, carry_over
 from canshaper.inputs.feedback import Feedback, Following
 from canshaper.inputs.input import EmergencyStopInput, Input
-from canshaper.inputs.lever import LeverInput
+from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.radius import RadiusInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
@@ -43,7 +43,7 @@ class Controller:
 
     Attributes:
         counters: what went wrong so far.
-        levers: the levers by name.
+        joysticks: the joysticks by name.
         events: changes of state since the owner last emptied the list.
         moves: whether the frame that was handed out last is one of a valve, and any moves.
     """
@@ -52,10 +52,12 @@ class Controller:
         self.deployment = deployment
         self.counters = Counters()
         self.events: list[Told] = []
-        levers = {name: LeverInput(lever) for name, lever in deployment.levers.items()}
-        self.levers = levers
+        joysticks = {
+            name: JoystickInput(joystick) for name, joystick in deployment.joysticks.items()
+        }
+        self.joysticks = joysticks
         taken: list[tuple[BoundInput, Received]] = [
-            (lever, levers[name]) for name, lever in deployment.levers.items()
+            (joystick, joysticks[name]) for name, joystick in deployment.joysticks.items()
         ]
         self._stop: EmergencyStopInput | None = None
         if stop := deployment.emergency_stop:
@@ -63,7 +65,7 @@ class Controller:
             taken.append((stop, self._stop))
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
-            name: AxisRunner(bound, tick_s, levers[bound.config.stick.lever])
+            name: AxisRunner(bound, tick_s, joysticks[bound.config.command.joystick])
             for name, bound in deployment.axes.items()
         }
         taken += self._choose()
@@ -101,7 +103,7 @@ class Controller:
             key = runner.bound.valve.message.sender.key
             self._by_message.setdefault(key, []).append(runner)
         self._lines = {
-            key: Line(runners[0].bound.valve.message, levers[_lever(runners[0])], runners)
+            key: Line(runners[0].bound.valve.message, joysticks[_joystick(runners[0])], runners)
             for key, runners in self._by_message.items()
             if runners[0].bound.rewrites
         }
@@ -178,7 +180,7 @@ class Controller:
         return self._passed_on(frame, arrived_ns) if self._lines else None
 
     def _passed_on(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """What a frame leaves as on the other bus of a gateway, where it is news of its lever."""
+        """What a frame leaves as on the other bus of a gateway, if it is news of its joystick."""
         for line in self._lines.values():
             if line.news():
                 if self._stood_still:  # what has waited is not passed on later either
@@ -259,14 +261,14 @@ class Controller:
         return name, runner, message, self._lines.get(message.sender.key)
 
     def _choose(self) -> list[tuple[BoundInput, Input]]:
-        """Let grapple and operator choose sway data and filter of the axes that have a choice."""
-        bound = self.deployment.grapple, self.deployment.feel
-        grapple, feel = (ValueInput(one, one.config.signal) if one else None for one in bound)
-        codes = self.deployment.config.feel.codes if self.deployment.config.feel else {}
+        """Let load state and operator choose sway data and filter of axes that have a choice."""
+        bound = self.deployment.load_state, self.deployment.profile
+        load_state, profile = (ValueInput(one, one.config.signal) if one else None for one in bound)
+        codes = self.deployment.config.profile.codes if self.deployment.config.profile else {}
         for runner in self.axes.values():
-            if runner.bound.config.sets or runner.bound.config.feels:
-                runner.add_chooser(grapple, feel, codes)
-        return [(b, one) for b, one in zip(bound, (grapple, feel), strict=True) if b and one]
+            if runner.bound.config.gain_schedule or runner.bound.config.profiles:
+                runner.add_chooser(load_state, profile, codes)
+        return [(b, one) for b, one in zip(bound, (load_state, profile), strict=True) if b and one]
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
         """Tell when the valve no longer does what it is told, and when it does again."""
@@ -374,8 +376,8 @@ class Controller:
         return frames
 
 
-def _lever(runner: AxisRunner) -> str:
-    return runner.bound.config.stick.lever
+def _joystick(runner: AxisRunner) -> str:
+    return runner.bound.config.command.joystick
 
 
 def _passed(last: int, now: int, period: int) -> int:

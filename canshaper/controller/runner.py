@@ -36,7 +36,7 @@ class StickSource(Protocol):
     def stick(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
-        """What the axis may use now, see ``LeverInput``."""
+        """What the axis may use now, see ``JoystickInput``."""
 
     @property
     def releases(self) -> int:
@@ -56,13 +56,13 @@ class AxisRunner:
         compensator: what this axis asks of another one, where it slews.
     """
 
-    def __init__(self, bound: BoundAxis, tick_s: float, lever: StickSource) -> None:
+    def __init__(self, bound: BoundAxis, tick_s: float, joystick: StickSource) -> None:
         config = bound.config
         self.bound = bound
-        self._lever = lever
+        self._joystick = joystick
         self._releases = self._presses = 0  # as this axis knows them
-        self._signal = config.stick.signal
-        self._neutral_band = config.stick.neutral_pct / 100.0
+        self._signal = config.command.signal
+        self._neutral_band = config.command.neutral_pct / 100.0
         self.period_ticks = bound.period_ticks
         self.period_s = period_s = tick_s * bound.period_ticks
         sway = SwayModel(config.sway.mode(), period_s) if config.sway else None
@@ -132,19 +132,19 @@ class AxisRunner:
         self.compensator = compensator
 
     def add_chooser(
-        self, grapple: ValueInput | None, feel: ValueInput | None, codes: Mapping[str, int]
+        self, load_state: ValueInput | None, profile: ValueInput | None, codes: Mapping[str, int]
     ) -> None:
-        """Let grapple and operator choose sway data and filter."""
-        self.chooser = SetChooser(self.bound, self.axis, grapple, feel, codes)
+        """Let load state and operator choose sway data and filter."""
+        self.chooser = SetChooser(self.bound, self.axis, load_state, profile, codes)
 
-    def isolate(self, lever: StickSource, axis: Axis | None = None) -> None:
+    def isolate(self, joystick: StickSource, axis: Axis | None = None) -> None:
         """For a measurement: another stick, perhaps another state machine, nothing of other axes.
 
         Args:
-            lever: where the stick comes from now.
+            joystick: where the stick comes from now.
             axis: what drives the valve now; by default the same as before.
         """
-        self._lever = lever
+        self._joystick = joystick
         self.compensator = None
         if axis is not None:
             self.axis, self.chooser = axis, None
@@ -204,8 +204,8 @@ class AxisRunner:
         if emergency or self._gates or self._invalid or self._foreign_ns is not None:
             fault = self._objections(now_ns, emergency)
         trip, self._trip = self._trip, None
-        stick = self._lever.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
-        self._releases = self._lever.releases
+        stick = self._joystick.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
+        self._releases = self._joystick.releases
         # A release is more than a fault.
         if fault is not None and (stick.enabled or self.axis.neutral):
             stick = StickInput(fault=fault, reset=stick.reset, trip=trip)

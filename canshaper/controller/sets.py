@@ -1,9 +1,9 @@
-"""Sway data and filter of an axis in motion: by the grapple, and by the operator's choice."""
+"""Sway data and filter of an axis in motion: by the load, and by the operator's choice."""
 
 from collections.abc import Mapping, Sequence
 
+from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
-from canshaper.config.sets import Feel
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import BoundAxis
 from canshaper.machine.filters import parameter_sets
@@ -18,17 +18,17 @@ LEAST_BETWEEN_NS = 100_000_000
 
 
 class SetChooser:
-    """Keeps sway data and filter of one axis at what grapple and operator ask for.
+    """Keeps sway data and filter of one axis at what load state and operator ask for.
 
     Args:
         bound: the axis.
         axis: its state machine, which is retuned.
-        grapple: tells what hangs on the crane, where there is a signal for it.
-        feel: the operator's choice, where there is one.
+        load_state: tells what hangs on the crane, where there is a signal for it.
+        profile: the operator's choice, where there is one.
         codes: its codes by name.
 
     Attributes:
-        number: set in force: 0 the axis' own, then its sets, then each feel and its sets, in the
+        number: set in force: 0 the axis' own, then its sets, then each profile and its sets, in the
             order of the file; between two sets the nearer one.
     """
 
@@ -36,15 +36,15 @@ class SetChooser:
         self,
         bound: BoundAxis,
         axis: Axis,
-        grapple: ValueInput | None,
-        feel: ValueInput | None,
+        load_state: ValueInput | None,
+        profile: ValueInput | None,
         codes: Mapping[str, int],
     ) -> None:
         config = bound.config
         self.number = 0
         self._axis = axis
-        self._grapple = grapple
-        self._feel = feel
+        self._load_state = load_state
+        self._profile = profile
         self._rate = config.limits.slowest_per_s
         self._codes = {float(code): name for name, code in codes.items()}
         self._programs = programs(bound)
@@ -58,12 +58,12 @@ class SetChooser:
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
-        feel = self._feel.fresh(now_ns) if self._feel else None
-        name = self._codes.get(feel, "") if feel is not None else ""
+        profile = self._profile.fresh(now_ns) if self._profile else None
+        name = self._codes.get(profile, "") if profile is not None else ""
         if name not in self._programs:
             name = ""
         base, sets = self._programs[name]
-        value = self._grapple.fresh(now_ns) if self._grapple and sets else None
+        value = self._load_state.fresh(now_ns) if self._load_state and sets else None
         steps = None if value is None else position(sets, value)
         if (name, steps) == self._now or now_ns < self._not_before_ns:
             return
@@ -81,13 +81,13 @@ class SetChooser:
 
 
 def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
-    """What an axis can run, by the name of the feel ("" without one): its own set, and others."""
+    """What an axis can run, by the name of the profile ("" without one)."""
     config = bound.config
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()
     found: dict[str, tuple[ParameterSet, Sequence[ParameterSet]]] = {}
-    parts: dict[str, AxisConfig | Feel] = {"": config, **config.feels}
+    parts: dict[str, AxisConfig | Profile] = {"": config, **config.profiles}
     for name, part in parts.items():
         base = ParameterSet(0.0, mode, part.filter.kind, part.filter.parameters())
-        found[name] = (base, parameter_sets(part.sets))
+        found[name] = (base, parameter_sets(part.gain_schedule))
     return found

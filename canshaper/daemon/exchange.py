@@ -36,7 +36,7 @@ class Reckons(Protocol):
 
 
 def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: Standstill) -> int:
-    """Take all waiting frames; those of a lever that pass a gateway leave at once, or not at all.
+    """Take all waiting frames; those of a joystick that pass a gateway leave at once or not at all.
 
     Args:
         reckons: what the frames are for.

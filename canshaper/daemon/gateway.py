@@ -23,7 +23,7 @@ from canshaper.protocols.gateway.rules import excluded, passing_rules
 
 log = logging.getLogger("canshaper")
 
-# Foreign frames that are passed on before the levers are looked at again.
+# Foreign frames that are passed on before the joysticks are looked at again.
 MOST_AT_ONCE = 8
 # Rounds that find nothing to take though a socket has something: frames of no use, or an error.
 MOST_EMPTY = 10
@@ -138,7 +138,7 @@ class InLine:
         self._check_ns = 0
         self._told: str | None = None
         first, second = (deployment.config.buses[bus] for bus in gateway.between)
-        self._kernel = gateway.passing == "kernel"
+        self._kernel = gateway.forwarding == "kernel"
         self._real = {first.interface, second.interface} == {"socketcan"}
         self._wanted = passing_rules(deployment)
         if not self._real:
@@ -153,7 +153,7 @@ class InLine:
         ports: Mapping[str, Port],
         standstill: Standstill,
     ) -> None:
-        """Until a deadline pass on what comes; frames of the levers first.
+        """Until a deadline pass on what comes; frames of the joysticks first.
 
         What comes later is left to the tick, which knows whether the loop stood still: it must not
         leave with the velocities from before.

@@ -19,7 +19,7 @@ def longest_gap_ns(deployment: Deployment) -> int:
     A valve that gets a frame in every n-th tick only may have waited for n - 1 ticks before.
     """
     tick_ms = deployment.config.tick_ms
-    limits = [lever.config.timeout_ms for lever in deployment.levers.values()]
+    limits = [joystick.config.timeout_ms for joystick in deployment.joysticks.values()]
     limits += [
         axis.config.valve.timeout_ms - (axis.period_ticks - 1) * tick_ms
         for axis in deployment.axes.values()

@@ -11,7 +11,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Sway
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
@@ -43,7 +43,7 @@ def drive(
         parameters: the crane; by default the nominal one.
         machine: tip, tip-controller or joints; by default what the axes of the deployment say.
         sway: swing of the grapple at the start; by default it hangs still.
-        crane: which one moves, where the deployment has several; the others' levers stand still.
+        crane: which one moves, where the deployment has several; the others' joysticks stand still.
         prepare: called with the fresh controller, to put another filter in.
         progress: called with the simulated seconds now and then.
 
@@ -61,11 +61,11 @@ def drive(
     try:
         driven = one_crane(deployment, crane) if crane else deployment
         plant = PlantNode(driven, parameters, machine, sway)
-        hands = [LeverNode(driven, script, bypass=bypass)]
+        hands = [JoystickNode(driven, script, bypass=bypass)]
         for other in cranes(deployment):
             if other != crane:
                 still = Script("still", (), script.duration_s)
-                hands.append(LeverNode(one_crane(deployment, other), still))
+                hands.append(JoystickNode(one_crane(deployment, other), still))
     except ValueError as error:
         raise DriveError(str(error)) from None
     recorder = Recorder(driven, parameters)

@@ -82,14 +82,14 @@ class GuardedAxis(Asked):
         stop: GuardedStop | None,
     ) -> None:
         config, limits = bound.config, bound.config.limits
-        message = deployment.levers[config.stick.lever].message
-        super().__init__(StickBits(message, config.stick))
+        message = deployment.joysticks[config.command.joystick].message
+        super().__init__(StickBits(message, config.command))
         joystick.drives(self)
         period_ns = deployment.config.tick_ms * 1_000_000 * bound.period_ticks
         period_s = period_ns * 1e-9
         self.name = bound.name
         self.bits = CommandBits(
-            bound.valve_message, config.valve, config.stick if bound.rewrites else None
+            bound.valve_message, config.valve, config.command if bound.rewrites else None
         )
         self._length, self.span = bound.valve_message.length, self.bits.span
         self.part = b""
@@ -290,7 +290,7 @@ def _ends(deployment: Deployment, bound: BoundAxis, key: str) -> tuple[float, fl
 
 def _standstill_ns(deployment: Deployment) -> int:
     """The longest that the loop may stand still without notice: the shortest of all timeouts."""
-    inputs = [*deployment.levers.values(), deployment.emergency_stop]
+    inputs = [*deployment.joysticks.values(), deployment.emergency_stop]
     timeouts = [one.config.timeout_ms for one in inputs if one]
     timeouts += [axis.config.valve.timeout_ms for axis in deployment.axes.values()]
     return min(timeouts) * 1_000_000

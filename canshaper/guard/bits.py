@@ -15,7 +15,7 @@ from typing import Literal
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.signals import find_signal, special_codes
-from canshaper.config.schema import Stick, Valve
+from canshaper.config.schema import Command, Valve
 
 # Part of full scale; more than the rounding of scale and offset, less than any resolution.
 ROUNDING = 1e-6
@@ -89,7 +89,7 @@ class StickBits:
         span: the bytes with all of them.
     """
 
-    def __init__(self, message: Message, stick: Stick) -> None:
+    def __init__(self, message: Message, stick: Command) -> None:
         length = message.length
         self._part = Part(_signal(message, stick.signal), length)
         self._negative = Part(_signal(message, stick.negative), length) if stick.negative else None
@@ -121,7 +121,7 @@ class CommandBits:
         span: bytes with the signals that tell it.
     """
 
-    def __init__(self, message: Message, valve: Valve, stick: Stick | None) -> None:
+    def __init__(self, message: Message, valve: Valve, stick: Command | None) -> None:
         """``stick`` is that of a joystick whose own message carries the command, else None."""
         length = message.length
         signal = _signal(message, valve.signal)

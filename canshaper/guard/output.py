@@ -60,14 +60,14 @@ class OutputGuard:
     """
 
     def __init__(self, deployment: Deployment) -> None:
-        config, levers = deployment.config, deployment.levers
-        joysticks = {n: GuardedJoystick(lever, lever.config.enable) for n, lever in levers.items()}
+        config, bound = deployment.config, deployment.joysticks
+        joysticks = {n: GuardedJoystick(one, one.config.enable) for n, one in bound.items()}
         inputs: list[tuple[BoundInput, GuardedInput]] = []
-        inputs += [(levers[name], joystick) for name, joystick in joysticks.items()]
+        inputs += [(one, joysticks[name]) for name, one in bound.items()]
         stop = None
-        if bound := deployment.emergency_stop:
-            stop = GuardedStop(bound, bound.config.signal)
-            inputs.append((bound, stop))
+        if button := deployment.emergency_stop:
+            stop = GuardedStop(button, button.config.signal)
+            inputs.append((button, stop))
         self.at = -1, -1
         self._stood_still = False
         self._joysticks = list(joysticks.values())
@@ -111,7 +111,7 @@ def _valves(
     axes: dict[str, GuardedAxis] = {}
     by_message: dict[Key, list[GuardedAxis]] = {}
     for name, bound in deployment.axes.items():
-        joystick = joysticks[bound.config.stick.lever]
+        joystick = joysticks[bound.config.command.joystick]
         axes[name] = GuardedAxis(deployment, bound, joystick, stop)
         by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
     for name, bound in deployment.axes.items():

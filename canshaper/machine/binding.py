@@ -12,11 +12,11 @@ from canshaper.codec.valve import ValveMessage
 from canshaper.config.bus import LAST_SPN, Bus, J1939Name
 from canshaper.config.gateway import Gateway
 from canshaper.config.load import load_config
+from canshaper.config.schedule import Profile
 from canshaper.config.schema import (
     AxisConfig,
     Status,
 )
-from canshaper.config.sets import Feel
 from canshaper.config.source import DeploymentError, Place
 from canshaper.machine.deployment import BoundAxis, BoundRadial, Deployment
 from canshaper.machine.filters import FilterBinder
@@ -49,16 +49,16 @@ class _Binder(FilterBinder):
         messages = self.load(path.parent, inside)
         if messages is None:
             raise DeploymentError(self.problems)
-        levers = {n: self.lever(n, lever) for n, lever in config.levers.items()}
+        joysticks = {n: self.joystick(n, joystick) for n, joystick in config.joysticks.items()}
         axes = {n: self._axis(n, axis) for n, axis in config.axes.items()}
         stop = self.stop(config.emergency_stop) if config.emergency_stop else None
-        grapple = self.switch(("grapple",), config.grapple) if config.grapple else None
-        feel = self.switch(("feel",), config.feel) if config.feel else None
-        if feel and config.feel:
-            codes = config.feel.codes.items()
-            self._check_values(feel, {("feel", "codes", name): code for name, code in codes})
-        if grapple:
-            self._check_values(grapple, self._values_of_sets())
+        load_state = self.switch(("load_state",), config.load_state) if config.load_state else None
+        profile = self.switch(("profile",), config.profile) if config.profile else None
+        if profile and config.profile:
+            codes = config.profile.codes.items()
+            self._check_values(profile, {("profile", "codes", name): code for name, code in codes})
+        if load_state:
+            self._check_values(load_state, self._values_of_sets())
         service = self._status(("status",), config.status, ServiceStatusCodec)
         identity = self._status(("identity",), config.identity, IdentityCodec)
         if config.gateway:
@@ -71,7 +71,7 @@ class _Binder(FilterBinder):
             path,
             config,
             messages,
-            {n: lever for n, lever in levers.items() if lever},
+            {n: joystick for n, joystick in joysticks.items() if joystick},
             {n: axis for n, axis in axes.items() if axis},
             stop,
             ServiceStatusCodec(service[0]) if service else None,
@@ -85,28 +85,30 @@ class _Binder(FilterBinder):
                 ),
             ),
             IdentityCodec(identity[0]) if identity else None,
-            grapple,
-            feel,
+            load_state,
+            profile,
             self.on_bus,
             source=self.source,
         )
 
     def _filter_kinds(self) -> set[str]:
-        """Of every filter that may run; those of sets are of the kind of their axis or feel."""
+        """Of every filter that may run; breakpoints are of the kind of their axis or profile."""
         axes = self.config.axes.values()
-        feels = (feel for axis in axes for feel in axis.feels.values())
-        return {axis.filter.kind for axis in axes} | {feel.filter.kind for feel in feels}
+        profiles = (profile for axis in axes for profile in axis.profiles.values())
+        return {axis.filter.kind for axis in axes} | {profile.filter.kind for profile in profiles}
 
     def _values_of_sets(self) -> dict[Place, float]:
-        """Values of the grapple that the sets name, by their places."""
-        parts: dict[Place, AxisConfig | Feel] = {}
+        """Values of the load state that the gain schedules name, by their places."""
+        parts: dict[Place, AxisConfig | Profile] = {}
         for name, axis in self.config.axes.items():
             parts["axes", name] = axis
-            parts |= {("axes", name, "feels", feel): part for feel, part in axis.feels.items()}
+            parts |= {
+                ("axes", name, "profiles", profile): part for profile, part in axis.profiles.items()
+            }
         return {
-            (*place, "sets", i, "at"): one.at
+            (*place, "gain_schedule", i, "breakpoint"): one.breakpoint
             for place, part in parts.items()
-            for i, one in enumerate(part.sets)
+            for i, one in enumerate(part.gain_schedule)
         }
 
     def _check_values(self, switch: BoundSwitch, values: Mapping[Place, float]) -> None:
@@ -146,7 +148,9 @@ class _Binder(FilterBinder):
             return
         rewritten = [m.sender for m in valves if isinstance(m, RewrittenMessage)]
         if not rewritten:
-            text = f"found {gateway.fallback}, and no valve has the message of a lever on the other"
+            text = (
+                f"found {gateway.fallback}, and no valve has the message of a joystick on the other"
+            )
             self.add(("gateway", "fallback"), f"{text} bus; allowed is stop")
         faults = {neutral_fault(s.protection, s.fields.message.length): s for s in rewritten}
         for fault, sender in faults.items():
@@ -198,17 +202,20 @@ class _Binder(FilterBinder):
     def _axis(self, name: str, axis: AxisConfig) -> BoundAxis | None:
         place: Place = ("axes", name)
         before = len(self.problems)
-        if axis.stick.lever not in self.config.levers:
-            names = ", ".join(self.config.levers)
-            self.add((*place, "stick", "lever"), f"found {axis.stick.lever!r}, levers are {names}")
-        bound = self.valve((*place, "valve"), axis.valve, axis.stick)
+        if axis.command.joystick not in self.config.joysticks:
+            names = ", ".join(self.config.joysticks)
+            self.add(
+                (*place, "command", "joystick"),
+                f"found {axis.command.joystick!r}, joysticks are {names}",
+            )
+        bound = self.valve((*place, "valve"), axis.valve, axis.command)
         status = self._status((*place, "status"), axis.status, AxisStatusCodec)
         if bound is None or len(self.problems) > before:
             return None
         message, codec, ticks = bound
         period_s = ticks * self.config.tick_ms / 1000.0
         self.check_filters(place, axis, period_s)
-        timeout_ms = self.config.levers[axis.stick.lever].timeout_ms
+        timeout_ms = self.config.joysticks[axis.command.joystick].timeout_ms
         if fault := stated_fault(axis, timeout_ms=timeout_ms, period_s=period_s):
             self.add((*place, "limits", "stop_distance_m"), fault)
         if len(self.problems) > before:

@@ -32,7 +32,7 @@ from canshaper.machine.ids import Ids
 from canshaper.machine.inputs import (
     BoundFeedback,
     BoundInput,
-    BoundLever,
+    BoundJoystick,
     BoundRadius,
     BoundStatusWord,
     BoundStop,
@@ -70,7 +70,7 @@ class BoundAxis:
 
     @property
     def rewrites(self) -> bool:
-        """Whether its command leaves in the frames of its own lever, through a gateway."""
+        """Whether its command leaves in the frames of its own joystick, through a gateway."""
         return isinstance(self.valve.message, RewrittenMessage)
 
 
@@ -81,15 +81,15 @@ class Deployment:
     path: Path
     config: DeploymentConfig
     messages: Messages
-    levers: dict[str, BoundLever]
+    joysticks: dict[str, BoundJoystick]
     axes: dict[str, BoundAxis]
     emergency_stop: BoundStop | None
     status: ServiceStatusCodec | None
     status_ticks: int
     identity: Identity
     identity_status: IdentityCodec | None
-    grapple: BoundSwitch | None
-    feel: BoundSwitch | None
+    load_state: BoundSwitch | None
+    profile: BoundSwitch | None
     on_bus: dict[str, list[Message]]
     source: Source = field(compare=False)
     """The file, for the lines of what is wrong with it on this machine."""
@@ -150,11 +150,11 @@ class Deployment:
         return has_node or any(is_j1939(message) for message in self.on_bus.get(bus, ()))
 
     def inputs(self) -> list[BoundInput]:
-        """Levers, switches, feedback and status words of the valves."""
+        """Joysticks, switches, feedback and status words of the valves."""
         axes = self.axes.values()
         told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
-        others = (self.emergency_stop, self.grapple, self.feel, *told)
-        return [*self.levers.values(), *(i for i in others if i)]
+        others = (self.emergency_stop, self.load_state, self.profile, *told)
+        return [*self.joysticks.values(), *(i for i in others if i)]
 
     def senders(self) -> list[Sender]:
         """Every message of the DBC files that we send, each once."""

@@ -6,8 +6,8 @@ from typing import Any
 from canshaper.config.adjust import Key, faults
 from canshaper.config.control import Control
 from canshaper.config.filters import Filter
+from canshaper.config.schedule import Breakpoint, Profile
 from canshaper.config.schema import AxisConfig
-from canshaper.config.sets import Feel, SetConfig
 from canshaper.config.source import Place
 from canshaper.config.sway import Sway
 from canshaper.machine.valves import ValveBinder
@@ -23,29 +23,33 @@ class FilterBinder(ValveBinder):
         """Every filter that the axis may get has to run at the period of its valve."""
         rate = axis.limits.slowest_per_s
         found: list[tuple[Place, Filter, Sway | None]] = []
-        parts: list[tuple[Place, AxisConfig | Feel]] = [(place, axis)]
-        parts += [((*place, "feels", name), feel) for name, feel in axis.feels.items()]
+        parts: list[tuple[Place, AxisConfig | Profile]] = [(place, axis)]
+        parts += [((*place, "profiles", name), profile) for name, profile in axis.profiles.items()]
         for at, part in parts:
             found.append(((*at, "filter"), part.filter, axis.sway))
-            for i, one in enumerate(part.sets):
-                found.append(((*at, "sets", i, "filter"), one.filter, one.sway))
-            if part.sets and not self.config.grapple:
-                self.add((*at, "sets"), "need the signal that chooses them; found no grapple")
+            for i, one in enumerate(part.gain_schedule):
+                found.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
+            if part.gain_schedule and not self.config.load_state:
+                self.add(
+                    (*at, "gain_schedule"), "need the signal that chooses them; found no load_state"
+                )
         good = True
         for at, chosen, sway in found:
             if fault := filter_fault(chosen, sway, period_s, rate):
                 self.add(at, fault)
                 good = False
         for at, part in parts if good else []:
-            if fault := _fault_between(part.sets, period_s, rate):
-                self.add((*at, "sets"), fault)
+            if fault := _fault_between(part.gain_schedule, period_s, rate):
+                self.add((*at, "gain_schedule"), fault)
         if len(found) > 1 and axis.sway is None:
-            self.add(place, "has sets or feels, and no sway data of its own; found no sway")
-        codes = self.config.feel.codes if self.config.feel else {}
-        for name in axis.feels:
+            self.add(
+                place, "has profiles or a gain schedule, and no sway data of its own; found no sway"
+            )
+        codes = self.config.profile.codes if self.config.profile else {}
+        for name in axis.profiles:
             if name not in codes:
-                allowed = ", ".join(codes) or "none: there is no feel at the top level"
-                self.add((*place, "feels", name), f"found {name!r}, feels are {allowed}")
+                allowed = ", ".join(codes) or "none: there is no profile at the top level"
+                self.add((*place, "profiles", name), f"found {name!r}, profiles are {allowed}")
 
     def check_control(self, control: Control) -> None:
         """Every adjustable number has to be one that can be changed in motion."""
@@ -77,18 +81,18 @@ def filter_fault(
     return _fault(chosen.kind, chosen.parameters(), mode, period_s, valve_rate_per_s)
 
 
-def parameter_sets(sets: Sequence[SetConfig]) -> list[ParameterSet]:
-    """Sets of an axis or of a feel as they run."""
+def parameter_sets(sets: Sequence[Breakpoint]) -> list[ParameterSet]:
+    """Sets of an axis or of a profile as they run."""
     return [
-        ParameterSet(one.at, one.sway.mode(), one.filter.kind, one.filter.parameters())
+        ParameterSet(one.breakpoint, one.sway.mode(), one.filter.kind, one.filter.parameters())
         for one in sets
     ]
 
 
 def _fault_between(
-    sets: Sequence[SetConfig], period_s: float, valve_rate_per_s: float
+    sets: Sequence[Breakpoint], period_s: float, valve_rate_per_s: float
 ) -> str | None:
-    """Why a filter between two sets cannot run, or None.
+    """Why a filter between two breakpoints cannot run, or None.
 
     Each that the load may ask for is built here, so that none is refused in motion.
     """
@@ -96,7 +100,7 @@ def _fault_between(
     for steps in range((len(running) - 1) * STEPS_BETWEEN):
         one = at_position(running, steps)
         if fault := _fault(one.kind, one.parameters, one.mode, period_s, valve_rate_per_s):
-            return f"at {one.at:g}, between two sets: {fault}"
+            return f"at {one.at:g}, between two breakpoints: {fault}"
     return None
 
 

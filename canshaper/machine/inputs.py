@@ -1,10 +1,10 @@
-"""Messages that are taken: levers and the emergency stop, bound to their DBC messages."""
+"""Messages that are taken: joysticks and the emergency stop, bound to their DBC messages."""
 
 from dataclasses import dataclass
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import LeverCodec
+from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.j1939 import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import is_j1939
@@ -16,8 +16,8 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.config.input import Input
-from canshaper.config.schema import EmergencyStop, Feedback, Lever, Radius, StatusWord, Stick
-from canshaper.config.sets import FeelSwitch, Grapple
+from canshaper.config.schedule import LoadState, ProfileSwitch
+from canshaper.config.schema import Command, EmergencyStop, Feedback, Joystick, Radius, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.protections import ProtectionBinder
@@ -33,7 +33,7 @@ class BoundInput:
 
     config: Input
     message: Message
-    codec: LeverCodec
+    codec: JoystickCodec
     protection: Protection
 
     @property
@@ -70,10 +70,10 @@ class BoundInput:
 
 
 @dataclass(frozen=True)
-class BoundLever(BoundInput):
-    """A lever with its message."""
+class BoundJoystick(BoundInput):
+    """A joystick with its message."""
 
-    config: Lever
+    config: Joystick
     name: str
 
 
@@ -109,36 +109,40 @@ class BoundStatusWord(BoundInput):
 class BoundSwitch(BoundInput):
     """The state of the grapple, or the operator's choice, with its message."""
 
-    config: Grapple | FeelSwitch
+    config: LoadState | ProfileSwitch
 
 
 class InputBinder(ProtectionBinder):
     """Binds them, or notes every problem."""
 
-    def lever(self, name: str, lever: Lever) -> BoundLever | None:
-        """A lever; its velocities are those that the axes name."""
-        place: Place = ("levers", name)
+    def joystick(self, name: str, joystick: Joystick) -> BoundJoystick | None:
+        """A joystick; its velocities are those that the axes name."""
+        place: Place = ("joysticks", name)
         before = len(self.problems)
         use: dict[str, str] = {}
-        found = self._input(place, lever, ("enable", "reset", "anti_sway_off"), use)
+        found = self._input(place, joystick, ("enable", "reset", "anti_sway_off"), use)
         if not found:
             return None
-        self.node(place, lever.bus, lever.node)
+        self.node(place, joystick.bus, joystick.node)
         file, message, protection = found
         velocities = self._velocities(name, file, message, use)
         if len(self.problems) > before:
             return None
-        return BoundLever(lever, message, LeverCodec(message, velocities), protection, name)
+        return BoundJoystick(
+            joystick, message, JoystickCodec(message, velocities), protection, name
+        )
 
     def _velocities(
-        self, lever: str, file: DbcFile, message: Message, use: dict[str, str]
+        self, joystick: str, file: DbcFile, message: Message, use: dict[str, str]
     ) -> list[Velocity]:
-        """What the axes take from a lever; ``use`` is what its other signals are."""
+        """What the axes take from a joystick; ``use`` is what its other signals are."""
         found: list[Velocity] = []
-        sticks = {n: a.stick for n, a in self.config.axes.items() if a.stick.lever == lever}
+        sticks = {
+            n: a.command for n, a in self.config.axes.items() if a.command.joystick == joystick
+        }
         moves = {s.signal: f"the stick of {axis}" for axis, s in reversed(sticks.items())}
         for axis, stick in sticks.items():
-            place: Place = ("axes", axis, "stick")
+            place: Place = ("axes", axis, "command")
             if stick.negative:
                 if rocker := self._rocker(place, stick, file, message, (moves, use)):
                     use[stick.negative] = f"the negative direction of {axis}"
@@ -169,7 +173,7 @@ class InputBinder(ProtectionBinder):
     def _rocker(
         self,
         place: Place,
-        stick: Stick,
+        stick: Command,
         file: DbcFile,
         message: Message,
         used: tuple[dict[str, str], dict[str, str]],
@@ -199,7 +203,7 @@ class InputBinder(ProtectionBinder):
         if not found or len(self.problems) > before:
             return None
         _, message, protection = found
-        bound = BoundStop(stop, message, LeverCodec(message, []), protection)
+        bound = BoundStop(stop, message, JoystickCodec(message, []), protection)
         self._known_source(place, bound, "the emergency stop")
         return bound if len(self.problems) == before else None
 
@@ -223,7 +227,7 @@ class InputBinder(ProtectionBinder):
         self.timeout(place, radius.timeout_ms, message)
         use = {radius.signal: "signal"}
         protection = self.input_protection(place, radius, message, use)
-        bound = BoundRadius(radius, message, LeverCodec(message, []), protection)
+        bound = BoundRadius(radius, message, JoystickCodec(message, []), protection)
         self._known_source(place, bound, "the radius")
         return bound if len(self.problems) == before else None
 
@@ -238,9 +242,9 @@ class InputBinder(ProtectionBinder):
             self.state_bits((*place, "signal"), signal)
         if len(self.problems) > before:
             return None
-        return BoundStatusWord(config, message, LeverCodec(message, []), protection)
+        return BoundStatusWord(config, message, JoystickCodec(message, []), protection)
 
-    def switch(self, place: Place, config: Grapple | FeelSwitch) -> BoundSwitch | None:
+    def switch(self, place: Place, config: LoadState | ProfileSwitch) -> BoundSwitch | None:
         """The state of the grapple, or the operator's choice."""
         before = len(self.problems)
         found = self._input(place, config, (), {config.signal: "signal"})
@@ -248,11 +252,11 @@ class InputBinder(ProtectionBinder):
             return None
         _, message, protection = found
         signal = self.signal((*place, "signal"), message, config.signal)
-        if signal and isinstance(config, FeelSwitch):
+        if signal and isinstance(config, ProfileSwitch):
             self.integer((*place, "signal"), signal)
         if len(self.problems) > before:
             return None
-        return BoundSwitch(config, message, LeverCodec(message, []), protection)
+        return BoundSwitch(config, message, JoystickCodec(message, []), protection)
 
     def node(self, place: Place, bus: str, name: str | None) -> None:
         """A node of CANopen that is named has to be one of its bus."""
@@ -277,7 +281,7 @@ class InputBinder(ProtectionBinder):
             self.problems.append(file.problem(message, text))
         if len(self.problems) > before:
             return None
-        return BoundFeedback(feedback, message, LeverCodec(message, []), protection)
+        return BoundFeedback(feedback, message, JoystickCodec(message, []), protection)
 
     def _input(
         self, place: Place, config: Input, switches: tuple[str, ...], use: dict[str, str]

@@ -46,7 +46,7 @@ def allowed_m(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> float | 
 
     Args:
         axis: the axis.
-        timeout_ms: that of its lever.
+        timeout_ms: that of its joystick.
         period_s: time between two commands to the valve.
     """
     speed = full_speed(axis).m_s
@@ -116,7 +116,7 @@ def _when(deployment: Deployment, name: str) -> _When:
     """When an axis sees an event."""
     axis = deployment.axes[name]
     return {
-        "timeout_ms": deployment.config.levers[axis.config.stick.lever].timeout_ms,
+        "timeout_ms": deployment.config.joysticks[axis.config.command.joystick].timeout_ms,
         "period_s": axis.period_ticks * deployment.config.tick_ms / 1000.0,
     }
 

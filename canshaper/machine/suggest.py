@@ -1,4 +1,4 @@
-"""What the messages of a DBC file look like: levers, valves, switches. Only a first guess."""
+"""What the messages of a DBC file look like: joysticks, valves, switches. Only a first guess."""
 
 import re
 from collections.abc import Sequence
@@ -13,7 +13,7 @@ ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
 ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
-_LEVER = re.compile(r"lever|joy|stick", re.IGNORECASE)
+_JOYSTICK = re.compile(r"lever|joy|stick", re.IGNORECASE)
 # A switch has two bits at most: off, on, error, not available.
 _SWITCH_BITS = 2
 # Part of a name that two have in common, from which on they are likely to belong together.
@@ -41,10 +41,10 @@ def counter(message: Message) -> str | None:
     return named(found, COUNTER)
 
 
-def levers(messages: Sequence[Message]) -> list[Message]:
+def joysticks(messages: Sequence[Message]) -> list[Message]:
     """Messages that come again and again with a stick and a switch; the likely ones first."""
     found = [m for m in messages if m.cycle_time and sticks(m) and switches(m)]
-    return sorted(found, key=lambda m: not _LEVER.search(m.name))
+    return sorted(found, key=lambda m: not _JOYSTICK.search(m.name))
 
 
 def commands(message: Message) -> list[Signal]:

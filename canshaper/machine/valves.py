@@ -17,7 +17,7 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec, ValveMessage
-from canshaper.config.schema import Cia408, DirectionCodes, Lever, Stick, Valve
+from canshaper.config.schema import Cia408, Command, DirectionCodes, Joystick, Valve
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.inputs import InputBinder
@@ -48,7 +48,7 @@ class ValveBinder(InputBinder):
     _shared: dict[tuple[str, int, bool], _Shared] = field(default_factory=dict)
 
     def valve(
-        self, place: Place, valve: Valve, stick: Stick
+        self, place: Place, valve: Valve, stick: Command
     ) -> tuple[Message, ValveCodec, int] | None:
         """The valve of an axis: its message, its codec, and its period in ticks."""
         before = len(self.problems)
@@ -96,41 +96,48 @@ class ValveBinder(InputBinder):
         return message, ValveCodec(shared.codec, signal, codec, others, negative), ticks
 
     def _rewrites(self, valve: Valve) -> str | None:
-        """Name of the lever whose frames leave as this message, through the gateway."""
+        """Name of the joystick whose frames leave as this message, through the gateway."""
         gateway = self.config.gateway
         if gateway is None or (bus := gateway.other(valve.bus)) is None:
             return None
-        of = {(lever.bus, lever.message): name for name, lever in self.config.levers.items()}
+        of = {
+            (joystick.bus, joystick.message): name
+            for name, joystick in self.config.joysticks.items()
+        }
         return of.get((bus, valve.message))
 
-    def _check_rewritten(self, place: Place, valve: Valve, stick: Stick, name: str) -> None:
-        """In the frames of a lever only its own sticks may be rewritten, and protected as it is."""
-        lever = self.config.levers[name]
-        if stick.lever != name:
-            text = f"found {valve.message!r}, the message of lever {name}, whose frames leave with"
+    def _check_rewritten(self, place: Place, valve: Valve, stick: Command, name: str) -> None:
+        """In the frames of a joystick only its own sticks may be rewritten, protected as it is."""
+        joystick = self.config.joysticks[name]
+        if stick.joystick != name:
+            text = (
+                f"found {valve.message!r}, the message of joystick {name}, whose frames leave with"
+            )
             self.add((*place, "message"), f"{text} its own sticks; that of this axis is at another")
         elif valve.signal != stick.signal:
-            text = f"found {valve.signal!r}; in the message of its lever allowed is that of the"
+            text = f"found {valve.signal!r}; in the message of its joystick allowed is that of the"
             self.add((*place, "signal"), f"{text} stick, {stick.signal!r}")
         for axis, other in self.config.axes.items():
             there = other.valve.bus, other.valve.message
-            if other.stick.lever == name and there != (valve.bus, valve.message):
-                text = f"found {other.valve.message!r}; the frames of lever {name} leave as"
+            if other.command.joystick == name and there != (valve.bus, valve.message):
+                text = f"found {other.valve.message!r}; the frames of joystick {name} leave as"
                 text += f" {valve.message} on bus {valve.bus}, with this stick unshaped in them"
                 self.add(("axes", axis, "valve", "message"), text)
         for key in ("direction", "cia408"):
             if getattr(valve, key) is not None:
-                text = f"found in the message of lever {name}; allowed is what the stick has"
+                text = f"found in the message of joystick {name}; allowed is what the stick has"
                 self.add((*place, key), text)
         for key in ("alive_counter", "checksum", "e2e"):
-            if getattr(valve, key) != getattr(lever, key):
-                self.add((*place, key), f"differs from that of lever {name}, allowed is the same")
-        if valve.timeout_ms <= lever.timeout_ms:
-            text = f"found {valve.timeout_ms}, allowed is more than the {lever.timeout_ms} ms of"
-            text += f" lever {name}: who takes its frames must not give up before we do"
+            if getattr(valve, key) != getattr(joystick, key):
+                self.add(
+                    (*place, key), f"differs from that of joystick {name}, allowed is the same"
+                )
+        if valve.timeout_ms <= joystick.timeout_ms:
+            text = f"found {valve.timeout_ms}, allowed is more than the {joystick.timeout_ms} ms of"
+            text += f" joystick {name}: who takes its frames must not give up before we do"
             self.add((*place, "timeout_ms"), text)
 
-    def _message(self, place: Place, valve: Valve, lever: str | None) -> _Shared | None:
+    def _message(self, place: Place, valve: Valve, joystick: str | None) -> _Shared | None:
         """The message of a valve, new or already that of another axis."""
         known = self.messages.find(valve.message)
         if not isinstance(known, str):
@@ -141,9 +148,9 @@ class ValveBinder(InputBinder):
                         text = f"differs from that of the other axes of {shared.message.name}"
                         self.add((*place, key), f"{text}, allowed is the same")
                 return shared
-        taken = self.config.levers[lever] if lever is not None else None
+        taken = self.config.joysticks[joystick] if joystick is not None else None
         source = taken.source if taken else None
-        # A lever's message keeps the address of its sender, who is not on this bus.
+        # A joystick's message keeps the address of its sender, who is not on this bus.
         found = self.message(
             place, valve.bus, valve.message, takes=taken is not None, source=source
         )
@@ -163,24 +170,29 @@ class ValveBinder(InputBinder):
         return shared
 
     def _rewritten(
-        self, place: Place, valve: Valve, lever: Lever, message: Message, protection: Protection
+        self,
+        place: Place,
+        valve: Valve,
+        joystick: Joystick,
+        message: Message,
+        protection: Protection,
     ) -> ValveMessage:
-        """The message of a lever as it leaves."""
-        can_id, any_source = self.address(valve.bus, message, takes=True, source=lever.source)
+        """The message of a joystick as it leaves."""
+        can_id, any_source = self.address(valve.bus, message, takes=True, source=joystick.source)
         if any_source:
             text = f"in the DBC {message.name} may come from any source address; where its frames"
-            self.add((*place, "message"), f"{text} leave, its lever needs the key source")
+            self.add((*place, "message"), f"{text} leave, its joystick needs the key source")
         ours: set[str] = set()
         for axis in self.config.axes.values():
             if (axis.valve.bus, axis.valve.message) == (valve.bus, valve.message):
-                stick = axis.stick
+                stick = axis.command
                 ours |= {axis.valve.signal, *axis.valve.also}
                 ours |= {stick.negative} if stick.negative else set()
                 ours |= {*stick.flags.model_dump().values()} if stick.flags else set()
         sender = Sender(valve.bus, message, can_id & 0xFF, protection)
-        if find_signal(message, lever.enable) is None:  # told with the lever
+        if find_signal(message, joystick.enable) is None:  # told with the joystick
             return ValveMessage(sender)
-        return RewrittenMessage(sender, lever.enable, frozenset(ours))
+        return RewrittenMessage(sender, joystick.enable, frozenset(ours))
 
     def _command(self, place: Place, shared: _Shared, name: str, magnitude: bool) -> Signal | None:
         """A signal that tells the command, or its magnitude where a direction is told apart."""

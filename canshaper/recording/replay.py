@@ -212,15 +212,15 @@ class Replay:
         for _, frame in tick.taken:
             self.heard[frame[:3]] += 1
 
-    def check_levers(self) -> None:
+    def check_joysticks(self) -> None:
         """Look whether there was anything to replay.
 
         Raises:
-            LogError: the log has no frame of any lever.
+            LogError: the log has no frame of any joystick.
         """
         deployment = self.stepper.deployment
         missing = self._missing()
-        if len(missing) == len(deployment.levers):
+        if len(missing) == len(deployment.joysticks):
             named = "; ".join(missing)
             found = ", ".join(f"{k[0]} {k[1]:#x}" for k in sorted(self.heard)[:MOST_NAMED])
             text = f"found none of its joystick messages ({named})"
@@ -231,13 +231,13 @@ class Replay:
             )
 
     def _missing(self) -> list[str]:
-        """Levers without frames in the log."""
+        """Joysticks without frames in the log."""
         heard = {(bus, group_of(i) if extended else i) for bus, i, extended in self.heard}
         return [
-            f"{lever.message.name}, id {lever.key[1]:#x} on {lever.key[0]}"
-            for lever in self.stepper.deployment.levers.values()
-            if self.heard.keys().isdisjoint(lever.keys)
-            and not (lever.by_group and (lever.key[0], group_of(lever.key[1])) in heard)
+            f"{joystick.message.name}, id {joystick.key[1]:#x} on {joystick.key[0]}"
+            for joystick in self.stepper.deployment.joysticks.values()
+            if self.heard.keys().isdisjoint(joystick.keys)
+            and not (joystick.by_group and (joystick.key[0], group_of(joystick.key[1])) in heard)
         ]
 
     def ticks_of(self) -> str:

@@ -264,11 +264,11 @@ class Stepper:
 def _row_of(controller: Controller, runner: AxisRunner) -> Callable[[], Row]:
     """Makes what is drawn of an axis."""
     config, axis = runner.bound.config, runner.axis
-    lever, signal = controller.levers[config.stick.lever], config.stick.signal
+    joystick, signal = controller.joysticks[config.command.joystick], config.command.signal
     full_speed_m_s = config.sway.full_speed_m_s if config.sway else 0.0
 
     def row() -> Row:
-        stick = lever.commands.get(signal, 0.0)
+        stick = joystick.commands.get(signal, 0.0)
         sway = axis.sway
         sway_deg = DEGREES * sway.sway_rad(full_speed_m_s) if sway is not None else 0.0
         return new_row(Row, (0.0 if type(stick) is Reason else stick, axis.sent, sway_deg))

@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 
 from canshaper.codec.frame import Frame
-from canshaper.machine.inputs import BoundInput, BoundLever
+from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.recording.snapshot import Snapshot
 from canshaper.recording.sorting import Key
 from canshaper.recording.stepper import Choice, Result, Stepper
@@ -267,7 +267,7 @@ class Verifier:
     def _content(self, key: Key, data: bytes) -> object:
         """What a frame says, without its alive counter and checksum."""
         bound = self._inputs.get(key)
-        if not isinstance(bound, BoundLever) or len(data) != bound.message.length:
+        if not isinstance(bound, BoundJoystick) or len(data) != bound.message.length:
             return data
         raw, commands = bound.codec.decode(data)
         config = bound.config

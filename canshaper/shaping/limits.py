@@ -28,7 +28,7 @@ class OutputLimits:
         curve: instead of the deadband: the measured valve.
         tail_s: how long after the operator asked for a speed the output may still be as fast.
         allow_faster: the output may exceed what the operator asks or asked within the tail.
-        allow_reverse: the output may go against the lever.
+        allow_reverse: the output may go against the joystick.
     """
 
     maximum: float = 1.0
@@ -94,7 +94,7 @@ class RecentCommand:
 def allowed_range(
     command: float, recent_low: float, recent_high: float, limits: OutputLimits
 ) -> tuple[float, float]:
-    """Range the operator allows now: never faster than asked, never against the lever.
+    """Range the operator allows now: never faster than asked, never against the joystick.
 
     Args:
         command: the operator's command now, [-1, 1].

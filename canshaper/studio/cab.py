@@ -17,7 +17,7 @@ SILENT_S = 0.2
 RELEASE_S = 3.0
 """From sticks in neutral to enable released: the longest usual run-on after release."""
 RESET_S = 0.3
-"""How long the reset switch is held: some messages of a lever."""
+"""How long the reset switch is held: some messages of a joystick."""
 NEUTRAL = 0.02
 """Below it a stick of the page counts as neutral."""
 

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY, LOOP_PRIORITY
+from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
 from canshaper.design.processes import Transport, end
 from canshaper.machine.binding import load_deployment
@@ -140,9 +140,9 @@ class Crane:
             self._tell(f"canshaper {verb} cannot start: {error.strerror}; tried again", "bad")
             return
         self.starts += verb == "run"
-        # The daemon as its unit does it, the crane as little delayed as the levers: where that is
-        # permitted. A browser that draws without a graphics card takes every processor.
-        priority = LOOP_PRIORITY if verb == "run" else LEVERS_PRIORITY
+        # The daemon as its unit does it, the crane as little delayed as the joysticks: where that
+        # is permitted. A browser that draws without a graphics card takes every processor.
+        priority = LOOP_PRIORITY if verb == "run" else JOYSTICKS_PRIORITY
         with contextlib.suppress(OSError):
             os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
 

@@ -39,11 +39,12 @@ class Number:
 def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     """The numbers of each slider; none where no filter of the deployment has any.
 
-    An axis with sets or feels is left out: what is in force there changes with the machine.
+    An axis with a gain schedule or profiles is left out: what is in force there
+    changes with the machine.
     """
     found: dict[str, list[Number]] = {CALM: [], LENGTH: []}
     for name, axis in config.axes.items():
-        if not axis.sets and not axis.feels:
+        if not axis.gain_schedule and not axis.profiles:
             found[CALM] += _calm(name, axis)
             found[LENGTH] += _length(name, axis)
     return {name: numbers for name, numbers in found.items() if numbers}

@@ -1,4 +1,4 @@
-"""The loop behind the page: levers out, frames in, every 20 ms in a thread of its own."""
+"""The loop behind the page: joysticks out, frames in, every 20 ms in a thread of its own."""
 
 import contextlib
 import os
@@ -11,7 +11,7 @@ from typing import Any
 
 from canshaper.bus.port import Port
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY
+from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY
 from canshaper.daemon import control_client as client
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.processes import Transport, on_transport
@@ -33,12 +33,12 @@ MS = 1_000_000
 def before_the_rest() -> None:
     """Let this thread come after the daemon and before all else, where that is permitted.
 
-    A browser that draws without a graphics card takes every processor, and levers that are late are
-    a fault. What is started from here does not inherit it.
+    A browser that draws without a graphics card takes every processor, and joysticks that are late
+    are a fault. What is started from here does not inherit it.
     """
     with contextlib.suppress(OSError):
         policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(LEVERS_PRIORITY))
+        os.sched_setscheduler(0, policy, os.sched_param(JOYSTICKS_PRIORITY))
 
 
 @dataclass
@@ -220,7 +220,7 @@ class Stage:
         return not self._stop.is_set()
 
     def _exchange(self, seen: Seen, held: Held, now_s: float) -> None:
-        """Take what waits on the buses of a crane; where the page drives it, move its levers."""
+        """Take what waits on the buses of a crane; where the page drives it, move its joysticks."""
         frames: list[Frame] = []
         for port in seen.ports.values():
             frames += port.frames()

@@ -12,7 +12,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import NULL, with_source
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundLever
+from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import MOVING, Reason, State
 from canshaper.studio.words import fault_words, reason_words, state_words
@@ -72,7 +72,7 @@ class CraneView:
         modes = [axis.config.sway.mode() for axis in deployment.axes.values() if axis.config.sway]
         periods = [2.0 * math.pi / mode.omega_rad_s for mode in modes]
         self._swing_s = max([LEAST_SWING_S, *periods])
-        self._levers = InputFinder(deployment.config.buses, deployment.levers.values())
+        self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
         self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
         self._find_messages()
 
@@ -105,10 +105,10 @@ class CraneView:
         self._handlers.setdefault(key, []).append((handler, what))
 
     def receive(self, frame: Frame, now_s: float) -> None:
-        """Take a frame, one that the page's levers sent too; what is none of ours is passed."""
+        """Take a frame, one that the page's joysticks sent too; what is none of ours is passed."""
         entries = self._handlers.get(frame[:3])
-        if lever := self._levers.find(frame, round(now_s * 1e9)):
-            entries = [*(entries or ()), (self._stick, lever)]
+        if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
+            entries = [*(entries or ()), (self._stick, joystick)]
         if entries is None and frame.extended:  # of J1939, from any address
             entries = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         for handler, what in entries or ():
@@ -192,11 +192,11 @@ class CraneView:
 
     # -- messages ------------------------------------------------------------------------------
 
-    def _stick(self, lever: BoundLever, data: bytes, _now_s: float) -> None:
-        _, commands = lever.codec.decode(data)
+    def _stick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
+        _, commands = joystick.codec.decode(data)
         for name, axis in self._deployment.axes.items():
-            if axis.config.stick.lever == lever.name:
-                command = commands[axis.config.stick.signal]
+            if axis.config.command.joystick == joystick.name:
+                command = commands[axis.config.command.signal]
                 self.axes[name].stick = None if isinstance(command, Reason) else command
 
     def _valve(self, name: str, data: bytes, now_s: float) -> None:

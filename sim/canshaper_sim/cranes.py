@@ -21,7 +21,7 @@ def cranes(deployment: Deployment) -> list[str]:
 
 
 def one_crane(deployment: Deployment, crane: str) -> Deployment:
-    """The same deployment with one crane's axes, under their own names, its levers and buses.
+    """The same deployment with one crane's axes, under their own names, its joysticks and buses.
 
     Raises:
         ValueError: no such crane.
@@ -34,8 +34,8 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
         for name, axis in deployment.axes.items()
         if name.startswith(f"{crane}_")
     }
-    levers = {axis.config.stick.lever for axis in axes.values()}
-    own = {n: lever for n, lever in deployment.levers.items() if n in levers}
+    joysticks = {axis.config.command.joystick for axis in axes.values()}
+    own = {n: joystick for n, joystick in deployment.joysticks.items() if n in joysticks}
     buses = {axis.config.valve.bus for axis in axes.values()} | {one.key[0] for one in own.values()}
     config = deployment.config.model_copy(
         update={"buses": {n: b for n, b in deployment.config.buses.items() if n in buses}}
@@ -45,6 +45,6 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
         deployment,
         config=config,
         axes=axes,
-        levers=own,
+        joysticks=own,
         emergency_stop=stop if stop and stop.key[0] in buses else None,
     )

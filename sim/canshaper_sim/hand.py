@@ -1,4 +1,4 @@
-"""The levers of a deployment as they are held: stick positions in, joystick frames out."""
+"""The joysticks of a deployment as they are held: stick positions in, joystick frames out."""
 
 import math
 from collections.abc import Mapping
@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundLever, BoundStop
+from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
 JOYSTICK_ADDRESS = 0x33
@@ -15,7 +15,7 @@ JOYSTICK_ADDRESS = 0x33
 
 @dataclass(frozen=True)
 class Held:
-    """What a hand does with the levers.
+    """What a hand does with the joysticks.
 
     Attributes:
         sticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.
@@ -31,7 +31,7 @@ class Held:
 
 
 class Hand:
-    """All levers of a deployment, and its emergency stop, which is never pressed.
+    """All joysticks of a deployment, and its emergency stop, which is never pressed.
 
     Args:
         deployment: names the joystick messages and their switches.
@@ -42,7 +42,7 @@ class Hand:
 
     def __init__(self, deployment: Deployment) -> None:
         self._messages: list[_Message] = [
-            _Lever(lever, deployment) for lever in deployment.levers.values()
+            _Joystick(joystick, deployment) for joystick in deployment.joysticks.values()
         ]
         if deployment.emergency_stop:
             self._messages.append(_Stop(deployment.emergency_stop))
@@ -71,22 +71,22 @@ class _Message:
         raise NotImplementedError
 
 
-class _Lever(_Message):
+class _Joystick(_Message):
     """One joystick message."""
 
-    def __init__(self, lever: BoundLever, deployment: Deployment) -> None:
-        super().__init__(lever)
-        self._config = lever.config
+    def __init__(self, joystick: BoundJoystick, deployment: Deployment) -> None:
+        super().__init__(joystick)
+        self._config = joystick.config
         self._sticks = {
-            name: axis.config.stick
+            name: axis.config.command
             for name, axis in deployment.axes.items()
-            if axis.config.stick.lever == lever.name
+            if axis.config.command.joystick == joystick.name
         }
-        self._full = {s.name: float(s.maximum or 0.0) for s in lever.message.signals}
+        self._full = {s.name: float(s.maximum or 0.0) for s in joystick.message.signals}
         # Sticks that no axis listens to stand in neutral too.
         self._base = {
             s.name: 0
-            for s in lever.message.signals
+            for s in joystick.message.signals
             if s.maximum is not None and s.minimum is not None and s.minimum < 0 < s.maximum
         }
 

@@ -8,7 +8,7 @@ from canshaper.codec.frame import FrameFault
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 
@@ -70,8 +70,8 @@ def run_plant(
 
 
 def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> None:
-    """Play a script once on the levers, then leave them in neutral."""
-    node = LeverNode(deployment, script, bypass=bypass)
+    """Play a script once on the joysticks, then leave them in neutral."""
+    node = JoystickNode(deployment, script, bypass=bypass)
     ports = open_ports(deployment)
     stop = StopFlag()
     cycle_ms = node.cycle_ms

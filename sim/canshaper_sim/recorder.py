@@ -10,7 +10,7 @@ from typing import Any
 from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import NULL, with_source
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundLever
+from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
@@ -50,10 +50,10 @@ class Recorder:
         }
         self._axes = deployment.axes
         self._handlers: dict[tuple[str, int, bool], Any] = {}
-        self._levers: dict[str, BoundLever] = {}
-        for lever in deployment.levers.values():
-            self._handlers[lever.key] = (self._stick, lever.message)
-            self._levers[lever.message.name] = lever
+        self._joysticks: dict[str, BoundJoystick] = {}
+        for joystick in deployment.joysticks.values():
+            self._handlers[joystick.key] = (self._stick, joystick.message)
+            self._joysticks[joystick.message.name] = joystick
         self._valves: dict[str, list[str]] = {}
         for name, axis in deployment.axes.items():
             message = axis.valve_message
@@ -105,11 +105,11 @@ class Recorder:
     def _stick(self, message: Any, data: bytes, time_s: float) -> None:
         if self._start_s is None:
             self._start_s = time_s
-        lever = self._levers[message.name]
-        _, commands = lever.codec.decode(data)
+        joystick = self._joysticks[message.name]
+        _, commands = joystick.codec.decode(data)
         for name, axis in self._axes.items():
-            if axis.config.stick.lever == lever.name:
-                command = commands[axis.config.stick.signal]
+            if axis.config.command.joystick == joystick.name:
+                command = commands[axis.config.command.signal]
                 self._now[name][0] = 0.0 if isinstance(command, Reason) else command
 
     def _valve(self, message: Any, data: bytes, _time_s: float) -> None:

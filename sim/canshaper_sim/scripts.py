@@ -71,7 +71,7 @@ _LOADING = Script(
     40.0,
 )
 
-# The same work with a lever for each joint: three of them make what near_far and lift do above.
+# The same work with a joystick for each joint: three of them make what near_far and lift do above.
 _LOADING_JOINTS = Script(
     "loading-joints",
     (

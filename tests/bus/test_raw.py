@@ -102,7 +102,7 @@ def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: 
 def test_an_error_frame_is_none_whatever_its_class_looks_like(
     make_line: Callable[..., Line], ids: Ids | None, kind: int
 ) -> None:
-    """The classes of errors stand where the id stands: 0x110 would be a lever."""
+    """The classes of errors stand where the id stands: 0x110 would be a joystick."""
     line = make_line(ids)
     line.error(kind)
     assert line.heard() == []
@@ -122,7 +122,7 @@ def test_a_flood_cannot_hold_up_the_tick_for_ever(line: Line) -> None:
     assert seen == most
 
 
-def test_what_can_wait_does_not_come_with_the_levers(line: Line) -> None:
+def test_what_can_wait_does_not_come_with_the_joysticks(line: Line) -> None:
     line.put(message(0x7F0), UNKNOWN)
     line.put(message(0x200), SENT_BACK)
     line.put(message(0x110))

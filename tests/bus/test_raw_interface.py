@@ -72,7 +72,7 @@ def test_an_interface_that_is_down_is_told_once_and_used_again(line: Line) -> No
 
 
 def test_an_interface_on_which_nothing_is_sent_is_up_with_the_first_frame(line: Line) -> None:
-    """Levers on one bus, valves on another."""
+    """Joysticks on one bus, valves on another."""
     down(line)
     assert line.port.state is BusState.DOWN
     up(line)

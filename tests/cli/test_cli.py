@@ -71,9 +71,9 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
     assert before.splitlines() == [
         f"{SHIPPED}: good",
         "  bus crane: socketcan vcan0, its 10 messages load 12% of 250 kbit/s",
-        "  axis slew: LeverLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
-        "  axis near_far: LeverLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
-        "  axis lift: LeverRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
+        "  axis slew: JoystickLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
+        "  axis near_far: JoystickLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
+        "  axis lift: JoystickRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
         f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
         *(f"    {line}" for line in identity.lines()[1:]),
     ]

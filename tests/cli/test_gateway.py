@@ -45,7 +45,7 @@ def test_the_check_tells_what_passes(tmp_path: Path, fallback: str, told: str) -
     file.write_text(text.replace("fallback: neutral", f"fallback: {fallback}"))
     result = invoke("check", str(file))
     assert result.exit_code == 0
-    line = "gateway between levers and machine: others pass by the kernel, "
+    line = "gateway between joysticks and machine: others pass by the kernel, "
     assert f"{line}{told}" in result.stdout
 
 

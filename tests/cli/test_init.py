@@ -17,9 +17,13 @@ DBC = ROOT / "dbc" / "forwarder.dbc"
 QUESTIONS = (
     "CAN interface",
     "Bit rate",
-    "Messages of the levers",
-    *(f"{lever}: {text}" for lever in ("LeverLeft", "LeverRight") for text in ("e", "r", "a")),
-    "Axis of LeverLeft.Slew",
+    "Messages of the joysticks",
+    *(
+        f"{joystick}: {text}"
+        for joystick in ("JoystickLeft", "JoystickRight")
+        for text in ("e", "r", "a")
+    ),
+    "Axis of JoystickLeft.Slew",
     "slew valve",
     "slew timeout",
     "slew swings",
@@ -27,7 +31,7 @@ QUESTIONS = (
     "slew first",
     "slew last",
     "slew speed",
-    "Axis of LeverLeft.NearFar",
+    "Axis of JoystickLeft.NearFar",
     "near_far valve",
     "near_far timeout",
     "near_far swings",
@@ -35,11 +39,11 @@ QUESTIONS = (
     "near_far first",
     "near_far last",
     "near_far speed",
-    "Axis of LeverRight.Lift",
+    "Axis of JoystickRight.Lift",
     "lift valve",
     "lift timeout",
     "lift swings",
-    "Axis of LeverRight.Rotate",
+    "Axis of JoystickRight.Rotate",
     "rotate valve",
 )
 
@@ -66,12 +70,12 @@ def test_enter_throughout_gives_a_machine_with_what_was_found(tmp_path: Path) ->
     config = load_deployment(file).config
     assert list(config.axes) == ["slew", "near_far", "lift"]
     slew = config.axes["slew"]
-    assert (slew.stick.signal, slew.valve.message) == ("Slew", "SlewCommand")
+    assert (slew.command.signal, slew.valve.message) == ("Slew", "SlewCommand")
     assert slew.status is not None
     assert slew.status.message == "SlewStatus"
     assert slew.limits.max_pct == 40
     assert config.axes["lift"].filter.kind == "off"
-    left = config.levers["lever_left"]
+    left = config.joysticks["joystick_left"]
     assert (left.enable, left.reset, left.anti_sway_off) == ("Enable", "Reset", "AntiSwayOff")
     assert (left.timeout_ms, left.alive_counter) == (100, "AliveCounter")
     assert config.status is not None
@@ -109,11 +113,11 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
     given = {
         "CAN interface": "can 0\ncan0",
         "Bit rate": "fast\n500000",
-        "Messages of the levers": "Left\nLeverLeft LeverRight",
-        "LeverLeft: e": "Slew\nEnable",
-        "LeverLeft: r": "Enable\nReset",
-        "Axis of LeverLeft.Slew": "big slew\nnull\nturn",
-        "Axis of LeverLeft.NearFar": "turn\nnear_far",
+        "Messages of the joysticks": "Left\nJoystickLeft JoystickRight",
+        "JoystickLeft: e": "Slew\nEnable",
+        "JoystickLeft: r": "Enable\nReset",
+        "Axis of JoystickLeft.Slew": "big slew\nnull\nturn",
+        "Axis of JoystickLeft.NearFar": "turn\nnear_far",
         "slew valve": "Valve\nSlewCommand.Velocity",
         "slew timeout": "50\n300",
         "slew swings": "y",
@@ -124,7 +128,7 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     for told in (
         "found 'fast', allowed is a whole number, 10000 to 1000000",
-        "found 'Left', allowed are some of LeverLeft, LeverRight",
+        "found 'Left', allowed are some of JoystickLeft, JoystickRight",
         "found 'Slew', allowed is one of Enable, AntiSwayOff, Reset",
         "found 'can 0', allowed is a name without spaces",
         "found 'Enable', allowed is one of AntiSwayOff, Reset, -",
@@ -195,7 +199,7 @@ def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path
 
 def test_axes_and_switches_can_be_left_out(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
-    text = answers({"LeverLeft: r": "-", "Axis of LeverLeft.NearFar": "-"}).splitlines()
+    text = answers({"JoystickLeft: r": "-", "Axis of JoystickLeft.NearFar": "-"}).splitlines()
     dropped = QUESTIONS.index("near_far valve")
     lines = text[:dropped] + text[dropped + 7 :]
     arguments = ["init", str(file), "--dbc", str(DBC)]
@@ -203,7 +207,7 @@ def test_axes_and_switches_can_be_left_out(tmp_path: Path) -> None:
     assert result.exit_code == 0, result.output
     config = load_deployment(file).config
     assert list(config.axes) == ["slew", "lift"]
-    assert config.levers["lever_left"].reset is None
+    assert config.joysticks["joystick_left"].reset is None
 
 
 def test_a_file_that_is_there_stays(tmp_path: Path) -> None:

@@ -45,7 +45,7 @@ def test_a_crane_is_the_first_part_of_the_names_of_its_axes() -> None:
     rear = one_crane(deployment, "rear")
     assert list(rear.axes) == ["slew", "near_far", "lift", "rotator"]
     assert list(rear.config.buses) == ["rear"]
-    assert list(rear.levers) == ["rear_left", "rear_right", "rear_rocker"]
+    assert list(rear.joysticks) == ["rear_left", "rear_right", "rear_rocker"]
 
 
 @pytest.mark.parametrize("file", ["forwarder.yaml", "forwarder-joints.yaml"])

@@ -20,12 +20,12 @@ REFERENCE: dict[str, Callable[[int, bytes, int], Any]] = {
     "crc16_ccitt_false": lambda _id, rest, _length: Crc16CcittFalse.calc(rest),
     "crc16_arc": lambda _id, rest, _length: Crc16Arc.calc(rest),
 }
-# Signal of each width that the tests add to LeverLeft, in bits that it does not use.
+# Signal of each width that the tests add to JoystickLeft, in bits that it does not use.
 PLACES = {4: "48|4@1+", 8: "48|8@1+", 16: "40|16@1+"}
 
 
 def with_checksum(kind: str, bits: int, can_id: int, data: bytes) -> bytes:
-    """The same frame of LeverLeft with its checksum."""
+    """The same frame of JoystickLeft with its checksum."""
     start = int(PLACES[bits].partition("|")[0])
     word = int.from_bytes(data, "little") & ~((1 << bits) - 1 << start)
     clear = word.to_bytes(len(data), "little")

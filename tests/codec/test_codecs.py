@@ -1,4 +1,4 @@
-"""Codecs of levers, valves and status, judged by plain cantools."""
+"""Codecs of joysticks, valves and status, judged by plain cantools."""
 
 import struct
 from pathlib import Path
@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from canshaper.codec.codecs import (
     AxisStatusCodec,
-    LeverCodec,
+    JoystickCodec,
     Sender,
     ServiceStatusCodec,
     WrongLengthError,
@@ -31,13 +31,13 @@ DBC = """VERSION ""
 
 BU_: A
 
-BO_ 1 Lever: 8 A
+BO_ 1 Joystick: 8 A
  SG_ Stick : 0|10@1+ (0.2,-100) [-100|100] "%" A
  SG_ Enable : 10|2@1+ (1,0) [0|3] "" A
  SG_ Motorola : 23|12@0- (0.1,0) [-100|100] "%" A
  SG_ Plain : 32|8@1- (1,0) [-100|100] "%" A
 
-BO_ 2 FloatLever: 5 A
+BO_ 2 FloatJoystick: 5 A
  SG_ Stick : 0|32@1- (50,0) [-100|100] "%" A
  SG_ Enable : 32|2@1+ (1,0) [0|3] "" A
 
@@ -73,8 +73,8 @@ def velocity(message: str, name: str = "Stick") -> VelocitySignal:
     return VelocitySignal.of(signal(custom.get_message_by_name(message), name))
 
 
-def lever(message: str) -> LeverCodec:
-    return LeverCodec(custom.get_message_by_name(message), [velocity(message)])
+def joystick(message: str) -> JoystickCodec:
+    return JoystickCodec(custom.get_message_by_name(message), [velocity(message)])
 
 
 def valve(message: str, counter: str | None = None) -> ValveCodec:
@@ -90,15 +90,15 @@ def sent(codec: ValveCodec, steps: int) -> Frame:
     return codec.message.frame()
 
 
-def raw_lever(stick: int) -> bytes:
-    data = custom.get_message_by_name("Lever").encode(
+def raw_joystick(stick: int) -> bytes:
+    data = custom.get_message_by_name("Joystick").encode(
         {"Stick": stick, "Enable": 1, "Motorola": 0, "Plain": 0}, scaling=False, strict=False
     )
     assert isinstance(data, bytes)
     return data
 
 
-# -- levers ----------------------------------------------------------------------------------------
+# -- joysticks ------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(
@@ -116,7 +116,7 @@ def raw_lever(stick: int) -> bytes:
     ],
 )
 def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None:
-    values, commands = lever("Lever").decode(raw_lever(raw))
+    values, commands = joystick("Joystick").decode(raw_joystick(raw))
     assert values["Stick"] == raw
     assert commands == {"Stick": pytest.approx(command)}
 
@@ -126,7 +126,7 @@ def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None
     [(50, Reason.STICK_NOT_AVAILABLE), (51, Reason.STICK_ERROR), (0, 0.0), (49, 0.49), (52, 0.52)],
 )
 def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reason) -> None:
-    assert velocity("Lever", "Plain").read({"Plain": raw}) == command
+    assert velocity("Joystick", "Plain").read({"Plain": raw}) == command
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reaso
 )
 def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
-    message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
+    message = cantools.database.load_string(text, "dbc").get_message_by_name("Joystick")
     assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == reason
 
 
@@ -174,7 +174,7 @@ def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
 )
 def test_ordinary_words_are_no_errors(name: str) -> None:
     text = DBC.replace('50 "SNA"', f'50 "{name}"')
-    message = cantools.database.load_string(text, "dbc").get_message_by_name("Lever")
+    message = cantools.database.load_string(text, "dbc").get_message_by_name("Joystick")
     assert VelocitySignal.of(signal(message, "Plain")).read({"Plain": 50}) == 0.5
 
 
@@ -192,7 +192,7 @@ def test_ordinary_words_are_no_errors(name: str) -> None:
     ],
 )
 def test_float_sticks(value: float, command: float | Reason) -> None:
-    _, commands = lever("FloatLever").decode(struct.pack("<fB", value, 1))
+    _, commands = joystick("FloatJoystick").decode(struct.pack("<fB", value, 1))
     assert commands == {"Stick": command}
 
 
@@ -205,22 +205,22 @@ def test_full_stick_is_full_in_spite_of_rounding(raw: int, command: float) -> No
 @pytest.mark.parametrize("length", [0, 1, 7, 9, 64])
 def test_another_length_is_refused(length: int) -> None:
     with pytest.raises(WrongLengthError):
-        lever("Lever").decode(bytes(length))
+        joystick("Joystick").decode(bytes(length))
 
 
 @pytest.mark.parametrize("switch", [0, 1, 2, 3])
 def test_switches_come_raw(switch: int) -> None:
-    data = bytearray(raw_lever(500))
+    data = bytearray(raw_joystick(500))
     data[1] = data[1] & 0b11 | switch << 2
-    values, _ = lever("Lever").decode(bytes(data))
+    values, _ = joystick("Joystick").decode(bytes(data))
     assert values["Enable"] == switch
 
 
 @given(data=st.binary(min_size=8, max_size=8))
 def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
-    message = custom.get_message_by_name("Lever")
+    message = custom.get_message_by_name("Joystick")
     names = ["Stick", "Motorola", "Plain"]
-    codec = LeverCodec(message, [velocity("Lever", n) for n in names])
+    codec = JoystickCodec(message, [velocity("Joystick", n) for n in names])
     _, commands = codec.decode(data)
     judge = message.decode(data, decode_choices=False)
     named = message.decode(data, decode_choices=True)

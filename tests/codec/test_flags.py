@@ -7,7 +7,7 @@ from typing import Any
 import cantools
 import pytest
 
-from canshaper.codec.codecs import LeverCodec
+from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.flags import FlaggedVelocity
 from canshaper.codec.signals import VelocitySignal
 from canshaper.shaping.states import Reason
@@ -48,7 +48,7 @@ def read(flags: tuple[int, int, int], position: float, message: str = "BJM1") ->
     """Command of a frame that cantools has made."""
     definition = custom.get_message_by_name(message)
     stick = VelocitySignal.of(definition.get_signal_by_name("XPosition"))
-    codec = LeverCodec(definition, [FlaggedVelocity(stick, "XNeutral", "XNeg", "XPos")])
+    codec = JoystickCodec(definition, [FlaggedVelocity(stick, "XNeutral", "XNeg", "XPos")])
     raw = dict(zip(("XNeutral", "XNeg", "XPos"), flags, strict=True))
     data = definition.encode({**raw, "XPosition": position}, scaling=False, strict=False)
     _, commands = codec.decode(data)
@@ -170,7 +170,7 @@ def flagged(machine: Machine, flags: str = FLAGS) -> int:
 
 def test_flags_bind(machine: Machine) -> None:
     flagged(machine)
-    codec = machine.load().levers["left"].codec
+    codec = machine.load().joysticks["left"].codec
     raw, commands = codec.decode(bytes.fromhex("c4 3e 00 00 01 00 00 00"))
     assert (raw["SlewNegative"], raw["Slew"]) == (1, 251)
     assert commands == {"Slew": pytest.approx(-0.251), "NearFar": 0.0}
@@ -179,7 +179,10 @@ def test_flags_bind(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("flags", "says"),
     [
-        (FLAGS.replace("SlewNeutral", "N"), "flags.neutral: found 'N', signals of LeverLeft are"),
+        (
+            FLAGS.replace("SlewNeutral", "N"),
+            "flags.neutral: found 'N', signals of JoystickLeft are",
+        ),
         (
             FLAGS.replace(", positive: SlewPositive", ""),
             "flags.positive: missing: signal that the velocity is positive",
@@ -214,7 +217,7 @@ def test_flags_bind(machine: Machine) -> None:
 def test_flags_that_do_not_fit(machine: Machine, flags: str, says: str) -> None:
     line = flagged(machine, flags)
     problem = machine.problems()[0]
-    assert problem.startswith(f"machine.yaml:{line}: axes.slew.stick.flags")
+    assert problem.startswith(f"machine.yaml:{line}: axes.slew.command.flags")
     assert says in problem
 
 
@@ -222,7 +225,7 @@ def test_the_stick_of_another_axis_is_no_flag(machine: Machine) -> None:
     line = flagged(machine, FLAGS.replace("SlewNeutral", "NearFar"))
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 16|16@1+")
     assert any(
-        p == f"machine.yaml:{line}: axes.slew.stick.flags.neutral:"
+        p == f"machine.yaml:{line}: axes.slew.command.flags.neutral:"
         " found 'NearFar', which is the stick of near_far already"
         for p in machine.problems()
     )
@@ -242,7 +245,7 @@ def test_two_axes_do_not_share_a_stick_with_flags(machine: Machine) -> None:
         f"NearFar : 16|{two_bits}\n SG_ Other : 18|{two_bits}",
     )
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.near_far.stick.signal:"
+        f"machine.yaml:{line}: axes.near_far.command.signal:"
         " found 'Slew', which is the stick of slew already"
     ]
 
@@ -253,7 +256,7 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
     machine.in_dbc("AliveCounter : 56|8@1+", "AliveCounter : 38|16@1+")
     machine.dbc += "SIG_VALTYPE_ 272 AliveCounter : 1;\n"
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.stick.flags.neutral: AliveCounter is a float, allowed is"
+        f"machine.yaml:{line}: axes.slew.command.flags.neutral: AliveCounter is a float, allowed is"
         " an unsigned integer signal"
     ]
 
@@ -280,13 +283,13 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
 def test_the_range_tells_whether_a_stick_has_flags(
     machine: Machine, change: tuple[str, str], flags: bool, says: str
 ) -> None:
-    line = machine.in_dbc("BO_ 272 LeverLeft", "BO_ 272 LeverLeft")
+    line = machine.in_dbc("BO_ 272 JoystickLeft", "BO_ 272 JoystickLeft")
     machine.in_dbc(*change)
     if flags:
         machine.in_dbc('Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n', _more_flags())
         machine.in_yaml(STICK, f"signal: Slew, flags: {FLAGS}")
     (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: LeverLeft: Slew ")
+    assert problem.startswith(f"machine.dbc:{line}: JoystickLeft: Slew ")
     assert says in problem
 
 

@@ -152,7 +152,7 @@ def test_our_address_is_no_joysticks(machine: Machine) -> None:
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x9C\n")
     line = machine.yaml[: machine.yaml.index("source: 0x9C")].count("\n") + 1
     text = "BJM1 comes from address 156, which is ours on bus crane"
-    assert machine.problems() == [f"machine.yaml:{line}: levers.left.source: {text}"]
+    assert machine.problems() == [f"machine.yaml:{line}: joysticks.left.source: {text}"]
 
 
 def second_bus(machine: Machine, name: str) -> int:
@@ -189,14 +189,14 @@ def test_a_source_for_a_message_that_is_none_of_j1939(machine: Machine) -> None:
     machine.in_dbc(f'BA_ "VFrameFormat" BO_ {BJM1} 3;\n', "")
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
     text = "BJM1 is no message of J1939 (VFrameFormat in the DBC)"
-    assert any(p.endswith(f"levers.left.source: {text}") for p in machine.problems())
+    assert any(p.endswith(f"joysticks.left.source: {text}") for p in machine.problems())
 
 
 def test_a_message_to_one_node_needs_its_sender(machine: Machine) -> None:
     # proprietary A, PGN 61184, to us
     machine.dbc = machine.dbc.replace(BJM1, str(0x98EF9CFE))
     (problem,) = machine.problems()
-    assert "levers.left.source: missing: BJM1 is sent from one node to another" in problem
+    assert "joysticks.left.source: missing: BJM1 is sent from one node to another" in problem
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
     assert (0x18EF9C33, True) in machine.load().ids("crane").taken
 
@@ -298,24 +298,24 @@ def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:
 
 def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:
     """Its address is in the id: that of the joystick, and ours in what we send."""
-    lever = ' SG_ Check : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 2365446398'
+    joystick = ' SG_ Check : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 2365446398'
     for name in ("Button9", "Button10", "Button11", "Button12"):
         machine.dbc = re.sub(rf" SG_ {name} : .*\n", "", machine.dbc, count=1)
         machine.dbc = re.sub(rf"VAL_ {BJM1} {name} .*\n", "", machine.dbc)
-    machine.in_dbc("\nBO_ 2365446398", lever)
+    machine.in_dbc("\nBO_ 2365446398", joystick)
     flow = ' SG_ ExtendedFlow : 24|16@1+ (0.0015625,0) [0|100] "%" VALVES\n'
     machine.in_dbc(flow, flow + ' SG_ Check : 40|8@1+ (1,0) [0|255] "" VALVES\n')
     check = "checksum: { signal: Check, kind: sum_id }"
     line = machine.in_yaml("    message: BJM1\n", f"    message: BJM1\n    {check}\n") + 1
     machine.in_yaml("      message: AVC0\n", f"      message: AVC0\n      {check}\n")
     assert machine.problems() == [
-        f"machine.yaml:{line}: levers.left.checksum.kind: found 'sum_id', which depends on the id,"
-        " and BJM1 may come from any source; allowed is it with a known one"
+        f"machine.yaml:{line}: joysticks.left.checksum.kind: found 'sum_id', which depends on the"
+        " id, and BJM1 may come from any source; allowed is it with a known one"
     ]
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x21\n")
     deployment = machine.load()
     protections = {
-        "lever": (deployment.levers["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
+        "joystick": (deployment.joysticks["left"].protection, (int(BJM1) & 0x1FFFFF00) | 0x21),
         "valve": (deployment.axes["slew"].valve.message.sender.protection, 0x0CFE3000 | OWN),
     }
     for protection, can_id in protections.values():

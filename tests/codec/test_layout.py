@@ -187,7 +187,7 @@ def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> s
 
 
 def test_a_file_with_such_a_message_is_refused(machine: Machine) -> None:
-    says = float_of_9_bits(machine, 272, "LeverLeft", "NearFar")
+    says = float_of_9_bits(machine, 272, "JoystickLeft", "NearFar")
     assert machine.problems() == [says]
 
 

@@ -122,6 +122,6 @@ def test_what_cannot_be_is_told(tmp_path: Path, new: str, told: str) -> None:
 
 
 def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:
-    sign = ("lever: front_rocker, signal: RotateLeft, negative: RotateRight",
-            "lever: front_right, signal: Lift, negative: Rotate")  # fmt: skip
+    sign = ("joystick: front_rocker, signal: RotateLeft, negative: RotateRight",
+            "joystick: front_right, signal: Lift, negative: Rotate")  # fmt: skip
     assert "allowed with direction flags is one from 0" in problems(tmp_path, sign)

@@ -195,14 +195,14 @@ def test_three_axes_in_one_message(machine: Machine) -> None:
     """One frame a tick with the commands of all; its counter counts frames, not axes."""
     deployment = with_valves(machine, *THREE).load()
     controller = Controller(deployment)
-    lever: Any = {m.name: m for m in deployment.messages.all()}
+    joystick: Any = {m.name: m for m in deployment.messages.all()}
     moved: list[Any] = []
     for n in range(60):
         for side, stick in (
             ("Left", {"Slew": 900, "NearFar": -400}),
             ("Right", {"Lift": -600}),
         ):
-            message = lever[f"Lever{side}"]
+            message = joystick[f"Joystick{side}"]
             raw = dict.fromkeys((s.name for s in message.signals), 0)
             raw |= {"Enable": 1, "AliveCounter": n % 256, **(stick if n > 4 else {})}
             data = message.encode(raw, scaling=False)

@@ -20,10 +20,10 @@ Load = Callable[[str | bytes], DeploymentConfig]
 SMALLEST = """
 buses: {b: {interface: virtual, channel: c}}
 dbc: [a.dbc]
-levers: {l: {bus: b, message: L, timeout_ms: 100, enable: E}}
+joysticks: {l: {bus: b, message: L, timeout_ms: 100, enable: E}}
 axes:
   x:
-    stick: {lever: l, signal: S}
+    command: {joystick: l, signal: S}
     valve: {bus: b, message: V, signal: S, timeout_ms: 200}
     filter: {kind: off}
 """
@@ -51,13 +51,13 @@ noise = settings(
 
 def test_defaults_are_the_cautious_ones(load: Load) -> None:
     config = load(SMALLEST)
-    axis, lever = config.axes["x"], config.levers["l"]
+    axis, joystick = config.axes["x"], config.joysticks["l"]
     assert config.tick_ms == 20
     assert config.status is None
     assert config.buses["b"].bitrate is None
-    assert (lever.reset, lever.anti_sway_off, lever.alive_counter) == (None, None, None)
+    assert (joystick.reset, joystick.anti_sway_off, joystick.alive_counter) == (None, None, None)
     assert (axis.status, axis.sway, axis.valve.alive_counter) == (None, None, None)
-    assert axis.stick.neutral_pct == 2.0
+    assert axis.command.neutral_pct == 2.0
     assert axis.limits.stop_s == 2.0
     assert axis.limits.output_limits() == OutputLimits()
     assert not axis.limits.allow_faster

@@ -102,7 +102,7 @@ def where(place: Place) -> str:
 def test_a_wrong_key_in_every_section(tmp_path: Path, schema: type[Section], kind: str) -> None:
     data = whole(schema, kind)
     # where every name is good, none is wrong
-    named = {"buses", "levers", "axes", "feels", "codes", "nodes", "adjustable"}
+    named = {"buses", "joysticks", "axes", "profiles", "codes", "nodes", "adjustable"}
     sections = [p for p, value in places(data) if isinstance(value, dict) and p[-1] not in named]
     assert sections
     for place in sections:
@@ -143,16 +143,18 @@ def test_a_wrong_kind_of_every_filter(tmp_path: Path, value: object) -> None:
 def test_faults_in_sets_are_told_as_everywhere(tmp_path: Path) -> None:
     data = whole(DeploymentConfig, "gff")
     axis = data["axes"]["name0"]
-    axis["sets"][0]["at"] = 1e7
-    axis["sets"][1]["filter"]["poles_rad_s"] = [-4.0, 4.0]
-    del axis["sets"][1]["sway"]["full_speed_m_s"]
-    axis["feels"]["name1"]["sets"][1] = {"at": 1.0}
+    axis["gain_schedule"][0]["breakpoint"] = 1e7
+    axis["gain_schedule"][1]["filter"]["poles_rad_s"] = [-4.0, 4.0]
+    del axis["gain_schedule"][1]["sway"]["full_speed_m_s"]
+    axis["profiles"]["name1"]["gain_schedule"][1] = {"breakpoint": 1.0}
     found = problems(tmp_path, DeploymentConfig, data)
     assert {
-        "axes.name0.sets.0.at": "found 10000000.0, allowed is -1e+06 to 1e+06",
-        "axes.name0.sets.1.filter.poles_rad_s.1": "found 4.0, allowed is -100 to -0.1 rad/s",
-        "axes.name0.sets.1.sway.full_speed_m_s": (
+        "axes.name0.gain_schedule.0.breakpoint": "found 10000000.0, allowed is -1e+06 to 1e+06",
+        "axes.name0.gain_schedule.1.filter.poles_rad_s.1": (
+            "found 4.0, allowed is -100 to -0.1 rad/s"
+        ),
+        "axes.name0.gain_schedule.1.sway.full_speed_m_s": (
             "missing: speed of the tip at full command, scales the sway shown (m/s)"
         ),
-        "axes.name0.feels.name1.sets.1.filter": "missing: filter at this value",
+        "axes.name0.profiles.name1.gain_schedule.1.filter": "missing: filter at this value",
     }.items() <= {place: problem.message for place, problem in found.items()}.items()

@@ -14,8 +14,8 @@ Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
 TOP = (
-    "tick_ms, buses, dbc, levers, axes, gateway, emergency_stop, grapple, feel, status, identity,"
-    " control"
+    "tick_ms, buses, dbc, joysticks, axes, gateway, emergency_stop, load_state, profile, status,"
+    " identity, control"
 )
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (
@@ -43,15 +43,15 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         (
             "enable: Enable",
             "enable: Enable\n    on: X",
-            "levers.left.on: unknown key; allowed are bus, message, alive_counter, checksum, e2e,"
-            " source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off, node,"
-            " frozen_s",
+            "joysticks.left.on: unknown key; allowed are bus, message, alive_counter, checksum,"
+            " e2e, source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off, node,"
+            " stuck_s",
         ),
         (
-            "{ lever: left,",
-            "{ lever: left, deadzone: 1,",
-            "axes.slew.stick.deadzone: unknown key; allowed are lever, signal, flags, negative, "
-            "neutral_pct",
+            "{ joystick: left,",
+            "{ joystick: left, deadzone: 1,",
+            "axes.slew.command.deadzone: unknown key; allowed are joystick, signal, flags,"
+            " negative, neutral_pct",
         ),
         (
             "kind: gff,",
@@ -61,7 +61,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         ("kind: off", "kind: off, a1: 1", "axes.lift.filter.a1: unknown key; allowed are kind"),
         # missing keys, with what they mean
         ("interface: socketcan, ", "", "buses.crane.interface: missing: python-can interface"),
-        ("lever: left, ", "", "axes.slew.stick.lever: missing: name of a lever"),
+        ("joystick: left, ", "", "axes.slew.command.joystick: missing: name of a joystick"),
         (", full_speed_m_s: 1.5", "", "axes.slew.sway.full_speed_m_s: missing: speed of the tip"),
         # numbers
         ("tick_ms: 20", "tick_ms: 0", "found 0, allowed is a whole number, 1 to 50 ms"),
@@ -147,19 +147,19 @@ def test_one_fault_is_one_problem_with_its_line(
     assert int(told[1]) in ((name,) if "needs the sway" in says else (line, line + new.count("\n")))
 
 
-@pytest.mark.parametrize("name", ["slew", "stick", "limits", "buses", "kind", "0"])
+@pytest.mark.parametrize("name", ["slew", "command", "limits", "buses", "kind", "0"])
 def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
     shipped: str, problems: Problems, name: str
 ) -> None:
     axis = f"'{name}'" if name == "0" else name
     text = shipped.replace("  slew:\n", f"  {axis}:\n    stik: 1\n", 1)
-    text = text.replace("{ lever: left, signal: Slew,", "{ leva: left, signal: Slew,", 1)
+    text = text.replace("{ joystick: left, signal: Slew,", "{ joistick: left, signal: Slew,", 1)
     line = shipped.splitlines().index("  slew:") + 2
     assert problems(text) == [
         f"machine.yaml:{line}: axes.{name}.stik: unknown key; allowed are {AXIS}",
-        f"machine.yaml:{line + 1}: axes.{name}.stick.leva: unknown key; allowed are"
-        " lever, signal, flags, negative, neutral_pct",
-        f"machine.yaml:{line + 1}: axes.{name}.stick.lever: missing: name of a lever",
+        f"machine.yaml:{line + 1}: axes.{name}.command.joistick: unknown key; allowed are"
+        " joystick, signal, flags, negative, neutral_pct",
+        f"machine.yaml:{line + 1}: axes.{name}.command.joystick: missing: name of a joystick",
     ]
 
 
@@ -178,8 +178,8 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_file(
     found = problems(text)
     assert [p.split(": ")[1] for p in found] == [
         "tick_ms",
-        "levers.left.timeout_ms",
-        "axes.near_far.stick.signal",
+        "joysticks.left.timeout_ms",
+        "axes.near_far.command.signal",
         "axes.lift.filter.kind",
         "staus",
     ]
@@ -190,7 +190,7 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_file(
 @pytest.mark.parametrize("text", ["", "# nothing\n", "{}\n"])
 def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
     keys = [re.sub(r"^machine\.yaml(:1)?: ", "", p).split(": ", 1) for p in problems(text)]
-    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "levers"]
+    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "joysticks"]
     assert all(text.startswith("missing: ") for _, text in keys)
 
 

@@ -53,9 +53,9 @@ def test_it_accepts_the_shipped_deployment(schema: dict[str, Any], machine: dict
     [
         (),
         ("buses", "crane"),
-        ("levers", "left"),
+        ("joysticks", "left"),
         ("axes", "slew"),
-        ("axes", "slew", "stick"),
+        ("axes", "slew", "command"),
         ("axes", "slew", "valve"),
         ("axes", "slew", "status"),
         ("axes", "slew", "sway"),
@@ -88,7 +88,7 @@ def test_it_refuses_an_unknown_key(
         (("axes", "slew", "filter"), {"kind": "gff", "poles_rad_s": [-3, 3]}),
         (("axes", "slew", "filter"), {"kind": "gff", "poles_rad_s": [-3]}),
         (("axes", "slew", "limits", "tail_s"), 5.1),
-        (("axes", "slew", "stick"), None),
+        (("axes", "slew", "command"), None),
     ],
 )
 def test_it_refuses_what_loading_refuses(

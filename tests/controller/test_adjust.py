@@ -118,7 +118,7 @@ def test_in_motion_nothing_jumps_and_the_new_filter_is_in_force(make: Make, at: 
         ),
         ({f"axes.slew.sway.{i}": 1.0 for i in range(16)}, "axes.slew.sway.0: not adjustable"),
         (
-            {"axes.slew.stick.neutral_pct": 2.0},
+            {"axes.slew.command.neutral_pct": 2.0},
             r"not adjustable; allowed are axes\.slew\.sway\.period_s, axes\.slew\.sway\.full",
         ),
         ({"axes.slew.sway.period_s": 1.79}, "found 1.79, allowed is 1.8 to 3"),

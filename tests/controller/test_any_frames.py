@@ -1,6 +1,6 @@
 """Whatever comes from the bus: no exception, and no move that no operator asked for.
 
-The judge reads the levers' bytes by itself, with ``struct``, and allows a move of an axis only
+The judge reads the joysticks' bytes by itself, with ``struct``, and allows a move of an axis only
 after an enabled stick in neutral and then an enabled one out of neutral.
 """
 
@@ -20,15 +20,15 @@ TICK_NS = 20_000_000
 TIMEOUT_NS = 100_000_000
 STOP_NS = 2_000_000_000
 MOST_MISSED = 3
-# axis: id of the lever, byte of the stick, id of the valve
+# axis: id of the joystick, byte of the stick, id of the valve
 AXES = {"slew": (0x110, 0, 0x200), "near_far": (0x110, 2, 0x201), "lift": (0x111, 0, 0x202)}
 
 
 @dataclass
 class Judge:
-    """What an axis may do, from the bytes of its lever alone."""
+    """What an axis may do, from the bytes of its joystick alone."""
 
-    lever: int
+    joystick: int
     byte: int
     alive: int | None = None
     heard_ns: int = -(10**12)
@@ -39,7 +39,7 @@ class Judge:
 
     def receive(self, frame: Frame, now_ns: int) -> None:
         place = (frame.bus, frame.can_id, frame.extended, len(frame.data))
-        if place != ("crane", self.lever, False, 8) or frame.data[7] == self.alive:
+        if place != ("crane", self.joystick, False, 8) or frame.data[7] == self.alive:
             return
         self.alive, self.heard_ns = frame.data[7], now_ns
         (stick,) = struct.unpack_from("<h", frame.data, self.byte)
@@ -67,7 +67,7 @@ sticks = st.sampled_from([0, 0, 0, 15, -20, 21, 300, -500, 1000, -1000, 1001, 32
 
 
 @st.composite
-def lever_frames(draw: st.DrawFn) -> Frame:
+def joystick_frames(draw: st.DrawFn) -> Frame:
     data = struct.pack(
         "<hhBBBB",
         draw(sticks),
@@ -88,7 +88,7 @@ any_frames = st.builds(
     st.binary(min_size=8, max_size=8) | st.binary(max_size=12),
 )
 steps = st.tuples(
-    st.lists(lever_frames() | any_frames, max_size=4),
+    st.lists(joystick_frames() | any_frames, max_size=4),
     st.sampled_from([0, 0, 0, 0, 0, 1, MOST_MISSED, 40]),
     st.sampled_from([1, 1, 1, 2, 7, 30]),
 )
@@ -97,7 +97,7 @@ steps = st.tuples(
 def drive(script: list[tuple[list[Frame], int, int]]) -> int:
     """Run a script of (frames, ticks missed, ticks); return how many frames moved a valve."""
     controller = Controller(DEPLOYMENT)
-    judges = {valve: Judge(lever, byte) for lever, byte, valve in AXES.values()}
+    judges = {valve: Judge(joystick, byte) for joystick, byte, valve in AXES.values()}
     now_ns, moves = 0, 0
     for frames, missed, ticks in script:
         now_ns += missed * TICK_NS
@@ -144,7 +144,7 @@ def test_noise_moves_nothing_that_is_not_asked(
 
 @settings(max_examples=2 * settings().max_examples)
 @given(script=st.lists(steps, max_size=25), switch=st.sampled_from([0, 2, 3]))
-def test_nothing_moves_while_no_lever_is_enabled(
+def test_nothing_moves_while_no_joystick_is_enabled(
     script: list[tuple[list[Frame], int, int]], switch: int
 ) -> None:
     disabled = [

@@ -344,13 +344,13 @@ def test_a_stop_that_is_pressed_is_so_for_a_new_axis_too(changed_rig: Make, pres
 def test_a_joysticks_sequence_goes_on(rig: Rig) -> None:
     """A repetition is no news, and a jump is one."""
     rig.run(3)
-    last = rig.lever()
+    last = rig.joystick()
     rig.receive(last)
     reload(rig)
     rig.receive(last)
     assert rig.controller.counters.last_fault is FrameFault.COUNTER_REPEATED
-    rig.counts["LeverLeft"] += 4
-    rig.receive(rig.lever())
+    rig.counts["JoystickLeft"] += 4
+    rig.receive(rig.joystick())
     assert rig.controller.counters.last_fault is FrameFault.COUNTER_JUMP
 
 
@@ -359,22 +359,22 @@ def test_of_a_bus_that_was_opened_again_any_counter_but_the_last_is_the_next(
 ) -> None:
     rig = changed_rig()
     rig.run(3)
-    last = rig.lever()
+    last = rig.joystick()
     rig.receive(last)
     reload(rig, ("bitrate: 250000", "bitrate: 500000"))
     rig.receive(last)
     assert rig.controller.counters.last_fault is FrameFault.COUNTER_REPEATED
-    rig.counts["LeverLeft"] += 4
+    rig.counts["JoystickLeft"] += 4
     rig.run(1)
     assert rig.state() is State.READY
 
 
 def test_an_enable_that_is_released_stays_so_until_a_frame_counts(rig: Rig) -> None:
     rig.run(3)
-    rig.receive(rig.lever(Enable=0))
+    rig.receive(rig.joystick(Enable=0))
     rig.tick()
-    rig.counts["LeverLeft"] += 9
-    doubtful = rig.lever(Enable=1)
+    rig.counts["JoystickLeft"] += 9
+    doubtful = rig.joystick(Enable=1)
     rig.receive(doubtful)
     reload(rig)
     rig.tick()

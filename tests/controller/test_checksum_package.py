@@ -15,12 +15,12 @@ from crccheck.crc import Crc16AugCcitt
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "checksums.md").read_text(encoding="utf-8")
 COUNTER = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'
-# In the lever of Motorola, in the valve of Intel, which has room behind its two bytes.
-IN_LEVER = ' SG_ Check : 47|16@0+ (1,0) [0|65535] "" SHAPER\n'
+# In the joystick of Motorola, in the valve of Intel, which has room behind its two bytes.
+IN_JOYSTICK = ' SG_ Check : 47|16@0+ (1,0) [0|65535] "" SHAPER\n'
 VALVE = "BO_ 512 SlewCommand: 2 SHAPER\n"
 IN_VALVE = ' SG_ Check : 16|16@1+ (1,0) [0|65535] "" VALVES\n'
 CHECKSUM = "checksum: { signal: Check, kind: crc16_id }"
-LEFT = "message: LeverLeft\n"
+LEFT = "message: JoystickLeft\n"
 
 # The drive of a process of its own, which prints what was seen on the bus.
 DRIVE = """
@@ -28,14 +28,14 @@ import json, sys
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 from pathlib import Path
 
 deployment = load_deployment(Path(sys.argv[1]))
 script = random_script(1)
 tip = drive(deployment, script).axes["slew"]
-controller, hand = Controller(deployment), LeverNode(deployment, script)
+controller, hand = Controller(deployment), JoystickNode(deployment, script)
 frames, faults = [], []
 for time_ms in range(0, 4000, 20):
     now_ns = time_ms * 1_000_000
@@ -77,7 +77,7 @@ class Installed:
             assert old in text, old
             text = text.replace(old, new, 1)
         dbc = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
-        dbc = dbc.replace(COUNTER, COUNTER + IN_LEVER, 1)
+        dbc = dbc.replace(COUNTER, COUNTER + IN_JOYSTICK, 1)
         dbc = dbc.replace(VALVE, VALVE.replace(": 2", ": 4") + IN_VALVE)
         (self.folder / "machine.dbc").write_text(dbc, "cp1252")
         (self.folder / "machine.yaml").write_text(text)
@@ -149,7 +149,7 @@ def test_the_kernel_is_not_left_alone_with_it(installed: Installed, command: str
     line = [row.strip()[:8] for row in file.read_text().splitlines()].index("fallback") + 1
     says = f"{file}:{line}: gateway.fallback: found neutral; can-gw of the kernel knows no checksum"
     found = installed.canshaper(command, file, code=2)
-    assert f"{says} of the kind crc16_id, which LeverLeft has\n" in found
+    assert f"{says} of the kind crc16_id, which JoystickLeft has\n" in found
     file.write_text(file.read_text().replace("fallback: neutral", "fallback: stop"))
     assert "good" in installed.canshaper("check", file)
 
@@ -192,6 +192,6 @@ def test_a_package_that_is_wrong_is_one_line_of_the_file(
     file = installed.machine("forwarder.yaml", ("kind: crc16_id", f"kind: {kind}"))
     line = next(i for i, row in enumerate(file.read_text().splitlines(), 1) if "kind:" in row)
     found = installed.canshaper("check", file, code=2)
-    assert found == f"{file}:{line}: levers.left.checksum.kind: {says}\n1 problem\n"
+    assert found == f"{file}:{line}: joysticks.left.checksum.kind: {says}\n1 problem\n"
     if change in (broken, taken):
         assert installed.canshaper("config-schema", "--checksums", code=2) == f"{says}\n"

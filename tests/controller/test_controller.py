@@ -55,18 +55,21 @@ def test_a_stick_that_is_out_at_the_start_moves_nothing(rig: Rig) -> None:
     assert rig.reason() == "STICK_NOT_NEUTRAL"
 
 
-def test_a_lever_that_is_not_enabled_moves_nothing(rig: Rig) -> None:
+def test_a_joystick_that_is_not_enabled_moves_nothing(rig: Rig) -> None:
     rig.run(3, Enable=0)
     assert still(rig.run(100, Slew=1000, Enable=0))
     assert still(rig.run(100, Slew=1000))
 
 
-def test_one_lever_does_not_enable_the_other(rig: Rig) -> None:
+def test_one_joystick_does_not_enable_the_other(rig: Rig) -> None:
     for _ in range(5):
-        rig.receive(rig.lever("LeverLeft"), rig.lever("LeverRight", Enable=0))
+        rig.receive(rig.joystick("JoystickLeft"), rig.joystick("JoystickRight", Enable=0))
         rig.tick()
     for _ in range(50):
-        rig.receive(rig.lever("LeverLeft", Slew=1000), rig.lever("LeverRight", Enable=0, Lift=999))
+        rig.receive(
+            rig.joystick("JoystickLeft", Slew=1000),
+            rig.joystick("JoystickRight", Enable=0, Lift=999),
+        )
         sent = rig.tick()
     assert sent["SlewCommand"]["Velocity"] > 50
     assert sent["LiftCommand"]["Velocity"] == 0
@@ -88,7 +91,7 @@ def test_silence_stops_the_axis_after_the_timeout(rig: Rig) -> None:
 
 def test_a_frozen_alive_counter_is_silence(rig: Rig) -> None:
     rig.moving()
-    frozen = rig.lever(Slew=1000)
+    frozen = rig.joystick(Slew=1000)
     states = []
     for _ in range(8):
         rig.receive(frozen)
@@ -97,10 +100,10 @@ def test_a_frozen_alive_counter_is_silence(rig: Rig) -> None:
     assert states == [State.ACTIVE] * 6 + [State.STOPPING] * 2
 
 
-def test_a_lever_frozen_from_the_start_never_arms(rig: Rig) -> None:
-    rig.receive(rig.lever())
+def test_a_joystick_frozen_from_the_start_never_arms(rig: Rig) -> None:
+    rig.receive(rig.joystick())
     for _ in range(50):
-        rig.receive(rig.lever(AliveCounter=1, Slew=900))
+        rig.receive(rig.joystick(AliveCounter=1, Slew=900))
         assert still(rig.tick())
     assert rig.reason() == "STICK_UNTRUSTED"
 
@@ -190,7 +193,7 @@ def test_foreign_frames_are_counted_and_never_a_move(
     rig: Rig, change: dict[str, Any], name: str, fault: FrameFault
 ) -> None:
     def spoiled(**raw: int) -> Frame:
-        frame = rig.lever("LeverLeft", **raw)
+        frame = rig.joystick("JoystickLeft", **raw)
         if "cut" in change:
             return frame._replace(data=(frame.data + b"\0")[: change["cut"]])
         return frame._replace(**change)
@@ -213,7 +216,7 @@ def test_foreign_frames_are_counted_and_never_a_move(
 def test_a_wrong_frame_does_not_refresh_the_stick(rig: Rig) -> None:
     rig.moving()
     for _ in range(7):
-        frame = rig.lever(Slew=1000)
+        frame = rig.joystick(Slew=1000)
         rig.receive(frame._replace(data=frame.data[:7]), frame._replace(extended=True))
         rig.tick()
     assert rig.state() is State.STOPPING

@@ -106,14 +106,14 @@ def test_a_stall_trips_what_moves_and_forgets_the_sticks(rig: Rig) -> None:
 
 def test_after_a_stall_the_last_frame_seen_again_is_no_news(rig: Rig) -> None:
     rig.run(2)
-    frame = rig.lever()
+    frame = rig.joystick()
     rig.receive(frame)
     rig.tick()
     rig.controller.stalled()
     rig.receive(frame)
     rig.tick()
     assert rig.reason() == "STICK_TIMEOUT"
-    rig.receive(rig.lever())
+    rig.receive(rig.joystick())
     rig.tick()
     assert rig.state() is State.READY
 
@@ -136,7 +136,7 @@ def test_missed_ticks_are_counted_and_the_model_swings_on(rig: Rig, missed: int)
     judge = axis.sway.retuned(axis.sway.mode, axis.sent)
     for _ in range(missed):
         judge.step(axis.sent)
-    rig.receive(rig.lever(Slew=1000))
+    rig.receive(rig.joystick(Slew=1000))
     rig.tick(missed)
     judge.step(axis.sent)
     assert swing(rig) == pytest.approx((judge.angle, judge.rate))
@@ -240,7 +240,7 @@ def test_status_shows_stick_and_valve(rig: Rig) -> None:
     assert sent["SlewStatus"]["PredictedSway"] != 0
 
 
-def test_levers_and_valves_on_two_buses(changed_rig: Make) -> None:
+def test_joysticks_and_valves_on_two_buses(changed_rig: Make) -> None:
     rig = changed_rig(yaml=TWO_BUSES)
     rig.run(3)
     sent = rig.run(50, Slew=1000)
@@ -250,8 +250,8 @@ def test_levers_and_valves_on_two_buses(changed_rig: Make) -> None:
     while "SlewStatus" not in sent:
         sent = rig.run(1, Slew=1000)
     assert sent["SlewStatus"][""].bus == "crane"
-    for _ in range(7):  # the lever's frames on the valves' bus are none of the lever
-        rig.receive(rig.lever(Slew=1000)._replace(bus="boom"))
+    for _ in range(7):  # the joystick's frames on the valves' bus are none of the joystick
+        rig.receive(rig.joystick(Slew=1000)._replace(bus="boom"))
         rig.tick()
     assert rig.state() is State.STOPPING
     assert rig.count("UnknownId") == 7

@@ -76,12 +76,12 @@ def test_a_machine_that_starts_with_it_pressed_is_tripped(machine: Machine) -> N
 
 @pytest.mark.parametrize("raw", [{"Slew": 32766, "Lift": 32766}, {"Enable": 3}, {}])
 def test_a_shaped_stop_becomes_neutral_at_once(machine: Machine, raw: dict[str, int]) -> None:
-    """Whatever else is wrong: no lever at all, an error code, an invalid switch."""
+    """Whatever else is wrong: no joystick at all, an error code, an invalid switch."""
     machine.moving()
     for _ in range(2 if raw else 7):
         machine.rig.receive(machine.stop(0))
         if raw:
-            machine.rig.receive(machine.rig.lever("LeverLeft", **{"Slew": 1000, **raw}))
+            machine.rig.receive(machine.rig.joystick("JoystickLeft", **{"Slew": 1000, **raw}))
         sent = machine.rig.tick()
     assert machine.rig.state() is State.STOPPING
     assert sent["SlewCommand"]["Velocity"] > 0

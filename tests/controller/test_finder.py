@@ -25,9 +25,9 @@ def any_source() -> Deployment:
 def one_source(tmp_path: Path) -> Deployment:
     """The left joystick is taken from one address only."""
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
-    lever = "    message: BJM1\n"
-    assert lever in text
-    text = text.replace(lever, f"{lever}    source: {JOYSTICK}\n")
+    joystick = "    message: BJM1\n"
+    assert joystick in text
+    text = text.replace(joystick, f"{joystick}    source: {JOYSTICK}\n")
     file = tmp_path / "machine.yaml"
     file.write_text(text.replace("../dbc/", f"{ROOT}/dbc/"), encoding="utf-8")
     return load_deployment(file)
@@ -41,7 +41,7 @@ def finder(deployment: Deployment) -> InputFinder[BoundInput]:
 def test_from_any_source_the_first_counts_until_it_is_silent(
     any_source: Deployment, priority: int
 ) -> None:
-    left, one = any_source.levers["left"], finder(any_source)
+    left, one = any_source.joysticks["left"], finder(any_source)
     late = (left.config.timeout_ms + 1) * MS
     assert one.find(bjm("BJM1", JOYSTICK, priority), 0) is left
     assert one.find(bjm("BJM1", OTHER, priority), MS) is None
@@ -53,13 +53,13 @@ def test_from_any_source_the_first_counts_until_it_is_silent(
 @pytest.mark.parametrize("priority", [0, 3, 7])
 def test_from_one_source_no_other_counts(one_source: Deployment, priority: int) -> None:
     one = finder(one_source)
-    assert one.find(bjm("BJM1", JOYSTICK, priority), 0) is one_source.levers["left"]
+    assert one.find(bjm("BJM1", JOYSTICK, priority), 0) is one_source.joysticks["left"]
     assert one.find(bjm("BJM1", OTHER, priority), 1000 * MS) is None
 
 
 def test_without_j1939_the_whole_identifier_counts() -> None:
     deployment = load_deployment(PLAIN)
-    one, left = finder(deployment), deployment.levers["left"]
+    one, left = finder(deployment), deployment.joysticks["left"]
     _, can_id, extended = left.key
     assert one.find(Frame("crane", can_id, extended, b""), 0) is left
     assert one.find(Frame("crane", can_id, not extended, b""), 0) is None
@@ -67,7 +67,7 @@ def test_without_j1939_the_whole_identifier_counts() -> None:
     assert one.find(Frame("boom", can_id, extended, b""), 0) is None
 
 
-def test_commands_of_a_log_are_those_of_the_levers(any_source: Deployment) -> None:
+def test_commands_of_a_log_are_those_of_the_joysticks(any_source: Deployment) -> None:
     commands = Commands(any_source)
     for n in range(100):
         frame = bjm("BJM1", JOYSTICK, 6, X=50.0 if n >= 50 else 0.0)

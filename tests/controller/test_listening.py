@@ -133,5 +133,5 @@ def test_no_fault_is_told_and_no_request_refused() -> None:
     rig = guest()
     rig.run(100)
     rig.receive(j1939.request(0xFECA), j1939.request(0xFEDA, to=j1939.OWN))
-    found = {i for _ in range(100) for i in j1939.ids(rig.tick())}  # the levers are silent
+    found = {i for _ in range(100) for i in j1939.ids(rig.tick())}  # the joysticks are silent
     assert not found & {j1939.DM1, j1939.BROADCAST, j1939.NACK, 0x18E8FF9C}

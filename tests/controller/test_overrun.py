@@ -18,10 +18,10 @@ Make = Callable[..., Rig]
 
 
 def late(rig: Rig, missed: int = 1, **raw: int) -> dict[str, dict[str, Any]]:
-    """Both levers, and a tick that comes after some that were missed."""
+    """Both joysticks, and a tick that comes after some that were missed."""
     left = {k: v for k, v in raw.items() if k != "Lift"}
     right = {k: v for k, v in raw.items() if k != "Slew"}
-    rig.receive(rig.lever("LeverLeft", **left), rig.lever("LeverRight", **right))
+    rig.receive(rig.joystick("JoystickLeft", **left), rig.joystick("JoystickRight", **right))
     return rig.tick(missed)
 
 

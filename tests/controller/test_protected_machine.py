@@ -12,7 +12,7 @@ from canshaper.shaping.states import State
 from tests.machine.protected_machine import IDS, load
 
 TICK_NS = 20_000_000
-LEVER, STOP = 272, 64
+JOYSTICK, STOP = 272, 64
 BOTH, NIBBLE = b"\x23\x01", b"\x42\x00"
 
 
@@ -36,7 +36,7 @@ class Rig:
         self.controller.receive(Frame("crane", can_id, False, data), self.now_ns)
         return self.controller.counters.last_fault
 
-    def lever(self, slew: int = 0, enable: int = 1, included: bytes = BOTH) -> bytes:
+    def joystick(self, slew: int = 0, enable: int = 1, included: bytes = BOTH) -> bytes:
         body = struct.pack("<h", slew) + struct.pack(">h", 0) + bytes([enable, 0])
         return p01(included, self.count, 0, body)
 
@@ -52,7 +52,7 @@ class Rig:
     def run(self, ticks: int, slew: int = 0) -> list[Frame]:
         sent = []
         for _ in range(ticks):
-            assert self.frame(LEVER, self.lever(slew)) is FrameFault.NONE
+            assert self.frame(JOYSTICK, self.joystick(slew)) is FrameFault.NONE
             assert self.frame(STOP, self.stop()) is FrameFault.NONE
             sent += self.tick()
         return sent
@@ -68,7 +68,7 @@ def rig(tmp_path: Path) -> Rig:
     return Rig(tmp_path)
 
 
-def test_a_lever_with_its_header_drives_and_needs_no_more_than_qualify(rig: Rig) -> None:
+def test_a_joystick_with_its_header_drives_and_needs_no_more_than_qualify(rig: Rig) -> None:
     rig.run(1)
     assert rig.axis[0] is State.NEUTRAL_WAIT
     rig.run(1)
@@ -79,10 +79,10 @@ def test_a_lever_with_its_header_drives_and_needs_no_more_than_qualify(rig: Rig)
 
 
 @pytest.mark.parametrize("included", [b"\x24\x01", b"\x23\x00", b"\x01\x23", b"\x23", b""])
-def test_a_lever_with_another_data_id_never_arms(rig: Rig, included: bytes) -> None:
+def test_a_joystick_with_another_data_id_never_arms(rig: Rig, included: bytes) -> None:
     for _ in range(20):
         rig.frame(STOP, rig.stop())
-        assert rig.frame(LEVER, rig.lever(included=included)) is FrameFault.CHECKSUM
+        assert rig.frame(JOYSTICK, rig.joystick(included=included)) is FrameFault.CHECKSUM
         rig.tick()
     assert rig.axis == (State.NEUTRAL_WAIT, "STICK_UNTRUSTED")
 
@@ -93,9 +93,9 @@ def test_nothing_in_a_frame_with_a_flipped_bit_is_believed(tmp_path: Path, bit: 
     rig = Rig(tmp_path)
     rig.run(3)
     rig.run(5, slew=1000)
-    wrong = bytearray(rig.lever(slew=-1000, enable=0))
+    wrong = bytearray(rig.joystick(slew=-1000, enable=0))
     wrong[bit // 8] ^= 1 << bit % 8
-    assert rig.frame(LEVER, bytes(wrong)) is FrameFault.CHECKSUM
+    assert rig.frame(JOYSTICK, bytes(wrong)) is FrameFault.CHECKSUM
     rig.frame(STOP, rig.stop())
     rig.tick()
     assert rig.axis[0] is State.ACTIVE
@@ -109,7 +109,7 @@ def test_a_pressed_stop_counts_with_its_own_data_id_only(rig: Rig) -> None:
         assert rig.frame(STOP, rig.stop(pressed=1, top=top)) is FrameFault.CHECKSUM
     rig.run(1, slew=1000)
     assert rig.axis[0] is State.ACTIVE
-    rig.frame(LEVER, rig.lever(1000))
+    rig.frame(JOYSTICK, rig.joystick(1000))
     rig.frame(STOP, rig.stop(pressed=1))
     rig.tick()
     assert rig.axis == (State.TRIPPED, "EMERGENCY_STOP")

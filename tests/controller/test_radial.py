@@ -15,7 +15,7 @@ SLEW_SWAY = "sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 
 FIXED = "axis: near_far, full_speed_rad_s: 0.5, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
 MEASURED = f"axis: near_far, full_speed_rad_s: 0.5, radius: {{ {TIP} }}"
-NEAR_STICK = "stick: { lever: left, signal: NearFar, neutral_pct: 2 }"
+NEAR_STICK = "command: { joystick: left, signal: NearFar, neutral_pct: 2 }"
 
 
 Make = Callable[..., Rig]
@@ -26,15 +26,15 @@ def compensated(make: Make, text: str = FIXED, **changes: dict[str, str]) -> Rig
     return make({SLEW_SWAY: section, **changes.get("yaml", {})}, changes.get("dbc"))
 
 
-# Near-far on the lever that the slew stick is not on, in place of lift.
+# Near-far on the joystick that the slew stick is not on, in place of lift.
 LIFT_OF_RIGHT = {
     "signal: Lift,": "signal: Rotate,",
     NEAR_STICK: NEAR_STICK.replace("left", "right").replace("NearFar", "Lift"),
 }
 
 
-def by_two_levers(make: Make) -> Rig:
-    """With compensation, and the two sticks on two levers."""
+def by_two_joysticks(make: Make) -> Rig:
+    """With compensation, and the two sticks on two joysticks."""
     return compensated(make, yaml=LIFT_OF_RIGHT)
 
 
@@ -119,11 +119,11 @@ def test_bypass_switches_it_off(changed_rig: Make) -> None:
     assert rig.state() is State.BYPASS_ON
 
 
-def test_a_slew_whose_anti_sway_is_off_asks_nothing_of_another_lever(changed_rig: Make) -> None:
-    rig = by_two_levers(changed_rig)
+def test_a_slew_whose_anti_sway_is_off_asks_nothing_of_another_joystick(changed_rig: Make) -> None:
+    rig = by_two_joysticks(changed_rig)
     for i in range(200):
-        left = rig.lever("LeverLeft", AntiSwayOff=1, Slew=1000 if i > 2 else 0)
-        rig.receive(left, rig.lever("LeverRight"))
+        left = rig.joystick("JoystickLeft", AntiSwayOff=1, Slew=1000 if i > 2 else 0)
+        rig.receive(left, rig.joystick("JoystickRight"))
         assert rig.tick()["NearFarCommand"]["Velocity"] == 0
     assert (rig.state(), rig.state("near_far")) == (State.BYPASS_ON, State.READY)
 
@@ -151,13 +151,13 @@ def test_anti_sway_on_in_full_slew_does_not_twitch(changed_rig: Make) -> None:
     assert max(map(abs, near_far(rig, 5, Slew=1000))) <= 0.02
 
 
-def test_a_lever_that_is_not_enabled_is_not_moved_for_slew(changed_rig: Make) -> None:
-    rig = by_two_levers(changed_rig)
+def test_a_joystick_that_is_not_enabled_is_not_moved_for_slew(changed_rig: Make) -> None:
+    rig = by_two_joysticks(changed_rig)
     for enable, state in ((0, State.NEUTRAL_WAIT), (1, State.NEUTRAL_WAIT), (1, State.ACTIVE)):
         lift = 500 if (enable, state) == (1, State.NEUTRAL_WAIT) else 0  # enabled, but held out
         for i in range(120):
-            left = rig.lever("LeverLeft", Slew=1000 if i > 2 else 0)
-            rig.receive(left, rig.lever("LeverRight", Enable=enable, Lift=lift))
+            left = rig.joystick("JoystickLeft", Slew=1000 if i > 2 else 0)
+            rig.receive(left, rig.joystick("JoystickRight", Enable=enable, Lift=lift))
             sent = rig.tick()
             if state is State.NEUTRAL_WAIT:
                 assert sent["NearFarCommand"]["Velocity"] == 0
@@ -165,14 +165,14 @@ def test_a_lever_that_is_not_enabled_is_not_moved_for_slew(changed_rig: Make) ->
         assert rig.state("near_far") is state
 
 
-def test_a_lost_lever_of_near_far_stops_the_compensation(changed_rig: Make) -> None:
-    rig = by_two_levers(changed_rig)
+def test_a_lost_joystick_of_near_far_stops_the_compensation(changed_rig: Make) -> None:
+    rig = by_two_joysticks(changed_rig)
     rig.run(3)
     sent = near_far(rig, 40, Slew=1000)
     assert sent[-1] < -0.05
     after = []
     for _ in range(120):
-        rig.receive(rig.lever("LeverLeft", Slew=1000))
+        rig.receive(rig.joystick("JoystickLeft", Slew=1000))
         rig.tick()
         after.append(rig.controller.axes["near_far"].axis.sent)
     assert rig.state() is State.ACTIVE
@@ -198,36 +198,38 @@ def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: M
     rig.run(3)
     assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     for _ in range(20):
-        rig.receive(rig.lever("LeverLeft", Slew=1000, Enable=0), rig.lever("LeverRight"))
+        rig.receive(
+            rig.joystick("JoystickLeft", Slew=1000, Enable=0), rig.joystick("JoystickRight")
+        )
         assert rig.tick()["NearFarCommand"]["Velocity"] == 0
         assert rig.state() is State.TRIPPED
     assert rig.state("near_far") is State.READY
 
 
 def test_a_released_enable_of_slew_leaves_the_operators_own_part(changed_rig: Make) -> None:
-    rig, plain = by_two_levers(changed_rig), changed_rig(LIFT_OF_RIGHT)
+    rig, plain = by_two_joysticks(changed_rig), changed_rig(LIFT_OF_RIGHT)
     for one in (rig, plain):
         for tick in range(60):
             slew = 1000 if tick > 2 and one is rig else 0
-            one.receive(one.lever("LeverLeft", Slew=slew))
-            one.receive(one.lever("LeverRight", Lift=400 if tick > 2 else 0))
+            one.receive(one.joystick("JoystickLeft", Slew=slew))
+            one.receive(one.joystick("JoystickRight", Lift=400 if tick > 2 else 0))
             one.tick()
     for one in (rig, plain):
-        one.receive(one.lever("LeverLeft", Enable=0), one.lever("LeverRight", Lift=400))
+        one.receive(one.joystick("JoystickLeft", Enable=0), one.joystick("JoystickRight", Lift=400))
         one.tick()
     sent = [one.controller.axes["near_far"].axis.sent for one in (rig, plain)]
     assert sent[0] == pytest.approx(sent[1], abs=0.02)
     assert sent[1] > 0.2
 
 
-def test_a_lost_lever_of_slew_ends_it_by_the_rate(changed_rig: Make) -> None:
+def test_a_lost_joystick_of_slew_ends_it_by_the_rate(changed_rig: Make) -> None:
     """The shaped stop of slew goes on; near-far has an operator who did not ask for it."""
-    rig = by_two_levers(changed_rig)
+    rig = by_two_joysticks(changed_rig)
     rig.run(3)
     assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     after = []
     for _ in range(30):
-        rig.receive(rig.lever("LeverRight"))
+        rig.receive(rig.joystick("JoystickRight"))
         rig.tick()
         after.append(rig.controller.axes["near_far"].axis.sent)
     assert rig.state() is State.STOPPING

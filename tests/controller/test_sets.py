@@ -23,14 +23,14 @@ BO_ 512 SlewCommand""",
     ),
 }
 SETS = """
-    sets:
-      - at: 0
+    gain_schedule:
+      - breakpoint: 0
         sway: { period_s: 2.3, damping_ratio: 0.04, full_speed_m_s: 1.5 }
         filter: { kind: gff, a1: 0.7, a2: 0.12 }
-      - at: 1000
+      - breakpoint: 1000
         sway: { period_s: 2.9, damping_ratio: 0.05, full_speed_m_s: 1.5 }
         filter: { kind: gff, a1: 0.9, a2: 0.2 }
-    feels:
+    profiles:
       fast: { filter: { kind: gff, a1: 0.5, a2: 0.06 } }
       calm: { filter: { kind: gff, a1: 1.2, a2: 0.3 } }"""
 SLEW = "full_speed_m_s: 1.5 }\n    filter: { kind: gff, a1: 0.708, a2: 0.12 }"
@@ -38,8 +38,8 @@ YAML = {
     SLEW: SLEW + SETS,
     "status: { bus: crane, message: ShaperStatus }": (
         "status: { bus: crane, message: ShaperStatus }\n"
-        "grapple: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n"
-        "feel: { bus: crane, message: Choice, signal: Feel, timeout_ms: 1500,"
+        "load_state: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n"
+        "profile: { bus: crane, message: Choice, signal: Feel, timeout_ms: 1500,"
         " codes: { balanced: 0, fast: 1, calm: 2 } }"
     ),
 }
@@ -93,7 +93,7 @@ def test_the_weight_chooses(chosen: Rig, kg: int, period: float, number: int) ->
 
 
 def test_the_weight_chooses_where_the_operator_has_no_choice(changed_rig: Make) -> None:
-    alone = {SLEW: SLEW + SETS.partition("    feels:")[0]}
+    alone = {SLEW: SLEW + SETS.partition("    profiles:")[0]}
     rig = changed_rig(yaml={**YAML, **alone}, dbc=DBC)
     rig.run(3)
     rig.receive(load(1000))
@@ -192,13 +192,13 @@ def test_what_cannot_run_between_two_sets_is_told(changed_rig: Make) -> None:
     one = "kind: robust, tick_ms: 20, taps: [0.056, 0.87, 0.075]"
     two = "kind: robust, tick_ms: 20, taps: [0.57, 0.2, 0.231]"
     slew = SLEW.replace("kind: gff, a1: 0.708, a2: 0.12", one)
-    sets = SETS.partition("    feels:")[0].replace("kind: gff, a1: 0.7, a2: 0.12", one)
+    sets = SETS.partition("    profiles:")[0].replace("kind: gff, a1: 0.7, a2: 0.12", one)
     changed = {**YAML, SLEW: slew + sets.replace("kind: gff, a1: 0.9, a2: 0.2", two)}
     with pytest.raises(DeploymentError) as caught:
         changed_rig(yaml=changed, dbc=DBC)
     (problem,) = caught.value.problems
-    text = "axes.slew.sets: at 31.25, between two sets: sum of the taps is 1.001, allowed is 1"
-    assert text in str(problem)
+    text = "at 31.25, between two breakpoints: sum of the taps is 1.001, allowed is 1"
+    assert f"axes.slew.gain_schedule: {text}" in str(problem)
 
 
 def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
@@ -216,23 +216,31 @@ def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        ("at: 1000", "at: 0", "axes.slew: found sets at 0, 0; allowed are rising values"),
+        (
+            "breakpoint: 1000",
+            "breakpoint: 0",
+            "axes.slew: found breakpoints at 0, 0; allowed are rising values",
+        ),
         (
             "filter: { kind: gff, a1: 0.9, a2: 0.2 }",
             "filter: { kind: zv }",
-            "axes.slew: found a set with filter zv, allowed is that of the axis, gff",
+            "axes.slew: found a breakpoint with filter zv, allowed is that of the axis, gff",
         ),
-        ("      fast: {", "      quick: {", "feels.quick: found 'quick', feels are balanced, fast"),
-        ("signal: Weight", "signal: Mass", "grapple.signal: found 'Mass', signals of Load are"),
         (
-            "grapple: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n",
+            "      fast: {",
+            "      quick: {",
+            "profiles.quick: found 'quick', profiles are balanced, fast",
+        ),
+        ("signal: Weight", "signal: Mass", "load_state.signal: found 'Mass', signals of Load are"),
+        (
+            "load_state: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n",
             "",
-            "axes.slew.sets: need the signal that chooses them; found no grapple",
+            "axes.slew.gain_schedule: need the signal that chooses them; found no load_state",
         ),
         (
             "filter: { kind: gff, a1: 0.5, a2: 0.06 }",
             "filter: { kind: gff, poles_rad_s: [-60, -3] }",
-            "axes.slew.feels.fast.filter: pole is -60 rad/s",
+            "axes.slew.profiles.fast.filter: pole is -60 rad/s",
         ),
     ],
 )
@@ -259,11 +267,13 @@ def test_a_value_that_the_dbc_names_default_is_a_choice(changed_rig: Make) -> No
     [
         (
             'VAL_ 1297 Feel 1 "Error" ;',
-            "feel.codes.fast: found 1, which Feel names Error in the DBC; allowed is a value that",
+            "profile.codes.fast: found 1, which Feel names Error in the DBC; allowed is a value"
+            " that",
         ),
         (
             'VAL_ 1296 Weight 1000 "Reserved" ;',
-            "axes.slew.sets.1.at: found 1000, which Weight names Reserved in the DBC; allowed is a",
+            "axes.slew.gain_schedule.1.breakpoint: found 1000, which Weight names"
+            " Reserved in the DBC; allowed is a",
         ),
     ],
 )

@@ -13,15 +13,15 @@ from canshaper.machine.binding import load_deployment
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 MESSAGES = {
-    "LeverLeft": {"Slew": 0, "NearFar": 0, "AntiSwayOff": 0},
-    "LeverRight": {"Lift": 0, "Rotate": 0, "AntiSwayOff": 0},
+    "JoystickLeft": {"Slew": 0, "NearFar": 0, "AntiSwayOff": 0},
+    "JoystickRight": {"Lift": 0, "Rotate": 0, "AntiSwayOff": 0},
     "RotatorRocker": {"RotateLeft": 0, "RotateRight": 0},
 }
 CRANES = ("front", "rear")
 
 
 class Rig:
-    """Both cranes; ``silent`` and ``released`` name buses whose levers are so."""
+    """Both cranes; ``silent`` and ``released`` name buses whose joysticks are so."""
 
     def __init__(self) -> None:
         self.controller = Controller(load_deployment(ROOT / "config" / "two-cranes.yaml"))
@@ -73,7 +73,7 @@ def rig() -> Rig:
 MOVING = {"Slew": 1000, "NearFar": 1000, "Lift": 1000, "RotateRight": 250}
 
 
-def test_both_move_each_by_its_own_levers(rig: Rig) -> None:
+def test_both_move_each_by_its_own_joysticks(rig: Rig) -> None:
     rig.silent = {"rear"}
     sent = rig.run(60, **MOVING)
     assert sent["front", "SlewCommand"] > 50

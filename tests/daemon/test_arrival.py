@@ -23,7 +23,7 @@ from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
 
 MS = 1_000_000
-LIMIT_NS = 100 * MS  # of both levers
+LIMIT_NS = 100 * MS  # of both joysticks
 FOREIGN = Frame("crane", 0x200, False, b"\x00\xee")
 Make = Callable[..., Rig]
 
@@ -69,8 +69,8 @@ def tick(rig: Rig, port: Waiting) -> None:
 
 
 def both(rig: Rig, arrived_ns: int, **raw: int) -> list[tuple[int, Frame]]:
-    """A frame of each lever."""
-    frames = rig.lever("LeverLeft", **raw), rig.lever("LeverRight")
+    """A frame of each joystick."""
+    frames = rig.joystick("JoystickLeft", **raw), rig.joystick("JoystickRight")
     return [(arrived_ns, frame) for frame in frames]
 
 
@@ -134,7 +134,7 @@ def test_a_counter_is_not_expected_to_run_on_over_a_silence_between_two_arrivals
 def test_an_address_is_silent_by_the_arrivals_of_its_frames() -> None:
     """Of J1939, where the joystick may have any: read together, they came a silence apart."""
     rig = J1939Rig()
-    limit_ns = rig.deployment.config.levers["left"].timeout_ms * MS
+    limit_ns = rig.deployment.config.joysticks["left"].timeout_ms * MS
     for source, arrived_ns in ((0x33, 0), (0x40, limit_ns + 1)):
         rig.controller.receive(bjm("BJM1", source), arrived_ns)
     assert rig.controller.counters.last_fault is FrameFault.NONE
@@ -193,7 +193,7 @@ def test_a_release_that_does_not_count_is_no_press_when_it_is_over(rig: Rig, age
     tripped(rig)
     port = Waiting()
     arrived_ns = rig.now_ns - age_ns
-    rig.counts["LeverLeft"] = (rig.counts["LeverLeft"] + 100) % 256
+    rig.counts["JoystickLeft"] = (rig.counts["JoystickLeft"] + 100) % 256
     port.queue = both(rig, arrived_ns, Enable=0)
     for _ in range(5):
         port.queue += both(rig, arrived_ns)
@@ -216,7 +216,7 @@ def test_a_press_of_the_emergency_stop_that_is_over_counts_when_it_is_read(
     assert machine.states() == PRESSED
 
 
-def test_every_axis_of_a_lever_sees_a_release_once(changed_rig: Make) -> None:
+def test_every_axis_of_a_joystick_sees_a_release_once(changed_rig: Make) -> None:
     """One with a slow valve too, whose turn comes ticks later; and none sees it twice."""
     rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(31)

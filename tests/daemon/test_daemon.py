@@ -38,7 +38,7 @@ def at(bench: Bench, acts: dict[int, Callable[[], Any]], last: int = 20) -> None
     """Run, and do something before these ticks."""
 
     def script(number: int) -> None:
-        bench.levers()
+        bench.joysticks()
         if number in acts:
             acts[number]()
         if number == last:
@@ -303,7 +303,7 @@ def test_a_reload_in_motion_waits_and_the_log_says_so_once(
     bench: Bench, log: Callable[[], list[str]]
 ) -> None:
     def script(number: int) -> None:
-        bench.levers(Slew=1000 if 5 <= number < 20 else 0)
+        bench.joysticks(Slew=1000 if 5 <= number < 20 else 0)
         if number == 10:
             bench.reload()
         if number == 200:

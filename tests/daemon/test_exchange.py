@@ -17,7 +17,7 @@ from tests.rigs.j1939 import bjm
 
 Make = Callable[..., Rig]
 
-# Levers that are believed for longer than a valve waits.
+# Joysticks that are believed for longer than a valve waits.
 PATIENT = {"timeout_ms: 100 #": "timeout_ms: 900 #", "timeout_ms: 100\n": "timeout_ms: 900\n"}
 
 
@@ -65,7 +65,7 @@ def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: 
     rig = changed_rig(PATIENT)
     rig.moving()
     port = Waiting()
-    port.queue = [rig.lever(Slew=1000)]
+    port.queue = [rig.joystick(Slew=1000)]
     tick(rig, port, missed=31)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "LOOP_STALLED")
     assert port.sent[0].data[0] == 0
@@ -74,20 +74,20 @@ def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: 
 # -- what waited while the loop stood still --------------------------------------------------------
 
 
-def levers(rig: Rig, **raw: int) -> list[Frame]:
-    return [rig.lever("LeverLeft", **raw), rig.lever("LeverRight")]
+def joysticks(rig: Rig, **raw: int) -> list[Frame]:
+    return [rig.joystick("JoystickLeft", **raw), rig.joystick("JoystickRight")]
 
 
 def test_what_waited_is_read_to_its_end_and_not_believed(rig: Rig) -> None:
     """However much it is: neutral is among it, and the stick has been out for long."""
     rig.run(3)
     port = Waiting(most=10)
-    port.queue = [frame for _ in range(100) for frame in levers(rig)]
+    port.queue = [frame for _ in range(100) for frame in joysticks(rig)]
     tick(rig, port, missed=100)
     assert port.queue == []
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_TIMEOUT")
     for _ in range(10):
-        port.queue = levers(rig, Slew=1000)
+        port.queue = joysticks(rig, Slew=1000)
         tick(rig, port)
         assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
 
@@ -95,7 +95,7 @@ def test_what_waited_is_read_to_its_end_and_not_believed(rig: Rig) -> None:
 def test_a_bus_that_never_ends_does_not_hold_up_the_loop_for_ever(rig: Rig) -> None:
     class Endless(Waiting):
         def frames(self) -> Iterator[Frame]:
-            yield rig.lever()
+            yield rig.joystick()
 
     port = Endless()
     tick(rig, port, missed=100)
@@ -107,11 +107,11 @@ def test_a_frame_that_waited_is_not_passed_on(tmp_path: Path) -> None:
     gateway = GatewayRig(tmp_path).moving()
     before = gateway.decoded(gateway.left[-2])
     port, machine = Waiting(), Waiting()
-    port.queue = [gateway.lever(Slew=1000) for _ in range(10)]
+    port.queue = [gateway.joystick(Slew=1000) for _ in range(10)]
     standstill = Standstill(gateway.deployment)
     standstill.last_ns = gateway.now_ns
     gateway.now_ns += 10 * TICK_NS
-    ports = {"levers": port, "machine": machine}
+    ports = {"joysticks": port, "machine": machine}
     exchange(gateway.controller, ports, gateway.now_ns, 10, standstill)
     (own,) = (f for f in machine.sent if f.can_id == 0x110)
     after = gateway.decoded(own)
@@ -126,11 +126,11 @@ def test_an_emergency_stop_of_a_standstill_is_latched(changed_rig: Make) -> None
     assert machine.states() == READY
     port, rig = Waiting(), machine.rig
     for pressed in (0, 0, 1, 1, 1, 0, 0, 0):
-        port.queue += [machine.stop(pressed), *levers(rig)]
+        port.queue += [machine.stop(pressed), *joysticks(rig)]
     tick(rig, port, missed=8)
     assert machine.states() == PRESSED
     for _ in range(3):
-        port.queue = [machine.stop(0), *levers(rig)]
+        port.queue = [machine.stop(0), *joysticks(rig)]
         tick(rig, port)
     assert machine.states() == PRESSED
 
@@ -155,13 +155,13 @@ def test_an_emergency_stop_that_was_free_in_a_standstill_is_not_known(changed_ri
     machine = Machine(changed_rig)
     machine.run(3)
     port, rig = Waiting(), machine.rig
-    port.queue = [machine.stop(0), *levers(rig)] * 8
+    port.queue = [machine.stop(0), *joysticks(rig)] * 8
     tick(rig, port, missed=8)
     for _ in range(3):
-        port.queue = levers(rig)
+        port.queue = joysticks(rig)
         tick(rig, port)
     assert machine.states() == [(State.NEUTRAL_WAIT, "EMERGENCY_STOP_LOST")] * 3
-    port.queue = [machine.stop(0), *levers(rig)]
+    port.queue = [machine.stop(0), *joysticks(rig)]
     tick(rig, port)
     assert machine.states() == READY
 
@@ -186,9 +186,9 @@ def test_a_frame_that_does_not_go_out_is_a_trip(rig: Rig) -> None:
 
     rig.moving()
     port = Full()
-    port.queue = [rig.lever(Slew=1000)]
+    port.queue = [rig.joystick(Slew=1000)]
     tick(rig, port)
     assert (rig.state(), rig.controller.counters.values["SendFailures"]) == (State.ACTIVE, 1)
-    port.queue = [rig.lever(Slew=1000)]
+    port.queue = [rig.joystick(Slew=1000)]
     tick(rig, port)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")

@@ -30,7 +30,7 @@ def rig(tmp_path: Path) -> GatewayRig:
 def ends() -> Iterator[tuple[dict[str, RawPort], dict[str, socket.socket], list[FrameFault]]]:
     """Ports on one end of a pair each, as the daemon has them, and the other ends."""
     ports, others, faults = {}, {}, []
-    for name in ("levers", "machine"):
+    for name in ("joysticks", "machine"):
         ours, others[name] = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         for one in (ours, others[name]):
             one.setblocking(False)
@@ -53,16 +53,16 @@ def ignore(_fault: FrameFault) -> None:
 
 def test_a_joystick_frame_does_not_wait_for_the_tick(rig: GatewayRig, ends: Ends) -> None:
     ports, others, _ = ends
-    frames = [rig.lever() for _ in range(3)]
+    frames = [rig.joystick() for _ in range(3)]
     for frame in frames:
-        others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
+        others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
     InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
     for frame in frames:
         word, length, data = CAN_FRAME.unpack(others["machine"].recv(CAN_FRAME.size))
         assert (word, length) == (0x110, 8)
         assert data[4:] == frame.data[4:]  # the counters of both begin with 1
     with pytest.raises(BlockingIOError):
-        others["levers"].recv(CAN_FRAME.size)
+        others["joysticks"].recv(CAN_FRAME.size)
 
 
 def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
@@ -70,8 +70,8 @@ def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
 ) -> None:
     """Whoever sleeps through the deadline leaves it to the tick to find out for how long."""
     ports, others, _ = ends
-    frame = rig.lever()
-    others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
+    frame = rig.joystick()
+    others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
     now_ns = [0]
     select = gateway.select.select
 
@@ -85,7 +85,7 @@ def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
     InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, standstill)
     with pytest.raises(BlockingIOError):
         others["machine"].recv(CAN_FRAME.size)
-    assert [one.can_id for one in ports["levers"].frames()] == [frame.can_id]
+    assert [one.can_id for one in ports["joysticks"].frames()] == [frame.can_id]
 
 
 def test_what_is_of_no_use_does_not_keep_the_loop_busy(
@@ -94,7 +94,7 @@ def test_what_is_of_no_use_does_not_keep_the_loop_busy(
     """Frames that count as none: after a few it sleeps until its deadline."""
     ports, others, faults = ends
     for _ in range(2 * MOST_EMPTY):
-        others["levers"].send(b"no frame")
+        others["joysticks"].send(b"no frame")
     asked: list[int] = []
     select = gateway.select.select
     monkeypatch.setattr(
@@ -108,8 +108,8 @@ def test_what_is_of_no_use_does_not_keep_the_loop_busy(
 def test_a_port_that_is_gone_is_waited_for(rig: GatewayRig, ends: Ends) -> None:
     ports, others, _ = ends
     ports["machine"].close()
-    frame = rig.lever()
-    others["levers"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
+    frame = rig.joystick()
+    others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
     InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
     assert rig.controller.counters.last_fault is FrameFault.SEND_FAILED
 

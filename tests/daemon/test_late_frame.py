@@ -22,7 +22,7 @@ def test_a_frame_from_before_a_stop_does_not_leave_after_it(
     changed_rig: Make, held_ms: int, leaves: bool
 ) -> None:
     """The process is stopped between computing and sending, for more than a tick."""
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     before = len(valves(machine.port))
     machine.hold_up_ns = held_ms * MS
     machine.tick(20 * MS)
@@ -35,7 +35,7 @@ def test_a_frame_from_before_a_stop_does_not_leave_after_it(
 
 
 def test_the_receiver_sees_no_gap_in_the_counter(changed_rig: Make) -> None:
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     machine.hold_up_ns = 30 * MS
     machine.tick(20 * MS)
     machine.tick(0, 1)
@@ -48,7 +48,7 @@ def test_the_tick_after_such_a_stop_sees_how_long_the_valve_has_waited(
     changed_rig: Make, held_ms: int, trips: bool
 ) -> None:
     """From the last tick whose frames all left; also where the machine was suspended meanwhile."""
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     machine.hold_up_ns = held_ms * MS
     machine.tick(20 * MS)
     machine.tick(0, 3)
@@ -57,7 +57,7 @@ def test_the_tick_after_such_a_stop_sees_how_long_the_valve_has_waited(
 
 
 def test_neutral_leaves_at_any_time_and_asks_for_no_clock(changed_rig: Make) -> None:
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200)
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200)
     machine.slew = 0
 
     def never() -> int:
@@ -71,7 +71,7 @@ def test_neutral_leaves_at_any_time_and_asks_for_no_clock(changed_rig: Make) -> 
 
 def test_a_moving_frame_asks_once(changed_rig: Make) -> None:
     """Status and the frames of the service ask for none."""
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     asked = []
     machine.standstill.clock = lambda: asked.append(1) or machine.now_ns  # type: ignore[func-returns-value]
     before = len(valves(machine.port))
@@ -81,7 +81,7 @@ def test_a_moving_frame_asks_once(changed_rig: Make) -> None:
 
 
 def test_a_short_tick_leaves_some_milliseconds(changed_rig: Make) -> None:
-    machine = Machine(changed_rig, 1, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 1, joysticks_ms=100, valve_ms=200).moving()
     for held_ns, leaves in ((LEAST_LEAVE_NS, 1), (LEAST_LEAVE_NS + 1, 0)):
         before = len([f for f in machine.port.sent if f.can_id == 0x200])
         machine.hold_up_ns = held_ns
@@ -91,7 +91,7 @@ def test_a_short_tick_leaves_some_milliseconds(changed_rig: Make) -> None:
 
 def test_a_late_tick_has_less_time_to_send(changed_rig: Make) -> None:
     """95 ms after the one before, and T is 100 ms: 5 ms are left."""
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     for held_ms, leaves in ((5, 1), (6, 0)):
         before = len([f for f in machine.port.sent if f.can_id == 0x200])
         machine.hold_up_ns = held_ms * MS
@@ -113,8 +113,8 @@ class InGateway:
             self.rig.moving()
         else:
             self.rig.run(5)
-        self.levers, self.machine = Waiting(), Waiting()
-        self.ports = {"levers": self.levers, "machine": self.machine}
+        self.joysticks, self.machine = Waiting(), Waiting()
+        self.ports = {"joysticks": self.joysticks, "machine": self.machine}
         self.standstill = Standstill(self.rig.deployment)
         self.last_ns = self.rig.now_ns - 20 * MS
         self.standstill.last_ns = self.last_ns
@@ -124,10 +124,10 @@ class InGateway:
         """Frames that leave of one that is taken so long after the tick, when it is held up."""
         self.now_ns = self.last_ns + after_ms * MS
         self.standstill.clock = lambda: self.now_ns + held_ms * MS
-        self.levers.queue = [self.rig.lever(Slew=self.slew)]
+        self.joysticks.queue = [self.rig.joystick(Slew=self.slew)]
         assert not self.standstill.over(self.now_ns)
         take(self.rig.controller, self.ports, self.now_ns, self.standstill)
-        assert self.levers.queue == []
+        assert self.joysticks.queue == []
         return len(self.machine.sent)
 
 
@@ -163,13 +163,13 @@ def test_between_two_ticks_of_a_gateway_a_standstill_is_left_to_the_tick(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gateway = InGateway(tmp_path)
-    gateway.levers.queue = [gateway.rig.lever(Slew=1000)]
+    gateway.joysticks.queue = [gateway.rig.joystick(Slew=1000)]
     times = iter((0, 0, 101 * MS))
     gateway.standstill.clock = lambda: gateway.last_ns + next(times)
     monkeypatch.setattr("canshaper.daemon.gateway.select.select", lambda *_: ([1], [], []))
     line = InLine(gateway.rig.deployment, lambda _fault: None)
     line.wait(0.2, gateway.rig.controller, gateway.ports, gateway.standstill)
-    assert len(gateway.levers.queue) == 1
+    assert len(gateway.joysticks.queue) == 1
     assert gateway.machine.sent == []
 
 

@@ -138,9 +138,9 @@ def test_an_option_without_a_section_is_an_error() -> None:
 def test_one_that_listens_tells_its_status_and_no_valve(tmp_path: Path) -> None:
     """Beside another controller on the same bus, whose frames have the ids of our valves."""
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
-    names = ("LeverLeft", "SlewCommand", "SlewStatus", "ShaperStatus")
+    names = ("JoystickLeft", "SlewCommand", "SlewStatus", "ShaperStatus")
     found = [deployment.messages.find(name) for name in names]
-    lever, command, status, service = (one[1] for one in found if not isinstance(one, str))
+    joystick, command, status, service = (one[1] for one in found if not isinstance(one, str))
     daemon = Daemon(tmp_path, "--listen-only")
     daemon.logged("listen-only=yes valves=none")
     daemon.logged("started file=")
@@ -154,9 +154,12 @@ def test_one_that_listens_tells_its_status_and_no_valve(tmp_path: Path) -> None:
         mine: list[bytes] = []
         for number in range(10_000):
             stick = 100.0 if number > 50 else 0.0
-            values = {s.name: 0 for s in lever.signals}
+            values = {s.name: 0 for s in joystick.signals}
             values |= {"Slew": stick, "Enable": 1, "AliveCounter": number % 256}
-            for message, fields in ((lever, values), (command, {"Velocity": 0, "AliveCounter": 0})):
+            for message, fields in (
+                (joystick, values),
+                (command, {"Velocity": 0, "AliveCounter": 0}),
+            ):
                 data = message.encode(fields)
                 can_id = message.frame_id
                 bus.send(can.Message(arbitration_id=can_id, data=data, is_extended_id=False))

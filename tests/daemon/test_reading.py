@@ -45,17 +45,17 @@ def drive(deployment: Deployment) -> list[Frame]:
     sent = []
     for tick in range(300):
         now_ns = tick * TICK_NS
-        for lever in deployment.config.levers.values():
-            found = deployment.messages.find(lever.message)
+        for joystick in deployment.config.joysticks.values():
+            found = deployment.messages.find(joystick.message)
             assert not isinstance(found, str)
             message = found[1]
             values = dict.fromkeys((s.name for s in message.signals), 0)
-            sticks = {a.stick.signal for a in deployment.config.axes.values()}
+            sticks = {a.command.signal for a in deployment.config.axes.values()}
             values |= {name: 900 if 50 < tick < 150 else 0 for name in values if name in sticks}
             values |= {"Enable": 1, "AliveCounter": tick % 256}
             data = message.encode(values, scaling=False)
             key = (message.frame_id, message.is_extended_frame)
-            controller.receive(Frame(lever.bus, *key, data), now_ns)
+            controller.receive(Frame(joystick.bus, *key, data), now_ns)
         sent += list(controller.tick(now_ns, 0))
     return sent
 

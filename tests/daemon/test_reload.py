@@ -95,7 +95,7 @@ class Bench:
         text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
         self.text = text.replace("../dbc", str(ROOT / "dbc"))
         self.file.write_text(self.text, encoding="utf-8")
-        self.rig = Rig(self.file)  # for its levers
+        self.rig = Rig(self.file)  # for its joysticks
         self._tick = 0
         self._handlers: dict[int, Any] = {}
         for one in (module, loop, service_ports):
@@ -153,8 +153,8 @@ class Bench:
             if port.channel == "vcan0" and not port.closed:
                 port.waiting += [(self.now_ns, frame) for frame in frames]
 
-    def levers(self, **raw: int) -> None:
-        self.put(self.rig.lever("LeverLeft", **raw), self.rig.lever("LeverRight"))
+    def joysticks(self, **raw: int) -> None:
+        self.put(self.rig.joystick("JoystickLeft", **raw), self.rig.joystick("JoystickRight"))
 
     def told(self) -> tuple[str, str]:
         """What the last status of the slew axis tells: state and reason."""
@@ -204,14 +204,14 @@ def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
     def opening(channel: str) -> None:
         if channel == "vcan1":
             for stick in [0] * 50 + [1000] * 50:
-                bench.levers(Slew=stick)
+                bench.joysticks(Slew=stick)
                 bench.now_ns += TICK_NS
             bench.now_ns += 10**9
             raise BusError("bus two: cannot open: no such adapter")
 
     def script(tick: int) -> None:
         if tick < 10:
-            bench.levers()
+            bench.joysticks()
         if tick == 9:
             assert bench.told() == ("READY", "STICK_NEUTRAL")
             bench.reload(BUS, SECOND)
@@ -232,14 +232,14 @@ def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
     def opening(channel: str) -> None:
         if channel == "vcan1":
             for _ in range(50):
-                bench.levers()
+                bench.joysticks()
                 bench.now_ns += TICK_NS
 
     def script(tick: int) -> None:
         if len(bench.ports) < 2:
-            bench.levers()
+            bench.joysticks()
         elif since:
-            bench.levers(Slew=1000)
+            bench.joysticks(Slew=1000)
         else:
             since.append(tick)
         if tick == 9:
@@ -258,7 +258,7 @@ def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -
     """What was sent from the old port comes to the new one, some of it after it was opened."""
 
     def script(tick: int) -> None:
-        bench.levers()
+        bench.joysticks()
         if tick == 9:
             bench.reload("bitrate: 250000", "bitrate: 500000")
         if tick == 100:
@@ -271,7 +271,7 @@ def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -
 
 def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
     def script(tick: int) -> None:
-        bench.levers()
+        bench.joysticks()
         bench.put(FOREIGN)
         if tick == 9:
             bench.reload("bitrate: 250000", "bitrate: 500000")
@@ -325,7 +325,7 @@ def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench)
     told: list[tuple[str, str]] = []
 
     def script(tick: int) -> None:
-        bench.levers(Reset=int(tick in (200, 201)))
+        bench.joysticks(Reset=int(tick in (200, 201)))
         if tick == 5:
             bench.put(FOREIGN)
         if tick in (9, 199, 205):

@@ -22,7 +22,7 @@ def test_a_gap_of_an_age_limit_goes_on_and_one_beyond_it_is_a_standstill(
     changed_rig: Make, tick_ms: int, over_ms: int
 ) -> None:
     """No matter how many deadlines lie in it."""
-    machine = Machine(changed_rig, tick_ms, levers_ms=T_MS, valve_ms=600).moving()
+    machine = Machine(changed_rig, tick_ms, joysticks_ms=T_MS, valve_ms=600).moving()
     gap_ns = (T_MS + over_ms) * MS
     machine.tick(gap_ns, gap_ns // machine.tick_ns - 1)
     assert (machine.rig.reason() == "LOOP_STALLED") is bool(over_ms)
@@ -36,7 +36,7 @@ def test_of_a_valve_with_a_slow_message_less_is_left(
     changed_rig: Make, tick_ms: int, period: int, over_ms: int
 ) -> None:
     """It has waited for all ticks but one of its period when the loop begins to stand still."""
-    machine = Machine(changed_rig, tick_ms, period_ticks=period, levers_ms=599, valve_ms=600)
+    machine = Machine(changed_rig, tick_ms, period_ticks=period, joysticks_ms=599, valve_ms=600)
     limit_ms = 599 if period == 1 else 600 - 2 * tick_ms
     machine.moving()
     gap_ms = limit_ms + over_ms
@@ -53,7 +53,7 @@ def test_an_emergency_stop_has_an_age_limit_too(changed_rig: Make) -> None:
 
 
 def test_the_first_tick_has_none_before_it(changed_rig: Make) -> None:
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200)
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200)
     assert not machine.standstill.over(10**12)
     machine.tick(10**12)
     assert machine.standstill.over(2 * 10**12)  # there is one before the next
@@ -73,7 +73,7 @@ def test_a_loop_that_is_held_up_in_its_sleep_trips_by_the_time_that_was(
     changed_rig: Make, monkeypatch: pytest.MonkeyPatch, held_ms: int, trips: bool
 ) -> None:
     """After a tick at 0 it is stopped just before the one at 20 ms; T is 100 ms."""
-    machine = Machine(changed_rig, 20, levers_ms=100, valve_ms=200).moving()
+    machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
     began_ns, calls = machine.now_ns, []
 
     class Sleeper:
@@ -105,6 +105,6 @@ def test_no_loop_has_a_clock_that_stands_still_in_a_suspend() -> None:
     own = {"raw.py", "gateway.py", "notify.py"}  # of bus and service manager, which ask themselves
     rooms = [ROOT / "canshaper" / name for name in CLOCKED]
     files = [file for room in rooms for file in room.rglob("*.py")]
-    assert {"loop.py", "levers.py", "run.py", "daemon.py"} < {file.name for file in files}
+    assert {"loop.py", "joysticks.py", "run.py", "daemon.py"} < {file.name for file in files}
     for file in files:
         assert file.name in own or not monotonic.search(file.read_text("utf-8")), file

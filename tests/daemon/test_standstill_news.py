@@ -176,7 +176,7 @@ def test_a_joystick_from_any_address_has_to_come_again() -> None:
 def test_a_press_of_enable_in_it_resets_nothing(rig: Rig) -> None:
     rig.moving()
     rig.controller.stalled()
-    rig.receive(rig.lever(Enable=0), rig.lever(Enable=1))
+    rig.receive(rig.joystick(Enable=0), rig.joystick(Enable=1))
     rig.run(10)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "LOOP_STALLED")
     rig.run(1, Enable=0)
@@ -202,8 +202,8 @@ def test_what_waited_is_never_passed_on_by_a_gateway(tmp_path: Path) -> None:
     rig = GatewayRig(tmp_path)
     rig.run(3)
     rig.controller.stalled()
-    waited = rig.lever()
+    waited = rig.joystick()
     assert rig.receive(waited) is None
     rig.tick()
     assert rig.receive(waited) is None
-    assert rig.receive(rig.lever()) is not None
+    assert rig.receive(rig.joystick()) is not None

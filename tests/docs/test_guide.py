@@ -15,7 +15,7 @@ from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import script_named
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
@@ -45,11 +45,11 @@ def recorded(file: Path, log: Path, change: str) -> None:
     begin_ms = 0
     for axis in AXES:
         script = script_named(f"pulse-{axis}")
-        levers = LeverNode(deployment, script, bypass=True)
+        joysticks = JoystickNode(deployment, script, bypass=True)
         end_ms = round(1000 * (script.duration_s + QUIET_S))
         for time_ms in range(0, end_ms, 20):
             now_ms = begin_ms + time_ms
-            for frame in levers.frames(time_ms):
+            for frame in joysticks.frames(time_ms):
                 controller.receive(frame, now_ms * 1_000_000)
                 put(frame, now_ms)
             for frame in controller.tick(now_ms * 1_000_000):

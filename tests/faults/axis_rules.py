@@ -3,7 +3,7 @@
 from collections import deque
 
 from canshaper.codec.frame import Frame
-from tests.faults.heard import LONG_AGO, HeardLever
+from tests.faults.heard import LONG_AGO, HeardJoystick
 from tests.faults.judge import FOREIGN_NS, OWED, ROUNDING
 from tests.faults.machine import Axis
 
@@ -15,8 +15,8 @@ RELEASED = "enable released"
 class AxisRules:
     """What one axis may do."""
 
-    def __init__(self, axis: Axis, lever: HeardLever, tick_ns: int) -> None:
-        self.axis, self.lever = axis, lever
+    def __init__(self, axis: Axis, joystick: HeardJoystick, tick_ns: int) -> None:
+        self.axis, self.joystick = axis, joystick
         self.velocity = 0.0
         self.raw = 0
         self.causes: set[str] = set()  # of neutral at once, since it was decided last
@@ -36,32 +36,32 @@ class AxisRules:
 
     # -- before a frame ---------------------------------------------------------------------------
 
-    def decide(self, now_ns: int, *, lever_works: bool) -> None:
+    def decide(self, now_ns: int, *, joystick_works: bool) -> None:
         """Take what has been read up to now.
 
         Args:
             now_ns: when it was read.
-            lever_works: whether the node of the joystick does.
+            joystick_works: whether the node of the joystick does.
         """
-        lever, axis = self.lever, self.axis
+        joystick, axis = self.joystick, self.axis
         causes, self.causes = self.causes, set()
         if self._stop_until_ns is not None and now_ns > self._stop_until_ns:
             self._stop_until_ns = None
-        if lever.releases > self._releases or lever.enable() == 0:
+        if joystick.releases > self._releases or joystick.enable() == 0:
             causes.add(RELEASED)
         if now_ns - self.contested_ns < FOREIGN_NS - 2 * self._tick_ns:
             causes.add("another sender")
-        presses = lever.presses[axis.name] + lever.resets
+        presses = joystick.presses[axis.name] + joystick.resets
         pressed = presses > self._presses or self._pressed_again
-        self._releases, self._presses = lever.releases, presses
+        self._releases, self._presses = joystick.releases, presses
         # Released and pressed again between two ticks is a press, though a release too.
-        self._pressed_again = pressed and causes == {RELEASED} and lever.enable() == 1
+        self._pressed_again = pressed and causes == {RELEASED} and joystick.enable() == 1
         # Silence counts a tick later, when the loop looks.
-        faults = lever.faults(axis, now_ns - self._tick_ns - SLACK_NS) if lever_works else {0}
-        stick = lever.sticks[axis.name][0]
+        faults = joystick.faults(axis, now_ns - self._tick_ns - SLACK_NS) if joystick_works else {0}
+        stick = joystick.sticks[axis.name][0]
         healthy = not causes and not faults
-        centred = healthy and abs(stick) <= axis.band and lever.enable() == 1
-        if faults or lever.faults(axis, now_ns):  # the loop may take it for silent already
+        centred = healthy and abs(stick) <= axis.band and joystick.enable() == 1
+        if faults or joystick.faults(axis, now_ns):  # the loop may take it for silent already
             self.may_stop(now_ns)
         if causes:
             self.latched |= self.velocity != 0.0 or "another sender" in causes
@@ -127,7 +127,9 @@ class AxisRules:
     def count(self, frame: Frame, *, late: bool) -> str:
         """What is wrong with the alive counter of a frame."""
         field = self.axis.valve_counter
-        if field is None or self.axis.valve_key[1] == self.axis.lever.key[1]:  # the lever's own
+        if (
+            field is None or self.axis.valve_key[1] == self.axis.joystick.key[1]
+        ):  # the joystick's own
             return ""
         gaps, self.lost = 1 + late + self._skipped + self.lost, 0
         last, self._count = self._count, self.axis.sent(frame.data)[1]

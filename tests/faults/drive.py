@@ -13,7 +13,7 @@ from tests.faults import inject
 from tests.faults.guarded import guarded
 from tests.faults.hand import path
 from tests.faults.inject import Fault
-from tests.faults.inputs import Lever
+from tests.faults.inputs import Joystick
 from tests.faults.judge import FOREIGN_NS, Judge, Violation
 from tests.faults.machine import Machine
 from tests.faults.senders import Sender, radius_frames
@@ -22,7 +22,7 @@ from tests.faults.variants import NAMES, machine
 # Most of a drive's ticks lie under faults; the rest is the way back to normal work.
 BODY_TICKS = (50, 110)
 # Within so many ticks an axis moves that is asked to: a filter that still damps the last swing may
-# hold it for a part of a swing of 2.4 s, never against the lever.
+# hold it for a part of a swing of 2.4 s, never against the joystick.
 MOVES_WITHIN = 75
 # Punctual ticks after which an overrun of the loop is over.
 OVERRUN_TICKS = 55
@@ -63,14 +63,14 @@ class Drive:
         self._trace = trace
         self._untold = 0
         tick_ms = self.machine.tick_ms
-        self.levers = {v.name: Sender(v, tick_ms, rng) for v in self.machine.levers.values()}
+        self.joysticks = {v.name: Sender(v, tick_ms, rng) for v in self.machine.joysticks.values()}
         self.stop = Sender(self.machine.stop, tick_ms, rng) if self.machine.stop else None
         self.paths = {
             name: path(rng, self.ticks, axis.stick.full, int(axis.band * axis.stick.full))
             for name, axis in self.machine.axes.items()
         }
         self.toggles = {
-            name: (rng.randrange(self.ticks), rng.randrange(self.ticks)) for name in self.levers
+            name: (rng.randrange(self.ticks), rng.randrange(self.ticks)) for name in self.joysticks
         }
         self.toggled = rng.random() < 0.2
         self._radius = rng.randint(2000, 8000)
@@ -112,7 +112,7 @@ class Drive:
                 self.tick_number += 1
                 last = self.tick_number - 1
                 sticks = {n: p[min(last, self.ticks - 1)] for n, p in self.paths.items()}
-                switches = {n: self._switches(v, last) for n, v in self.machine.levers.items()}
+                switches = {n: self._switches(v, last) for n, v in self.machine.joysticks.items()}
                 self._take(sticks, switches, active)
             if stalled:
                 self._tell("stood still")
@@ -120,11 +120,11 @@ class Drive:
                 self.controller.stalled()
             self._step(missed, active)
 
-    def _switches(self, lever: Lever, tick: int) -> dict[str, int]:
-        raw = {lever.enable.name: 1}
-        first, second = self.toggles[lever.name]
-        if self.toggled and lever.off and min(first, second) <= tick < max(first, second):
-            raw[lever.off.name] = 1
+    def _switches(self, joystick: Joystick, tick: int) -> dict[str, int]:
+        raw = {joystick.enable.name: 1}
+        first, second = self.toggles[joystick.name]
+        if self.toggled and joystick.off and min(first, second) <= tick < max(first, second):
+            raw[joystick.off.name] = 1
         return raw
 
     def _loop(self, active: list[Fault]) -> tuple[int, int, bool]:
@@ -169,23 +169,23 @@ class Drive:
     ) -> None:
         """Everything that is put on the buses in one tick of the clock."""
         frames: list[Frame] = []
-        for name, lever in self.machine.levers.items():
-            sender = self.levers[name]
-            mine = [f for f in active if f.lever is lever]
+        for name, joystick in self.machine.joysticks.items():
+            sender = self.joysticks[name]
+            mine = [f for f in active if f.joystick is joystick]
             sent = []
             for _ in range(sender.due(self.tick_number)):
                 raw = dict(switches[name])
-                for axis in lever.axes:
+                for axis in joystick.axes:
                     raw |= axis.raw(sticks[axis.name])
                 raw = sender.counted(raw)
                 for fault in mine:
                     if act := inject.RAW.get(fault.kind):
                         act(fault, raw)
-                sent.append(lever.data(raw))
+                sent.append(joystick.data(raw))
             for fault in mine:
                 if spoil := inject.WIRE.get(fault.kind):
                     sent = spoil(fault, sent)
-            frames += [Frame(*lever.key, data) for data in sender.passed(sent)]
+            frames += [Frame(*joystick.key, data) for data in sender.passed(sent)]
         frames += self._stop_frames(active)
         frames += radius_frames(self.machine, self._radius, active)
         for fault in active:
@@ -237,7 +237,7 @@ class Drive:
         machine, rng = self.machine, self.rng
         cycles = max(a.period_ticks for a in machine.axes.values())
         # enough for frames that qualify, a state a tick, and valves that are served seldom
-        some = 4 + 3 * cycles + max(v.qualify for v in machine.levers.values())
+        some = 4 + 3 * cycles + max(v.qualify for v in machine.joysticks.values())
         kinds = {f.kind for f in self.faults}
         patient = rng.random() < (0.5 if machine.rest_ticks < 70 else 0.05)
         if patient:
@@ -246,7 +246,7 @@ class Drive:
             self._healthy(OVERRUN_TICKS, enable=1)
         if "others: our valve" in kinds:
             self._healthy(FOREIGN_NS // machine.tick_ns, enable=1)
-        resets = patient and all(v.reset for v in machine.levers.values())
+        resets = patient and all(v.reset for v in machine.joysticks.values())
         if resets and rng.random() < 0.5:
             self._healthy(some, enable=1, reset=0)
             self._healthy(some, enable=1, reset=1)
@@ -270,10 +270,10 @@ class Drive:
         axes = self.machine.axes.values()
         sticks = {a.name: deflected * a.stick.full for a in axes}
         switches = {}
-        for name, lever in self.machine.levers.items():
-            switches[name] = {lever.enable.name: enable}
-            if lever.reset:
-                switches[name][lever.reset.name] = reset
+        for name, joystick in self.machine.joysticks.items():
+            switches[name] = {joystick.enable.name: enable}
+            if joystick.reset:
+                switches[name][joystick.reset.name] = reset
         for _ in range(ticks):
             self.tick_number += 1
             self._take(sticks, switches, [])

@@ -1,7 +1,7 @@
 """What was heard of the inputs, from the bytes on the bus alone."""
 
 from tests.faults.fields import Field
-from tests.faults.inputs import Input, Lever
+from tests.faults.inputs import Input, Joystick
 from tests.faults.machine import Axis
 
 LONG_AGO = -(10**15)
@@ -104,8 +104,8 @@ class HeardStop(Heard):
         self.says_stop = self._signal.get(word) != 0
 
 
-class HeardLever(Heard):
-    """A lever, as its axes may use it.
+class HeardJoystick(Heard):
+    """A joystick, as its axes may use it.
 
     Attributes:
         releases: how many frames so far had the enable switch off.
@@ -113,9 +113,9 @@ class HeardLever(Heard):
         presses: by axis, how many times enable went from 0 to 1 in frames that it can use.
     """
 
-    def __init__(self, source: Lever) -> None:
+    def __init__(self, source: Joystick) -> None:
         super().__init__(source)
-        self.lever = source
+        self.joystick = source
         self.releases = self.resets = 0
         self.presses = {a.name: 0 for a in source.axes}
         self._enabled = {a.name: True for a in source.axes}
@@ -125,19 +125,19 @@ class HeardLever(Heard):
         self._reset = 1
 
     def whole(self, word: int) -> None:
-        if self.lever.enable.get(word) == 0:  # released is released, whoever says so
+        if self.joystick.enable.get(word) == 0:  # released is released, whoever says so
             self.releases += 1
             self._enabled = dict.fromkeys(self._enabled, False)
 
     def accepted(self, word: int, now_ns: int) -> None:
-        lever = self.lever
-        enable = lever.enable.get(word)
-        if lever.reset:
-            reset = lever.reset.get(word)
+        joystick = self.joystick
+        enable = joystick.enable.get(word)
+        if joystick.reset:
+            reset = joystick.reset.get(word)
             self.resets += reset == 1 and self._reset == 0
             if reset in (0, 1):  # the codes above say nothing
                 self._reset = reset
-        for axis in lever.axes:
+        for axis in joystick.axes:
             stick = axis.read(word)
             if stick != self.sticks[axis.name]:
                 self.sticks[axis.name], self._still_ns[axis.name] = stick, now_ns
@@ -150,7 +150,7 @@ class HeardLever(Heard):
 
     def bypasses(self) -> bool:
         """Whether anti-sway is switched off."""
-        return self.lever.off is not None and self.lever.off.get(self.word) == 1
+        return self.joystick.off is not None and self.joystick.off.get(self.word) == 1
 
     def faults(self, axis: Axis, now_ns: int) -> set[int]:
         """Every reason why the stick of this axis cannot be used now; empty when it can."""
@@ -164,10 +164,10 @@ class HeardLever(Heard):
         if self.enable() not in (0, 1):
             found.add(SWITCH_INVALID)
         still_ns = now_ns - self._still_ns[axis.name]
-        if not found and still_ns > self.lever.frozen_ns and abs(stick) > axis.band:
+        if not found and still_ns > self.joystick.frozen_ns and abs(stick) > axis.band:
             found.add(STICK_FROZEN)
         return found
 
     def enable(self) -> int:
         """The enable switch in the last good frame."""
-        return self.lever.enable.get(self.word)
+        return self.joystick.enable.get(self.word)

@@ -2,8 +2,8 @@
 
 A fault acts from tick ``start`` to tick ``stop`` and lies at one of these places:
 
-    RAW     on the raw values of a lever, before its frame is made
-    WIRE    on the bytes of a lever's frames
+    RAW     on the raw values of a joystick, before its frame is made
+    WIRE    on the bytes of a joystick's frames
     EXTRA   frames that someone else sends
     LOOP    on the loop of the daemon: ticks that come late, frames that do not go out
     STOP    on the emergency stop, where there is one
@@ -16,7 +16,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from tests.faults.inputs import Input, Lever
+from tests.faults.inputs import Input, Joystick
 from tests.faults.machine import Axis, Machine
 
 Raw = dict[str, int]
@@ -31,7 +31,7 @@ class Fault:
     stop: int
     machine: Machine
     rng: random.Random
-    lever: Lever
+    joystick: Joystick
     axis: Axis
     memory: dict[str, Any] = field(default_factory=dict)
 
@@ -39,10 +39,10 @@ class Fault:
         return self.start <= tick < self.stop
 
     def __str__(self) -> str:
-        return f"{self.kind} {self.lever.name}/{self.axis.name} {self.start}..{self.stop}"
+        return f"{self.kind} {self.joystick.name}/{self.axis.name} {self.start}..{self.stop}"
 
 
-# -- raw values of a lever -------------------------------------------------------------------------
+# -- raw values of a joystick ---------------------------------------------------------------------
 
 
 def _code(name: str) -> Callable[[Fault, Raw], None]:
@@ -62,7 +62,7 @@ def _out_of_range(fault: Fault, raw: Raw) -> None:
 
 
 def _frozen_stick(fault: Fault, raw: Raw) -> None:
-    for axis in fault.lever.axes:
+    for axis in fault.joystick.axes:
         for signal in (axis.stick, *(axis.flags or ())):
             raw[signal.name] = fault.memory.setdefault(signal.name, raw[signal.name])
 
@@ -83,40 +83,40 @@ def _flags(*values: int) -> Callable[[Fault, Raw], None]:
 def _enable(*values: int, share: float = 1.0) -> Callable[[Fault, Raw], None]:
     def act(fault: Fault, raw: Raw) -> None:
         if fault.rng.random() < share:
-            raw[fault.lever.enable.name] = fault.rng.choice(values)
+            raw[fault.joystick.enable.name] = fault.rng.choice(values)
 
     return act
 
 
 def _reset(*values: int) -> Callable[[Fault, Raw], None]:
     def act(fault: Fault, raw: Raw) -> None:
-        if fault.lever.reset:
-            raw[fault.lever.reset.name] = fault.rng.choice(values)
+        if fault.joystick.reset:
+            raw[fault.joystick.reset.name] = fault.rng.choice(values)
 
     return act
 
 
 def _anti_sway_off(*values: int) -> Callable[[Fault, Raw], None]:
     def act(fault: Fault, raw: Raw) -> None:
-        if fault.lever.off:
-            raw[fault.lever.off.name] = fault.rng.choice(values)
+        if fault.joystick.off:
+            raw[fault.joystick.off.name] = fault.rng.choice(values)
 
     return act
 
 
 def _frozen_counter(fault: Fault, raw: Raw) -> None:
-    if counter := fault.lever.counter:
+    if counter := fault.joystick.counter:
         raw[counter.name] = fault.memory.setdefault("count", raw[counter.name])
 
 
 def _jumping_counter(fault: Fault, raw: Raw) -> None:
-    if counter := fault.lever.counter:
+    if counter := fault.joystick.counter:
         raw[counter.name] = fault.rng.randint(0, counter.mask)
 
 
 def _stepping_counter(fault: Fault, raw: Raw) -> None:
     """Every frame a few steps too far: up to the largest step it is still the next one."""
-    if counter := fault.lever.counter:
+    if counter := fault.joystick.counter:
         step = fault.memory.setdefault("step", fault.rng.randint(1, 5))
         count = fault.memory.get("count", raw[counter.name]) + step
         raw[counter.name] = fault.memory["count"] = count & counter.mask
@@ -144,7 +144,7 @@ RAW: dict[str, Callable[[Fault, Raw], None]] = {
 }
 
 
-# -- frames of a lever -----------------------------------------------------------------------------
+# -- frames of a joystick -------------------------------------------------------------------------
 
 
 def _silent(_fault: Fault, _frames: list[bytes]) -> list[bytes]:
@@ -192,9 +192,9 @@ def _bit_errors(fault: Fault, frames: list[bytes]) -> list[bytes]:
 
 
 def _wrong_checksum(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    if fault.lever.checksum is None:
+    if fault.joystick.checksum is None:
         return frames
-    at = fault.lever.checksum_byte
+    at = fault.joystick.checksum_byte
     return [f[:at] + bytes([f[at] ^ 0x40]) + f[at + 1 :] if len(f) > at else f for f in frames]
 
 
@@ -220,7 +220,7 @@ WIRE: dict[str, Callable[[Fault, list[bytes]], list[bytes]]] = {
 
 def _foreign(fault: Fault) -> list[Frame]:
     rng, machine = fault.rng, fault.machine
-    bus, can_id, extended = fault.lever.key
+    bus, can_id, extended = fault.joystick.key
     data = rng.randbytes(rng.choice([0, 2, 8]))
     taken = {*machine.inputs, *machine.valves, *machine.statuses, machine.service}
     if machine.radius:
@@ -300,14 +300,14 @@ KINDS = (*RAW, *WIRE, *EXTRA, *LOOP, *STOP, *RADIUS)
 
 def kinds_for(machine: Machine) -> list[str]:
     """Every kind of fault that can happen to a machine."""
-    levers, axes = machine.levers.values(), machine.axes.values()
+    joysticks, axes = machine.joysticks.values(), machine.axes.values()
     impossible = {
         "stop": machine.stop is None,
         "radius": machine.radius is None,
         "flags": not any(a.flags for a in axes),
-        "reset": not any(v.reset for v in levers),
-        "counter": not any(v.counter for v in levers),
-        "frames: wrong checksum": not any(v.checksum for v in levers),
+        "reset": not any(v.reset for v in joysticks),
+        "counter": not any(v.counter for v in joysticks),
+        "frames: wrong checksum": not any(v.checksum for v in joysticks),
     }
     return [k for k in KINDS if not (impossible.get(k) or impossible.get(k.split(":")[0]))]
 
@@ -326,5 +326,5 @@ def random_faults(machine: Machine, rng: random.Random, ticks: int) -> list[Faul
         stop = start + rng.choice((1, 1, 2, 3, 5, 7, 12, 30))
         axis = rng.choice(list(machine.axes.values()))
         kind = rng.choice(own if rng.random() < 0.15 else kinds)
-        faults.append(Fault(kind, start, min(stop, ticks), machine, rng, axis.lever, axis))
+        faults.append(Fault(kind, start, min(stop, ticks), machine, rng, axis.joystick, axis))
     return faults

@@ -1,4 +1,4 @@
-"""The messages that a machine takes: its levers and its emergency stop."""
+"""The messages that a machine takes: its joysticks and its emergency stop."""
 
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
@@ -25,7 +25,7 @@ def key_of(bus: str, message: Message, source: int | None) -> Key:
 
 
 class Input:
-    """A message that the controller takes: a lever or the emergency stop."""
+    """A message that the controller takes: a joystick or the emergency stop."""
 
     def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
         self.name = name
@@ -63,7 +63,7 @@ class Input:
         return self.checksum is None or self.checksum(data[:at] + data[at + 1 :]) == data[at]
 
 
-class Lever(Input):
+class Joystick(Input):
     """A joystick message with its switches."""
 
     def __init__(self, name: str, section: dict[str, Any], message: Message) -> None:
@@ -71,5 +71,5 @@ class Lever(Input):
         self.enable = self.fields[section["enable"]]
         self.reset = self.fields[section["reset"]] if "reset" in section else None
         self.off = self.fields[section["anti_sway_off"]] if "anti_sway_off" in section else None
-        self.frozen_ns = round(section.get("frozen_s", 20.0) * 1e9)
+        self.frozen_ns = round(section.get("stuck_s", 20.0) * 1e9)
         self.axes: list[Axis] = []

@@ -9,8 +9,8 @@ axis whether motion is allowed at all:
     STOP     the input was lost or invalid in motion: to zero, within stop_s
     LATCHED  neutral at once, until enable or reset is pressed with the stick in neutral
 
-and within which velocities: never faster than was asked within the tail, never against the lever,
-never quicker than the valve's rates, all on the grid of the valve's frame.
+and within which velocities: never faster than was asked within the tail, never against the
+joystick, never quicker than the valve's rates, all on the grid of the valve's frame.
 """
 
 from collections import Counter, deque
@@ -18,7 +18,7 @@ from typing import Any
 
 from canshaper.codec.frame import Frame
 from tests.faults import heard
-from tests.faults.heard import LONG_AGO, Heard, HeardLever, HeardStop
+from tests.faults.heard import LONG_AGO, Heard, HeardJoystick, HeardStop
 from tests.faults.machine import Axis, Machine
 
 WAIT, FREE, STOP, LATCHED = range(4)
@@ -56,9 +56,9 @@ class Violation(AssertionError):
 class AxisJudge:
     """What one axis may do."""
 
-    def __init__(self, axis: Axis, lever: HeardLever) -> None:
+    def __init__(self, axis: Axis, joystick: HeardJoystick) -> None:
         self.axis = axis
-        self.lever = lever
+        self.joystick = joystick
         self.mode = WAIT
         self.raw = 0
         self.low = self.high = 0.0
@@ -90,13 +90,15 @@ class AxisJudge:
             overrun: so many ticks came late that the axis may stop for it.
             slewing: another axis may ask this one for compensation.
         """
-        lever, axis = self.lever, self.axis
-        faults = lever.faults(axis, now_ns)
-        released = lever.releases > self._releases or (lever.fresh(now_ns) and lever.enable() == 0)
-        pressed = lever.presses[axis.name] > self._presses or lever.resets > self._resets
+        joystick, axis = self.joystick, self.axis
+        faults = joystick.faults(axis, now_ns)
+        released = joystick.releases > self._releases or (
+            joystick.fresh(now_ns) and joystick.enable() == 0
+        )
+        pressed = joystick.presses[axis.name] > self._presses or joystick.resets > self._resets
         pressed |= self._pressed_again
-        self._releases, self._resets = lever.releases, lever.resets
-        self._presses = lever.presses[axis.name]
+        self._releases, self._resets = joystick.releases, joystick.resets
+        self._presses = joystick.presses[axis.name]
         causes, self.causes = self.causes, set()
         self._pressed_since = pressed or (self._pressed_since and not causes)
         in_motion = self.state in MOVING  # as it told last; ``agrees`` holds that against the valve
@@ -104,8 +106,8 @@ class AxisJudge:
             causes.add(heard.SECOND_SENDER)
         if not in_motion:
             causes.discard(heard.SEND_FAILED)
-        usable = not faults and not causes and lever.enable() == 1
-        stick = lever.sticks[axis.name][0] if usable else 0.0
+        usable = not faults and not causes and joystick.enable() == 1
+        stick = joystick.sticks[axis.name][0] if usable else 0.0
         centred = usable and abs(stick) <= axis.band
         self.reasons = causes | faults | ({heard.LOOP_OVERRUN} if overrun else set())
         if released:
@@ -118,7 +120,7 @@ class AxisJudge:
         elif self.mode == LATCHED:
             # A press among frames that say nothing else, or with enable off, may count later.
             late = self._pressed_since and told == 0 and not faults and not causes
-            if (pressed and centred) or (late and abs(lever.sticks[axis.name][0]) <= axis.band):
+            if (pressed and centred) or (late and abs(joystick.sticks[axis.name][0]) <= axis.band):
                 self._go(WAIT)
         elif causes or released:
             self._go(WAIT)
@@ -170,7 +172,7 @@ class AxisJudge:
             high = 0.0
         compensates = axis.compensates is not None and (before or self.asked)
         added = axis.largest_added and (compensates or slewing) and self.mode == FREE
-        if added and not self.lever.bypasses():
+        if added and not self.joystick.bypasses():
             most = axis.largest_added + OWED + ROUNDING * axis.step
             low, high = low - most, high + most
         self.low, self.high = max(low, -axis.maximum), min(high, axis.maximum)
@@ -275,7 +277,7 @@ class Judge:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        self.heard = {name: HeardLever(v) for name, v in machine.levers.items()}
+        self.heard = {name: HeardJoystick(v) for name, v in machine.joysticks.items()}
         self.stop = HeardStop(machine.stop, machine.stop_field) if machine.stop else None
         self._inputs: dict[tuple[str, int, bool], Heard] = {
             h.source.key: h for h in self.heard.values()
@@ -285,7 +287,7 @@ class Judge:
         self._presses = 0
         self._stood_still = False
         self._before: dict[str, tuple[int, dict[str, int]]] = {}
-        self.axes = {n: AxisJudge(a, self.heard[a.lever.name]) for n, a in machine.axes.items()}
+        self.axes = {n: AxisJudge(a, self.heard[a.joystick.name]) for n, a in machine.axes.items()}
         self._by_valve = {a.axis.valve_key: a for a in self.axes.values()}
         self._by_status = {a.axis.status_key: a for a in self.axes.values() if a.axis.status_key}
         ours = {*self._by_valve, *self._by_status, *({machine.service} - {None})}
@@ -394,8 +396,8 @@ class Judge:
         self._stood_still = False
         for entry in self._inputs.values():
             entry.forget()
-        for name, lever in self.heard.items():
-            lever.resets, lever.presses = self._before[name]
+        for name, joystick in self.heard.items():
+            joystick.resets, joystick.presses = self._before[name]
 
     def words(self) -> str:
         """What is allowed now, for a reader."""

@@ -9,7 +9,7 @@ from typing import Any
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
-from tests.faults.inputs import Lever
+from tests.faults.inputs import Joystick
 from tests.faults.machine import Machine
 
 
@@ -36,10 +36,10 @@ class Honest:
     def neutral_frames(self) -> list[Frame]:
         return self.real.neutral_frames()
 
-    def lever(self, frame: Frame) -> Lever | None:
-        """The lever whose frame this is."""
+    def joystick(self, frame: Frame) -> Joystick | None:
+        """The joystick whose frame this is."""
         found = self.machine.inputs.get(frame[:3])
-        return found if isinstance(found, Lever) and len(frame.data) == found.length else None
+        return found if isinstance(found, Joystick) and len(frame.data) == found.length else None
 
     def steps(self, frame: Frame, change: Any) -> Frame:
         """The frame with its command changed, if it is one of a valve."""
@@ -57,15 +57,15 @@ class EnableForced(Honest):
     """Sees the enable switch on, always."""
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        if (lever := self.lever(frame)) and lever.checksum is None:
+        if (joystick := self.joystick(frame)) and joystick.checksum is None:
             word = int.from_bytes(frame.data, "little")
-            word += lever.enable.put(1) - lever.enable.put(lever.enable.get(word))
-            frame = frame._replace(data=word.to_bytes(lever.length, "little"))
+            word += joystick.enable.put(1) - joystick.enable.put(joystick.enable.get(word))
+            frame = frame._replace(data=word.to_bytes(joystick.length, "little"))
         super().receive(frame, now_ns)
 
 
 class SilenceUnseen(Honest):
-    """Takes the last frame of a silent lever once more, with the next counter."""
+    """Takes the last frame of a silent joystick once more, with the next counter."""
 
     def __init__(self, deployment: Deployment) -> None:
         super().__init__(deployment)
@@ -73,20 +73,22 @@ class SilenceUnseen(Honest):
         self._count = 0
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        if (lever := self.lever(frame)) and lever.counter and lever.checksum is None:
-            self._last[lever.name] = frame
+        if (joystick := self.joystick(frame)) and joystick.counter and joystick.checksum is None:
+            self._last[joystick.name] = frame
             return
         super().receive(frame, now_ns)
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
         self._count += 1
         for frame in self._last.values():
-            lever = self.lever(frame)
-            assert lever
-            assert lever.counter
+            joystick = self.joystick(frame)
+            assert joystick
+            assert joystick.counter
             word = int.from_bytes(frame.data, "little")
-            word += lever.counter.put(self._count) - lever.counter.put(lever.counter.get(word))
-            super().receive(frame._replace(data=word.to_bytes(lever.length, "little")), now_ns)
+            word += joystick.counter.put(self._count) - joystick.counter.put(
+                joystick.counter.get(word)
+            )
+            super().receive(frame._replace(data=word.to_bytes(joystick.length, "little")), now_ns)
         return super().tick(now_ns, missed)
 
 

@@ -6,16 +6,16 @@ They stand between the daemon and its buses, so they stay what they are however 
 from collections.abc import Callable
 
 from canshaper.codec.frame import Frame
-from tests.faults.inputs import Lever
+from tests.faults.inputs import Joystick
 from tests.faults.machine import Axis, Machine
 from tests.faults.sequence import Sequence
 
 STICKS = "forwarder"
 
 
-def _lever(machine: Machine, frame: Frame) -> Lever | None:
+def _joystick(machine: Machine, frame: Frame) -> Joystick | None:
     found = machine.inputs.get(frame[:3])
-    return found if isinstance(found, Lever) and len(frame.data) == found.length else None
+    return found if isinstance(found, Joystick) and len(frame.data) == found.length else None
 
 
 def _incoming(change: Callable[[Machine, Frame], Frame | None]) -> Callable[[Sequence], None]:
@@ -47,23 +47,23 @@ def _steps(change: Callable[[Axis, int], int]) -> Callable[[Sequence], None]:
 
 def _enabled(machine: Machine, frame: Frame) -> Frame:
     """Enable is on, whatever the frame says."""
-    if (lever := _lever(machine, frame)) is None:
+    if (joystick := _joystick(machine, frame)) is None:
         return frame
     word = int.from_bytes(frame.data, "little")
-    word += lever.enable.put(1) - lever.enable.put(lever.enable.get(word))
-    return frame._replace(data=word.to_bytes(lever.length, "little"))
+    word += joystick.enable.put(1) - joystick.enable.put(joystick.enable.get(word))
+    return frame._replace(data=word.to_bytes(joystick.length, "little"))
 
 
 def _no_error(machine: Machine, frame: Frame) -> Frame:
     """An error code is full deflection."""
-    if (lever := _lever(machine, frame)) is None:
+    if (joystick := _joystick(machine, frame)) is None:
         return frame
     word = int.from_bytes(frame.data, "little")
-    for axis in lever.axes:
+    for axis in joystick.axes:
         raw = axis.stick.get(word)
         if raw in axis.stick.special:
             word += axis.stick.put(axis.stick.full) - axis.stick.put(raw)
-    return frame._replace(data=word.to_bytes(lever.length, "little"))
+    return frame._replace(data=word.to_bytes(joystick.length, "little"))
 
 
 def _no_others(machine: Machine, frame: Frame) -> Frame | None:

@@ -12,7 +12,7 @@ import yaml
 from cantools.database.can import Message
 
 from tests.faults.fields import Field
-from tests.faults.inputs import Input, Key, Lever, key_of
+from tests.faults.inputs import Input, Joystick, Key, key_of
 
 # Reasons why a stick is none, by their numbers in docs/states.md.
 STICK_ERROR, STICK_NOT_AVAILABLE, STICK_OUT_OF_RANGE, STICK_CONTRADICTORY = 33, 34, 35, 38
@@ -46,7 +46,7 @@ class Axis:
     """One axis: its stick, its valve, its limits, times in ticks of its valve."""
 
     name: str
-    lever: Lever
+    joystick: Joystick
     stick: Field
     band: float
     valve: Field
@@ -86,7 +86,7 @@ class Axis:
         self._velocities: dict[int, float] = {}
 
     def read(self, word: int) -> tuple[float, int]:
-        """Deflection in a frame of the lever, fraction of full, and 0 or why it is none."""
+        """Deflection in a frame of the joystick, fraction of full, and 0 or why it is none."""
         stick = self.stick
         raw = stick.get(word)
         if name := stick.special.get(raw):
@@ -116,7 +116,7 @@ class Axis:
         return (raw - other) / self.stick.full, 0
 
     def raw(self, value: int) -> dict[str, int]:
-        """Raw values that a healthy lever sends for a signed deflection of so many raw steps."""
+        """Raw values that a healthy joystick sends for a signed deflection of so many raw steps."""
         if self.negative:
             return {self.stick.name: max(0, value), self.negative.name: max(0, -value)}
         if self.flags is None:
@@ -160,11 +160,11 @@ class Axis:
         return found
 
 
-def _flags(lever: Lever, stick: dict[str, Any]) -> tuple[Field, Field, Field] | None:
+def _flags(joystick: Joystick, stick: dict[str, Any]) -> tuple[Field, Field, Field] | None:
     names = stick.get("flags")
     if names is None:
         return None
-    field = lever.fields
+    field = joystick.fields
     return field[names["neutral"]], field[names["negative"]], field[names["positive"]]
 
 
@@ -197,13 +197,13 @@ class Machine:
         self.addresses: dict[str, int] = {
             b: s["j1939"]["address"] for b, s in data["buses"].items() if "j1939" in s
         }
-        self.levers = {
-            n: Lever(n, section, messages[section["message"]])
-            for n, section in data["levers"].items()
+        self.joysticks = {
+            n: Joystick(n, section, messages[section["message"]])
+            for n, section in data["joysticks"].items()
         }
-        self.lever_nodes = {
+        self.joystick_nodes = {
             name: self.nodes[section["bus"], section["node"]]
-            for name, section in data["levers"].items()
+            for name, section in data["joysticks"].items()
             if "node" in section
         }
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
@@ -215,7 +215,7 @@ class Machine:
         if stop := data.get("emergency_stop"):
             self.stop = Input("stop", stop, messages[stop["message"]])
             self.stop_field = self.stop.fields[stop["signal"]]
-        inputs = [*self.levers.values(), *([self.stop] if self.stop else [])]
+        inputs = [*self.joysticks.values(), *([self.stop] if self.stop else [])]
         self.inputs: dict[Key, Input] = {i.key: i for i in inputs}
         self.valves = {a.valve_key: a for a in self.axes.values()}
         self.statuses = {a.status_key: a for a in self.axes.values() if a.status_key}
@@ -224,7 +224,7 @@ class Machine:
         if section := data.get("status"):
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
-        self.shortest_timeout_ns = min(v.timeout_ns for v in self.levers.values())
+        self.shortest_timeout_ns = min(v.timeout_ns for v in self.joysticks.values())
         # longest time between two ticks after which an axis in motion may go on
         waits_ms = [
             section["valve"]["timeout_ms"] - (self.axes[n].period_ticks - 1) * self.tick_ms
@@ -241,8 +241,8 @@ class Machine:
         return key_of(bus, message, self.addresses.get(bus))
 
     def _axis(self, name: str, section: dict[str, Any], messages: dict[str, Message]) -> Axis:
-        stick, valve = section["stick"], section["valve"]
-        lever = self.levers[stick["lever"]]
+        stick, valve = section["command"], section["valve"]
+        joystick = self.joysticks[stick["joystick"]]
         message = messages[valve["message"]]
         signals = {s.name: s for s in message.signals}
         counter = valve.get("alive_counter")
@@ -250,8 +250,8 @@ class Machine:
         shown = messages[status["message"]] if status else None
         axis = Axis(
             name=name,
-            lever=lever,
-            stick=lever.fields[stick["signal"]],
+            joystick=joystick,
+            stick=joystick.fields[stick["signal"]],
             band=stick.get("neutral_pct", 2.0) / 100.0,
             valve=Field(signals[valve["signal"]]),
             valve_message=message,
@@ -264,12 +264,12 @@ class Machine:
             tick_s=self.tick_ms / 1000.0,
             filter=section["filter"]["kind"] or "off",  # to PyYAML, off is false
             limits=section.get("limits", {}),
-            flags=_flags(lever, stick),
-            negative=lever.fields[stick["negative"]] if "negative" in stick else None,
+            flags=_flags(joystick, stick),
+            negative=joystick.fields[stick["negative"]] if "negative" in stick else None,
             direction=_direction(valve.get("direction")),
             words=self._words(valve, message, messages),
         )
-        lever.axes.append(axis)
+        joystick.axes.append(axis)
         return axis
 
     def _words(

@@ -17,7 +17,7 @@ A reload, a change of a number: nothing of this ends with them, so the rules do 
 
 from canshaper.codec.frame import Frame
 from tests.faults.axis_rules import SLACK_NS, AxisRules
-from tests.faults.heard import HeardLever
+from tests.faults.heard import HeardJoystick
 from tests.faults.judge import Violation
 from tests.faults.machine import Key, Machine
 from tests.faults.other_nodes import AddressRules, NodeRules, WordRules
@@ -28,10 +28,10 @@ class Rules:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        levers = {name: HeardLever(v) for name, v in machine.levers.items()}
-        self._levers = {v.source.key: v for v in levers.values()}
+        joysticks = {name: HeardJoystick(v) for name, v in machine.joysticks.items()}
+        self._joysticks = {v.source.key: v for v in joysticks.values()}
         self.axes = {
-            name: AxisRules(axis, levers[axis.lever.name], machine.tick_ns)
+            name: AxisRules(axis, joysticks[axis.joystick.name], machine.tick_ns)
             for name, axis in machine.axes.items()
         }
         self._by_valve: dict[Key, list[AxisRules]] = {}
@@ -79,8 +79,8 @@ class Rules:
 
     def hear(self, frame: Frame, arrived_ns: int) -> None:
         """The daemon has read a frame."""
-        if lever := self._levers.get(frame[:3]):
-            lever.hear(frame.data, arrived_ns)
+        if joystick := self._joysticks.get(frame[:3]):
+            joystick.hear(frame.data, arrived_ns)
         for one in self.commanded(frame):
             one.contested_ns = arrived_ns
             one.causes.add("another sender")
@@ -115,11 +115,11 @@ class Rules:
         for name, one in self.axes.items():
             if words := self._words.get(name):
                 one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
-            node = self.machine.lever_nodes.get(one.axis.lever.name)
+            node = self.machine.joystick_nodes.get(one.axis.joystick.name)
             works = node is None or not self._nodes[node].seen(now_ns)
             if node and self._nodes[node].may_be_lost(now_ns):
                 one.may_stop(now_ns)
-            one.decide(now_ns, lever_works=works)
+            one.decide(now_ns, joystick_works=works)
             address = self.addresses.get(one.axis.valve_key[0])
             if address and address.lost:
                 one.silenced()

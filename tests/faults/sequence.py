@@ -162,7 +162,7 @@ class Sequence:
             axis = rng.choice(list(machine.axes.values()))
             stop = min(start + length, self.ticks)
             if start < stop:
-                faults.append(Fault(kind, start, stop, machine, rng, axis.lever, axis))
+                faults.append(Fault(kind, start, stop, machine, rng, axis.joystick, axis))
         return faults
 
     def _put(self, frame: Any, now_ns: int) -> None:

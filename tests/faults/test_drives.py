@@ -84,7 +84,7 @@ def test_bits_are_read_as_cantools_reads_them(name: str) -> None:
 
 def _message_names(deployment: object) -> list[str]:
     config = deployment.config  # type: ignore[attr-defined]
-    names = [lever.message for lever in config.levers.values()]
+    names = [joystick.message for joystick in config.joysticks.values()]
     return [*names, config.emergency_stop.message] if config.emergency_stop else names
 
 

@@ -24,7 +24,7 @@ RADIUS = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms
 COUNTER = "    alive_counter: AliveCounter\n"
 BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
 SLEW = ' SG_ Slew : 0|16@1- (0.1,0) [-100|100] "%" SHAPER\n'
-LEVER_COUNTER = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'
+JOYSTICK_COUNTER = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'
 NETWORK_END = "BO_ 1024 GrappleSway: 4 PLANT"
 
 
@@ -65,7 +65,7 @@ VARIANTS = {
             LIFT_LIMITS: limits("max_pct: 90, tail_s: 0.2, stop_s: 0.14"),
         },
     ),
-    # Valves of 40 and 60 ms, levers of 10 ms.
+    # Valves of 40 and 60 ms, joysticks of 10 ms.
     "slow-valves": Variant(
         "forwarder",
         {
@@ -87,12 +87,12 @@ VARIANTS = {
             LIFT_LIMITS: limits("rise_per_s: 100, fall_per_s: 100, tail_s: 0, stop_s: 0.1"),
         },
     ),
-    # Filters of others; levers without counter and reset on a bus of their own.
+    # Filters of others; joysticks without counter and reset on a bus of their own.
     "plain": Variant(
         "forwarder",
         {
-            BUS: BUS + "\n  levers: { interface: socketcan, channel: vcan1 }",
-            "    bus: crane\n    message: Lever": "    bus: levers\n    message: Lever",
+            BUS: BUS + "\n  joysticks: { interface: socketcan, channel: vcan1 }",
+            "    bus: crane\n    message: Joystick": "    bus: joysticks\n    message: Joystick",
             COUNTER: "",
             "    reset: Reset\n": "",
             SLEW_FILTER: "filter: { kind: s_curve, rate_per_s: 4, jerk_per_s2: 40 }\n",
@@ -122,7 +122,7 @@ VARIANTS = {
         "forwarder",
         {
             COUNTER: COUNTER
-            + "    alive_max_step: 2\n    qualify: 2\n    frozen_s: 1.0\n"
+            + "    alive_max_step: 2\n    qualify: 2\n    stuck_s: 1.0\n"
             + "    checksum: { signal: Checksum, kind: crc8_sae_j1850 }\n",
             LIMITS: limits("tail_s: 0.6, stop_s: 0.5"),
             "axes:\n": "emergency_stop:\n  bus: crane\n  message: EmergencyStop\n"
@@ -130,7 +130,8 @@ VARIANTS = {
             "  checksum: { signal: Checksum, kind: xor }\n\naxes:\n",
         },
         {
-            LEVER_COUNTER: LEVER_COUNTER + ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n',
+            JOYSTICK_COUNTER: JOYSTICK_COUNTER
+            + ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n',
             NETWORK_END: "BO_ 256 EmergencyStop: 3 PLANT\n"
             ' SG_ Stop : 0|2@1+ (1,0) [0|3] "" SHAPER\n'
             ' SG_ AliveCounter : 8|4@1+ (1,0) [0|15] "" SHAPER\n'

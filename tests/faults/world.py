@@ -12,7 +12,7 @@ from canshaper.codec.frame import Frame
 from tests.faults import inject
 from tests.faults.hand import path
 from tests.faults.inject import Fault
-from tests.faults.inputs import Lever
+from tests.faults.inputs import Joystick
 from tests.faults.machine import Machine
 from tests.faults.nodes import CanopenNode, Claimant
 from tests.faults.senders import Sender, radius_frames
@@ -50,13 +50,15 @@ class World:
         self._put = put
         self._events: list[tuple[int, int, Callable[[], None]]] = []
         self._number = itertools.count()
-        self._levers = {v.name: Sender(v, machine.tick_ms, rng) for v in machine.levers.values()}
+        self._joysticks = {
+            v.name: Sender(v, machine.tick_ms, rng) for v in machine.joysticks.values()
+        }
         self._paths = {
             name: path(rng, ticks, axis.stick.full, int(axis.band * axis.stick.full))
             for name, axis in machine.axes.items()
         }
         self._toggles = {
-            name: sorted((rng.randrange(ticks), rng.randrange(ticks))) for name in self._levers
+            name: sorted((rng.randrange(ticks), rng.randrange(ticks))) for name in self._joysticks
         }
         self._toggled = rng.random() < 0.2
         self._radius = rng.randint(2000, 8000)
@@ -64,9 +66,13 @@ class World:
             node.number: CanopenNode(self, node, machine, rng) for node in machine.nodes.values()
         }
         self.claimants = [Claimant(bus, own) for bus, own in machine.addresses.items()]
-        for lever in machine.levers.values():
-            cycle_ns = lever.cycle_ms * MS
-            self.every(cycle_ns, rng.randrange(cycle_ns), lambda lever=lever: self._lever(lever))
+        for joystick in machine.joysticks.values():
+            cycle_ns = joystick.cycle_ms * MS
+            self.every(
+                cycle_ns,
+                rng.randrange(cycle_ns),
+                lambda joystick=joystick: self._joystick(joystick),
+            )
         if machine.radius:
             self.every(RADIUS_CYCLE_NS, rng.randrange(RADIUS_CYCLE_NS), self._radius_now)
         self.every(machine.tick_ns, rng.randrange(machine.tick_ns), self._others)
@@ -116,39 +122,39 @@ class World:
         """A frame is on its bus."""
         self._put(frame, self.now_ns)
 
-    def _lever(self, lever: Lever) -> None:
-        node = self.machine.lever_nodes.get(lever.name)
+    def _joystick(self, joystick: Joystick) -> None:
+        node = self.machine.joystick_nodes.get(joystick.name)
         if node and not self.nodes[node.number].operational:
             return
-        sender = self._levers[lever.name]
-        mine = [f for f in self.active() if f.lever is lever]
-        raw = sender.counted(self._hand(lever))
+        sender = self._joysticks[joystick.name]
+        mine = [f for f in self.active() if f.joystick is joystick]
+        raw = sender.counted(self._hand(joystick))
         for fault in mine:
             if act := inject.RAW.get(fault.kind):
                 act(fault, raw)
-        sent = [lever.data(raw)]
+        sent = [joystick.data(raw)]
         for fault in mine:
             if spoil := inject.WIRE.get(fault.kind):
                 sent = spoil(fault, sent)
         for data in sender.passed(sent):
-            self.put(Frame(*lever.key, data))
+            self.put(Frame(*joystick.key, data))
 
-    def _hand(self, lever: Lever) -> dict[str, int]:
+    def _hand(self, joystick: Joystick) -> dict[str, int]:
         """Raw values of sticks and switches as the operator has them now."""
         tick = self.tick
         if tick >= self.ticks:
             enable, reset, deflection = self.healthy
-            raw = {lever.enable.name: enable}
-            if lever.reset:
-                raw[lever.reset.name] = reset
-            for axis in lever.axes:
+            raw = {joystick.enable.name: enable}
+            if joystick.reset:
+                raw[joystick.reset.name] = reset
+            for axis in joystick.axes:
                 raw |= axis.raw(round(deflection * axis.stick.full))
             return raw
-        raw = {lever.enable.name: 1}
-        first, second = self._toggles[lever.name]
-        if self._toggled and lever.off and first <= tick < second:
-            raw[lever.off.name] = 1
-        for axis in lever.axes:
+        raw = {joystick.enable.name: 1}
+        first, second = self._toggles[joystick.name]
+        if self._toggled and joystick.off and first <= tick < second:
+            raw[joystick.off.name] = 1
+        for axis in joystick.axes:
             raw |= axis.raw(self._paths[axis.name][tick])
         return raw
 

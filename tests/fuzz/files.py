@@ -65,7 +65,7 @@ def runs(deployment: Deployment) -> None:
     controller = Controller(deployment)
     now_ns = 0
     tick_ns = deployment.config.tick_ms * 1_000_000
-    messages = {lever.key: lever.message for lever in deployment.levers.values()}
+    messages = {joystick.key: joystick.message for joystick in deployment.joysticks.values()}
     if stop := deployment.emergency_stop:
         messages[stop.key] = stop.message
     for axis in deployment.axes.values():

@@ -31,7 +31,7 @@ class Script:
         self.judge.hear(frame, now_ns)
         self.controller.receive(frame, now_ns)
 
-    def lever(self, number: int, word: int) -> None:
+    def joystick(self, number: int, word: int) -> None:
         """A frame of an input with any content, next counter and right checksum."""
         source = self.inputs[number % len(self.inputs)]
         self.counts[source.key] += 1
@@ -49,10 +49,10 @@ class Script:
                 if (source.counter)
                 else {}
             )
-            for lever in self.machine.levers.values():
-                if lever is source:
-                    raw[lever.enable.name] = 1
-                    for axis in lever.axes:
+            for joystick in self.machine.joysticks.values():
+                if joystick is source:
+                    raw[joystick.enable.name] = 1
+                    for axis in joystick.axes:
                         raw |= axis.raw(deflected * axis.stick.full // 100)
             self.receive(Frame(*source.key, source.data(raw)))
 
@@ -112,7 +112,7 @@ def run(data: bytes) -> int:
         if kind < 80:
             script.tick()
         elif kind < 110:
-            script.lever(source.number(), source.number(8))
+            script.joystick(source.number(), source.number(8))
         elif kind < 170:
             script.healthy(source.number() % 101 * (-1 if kind & 1 else 1))
             script.tick()

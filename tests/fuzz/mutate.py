@@ -17,9 +17,13 @@ YAML_WORDS = (
     *_words("~ true off 0 -1 1 1e999 .nan .inf 1e-9 99999999999999 '' \" [ ] { } : , | > / -"),
     *("", "- ", "? ", "&a ", "*a ", "!!str ", "!x ", "\n", "\t", "\r\n"),
     *("\0", "\x85", "é", "\ud7ff"),
-    *("# ", "---\n", "...\n", "%YAML 1.1\n", "qualify: 3", "frozen_s: 1", "alive_max_step: 200"),
-    *_words("crane left right slew near_far lift Slew NearFar Enable Reset AliveCounter LeverLeft"),
-    *_words("LeverRight SlewCommand ShaperStatus SlewStatus X Y Lever Stop Tip Radius Count Sum"),
+    *("# ", "---\n", "...\n", "%YAML 1.1\n", "qualify: 3", "stuck_s: 1", "alive_max_step: 200"),
+    *_words(
+        "crane left right slew near_far lift Slew NearFar Enable Reset AliveCounter JoystickLeft"
+    ),
+    *_words(
+        "JoystickRight SlewCommand ShaperStatus SlewStatus X Y Joystick Stop Tip Radius Count Sum"
+    ),
     *_words("kind taps machine.dbc"),
     *(name for kind in KINDS.values() for name in (kind.name, *(p.name for p in kind.parameters))),
     "checksum: { signal: Reset, kind: xor }",
@@ -31,7 +35,9 @@ DBC_WORDS = (
     *_words("0 1 2 -1 7 8 9 15 16 17 32 63 64 65 255 65536 0.5 1e400 -0 nan inf 1e-400"),
     *_words("@0 @1 + - | : ; , ( ) [ ]"),
     *("", '"', "\n", "\r", "\t", " ", "\0", "é", "\xff", "SIG_VALTYPE_ 272 Slew : 1;\n"),
-    *_words("m0 M m1M LeverLeft Slew Enable Velocity State NearFar Lever X Y Flow Radius Stop"),
+    *_words(
+        "m0 M m1M JoystickLeft Slew Enable Velocity State NearFar Joystick X Y Flow Radius Stop"
+    ),
     *_words("BO_ SG_ VAL_ BA_ BA_DEF_ CM_ VAL_TABLE_ SG_MUL_VAL_ SIG_GROUP_ EV_ BO_TX_BU_"),
     *_words("GenMsgCycleTime GenSigStartValue INT FLOAT STRING ENUM VFrameFormat"),
     *_words("Error NotAvailable Vector__XXX"),

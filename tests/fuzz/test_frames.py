@@ -10,7 +10,7 @@ from tests.faults.variants import NAMES
 from tests.fuzz import frames
 
 # Kinds of steps that the first byte of each tells apart (``frames.run``).
-TICK, LEVER, HEALTHY, MISSED, LATE, NOT_SENT, OURS, ANY = 0, 80, 110, 170, 180, 190, 200, 225
+TICK, JOYSTICK, HEALTHY, MISSED, LATE, NOT_SENT, OURS, ANY = 0, 80, 110, 170, 180, 190, 200, 225
 
 
 def step(kind: int, *parts: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
@@ -23,7 +23,7 @@ def some(count: int) -> st.SearchStrategy[bytes]:
 
 steps = st.one_of(
     st.just(bytes([TICK])),
-    step(LEVER, some(9)),
+    step(JOYSTICK, some(9)),
     step(HEALTHY, some(1)),
     step(HEALTHY + 1, some(1)),
     step(MISSED, st.integers(0, 12).map(lambda n: bytes([n]))),

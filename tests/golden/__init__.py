@@ -1,6 +1,6 @@
 """A recorded drive, replayed through the controller: the same frames to the last bit.
 
-``drive.log`` is what came in: both levers and the tip's place, as ``candump -L`` writes it.
+``drive.log`` is what came in: both joysticks and the tip's place, as ``candump -L`` writes it.
 ``forwarder.log`` and ``forwarder-robust.log`` are what the controller sends at every tick of it.
 Both are lines of text, so a change of behaviour is read in a diff.
 

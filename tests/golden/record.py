@@ -1,14 +1,14 @@
 """The recorded drive: an operator on the simulated crane, with what happens on a machine.
 
-The enable switch is released in motion, the levers fall silent for longer than their timeout, the
-anti-sway switch is used, a stick tells an error, and a node sends what nobody knows.
+The enable switch is released in motion, the joysticks fall silent for longer than their timeout,
+the anti-sway switch is used, a stick tells an error, and a node sends what nobody knows.
 """
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script, Stroke
 from tests.golden.replay import CONFIG, TICK_NS, line, ticks
@@ -37,17 +37,17 @@ SCRIPT = Script(
 
 
 def record() -> list[str]:
-    """The frames of the levers and of the tip, as they came."""
+    """The frames of the joysticks and of the tip, as they came."""
     deployment = load_deployment(CONFIG / "forwarder-robust.yaml")
     controller = Controller(deployment)
-    levers, plant = LeverNode(deployment, SCRIPT), PlantNode(deployment)
+    joysticks, plant = JoystickNode(deployment, SCRIPT), PlantNode(deployment)
     rows: list[str] = []
     feedback: list[Frame] = []
     for now_ns, missed in ticks():
         for late in range(missed, -1, -1):
             due_ns = now_ns - late * TICK_NS
             time_s = due_ns / 1e9
-            frames = [_changed(frame, time_s) for frame in levers.frames(due_ns // 1_000_000)]
+            frames = [_changed(frame, time_s) for frame in joysticks.frames(due_ns // 1_000_000)]
             tip = [frame for frame in feedback if frame.can_id == TIP]
             for frame in (*(f for f in frames if f), *tip, *_strange(time_s)):
                 at_ns = due_ns - BEFORE_NS.get(frame.can_id, 0)
@@ -62,7 +62,7 @@ def record() -> list[str]:
 
 
 def _changed(frame: Frame, time_s: float) -> Frame | None:
-    """A lever's frame as it really comes; None where it is lost."""
+    """A joystick's frame as it really comes; None where it is lost."""
     data = bytearray(frame.data)
     if frame.can_id == LEFT:
         if 8.0 <= time_s < 8.4:

@@ -16,12 +16,12 @@ from tests.faults import shipped
 def test_sticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
     deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
     for axis in deployment.axes.values():
-        stick = axis.config.stick
-        lever = deployment.levers[stick.lever]
-        bits = StickBits(lever.message, stick)
+        stick = axis.config.command
+        joystick = deployment.joysticks[stick.joystick]
+        bits = StickBits(joystick.message, stick)
         for _ in range(300):
-            data = rng.randbytes(lever.message.length)
-            command = lever.codec.decode(data)[1][stick.signal]
+            data = rng.randbytes(joystick.message.length)
+            command = joystick.codec.decode(data)[1][stick.signal]
             if isinstance(command, float) and abs(command) > stick.neutral_pct / 100.0:
                 assert bits.ask(data) == command
 
@@ -30,7 +30,7 @@ def test_sticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
 def test_commands_are_read_as_the_valve_codec_reads_them(name: str) -> None:
     deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
     for axis in deployment.axes.values():
-        stick = axis.config.stick if axis.rewrites else None
+        stick = axis.config.command if axis.rewrites else None
         bits, codec = CommandBits(axis.valve_message, axis.config.valve, stick), axis.valve
         layout = codec.message.sender.fields.layout
         for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):

@@ -50,7 +50,7 @@ def test_an_emergency_stop_is_pressed_missing_or_free() -> None:
     assert stop is not None
     entry = one.guard.inputs[stop.key]
     short = [frame for frame in one.joysticks(near_far=1.0) if frame[:3] != stop.key]
-    for _ in range(one.deployment.config.levers["left"].timeout_ms // 20):
+    for _ in range(one.deployment.config.joysticks["left"].timeout_ms // 20):
         one.takes(short)
         assert not one.sent(10)
     heard_ns = entry.heard_ns

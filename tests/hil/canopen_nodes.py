@@ -12,7 +12,7 @@ from pathlib import Path
 import canopen
 from canopen.nmt import NMT_STATES
 
-LEVERS = {"left": 0x10, "right": 0x11}
+JOYSTICKS = {"left": 0x10, "right": 0x11}
 VALVES = {"slew": 0x20, "near_far": 0x21, "lift": 0x22}
 INIT, DISABLED, HOLD, ACTIVE, FAULT_HOLD = 0x8, 0x9, 0xB, 0xF, 0x3
 UP = {INIT: DISABLED, DISABLED: HOLD, HOLD: ACTIVE}
@@ -173,8 +173,8 @@ class Machine(threading.Thread):
                 (0x6301, 1): ("Vpoc actual value", I16),
             },
         )
-        self.levers = {n: Joystick(self.network, i, stick) for n, i in LEVERS.items()}
-        for joystick in self.levers.values():
+        self.joysticks = {n: Joystick(self.network, i, stick) for n, i in JOYSTICKS.items()}
+        for joystick in self.joysticks.values():
             joystick.node.nmt.state = "INITIALISING"
             joystick.node.nmt.state = "PRE-OPERATIONAL"
         self.valves = {n: Valve(self.network, i, valve) for n, i in VALVES.items()}
@@ -183,14 +183,14 @@ class Machine(threading.Thread):
     def run(self) -> None:
         passed = 0.0
         while not self._ended.wait(STICK_CYCLE_S):
-            for joystick in self.levers.values():
+            for joystick in self.joysticks.values():
                 joystick.cycle()
             passed += STICK_CYCLE_S
             if passed >= STATUS_CYCLE_S:
                 passed = 0.0
                 for valve in self.valves.values():
                     valve.report()
-                for unit in (*self.levers.values(), *self.valves.values()):
+                for unit in (*self.joysticks.values(), *self.valves.values()):
                     if not unit.dead:
                         nmt = unit.node.nmt
                         self.network.send_message(0x700 + nmt.id, [STATES[nmt.state]])

@@ -1,4 +1,4 @@
-"""Faults of the levers' frames: how each is made, what must be said of it, what may still move.
+"""Faults of the joysticks' frames: how each is made, what must be said of it, what may still move.
 
 What is allowed is counted in valve frames, of which every tick sends one: an emulated machine that
 stands still for a while stands still for both sides.

@@ -1,4 +1,4 @@
-"""A hand on protected levers, and the deployment that reads them; plain cantools and crccheck."""
+"""A hand on protected joysticks, and the deployment reading them; plain cantools and crccheck."""
 
 import threading
 from collections.abc import Callable, Iterator
@@ -19,7 +19,7 @@ DBC_CHANGES = (
         ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273',
         ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
         ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n\n'
-        "BO_ 274 EmergencyStop: 2 LEVERS\n"
+        "BO_ 274 EmergencyStop: 2 JOYSTICKS\n"
         ' SG_ Stop : 0|2@1+ (1,0) [0|1] "" SHAPER\n'
         ' SG_ AliveCounter : 8|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273',
     ),
@@ -40,7 +40,7 @@ FILE_CHANGES = (
         "    alive_counter: AliveCounter\n  right:",
         "    alive_counter: AliveCounter\n"
         "    checksum: { signal: Checksum, kind: crc8_sae_j1850 }\n"
-        "    frozen_s: 2\n  right:",
+        "    stuck_s: 2\n  right:",
     ),
     ("signal: Lift,", "signal: Lift, flags: { neutral: LiftNeutral, negative: LiftDown, "
      "positive: LiftUp },"),
@@ -71,13 +71,13 @@ def _changed(text: str, changes: tuple[tuple[str, str], ...]) -> str:
 
 
 def with_checksum(data: bytes) -> bytes:
-    """A frame of the left lever with its checksum."""
+    """A frame of the left joystick with its checksum."""
     rest = data[:6] + data[7:]
     return data[:6] + bytes([Crc8SaeJ1850.calc(rest)]) + data[7:]
 
 
 class Hand(threading.Thread):
-    """Both levers and the emergency stop, sent every 20 ms.
+    """Both joysticks and the emergency stop, sent every 20 ms.
 
     ``spoil`` is asked for what really goes out of every frame: (id, data) to a list of data.
     """
@@ -128,8 +128,8 @@ class Hand(threading.Thread):
         slew = (
             self.slew - 0.1 * (self._count % 2) if self.slew > 0 and not self.frozen else self.slew
         )
-        left = self.encode("LeverLeft", Slew=slew, NearFar=0, Checksum=0, **switches)
-        right = self.encode("LeverRight", Lift=abs(self.lift), Rotate=0, **flags, **switches)
+        left = self.encode("JoystickLeft", Slew=slew, NearFar=0, Checksum=0, **switches)
+        right = self.encode("JoystickRight", Lift=abs(self.lift), Rotate=0, **flags, **switches)
         stop = self.encode("EmergencyStop", Stop=self.stop, AliveCounter=self._count)
         return [(LEFT, with_checksum(left)), (RIGHT, right), (STOP, stop)]
 

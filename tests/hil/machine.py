@@ -1,4 +1,4 @@
-"""Parts of a machine for these tests: levers by plain cantools, the daemon as a process, a wait."""
+"""Parts of a machine for tests: joysticks by plain cantools, the daemon as a process, a wait."""
 
 import os
 import re
@@ -19,7 +19,7 @@ FILE = ROOT / "config" / "forwarder.yaml"
 DBC = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc")
 # Only to end a test that hangs; emulated processors are slow.
 ANSWER_S = 120.0
-JOYSTICKS = (("LeverLeft", ("Slew", "NearFar")), ("LeverRight", ("Lift", "Rotate")))
+JOYSTICKS = (("JoystickLeft", ("Slew", "NearFar")), ("JoystickRight", ("Lift", "Rotate")))
 VALVES = {"SlewCommand", "NearFarCommand", "LiftCommand"}
 
 
@@ -44,10 +44,10 @@ def wait_for(bus: can.BusABC, name: str, accept: Accept) -> dict:
     return wait_for_one(bus, {name: accept})[1]
 
 
-def drive(bus: can.BusABC, levers: "Levers", faster_than: float = 30.0) -> float:
+def drive(bus: can.BusABC, joysticks: "Joysticks", faster_than: float = 30.0) -> float:
     """Bring slew into motion and return the command, %.
 
-    Where this machine held up a lever's frames and the axis stopped, once more from neutral.
+    Where this machine held up a joystick's frames and the axis stopped, once more from neutral.
     """
     until = time.monotonic() + ANSWER_S
     state = ""
@@ -59,8 +59,8 @@ def drive(bus: can.BusABC, levers: "Levers", faster_than: float = 30.0) -> float
         signals = dict(DBC.decode_message(name, message.data))
         if name == "SlewStatus":
             state = str(signals["State"])
-            levers.values["Slew"] = 100.0 if state in ("READY", "ACTIVE") else 0.0
-            levers.switches["Reset"] = int(state == "TRIPPED")
+            joysticks.values["Slew"] = 100.0 if state in ("READY", "ACTIVE") else 0.0
+            joysticks.switches["Reset"] = int(state == "TRIPPED")
         # before that it may be the end of a stop that began before this test
         elif state == "ACTIVE" and signals["Velocity"] > faster_than:
             return float(signals["Velocity"])
@@ -84,7 +84,7 @@ def wait_for_one(bus: can.BusABC, wanted: dict[str, Accept]) -> tuple[str, dict]
     raise AssertionError(f"none of {list(wanted)} within {ANSWER_S:g} s; the last were {last}")
 
 
-class Levers(threading.Thread):
+class Joysticks(threading.Thread):
     """Both joysticks, sent every 20 ms; set ``values`` or ``silent`` at any time."""
 
     def __init__(self, channel: str) -> None:
@@ -120,13 +120,13 @@ class Levers(threading.Thread):
 
 
 @contextmanager
-def levers_on(channel: str) -> Iterator[Levers]:
-    levers = Levers(channel)
-    levers.start()
+def joysticks_on(channel: str) -> Iterator[Joysticks]:
+    joysticks = Joysticks(channel)
+    joysticks.start()
     try:
-        yield levers
+        yield joysticks
     finally:
-        levers.end()
+        joysticks.end()
 
 
 class Service:

@@ -52,10 +52,10 @@ class Hand(threading.Thread):
         silent: it sends nothing.
     """
 
-    out = _frame("LeverLeft", Slew=OUT_PCT, Enable=1)
-    neutral = _frame("LeverLeft", Enable=1)
-    released = _frame("LeverLeft", Enable=0)
-    right = _frame("LeverRight", Enable=1)
+    out = _frame("JoystickLeft", Slew=OUT_PCT, Enable=1)
+    neutral = _frame("JoystickLeft", Enable=1)
+    released = _frame("JoystickLeft", Enable=0)
+    right = _frame("JoystickRight", Enable=1)
 
     def __init__(self) -> None:
         super().__init__(daemon=True)

@@ -10,10 +10,10 @@ from canshaper.machine.binding import load_deployment
 from tests.hil.machine import (
     DBC,
     FILE,
-    Levers,
+    Joysticks,
     Service,
     candump,
-    levers_on,
+    joysticks_on,
     logged,
     open_bus,
     service,
@@ -54,7 +54,7 @@ def test_a_valve_on_the_bus_is_measured(file: Path, tmp_path: Path) -> None:
     options = ["--set", "slew.deadband=0.08"]
     with (
         service(tmp_path / "sim.log", "sim", str(file), *options),
-        levers_on("vcan0"),
+        joysticks_on("vcan0"),
         candump(log, "vcan0"),
         service(tmp_path / "calibrate.log", "calibrate", str(file), *QUICK, "--write") as running,
     ):
@@ -77,7 +77,7 @@ def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end:
     before = file.read_text()
     with (
         service(tmp_path / "sim.log", "sim", str(file)),
-        levers_on("vcan0") as levers,
+        joysticks_on("vcan0") as joysticks,
         open_bus("vcan0") as bus,
         candump(log, "vcan0"),
     ):
@@ -86,7 +86,7 @@ def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end:
             with service(tmp_path / "calibrate.log", *arguments) as running:
                 if not moves(bus, running):
                     continue
-                make(levers, end, running)
+                make(joysticks, end, running)
                 assert running.process.wait() == 1, running.text()
                 break
     assert "the measurement was not taken to its end: stopped" in running.text()
@@ -94,13 +94,13 @@ def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end:
     assert file.read_text() == before
 
 
-def make(levers: Levers, end: str, running: Service) -> None:
+def make(joysticks: Joysticks, end: str, running: Service) -> None:
     if end == "enable":
-        levers.switches["Enable"] = 0
+        joysticks.switches["Enable"] = 0
     elif end == "silence":
-        levers.silent = True
+        joysticks.silent = True
     elif end == "stick":
-        levers.values["Slew"] = 30.0
+        joysticks.values["Slew"] = 30.0
     else:
         number = signal.SIGINT if end == "ctrl-c" else signal.SIGHUP
         running.process.send_signal(number)
@@ -109,7 +109,7 @@ def make(levers: Levers, end: str, running: Service) -> None:
 def test_it_asks_before_anything_moves(file: Path, tmp_path: Path) -> None:
     log = tmp_path / "bus.log"
     with (
-        levers_on("vcan0"),
+        joysticks_on("vcan0"),
         candump(log, "vcan0"),
         service(tmp_path / "calibrate.log", "calibrate", str(file), *QUICK[:-1]) as running,
     ):

@@ -90,18 +90,18 @@ def wait_state(state: str, reason: str | None = None, status: int = SLEW_STATUS)
 def drive(machine: Machine) -> None:
     """Bring slew into motion."""
     wait_state("READY")
-    machine.levers["left"].x = 32767
+    machine.joysticks["left"].x = 32767
     until(lambda: machine.valves["slew"].spool > 8000, "the spool follows")
 
 
 def reset(machine: Machine) -> None:
     """The operator lets go and presses reset."""
-    machine.levers["left"].x = 0
+    machine.joysticks["left"].x = 0
     wait_state("TRIPPED")
     until(lambda: machine.valves["slew"].state == ACTIVE, "the valve works again")
-    machine.levers["left"].switches = 0b11
+    machine.joysticks["left"].switches = 0b11
     wait_state("READY")
-    machine.levers["left"].switches = 0b01
+    machine.joysticks["left"].switches = 0b01
 
 
 def commands(log: Path, can_id: int = SLEW_COMMAND) -> list[tuple[float, int, int]]:
@@ -127,10 +127,10 @@ def test_nodes_are_started_and_the_set_point_follows_the_stick(
         daemon.wait_log("started file=")
         drive(machine)
         assert machine.valves["lift"].spool == 0
-        machine.levers["left"].x = 0
+        machine.joysticks["left"].x = 0
         until(lambda: machine.valves["slew"].spool == 0, "the spool returns")
         wait_state("READY")
-        machine.levers["left"].x = -32767
+        machine.joysticks["left"].x = -32767
         until(lambda: machine.valves["slew"].spool < -8000, "the spool follows")
         assert daemon.end() == 0
         assert "fault=" not in daemon.text()
@@ -176,7 +176,7 @@ def test_an_emergency_in_motion_is_neutral_named_reset_and_on_again(
         daemon.wait_log(r"node=slew state=OPERATIONAL emergency=0x8003")
         daemon.wait_log(r"axis=slew state=TRIPPED from=ACTIVE reason=VALVE_FAULT")
         reset(machine)
-        machine.levers["left"].x = 32767
+        machine.joysticks["left"].x = 32767
         until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
     messages = logged(log)
     told = next(m.timestamp for m in messages if m.arbitration_id == 0xA0 and any(m.data[:2]))
@@ -210,10 +210,10 @@ def test_an_emergency_of_a_standstill_counts_until_it_is_over(
     stand_still(daemon, lambda: valve.node.emcy.send(FLOW_COMMAND_LATE, 0x81))
     wait_state("NEUTRAL_WAIT", "NODE_FAULT")
     wait_state("READY", status=LIFT_STATUS)
-    machine.levers["left"].x = 32767
+    machine.joysticks["left"].x = 32767
     wait_state("NEUTRAL_WAIT", "NODE_FAULT")
     assert valve.spool == 0
-    machine.levers["left"].x = 0
+    machine.joysticks["left"].x = 0
     valve.node.emcy.reset()
     drive(machine)
 
@@ -249,7 +249,7 @@ def test_a_node_that_restarts_in_motion(machine: Machine, daemon: Service, tmp_p
         machine.valves["slew"].boot()
         wait_state("TRIPPED", "VALVE_FAULT")
         reset(machine)
-        machine.levers["left"].x = 32767
+        machine.joysticks["left"].x = 32767
         until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
     # What it was told since it booted, the frame that was under way left out.
     words = machine.valves["slew"].words
@@ -264,10 +264,10 @@ def test_a_node_that_restarts_in_motion(machine: Machine, daemon: Service, tmp_p
 
 def test_a_joystick_that_boots_in_motion_stops_shaped(machine: Machine, daemon: Service) -> None:
     drive(machine)
-    machine.levers["left"].node.nmt.state = "INITIALISING"
+    machine.joysticks["left"].node.nmt.state = "INITIALISING"
     daemon.wait_log(r"axis=slew state=STOPPING from=ACTIVE reason=NODE_FAULT")
-    machine.levers["left"].node.nmt.state = "PRE-OPERATIONAL"  # our master starts it again
-    machine.levers["left"].x = 0
+    machine.joysticks["left"].node.nmt.state = "PRE-OPERATIONAL"  # our master starts it again
+    machine.joysticks["left"].x = 0
     wait_state("READY")
 
 

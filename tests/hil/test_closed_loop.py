@@ -50,10 +50,12 @@ def test_joystick_and_valves_on_different_buses(
         "  joy: { interface: socketcan, channel: can0 }\n"
         "  crane: { interface: socketcan, channel: can2 }",
     )
-    head, levers, rest = text.partition("levers:")
-    lever_part, axes, rest = rest.partition("axes:")
+    head, joysticks, rest = text.partition("joysticks:")
+    joystick_part, axes, rest = rest.partition("axes:")
     file = tmp_path / "two.yaml"
-    file.write_text(head + levers + lever_part.replace("bus: crane", "bus: joy") + axes + rest)
+    file.write_text(
+        head + joysticks + joystick_part.replace("bus: crane", "bus: joy") + axes + rest
+    )
     ours = ["--channel", f"joy={joystick}", "--channel", f"crane={valve}"]
     theirs = ["--channel", f"joy={joystick_far}", "--channel", f"crane={valve_far}"]
     with (
@@ -71,7 +73,7 @@ def test_joystick_and_valves_on_different_buses(
     names_joy = {message_name(m) for m in logged(tmp_path / "joy.log")}
     on_valves = logged(tmp_path / "valve.log")
     names_valve = {message_name(m) for m in on_valves}
-    assert names_joy == {"LeverLeft", "LeverRight"}
+    assert names_joy == {"JoystickLeft", "JoystickRight"}
     assert names_valve >= VALVES | {"GrappleSway", "ShaperStatus"}
     assert not names_valve & names_joy
     assert max(speed(m) for m in on_valves) == pytest.approx(1.0, abs=0.03)

@@ -14,11 +14,11 @@ from tests.hil.machine import (
     ANSWER_S,
     FILE,
     VALVES,
-    Levers,
+    Joysticks,
     Service,
     candump,
     drive,
-    levers_on,
+    joysticks_on,
     logged,
     message_name,
     open_bus,
@@ -45,8 +45,8 @@ def bus() -> Iterator[can.BusABC]:
 
 
 @pytest.fixture
-def levers() -> Iterator[Levers]:
-    with levers_on("vcan0") as running:
+def joysticks() -> Iterator[Joysticks]:
+    with joysticks_on("vcan0") as running:
         yield running
 
 
@@ -62,9 +62,9 @@ def state(name: str) -> Callable[[dict], bool]:
 
 
 def test_stick_moves_valve_and_everything_ends_neutral(
-    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     status = wait_for(bus, "SlewStatus", state("ACTIVE"))
     assert str(status["Reason"]) == "STICK_MOVED"
     assert status["RawCommand"] == 100.0
@@ -78,9 +78,9 @@ def test_stick_moves_valve_and_everything_ends_neutral(
 
 
 def test_ctrl_c_in_motion_ends_neutral(
-    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     with candump(tmp_path / "end.log", "vcan0"):
         assert daemon.end(signal.SIGINT) == 0
     slew = [m for m in logged(tmp_path / "end.log") if message_name(m) == "SlewCommand"]
@@ -89,43 +89,43 @@ def test_ctrl_c_in_motion_ends_neutral(
 
 
 def test_silence_stops_shaped_and_bounded_then_works_again(
-    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     with candump(tmp_path / "silence.log", "vcan0"):
-        levers.silent = True
+        joysticks.silent = True
         wait_for(bus, "SlewStatus", state("STOPPING"))
         wait_for(bus, "SlewStatus", state("NEUTRAL_WAIT"))
     messages = logged(tmp_path / "silence.log")
-    last_lever = max(m.timestamp for m in messages if message_name(m) == "LeverLeft")
+    last_joystick = max(m.timestamp for m in messages if message_name(m) == "JoystickLeft")
     moving = [m.timestamp for m in messages if message_name(m) == "SlewCommand" and m.data[0] != 0]
     # Timeout 0.1 s and stop 2 s of the file; one tick each for seeing and sending. An emulated
     # machine may hold the whole process up, which the daemon cannot see: half a second for that.
-    assert max(moving) - last_lever < 0.1 + 2.0 + 0.04 + 0.5
-    levers.values["Slew"] = 0.0
-    levers.silent = False
+    assert max(moving) - last_joystick < 0.1 + 2.0 + 0.04 + 0.5
+    joysticks.values["Slew"] = 0.0
+    joysticks.silent = False
     wait_for(bus, "SlewStatus", state("READY"))
-    levers.values["Slew"] = -60.0
+    joysticks.values["Slew"] = -60.0
     wait_for(bus, "SlewCommand", lambda v: v["Velocity"] < -20.0)
 
 
 def test_enable_released_in_motion_is_neutral_at_once_and_latched(
-    bus: can.BusABC, levers: Levers, daemon: Service
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
-    drive(bus, levers)
-    levers.switches["Enable"] = 0
+    drive(bus, joysticks)
+    joysticks.switches["Enable"] = 0
     status = wait_for(bus, "SlewStatus", state("TRIPPED"))
     assert (str(status["Reason"]), status["ShapedCommand"]) == ("ENABLE_LOST", 0.0)
-    levers.switches["Enable"] = 1  # the stick is still deflected: no way back yet
+    joysticks.switches["Enable"] = 1  # the stick is still deflected: no way back yet
     status = wait_for(bus, "SlewStatus", lambda s: True)
     assert str(status["State"]) == "TRIPPED"
-    levers.values["Slew"] = 0.0
-    levers.switches["Reset"] = 1
+    joysticks.values["Slew"] = 0.0
+    joysticks.switches["Reset"] = 1
     wait_for(bus, "SlewStatus", state("READY"))
 
 
 def test_bad_frames_are_counted_and_named_and_move_nothing(
-    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
     wait_for(bus, "SlewStatus", state("READY"))
     cases = (
@@ -151,7 +151,7 @@ def test_bad_frames_are_counted_and_named_and_move_nothing(
 
 
 def test_interface_down_and_up_is_survived(
-    bus: can.BusABC, levers: Levers, daemon: Service
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
     wait_for(bus, "SlewStatus", state("READY"))
     subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
@@ -160,33 +160,33 @@ def test_interface_down_and_up_is_survived(
         assert daemon.process.poll() is None
     finally:
         subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
-    with open_bus("vcan0") as again, levers_on("vcan0"):
+    with open_bus("vcan0") as again, joysticks_on("vcan0"):
         wait_for(again, "SlewStatus", state("READY"))
 
 
 def test_reload_refuses_a_broken_file_and_applies_a_good_one_in_neutral(
-    bus: can.BusABC, levers: Levers, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, tmp_path: Path
 ) -> None:
     text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
     file = tmp_path / "machine.yaml"
     file.write_text(text)
     with service(tmp_path / "daemon.log", "run", str(file)) as daemon:
         daemon.wait_log("started file=")
-        drive(bus, levers)
+        drive(bus, joysticks)
         file.write_text(text.replace("deadband_pct: 5", "deadband_pct: 90", 1))
         daemon.process.send_signal(signal.SIGHUP)
         wait_for(bus, "SlewCommand", lambda v: v["Velocity"] > 90.0)  # goes on in motion
         assert "reload=waiting" in daemon.text()
         assert "reload=refused" not in daemon.text()
-        levers.values["Slew"] = 0.0
+        joysticks.values["Slew"] = 0.0
         daemon.wait_log(r"reload=refused .*machine\.yaml:\d+: axes\.slew\.limits\.deadband_pct")
         file.write_text(text.replace("deadband_pct: 5", "max_pct: 40, deadband_pct: 5", 1))
         daemon.process.send_signal(signal.SIGHUP)
         daemon.wait_log("reload=applied")
         wait_for(bus, "SlewStatus", state("READY"))
-        levers.values["Slew"] = 100.0
+        joysticks.values["Slew"] = 100.0
         wait_for(bus, "SlewStatus", lambda s: s["ShapedCommand"] > 35.0)
-        levers.values["Slew"] = 0.0
+        joysticks.values["Slew"] = 0.0
         held = wait_for(bus, "SlewStatus", state("READY"))
         assert held["ShapedCommand"] == 0.0
 

@@ -18,7 +18,7 @@ from tests.hil.machine import (
     ROOT,
     Service,
     candump,
-    levers_on,
+    joysticks_on,
     logged,
     message_name,
     open_bus,
@@ -28,7 +28,7 @@ from tests.hil.machine import (
 from tests.hil.test_daemon import drive
 
 OTHER_CRANE = "vcan1"
-LEVERS = {"LeverLeft", "LeverRight"}
+JOYSTICKS = {"JoystickLeft", "JoystickRight"}
 # Frames of each joystick of the other crane: ten looks at the name, one every 0.2 s.
 FRAMES = 100
 DRIVER = Path("/sys/bus/pci/drivers/kvaser_pci")
@@ -80,10 +80,10 @@ def witness(folder: Path, channel: str) -> set[str | None]:
     """What is on the other crane's bus while its joysticks are moved under the name of ours."""
     log = folder / "other.log"
     until = time.monotonic() + ANSWER_S
-    with candump(log, channel), levers_on(channel) as levers:
-        while (count := frames_of(log, "LeverLeft")) < FRAMES:
+    with candump(log, channel), joysticks_on(channel) as joysticks:
+        while (count := frames_of(log, "JoystickLeft")) < FRAMES:
             assert time.monotonic() < until, "the other crane's joysticks are silent"
-            levers.values["Slew"] = 100.0 if count > FRAMES / 2 else 0.0
+            joysticks.values["Slew"] = 100.0 if count > FRAMES / 2 else 0.0
             time.sleep(0.2)
     return {message_name(message) for message in logged(log)}
 
@@ -108,24 +108,24 @@ def daemon(tmp_path: Path, ours: str) -> Iterator[Service]:
 
 def drive_from(far: str) -> None:
     """Joysticks that begin in neutral and press reset where something is latched; full motion."""
-    with open_bus(far) as bus, levers_on(far) as levers:
+    with open_bus(far) as bus, joysticks_on(far) as joysticks:
         while str(wait_for(bus, "SlewStatus", lambda _: True)["State"]) != "READY":
-            levers.switches["Reset"] ^= 1
-        levers.switches["Reset"] = 0
-        drive(bus, levers)
+            joysticks.switches["Reset"] ^= 1
+        joysticks.switches["Reset"] = 0
+        drive(bus, joysticks)
 
 
 def test_a_name_that_changed_hands_while_it_was_down(
     daemon: Service, ours: str, far: str, tmp_path: Path
 ) -> None:
-    with open_bus(far) as bus, levers_on(far) as levers:
-        drive(bus, levers)
+    with open_bus(far) as bus, joysticks_on(far) as joysticks:
+        drive(bus, joysticks)
         with named(ours, "parked"):
             daemon.wait_log("bus=crane state=(down|gone)")
             daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
             with named(OTHER_CRANE, ours):
                 daemon.wait_log("bus=crane state=wrong-device")
-                assert witness(tmp_path, ours) == LEVERS
+                assert witness(tmp_path, ours) == JOYSTICKS
                 assert "state=ACTIVE" not in daemon.text().partition("wrong-device")[2]
     daemon.wait_log("bus=crane state=up")
     drive_from(far)
@@ -143,7 +143,7 @@ def test_an_adapter_that_goes_and_leaves_its_name_to_another(
         daemon.wait_log("bus=crane state=gone")
         with named(OTHER_CRANE, ours):
             daemon.wait_log("bus=crane state=wrong-device")
-            assert witness(tmp_path, ours) == LEVERS
+            assert witness(tmp_path, ours) == JOYSTICKS
         daemon.wait_log("(?s)state=wrong-device.*bus=crane state=gone")
     finally:
         (DRIVER / "bind").write_text(place)  # the first free name: its own
@@ -162,7 +162,7 @@ def test_another_bit_rate_is_no_return(
     try:
         set_up(ours, 500_000)
         daemon.wait_log("bus=crane state=wrong-device")
-        assert witness(tmp_path, far) == LEVERS
+        assert witness(tmp_path, far) == JOYSTICKS
     finally:
         ip("set", ours, "down")
         set_up(ours)

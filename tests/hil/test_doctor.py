@@ -1,4 +1,4 @@
-"""The doctor beside real interfaces: it sees them, hears the levers, and sends nothing."""
+"""The doctor beside real interfaces: it sees them, hears the joysticks, and sends nothing."""
 
 import json
 import subprocess
@@ -6,7 +6,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from tests.hil.machine import FILE, candump, levers_on, logged
+from tests.hil.machine import FILE, candump, joysticks_on, logged
 
 
 def doctor(file: Path, *arguments: str) -> dict[str, dict[str, Any]]:
@@ -24,14 +24,14 @@ def test_nothing_is_sent_on_the_bus_of_the_deployment(tmp_path: Path) -> None:
         found = doctor(tmp_path / "doctor.json", "--no-load", "--listen", "1")
     assert logged(tmp_path / "vcan0.log") == []
     assert found["vcan0"]["found"] == "up; a virtual bus, nothing else to check"
-    assert found["lever left"]["level"] == "bad"
-    assert found["lever left"]["found"] == "0 frames heard"
+    assert found["joystick left"]["level"] == "bad"
+    assert found["joystick left"]["found"] == "0 frames heard"
 
 
-def test_the_levers_are_heard(tmp_path: Path) -> None:
-    with levers_on("vcan0"):
+def test_the_joysticks_are_heard(tmp_path: Path) -> None:
+    with joysticks_on("vcan0"):
         found = doctor(tmp_path / "doctor.json", "--no-load", "--listen", "1")
-    for name in ("lever left", "lever right"):
+    for name in ("joystick left", "joystick right"):
         assert "frames, a period of" in found[name]["found"]
         assert "(DBC: 20 ms)" in found[name]["found"]
 
@@ -47,4 +47,4 @@ def test_the_set_up_of_a_controller_is_seen(tmp_path: Path, can_pair: tuple[str,
 def test_an_interface_that_is_not_there_cannot_be_listened_to(tmp_path: Path) -> None:
     found = doctor(tmp_path / "doctor.json", "--no-load", "--channel", "can7", "--listen", "1")
     assert found["can7"]["found"] == "there is no such interface"
-    assert found["levers"]["found"] == "cannot listen: No such device"
+    assert found["joysticks"]["found"] == "cannot listen: No such device"

@@ -16,12 +16,12 @@ import pytest
 
 from canshaper.checksums import CHECKSUMS
 from tests.codec.checksum_reference import REFERENCE
-from tests.hil.machine import ANSWER_S, DBC, FILE, Service, levers_on, open_bus, service
+from tests.hil.machine import ANSWER_S, DBC, FILE, Service, joysticks_on, open_bus, service
 from tests.hil.machine import wait_for as wait
 
 GATEWAY = FILE.with_name("gateway-forwarder.yaml")
 NEAR, FAR = "vcan0", "vcan1"
-OURS = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310, 0x311}  # levers and status messages
+OURS = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310, 0x311}  # joysticks and status messages
 LAST = 0x7FD
 BATCH = 40  # a bus carries so many in 20 ms, a receive queue some more
 
@@ -58,8 +58,8 @@ def cangw() -> list[str]:
     return [line.partition(" #")[0] for line in done.stdout.splitlines()]
 
 
-KERNEL = ("passing: kernel", "passing: kernel")
-DAEMON = ("passing: kernel", "passing: daemon")
+KERNEL = ("forwarding: kernel", "forwarding: kernel")
+DAEMON = ("forwarding: kernel", "forwarding: daemon")
 STOP = ("fallback: neutral", "fallback: stop")
 
 
@@ -116,12 +116,12 @@ def test_frames_of_others_pass_in_both_directions(tmp_path: Path, who: tuple[str
     """Untouched, once, in their order; while the joysticks move what is ours."""
     with (
         in_the_line(tmp_path, who, STOP),
-        levers_on(NEAR) as levers,
+        joysticks_on(NEAR) as joysticks,
         open_bus(NEAR) as near,
         open_bus(FAR) as far,
     ):
-        levers.values["Slew"] = 0.0
-        wait(far, "LeverLeft", lambda v: v["Enable"] == "On")
+        joysticks.values["Slew"] = 0.0
+        wait(far, "JoystickLeft", lambda v: v["Enable"] == "On")
         out, back = foreign(400, 1), foreign(400, 2)
         assert exchanged(near, far, out) == [key(m) for m in out]
         drain(near)
@@ -162,18 +162,18 @@ def test_what_is_ours_or_blocked_passes_in_no_direction(
 
 
 def test_the_joystick_leaves_with_our_velocity_and_a_counter_without_a_gap(tmp_path: Path) -> None:
-    with in_the_line(tmp_path), levers_on(NEAR) as levers, open_bus(FAR) as far:
+    with in_the_line(tmp_path), joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
         wait(far, "SlewStatus", lambda v: v["State"] == "READY")
-        levers.values.update(Slew=80.0, Rotate=30.0)
+        joysticks.values.update(Slew=80.0, Rotate=30.0)
         seen = []
         right = None
         while len(seen) < 200:
             message = far.recv(ANSWER_S)
             assert message is not None
             if message.arbitration_id == 0x110:
-                seen.append(DBC.decode_message("LeverLeft", message.data))
+                seen.append(DBC.decode_message("JoystickLeft", message.data))
             elif message.arbitration_id == 0x111:
-                right = DBC.decode_message("LeverRight", message.data)
+                right = DBC.decode_message("JoystickRight", message.data)
     assert right is not None
     assert right["Rotate"] == 30.0  # no axis of ours: as it came
     speeds = [float(v["Slew"]) for v in seen]  # type: ignore[arg-type]
@@ -186,30 +186,30 @@ def test_the_joystick_leaves_with_our_velocity_and_a_counter_without_a_gap(tmp_p
 
 def test_killed_the_joystick_is_neutral_until_the_daemon_is_back(tmp_path: Path) -> None:
     """As the unit does it: rules away after the end, running before the start."""
-    with levers_on(NEAR) as levers, open_bus(FAR) as far:
+    with joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
         with in_the_line(tmp_path) as (daemon, file):
             wait(far, "SlewStatus", lambda v: v["State"] == "READY")
-            levers.values.update(Slew=80.0, Rotate=30.0)
-            wait(far, "LeverLeft", lambda v: v["Slew"] > 20.0)
+            joysticks.values.update(Slew=80.0, Rotate=30.0)
+            wait(far, "JoystickLeft", lambda v: v["Slew"] > 20.0)
             daemon.process.send_signal(signal.SIGKILL)
             daemon.process.wait(ANSWER_S)
             drain(far)
             silent(far, {0x110, 0x111})
             rules(file, "away")
             for _ in range(20):
-                wait(far, "LeverLeft", assert_neutral)
-            wait(far, "LeverRight", lambda v: v["Rotate"] == 30.0)
+                wait(far, "JoystickLeft", assert_neutral)
+            wait(far, "JoystickRight", lambda v: v["Rotate"] == 30.0)
             assert "AND" in "".join(cangw())
         rules(file, "running")
         assert "AND" not in "".join(cangw())
         with service(tmp_path / "log2", "run", str(file)) as daemon:
             daemon.wait_log("gateway=rules-right")
             wait(far, "SlewStatus", lambda v: v["Reason"] == "STICK_NOT_NEUTRAL")
-            wait(far, "LeverLeft", assert_neutral)
-            levers.values["Slew"] = 0.0
+            wait(far, "JoystickLeft", assert_neutral)
+            joysticks.values["Slew"] = 0.0
             wait(far, "SlewStatus", lambda v: v["State"] == "READY")
-            levers.values["Slew"] = 80.0
-            wait(far, "LeverLeft", lambda v: v["Slew"] > 20.0)
+            joysticks.values["Slew"] = 80.0
+            wait(far, "JoystickLeft", lambda v: v["Slew"] > 20.0)
 
 
 def assert_neutral(values: dict) -> bool:
@@ -228,28 +228,28 @@ def silent(bus: can.BusABC, ids: set[int]) -> None:
 
 
 def test_stopped_in_motion_it_leaves_neutral(tmp_path: Path) -> None:
-    with levers_on(NEAR) as levers, open_bus(FAR) as far:
+    with joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
         with in_the_line(tmp_path) as (daemon, _):
             wait(far, "SlewStatus", lambda v: v["State"] == "READY")
-            levers.values["Slew"] = 80.0
-            wait(far, "LeverLeft", lambda v: v["Slew"] > 20.0)
+            joysticks.values["Slew"] = 80.0
+            wait(far, "JoystickLeft", lambda v: v["Slew"] > 20.0)
             assert daemon.end() == 0
         last = None
         while (message := far.recv(0.2)) is not None:
             if message.arbitration_id == 0x110:
                 last = message
         assert last is not None
-        assert DBC.decode_message("LeverLeft", last.data)["Slew"] == 0.0
+        assert DBC.decode_message("JoystickLeft", last.data)["Slew"] == 0.0
 
 
 def test_a_lost_joystick_ends_in_a_shaped_stop_and_silence(tmp_path: Path) -> None:
-    with in_the_line(tmp_path), levers_on(NEAR) as levers, open_bus(FAR) as far:
+    with in_the_line(tmp_path), joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
         wait(far, "SlewStatus", lambda v: v["State"] == "READY")
-        levers.values["Slew"] = 80.0
-        wait(far, "LeverLeft", lambda v: v["Slew"] > 30.0)
-        levers.silent = True
+        joysticks.values["Slew"] = 80.0
+        wait(far, "JoystickLeft", lambda v: v["Slew"] > 30.0)
+        joysticks.silent = True
         wait(far, "SlewStatus", lambda v: v["State"] == "STOPPING")
-        wait(far, "LeverLeft", lambda v: 0.0 < v["Slew"] < 30.0 and v["Enable"] == "On")
+        wait(far, "JoystickLeft", lambda v: 0.0 < v["Slew"] < 30.0 and v["Enable"] == "On")
         wait(far, "SlewStatus", lambda v: v["State"] == "NEUTRAL_WAIT")
         drain(far)
         silent(far, {0x110, 0x111})
@@ -268,7 +268,7 @@ def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
     checksum = f"checksum: {{ signal: Checksum, kind: {kind} }}"
     file = write(
         tmp_path,
-        ("left:\n    bus: levers", f"left:\n    {checksum}\n    bus: levers"),
+        ("left:\n    bus: joysticks", f"left:\n    {checksum}\n    bus: joysticks"),
         ("signal: Slew, timeout_ms: 200,", f"signal: Slew, timeout_ms: 200, {checksum},"),
         ("signal: NearFar, timeout_ms: 200,", f"signal: NearFar, timeout_ms: 200, {checksum},"),
         (f"{FILE.parents[1] / 'dbc'}/forwarder.dbc", "gateway.dbc"),
@@ -290,7 +290,7 @@ def test_a_fallback_that_is_left_in_place_is_told_and_moves_nothing(tmp_path: Pa
     file = write(tmp_path)
     rules(file, "away")
     with (
-        levers_on(NEAR),
+        joysticks_on(NEAR),
         open_bus(FAR) as far,
         service(tmp_path / "log", "run", str(file)) as daemon,
     ):
@@ -324,9 +324,9 @@ def test_rules_are_set_up_shown_and_removed(tmp_path: Path) -> None:
 def test_pass_lets_the_joystick_through_while_the_daemon_is_away(tmp_path: Path) -> None:
     file = write(tmp_path, ("fallback: neutral", "fallback: pass"))
     rules(file, "away")
-    with levers_on(NEAR) as levers, open_bus(FAR) as far:
-        levers.values["Slew"] = 80.0
-        wait(far, "LeverLeft", lambda v: v["Slew"] == 80.0)
+    with joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
+        joysticks.values["Slew"] = 80.0
+        wait(far, "JoystickLeft", lambda v: v["Slew"] == 80.0)
 
 
 @pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
@@ -344,7 +344,7 @@ def test_an_interface_that_was_removed(tmp_path: Path, who: tuple[str, str]) -> 
             daemon.wait_log("gateway=rules-missing 40 of 40")
             rules(file, "running")
             daemon.wait_log("rules-right(.|\n)*rules-missing(.|\n)*rules-right")
-        with levers_on(NEAR), open_bus(NEAR) as near, open_bus(FAR) as far:
-            wait(far, "LeverLeft", lambda v: v["Enable"] == "On")
+        with joysticks_on(NEAR), open_bus(NEAR) as near, open_bus(FAR) as far:
+            wait(far, "JoystickLeft", lambda v: v["Enable"] == "On")
             message = can.Message(arbitration_id=0x7E1, is_extended_id=False, data=[1])
             assert exchanged(near, far, [message]) == [key(message)]

@@ -22,10 +22,10 @@ import pytest
 from tests.hil.machine import (
     FILE,
     Accept,
-    Levers,
+    Joysticks,
     Service,
     candump,
-    levers_on,
+    joysticks_on,
     logged,
     open_bus,
     service,
@@ -37,8 +37,8 @@ SLEW = 0x200
 
 
 @pytest.fixture
-def levers() -> Iterator[Levers]:
-    with levers_on("vcan0") as running:
+def joysticks() -> Iterator[Joysticks]:
+    with joysticks_on("vcan0") as running:
         yield running
 
 
@@ -59,11 +59,11 @@ def state(*names: str) -> Callable[[dict], bool]:
     return lambda status: str(status["State"]) in names
 
 
-def drive(bus: can.BusABC, levers: Levers) -> None:
+def drive(bus: can.BusABC, joysticks: Joysticks) -> None:
     """Full motion; once more where an emulated machine that stood still has tripped the axis."""
     for _ in range(5):
-        ready(bus, levers)
-        levers.values["Slew"] = 100.0
+        ready(bus, joysticks)
+        joysticks.values["Slew"] = 100.0
         wanted: dict[str, Accept] = {
             "SlewCommand": lambda v: v["Velocity"] > 90.0,
             "SlewStatus": lambda s: str(s["Reason"]) == "LOOP_STALLED",
@@ -73,19 +73,19 @@ def drive(bus: can.BusABC, levers: Levers) -> None:
     raise AssertionError("the machine stands still too often")
 
 
-def ready(bus: can.BusABC, levers: Levers) -> None:
+def ready(bus: can.BusABC, joysticks: Joysticks) -> None:
     """Neutral, and presses of reset until one counts."""
-    levers.values["Slew"] = 0.0
-    levers.silent = False
+    joysticks.values["Slew"] = 0.0
+    joysticks.silent = False
     until = time.monotonic() + 60.0
     while time.monotonic() < until:
-        levers.switches["Reset"] ^= 1
+        joysticks.switches["Reset"] ^= 1
         while bus.recv(0):  # what was sent while nobody read says nothing of now
             pass
         for _ in range(3):
             status = wait_for(bus, "SlewStatus", lambda s: True)
         if str(status["State"]) == "READY" and status["RawCommand"] == 0:
-            levers.switches["Reset"] = 0
+            joysticks.switches["Reset"] = 0
             return
     raise AssertionError(f"not ready: {status}")
 
@@ -103,14 +103,14 @@ def slew_of(log: Path) -> list[int]:
 
 
 def test_a_process_that_was_stopped_trips_and_moves_nothing(
-    bus: can.BusABC, levers: Levers, daemon: Service, tmp_path: Path
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     with candump(tmp_path / "stop.log", "vcan0"):
         daemon.process.send_signal(signal.SIGSTOP)
-        levers.values["Slew"] = -100.0  # waits in the sockets as if it were fresh
+        joysticks.values["Slew"] = -100.0  # waits in the sockets as if it were fresh
         for _ in range(100):
-            wait_for(bus, "LeverLeft", lambda v: True)
+            wait_for(bus, "JoystickLeft", lambda v: True)
         daemon.process.send_signal(signal.SIGCONT)
         status = wait_for(bus, "SlewStatus", state("TRIPPED"))
         assert str(status["Reason"]) == "LOOP_STALLED"
@@ -118,21 +118,21 @@ def test_a_process_that_was_stopped_trips_and_moves_nothing(
     stopped = values.index(0)
     assert not any(values[stopped:])
     assert all(v < 128 for v in values), "moved the other way"
-    drive(bus, levers)
+    drive(bus, joysticks)
 
 
 def test_repeated_overruns_stop_the_axis_and_a_single_one_does_not(
-    bus: can.BusABC, levers: Levers, daemon: Service
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
     def hold_up(times: int) -> None:
         for _ in range(times):
             daemon.process.send_signal(signal.SIGSTOP)
-            wait_for(bus, "LeverLeft", lambda v: True)
-            wait_for(bus, "LeverLeft", lambda v: True)
+            wait_for(bus, "JoystickLeft", lambda v: True)
+            wait_for(bus, "JoystickLeft", lambda v: True)
             daemon.process.send_signal(signal.SIGCONT)
             wait_for(bus, "SlewCommand", lambda v: True)
 
-    drive(bus, levers)
+    drive(bus, joysticks)
     hold_up(1)
     assert str(wait_for(bus, "SlewStatus", lambda s: True)["State"]) == "ACTIVE"
     hold_up(40)
@@ -140,19 +140,19 @@ def test_repeated_overruns_stop_the_axis_and_a_single_one_does_not(
     status = wait_for(bus, "SlewStatus", state("STOPPING", "NEUTRAL_WAIT", "TRIPPED"))
     assert str(status["Reason"]) in ("LOOP_OVERRUN", "STOP_DONE", "LOOP_STALLED")
     assert "reason=LOOP_OVERRUN" in daemon.text() or "reason=LOOP_STALLED" in daemon.text()
-    drive(bus, levers)
+    drive(bus, joysticks)
 
 
 def test_steps_of_the_clock_change_nothing(
-    bus: can.BusABC, levers: Levers, daemon: Service
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     now = time.clock_gettime(time.CLOCK_REALTIME)
     try:
         for hours in (1, -1):
             time.clock_settime(time.CLOCK_REALTIME, now + 3600 * hours)
             for slew in (90.0, 80.0, 100.0):
-                levers.values["Slew"] = slew
+                joysticks.values["Slew"] = slew
                 wait_for(bus, "SlewStatus", lambda s, slew=slew: s["RawCommand"] == slew)
     finally:
         time.clock_settime(time.CLOCK_REALTIME, now)
@@ -178,10 +178,10 @@ def test_bus_off_is_seen_and_survived(
     with (
         service(tmp_path / "d.log", "run", str(FILE), "--channel", ours) as daemon,
         open_bus(far_end) as far,
-        levers_on(far_end) as levers,
+        joysticks_on(far_end) as joysticks,
     ):
         daemon.wait_log("started file=")
-        drive(far, levers)
+        drive(far, joysticks)
         tc("replace", "dev", ours, "root", "handle", "1:", "prio")
         tc("add", "dev", ours, "parent", "1:2", "netem", "delay", "250s", "limit", "1000")
         try:
@@ -191,11 +191,13 @@ def test_bus_off_is_seen_and_survived(
         finally:
             tc("del", "dev", ours, "root")
         daemon.wait_log("bus=crane state=up")
-        drive(far, levers)
+        drive(far, joysticks)
 
 
-def test_passive_is_told_and_goes_on(bus: can.BusABC, levers: Levers, daemon: Service) -> None:
-    drive(bus, levers)
+def test_passive_is_told_and_goes_on(
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
+) -> None:
+    drive(bus, joysticks)
     subprocess.run(["cansend", "vcan0", "20000004#0020000000000000"], check=True)
     daemon.wait_log("bus=crane state=passive")
     assert str(wait_for(bus, "SlewStatus", lambda s: True)["State"]) == "ACTIVE"
@@ -204,9 +206,9 @@ def test_passive_is_told_and_goes_on(bus: can.BusABC, levers: Levers, daemon: Se
 
 
 def test_an_interface_removed_and_back_is_used_again(
-    bus: can.BusABC, levers: Levers, daemon: Service
+    bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     ip("link", "del", "vcan0")
     try:
         daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
@@ -215,8 +217,8 @@ def test_an_interface_removed_and_back_is_used_again(
         ip("link", "add", "vcan0", "type", "vcan")
         ip("link", "set", "vcan0", "up")
     daemon.wait_log("bus=crane state=up")
-    with open_bus("vcan0") as again, levers_on("vcan0") as new_levers:
-        drive(again, new_levers)
+    with open_bus("vcan0") as again, joysticks_on("vcan0") as new_joysticks:
+        drive(again, new_joysticks)
     assert daemon.process.poll() is None
 
 
@@ -225,17 +227,17 @@ def test_a_full_queue_trips_and_is_survived(tmp_path: Path) -> None:
     with (
         service(tmp_path / "d.log", "run", str(FILE), "--channel", "vxcan0") as daemon,
         open_bus("vxcan1") as far,
-        levers_on("vxcan1") as levers,
+        joysticks_on("vxcan1") as joysticks,
     ):
         daemon.wait_log("started file=")
-        drive(far, levers)
+        drive(far, joysticks)
         # 8 bit/s: the queue of 160 bytes is full with the next ten frames
         tc("replace", "dev", "vxcan0", "root", "tbf", "rate", "8bit", "burst", "64", "limit", "160")
         try:
             daemon.wait_log("axis=slew state=TRIPPED from=ACTIVE reason=SEND_FAILED")
         finally:
             tc("del", "dev", "vxcan0", "root")
-        drive(far, levers)
+        drive(far, joysticks)
 
 
 def test_frames_that_do_not_get_onto_the_bus_are_not_piled_up(
@@ -247,11 +249,11 @@ def test_frames_that_do_not_get_onto_the_bus_are_not_piled_up(
     with (
         service(tmp_path / "d.log", "run", str(FILE), "--channel", ours) as daemon,
         open_bus(far_end) as far,
-        levers_on(far_end) as levers,
+        joysticks_on(far_end) as joysticks,
         candump(log, far_end),
     ):
         daemon.wait_log("started file=")
-        drive(far, levers)
+        drive(far, joysticks)
         tc("replace", "dev", ours, "root", "netem", "delay", "3s", "limit", "1000")
         try:
             daemon.wait_log("bus=crane state=not-confirmed")
@@ -260,7 +262,7 @@ def test_frames_that_do_not_get_onto_the_bus_are_not_piled_up(
             daemon.wait_log("bus=crane state=up")  # the first of them are out
         finally:
             tc("del", "dev", ours, "root")
-        drive(far, levers)
+        drive(far, joysticks)
     messages = logged(log)
     mark = next(i for i, m in enumerate(messages) if m.arbitration_id == 0x7F0)
     late = [m.data[0] for m in messages[mark:] if m.arbitration_id == SLEW]
@@ -282,23 +284,23 @@ def running(stderr: int) -> Iterator[subprocess.Popen]:
 
 
 def test_a_full_disk_and_a_reader_that_has_gone_change_nothing(
-    bus: can.BusABC, levers: Levers
+    bus: can.BusABC, joysticks: Joysticks
 ) -> None:
     reading, writing = os.pipe()
     os.close(reading)
     for stderr in (os.open("/dev/full", os.O_WRONLY), writing):
         with running(stderr) as process:
-            drive(bus, levers)
+            drive(bus, joysticks)
             for slew in (90.0, 80.0, 100.0):
-                levers.values["Slew"] = slew
+                joysticks.values["Slew"] = slew
                 wait_for(bus, "SlewStatus", lambda s, slew=slew: s["RawCommand"] == slew)
-            levers.values["Slew"] = 0.0
+            joysticks.values["Slew"] = 0.0
             process.send_signal(signal.SIGTERM)
             assert process.wait(120) == 0
         os.close(stderr)
 
 
-def test_a_log_reader_that_hangs_holds_up_nothing(bus: can.BusABC, levers: Levers) -> None:
+def test_a_log_reader_that_hangs_holds_up_nothing(bus: can.BusABC, joysticks: Joysticks) -> None:
     reading, writing = os.pipe()
     os.set_blocking(writing, False)
     try:
@@ -307,8 +309,8 @@ def test_a_log_reader_that_hangs_holds_up_nothing(bus: can.BusABC, levers: Lever
     except BlockingIOError:
         os.set_blocking(writing, True)  # as the daemon gets it: a write would wait for ever
     with running(writing) as process:
-        drive(bus, levers)
-        levers.values["Slew"] = 0.0
+        drive(bus, joysticks)
+        joysticks.values["Slew"] = 0.0
         process.send_signal(signal.SIGTERM)
         assert process.wait(120) == 0
     os.close(reading)

@@ -172,7 +172,7 @@ FILES: dict[str, Make] = {
     "DBC of 16 MB, one table": filled(HEAD + "VAL_ 1 A ", '0 "" '),
     "DBC of 16 MB, tables without end": filled(HEAD, "VAL_ 1 A "),
     "DBC of 16 MB, signals of one message": filled(HEAD + "BO_ 5 M: 4095 A\n", SIGNAL),
-    "DBC of 16 MB, signals of a used message": filled(HEAD + "BO_ 272 LeverLeft: 8 A\n", SIGNAL),
+    "DBC of 16 MB, signals of a used message": filled(HEAD + "BO_ 272 JoystickLeft: 8 A\n", SIGNAL),
     "DBC of 16 MB, quotes": filled(HEAD, '"'),
     "DBC of 16 MB, quotes in a string": filled(HEAD + '"', '\\"'),
     "DBC of 16 MB, empty lines": filled(HEAD, "\n"),

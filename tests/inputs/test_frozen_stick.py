@@ -1,11 +1,11 @@
-"""A stick that stands still: in neutral for ever, deflected for ``frozen_s`` at most."""
+"""A stick that stands still: in neutral for ever, deflected for ``stuck_s`` at most."""
 
 from collections.abc import Callable
 from typing import Any
 
 import pytest
 
-from canshaper.inputs.lever import LeverInput
+from canshaper.inputs.joystick import JoystickInput
 from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import Rig
 
@@ -21,14 +21,14 @@ def velocity(sent: dict[str, dict[str, Any]]) -> float:
 
 def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make) -> None:
     deployment = changed_rig(ONE_SECOND).deployment
-    lever = LeverInput(deployment.levers["left"])
+    joystick = JoystickInput(deployment.joysticks["left"])
     rig = changed_rig(ONE_SECOND)
     for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.STICK_FROZEN)):
-        lever.receive(rig.lever(Slew=500).data, now_ns)
-        assert lever.stick("Slew", now_ns, 0, None, 0.02).fault is fault
+        joystick.receive(rig.joystick(Slew=500).data, now_ns)
+        assert joystick.stick("Slew", now_ns, 0, None, 0.02).fault is fault
 
 
-ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    frozen_s: 1\n  right")}
+ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    stuck_s: 1\n  right")}
 SECOND_TICKS = 50
 
 
@@ -93,7 +93,7 @@ def test_the_least_change_is_a_change(changed_rig: Make) -> None:
         assert rig.state() is State.ACTIVE
 
 
-def test_another_stick_of_the_lever_is_no_sign_of_life(changed_rig: Make) -> None:
+def test_another_stick_of_the_joystick_is_no_sign_of_life(changed_rig: Make) -> None:
     rig = changed_rig(ONE_SECOND)
     rig.run(3)
     for n in range(2 * SECOND_TICKS):
@@ -115,9 +115,9 @@ def test_frames_that_do_not_count_are_no_change(changed_rig: Make) -> None:
     rig.run(3)
     rig.run(1, Slew=500)
     for n in range(SECOND_TICKS + 1):
-        rig.receive(rig.lever(Slew=500), rig.lever("LeverRight"))
-        rig.receive(rig.lever(Slew=400 + n, AliveCounter=rig.counts["LeverLeft"]))  # repeated
-        rig.counts["LeverLeft"] -= 1
+        rig.receive(rig.joystick(Slew=500), rig.joystick("JoystickRight"))
+        rig.receive(rig.joystick(Slew=400 + n, AliveCounter=rig.counts["JoystickLeft"]))  # repeated
+        rig.counts["JoystickLeft"] -= 1
         rig.tick()
     assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_FROZEN")
 

@@ -1,4 +1,4 @@
-"""What a lever's frames are worth: sequence, silence, and an enable seen released."""
+"""What a joystick's frames are worth: sequence, silence, and an enable seen released."""
 
 from collections.abc import Callable
 from typing import Any
@@ -9,7 +9,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.rigs.forwarder import SLOW_VALVE, Rig
 
-# timeout_ms of the shipped levers, 100 ms: the last frame counts in so many ticks after its own.
+# timeout_ms of the shipped joysticks, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
 LEFT = "    alive_counter: AliveCounter\n  right:"
 
@@ -30,14 +30,14 @@ def last_fault(rig: Rig) -> FrameFault:
 
 
 def feed(rig: Rig, *frames: Frame) -> dict[str, dict[str, Any]]:
-    """These frames of the left lever, a good one of the right, and a tick."""
-    rig.receive(*frames, rig.lever("LeverRight"))
+    """These frames of the left joystick, a good one of the right, and a tick."""
+    rig.receive(*frames, rig.joystick("JoystickRight"))
     return rig.tick()
 
 
 def skip(rig: Rig, counts: int) -> None:
-    """The left lever's counter runs on unseen; the next frame is ``counts`` + 1 after the last."""
-    rig.counts["LeverLeft"] += counts
+    """The left joystick's counter runs on unseen; the next frame is ``counts`` + 1 after it."""
+    rig.counts["JoystickLeft"] += counts
 
 
 # -- sequence --------------------------------------------------------------------------------------
@@ -47,9 +47,9 @@ def skip(rig: Rig, counts: int) -> None:
 def test_a_frozen_counter_never_counts_again_however_long_it_was_silent(
     rig: Rig, silence: int
 ) -> None:
-    """A gateway that repeats its last frame for ever, with pauses: the lever behind it is gone."""
+    """A gateway that repeats its last frame for ever, with pauses: its joystick is gone."""
     rig.run(5)
-    frozen = rig.lever()
+    frozen = rig.joystick()
     for _ in range(3):
         for _ in range(15):
             feed(rig, frozen)
@@ -57,13 +57,13 @@ def test_a_frozen_counter_never_counts_again_however_long_it_was_silent(
         for _ in range(silence):
             feed(rig)
             assert rig.state() is State.NEUTRAL_WAIT
-    feed(rig, rig.lever())
+    feed(rig, rig.joystick())
     assert rig.state() is State.READY
 
 
 def test_a_frozen_counter_stops_what_moves_through_the_filter(rig: Rig) -> None:
     rig.moving()
-    frozen = rig.lever(Slew=1000)
+    frozen = rig.joystick(Slew=1000)
     feed(rig, frozen)
     for _ in range(FRESH_TICKS):
         assert velocity(feed(rig, frozen)) > 50
@@ -75,16 +75,18 @@ def test_a_frozen_counter_stops_what_moves_through_the_filter(rig: Rig) -> None:
 
 
 @pytest.mark.parametrize("counter", [0, 3, 77, 255])
-def test_a_lever_that_was_switched_off_may_begin_with_any_counter(rig: Rig, counter: int) -> None:
+def test_a_joystick_that_was_switched_off_may_begin_with_any_counter(
+    rig: Rig, counter: int
+) -> None:
     rig.run(5)
     for _ in range(FRESH_TICKS + 1):
         feed(rig)
     assert rig.reason() == "STICK_TIMEOUT"
-    rig.counts["LeverLeft"] = counter - 1
-    feed(rig, rig.lever())
+    rig.counts["JoystickLeft"] = counter - 1
+    feed(rig, rig.joystick())
     assert rig.state() is State.READY
     assert rig.count("InvalidSignals") == 0
-    feed(rig, rig.lever())
+    feed(rig, rig.joystick())
     assert rig.state() is State.READY
 
 
@@ -93,7 +95,7 @@ def test_silence_until_the_timeout_is_none(rig: Rig) -> None:
     for _ in range(FRESH_TICKS - 1):
         feed(rig)
     skip(rig, 100)
-    feed(rig, rig.lever(Slew=200))
+    feed(rig, rig.joystick(Slew=200))
     assert last_fault(rig) is FrameFault.COUNTER_JUMP
     assert command(rig) == 1.0
 
@@ -102,7 +104,7 @@ def test_without_a_counter_every_frame_counts(changed_rig: Make) -> None:
     rig = changed_rig({LEFT: "  right:"})
     rig.moving()
     for raw in (400, 400, 200):
-        feed(rig, rig.lever(Slew=raw, AliveCounter=7))
+        feed(rig, rig.joystick(Slew=raw, AliveCounter=7))
         assert command(rig) == pytest.approx(raw / 1000)
     assert rig.count("InvalidSignals") == 0
 
@@ -110,11 +112,11 @@ def test_without_a_counter_every_frame_counts(changed_rig: Make) -> None:
 def test_a_jump_without_silence_is_refused_and_the_next_frame_counts(rig: Rig) -> None:
     rig.moving()
     skip(rig, 3)
-    feed(rig, rig.lever(Slew=0))
+    feed(rig, rig.joystick(Slew=0))
     assert command(rig) == 1.0
     assert rig.state() is State.ACTIVE
     assert (rig.count("InvalidSignals"), last_fault(rig)) == (1, FrameFault.COUNTER_JUMP)
-    feed(rig, rig.lever(Slew=200))
+    feed(rig, rig.joystick(Slew=200))
     assert command(rig) == pytest.approx(0.2)
     assert rig.count("InvalidSignals") == 1
 
@@ -123,19 +125,19 @@ def test_a_jump_without_silence_is_refused_and_the_next_frame_counts(rig: Rig) -
 def test_a_few_lost_frames_are_no_jump(rig: Rig, lost: int) -> None:
     rig.moving()
     for _ in range(lost):
-        rig.lever()
+        rig.joystick()
         feed(rig)
-    feed(rig, rig.lever(Slew=200))
+    feed(rig, rig.joystick(Slew=200))
     assert command(rig) == pytest.approx(0.2)
     assert rig.count("InvalidSignals") == 0
 
 
-def test_jumps_without_end_are_no_lever(rig: Rig) -> None:
+def test_jumps_without_end_are_no_joystick(rig: Rig) -> None:
     """Two senders of one id, each with a counter of its own."""
     rig.moving()
     for tick in range(FRESH_TICKS + 2):
-        rig.counts["LeverLeft"] = 100 * (tick % 2) + tick
-        feed(rig, rig.lever(Slew=1000))
+        rig.counts["JoystickLeft"] = 100 * (tick % 2) + tick
+        feed(rig, rig.joystick(Slew=1000))
     assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_UNTRUSTED")
 
 
@@ -143,17 +145,17 @@ def test_jumps_without_end_are_no_lever(rig: Rig) -> None:
 def test_so_many_good_frames_are_needed_after_a_wrong_one(changed_rig: Make, qualify: int) -> None:
     rig = changed_rig({LEFT: LEFT.replace("\n  right", f"\n    qualify: {qualify}\n  right")})
     for _ in range(qualify - 1):
-        feed(rig, rig.lever())
+        feed(rig, rig.joystick())
         assert rig.state() is State.NEUTRAL_WAIT
-    feed(rig, rig.lever())
+    feed(rig, rig.joystick())
     assert rig.state() is State.READY
-    feed(rig, rig.lever(Slew=1000))
+    feed(rig, rig.joystick(Slew=1000))
     assert command(rig) == 1.0
     skip(rig, 10)
     for _ in range(qualify):
-        feed(rig, rig.lever(Slew=200))
+        feed(rig, rig.joystick(Slew=200))
         assert command(rig) == 1.0
-    feed(rig, rig.lever(Slew=200))
+    feed(rig, rig.joystick(Slew=200))
     assert command(rig) == pytest.approx(0.2)
 
 
@@ -161,7 +163,7 @@ def test_so_many_good_frames_are_needed_after_a_wrong_one(changed_rig: Make, qua
 def test_silence_is_not_distrust(rig: Rig, silent: bool) -> None:
     """The reason tells whom to ask: nothing comes, or what comes is wrong."""
     rig.run(5)
-    frozen = rig.lever()
+    frozen = rig.joystick()
     for _ in range(FRESH_TICKS + 2):
         if silent:
             feed(rig)
@@ -182,11 +184,11 @@ def test_silence_is_not_distrust(rig: Rig, silent: bool) -> None:
 def test_a_released_enable_in_a_frame_out_of_sequence_stops_at_once(rig: Rig, wrong: str) -> None:
     rig.moving()
     skip(rig, -1 if wrong == "repeated" else 100)
-    sent = feed(rig, rig.lever(Slew=1000, Enable=0))
+    sent = feed(rig, rig.joystick(Slew=1000, Enable=0))
     assert velocity(sent) == 0
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
     for _ in range(20):  # frozen: nothing in it counts
-        sent = feed(rig, rig.lever(Slew=1000, Enable=1, AliveCounter=rig.counts["LeverLeft"]))
+        sent = feed(rig, rig.joystick(Slew=1000, Enable=1, AliveCounter=rig.counts["JoystickLeft"]))
         skip(rig, -1)
         assert velocity(sent) == 0
     assert rig.state() is State.TRIPPED
@@ -198,9 +200,9 @@ def test_a_released_enable_needs_no_qualification(changed_rig: Make, qualify: in
     rig.run(qualify)
     rig.moving()
     skip(rig, 10)
-    feed(rig, rig.lever(Slew=1000))  # refused; from here on all is well again
+    feed(rig, rig.joystick(Slew=1000))  # refused; from here on all is well again
     assert rig.state() is State.ACTIVE
-    assert velocity(feed(rig, rig.lever(Slew=1000, Enable=0))) == 0
+    assert velocity(feed(rig, rig.joystick(Slew=1000, Enable=0))) == 0
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
@@ -211,38 +213,38 @@ def test_a_short_release_is_a_release(
 ) -> None:
     """Off and on again before the next tick, or before the next frame of a slow valve.
 
-    Nor does it matter that the lever falls silent after it.
+    Nor does it matter that the joystick falls silent after it.
     """
     rig = changed_rig(dbc=slow)
     rig.run(30)
     rig.run(61, Slew=1000)
     assert rig.state() is State.ACTIVE
-    rig.receive(rig.lever(Slew=1000, Enable=0))
+    rig.receive(rig.joystick(Slew=1000, Enable=0))
     for _ in range(10):
         if silent:
             feed(rig)
         else:
-            feed(rig, rig.lever(Slew=1000))
+            feed(rig, rig.joystick(Slew=1000))
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
 def test_a_released_enable_stays_released_until_a_frame_counts(rig: Rig) -> None:
     rig.run(3)
     assert rig.state() is State.READY
-    number = rig.counts["LeverLeft"]
-    feed(rig, rig.lever(AliveCounter=number, Enable=0))
+    number = rig.counts["JoystickLeft"]
+    feed(rig, rig.joystick(AliveCounter=number, Enable=0))
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
-    feed(rig, rig.lever(AliveCounter=number))
+    feed(rig, rig.joystick(AliveCounter=number))
     assert rig.reason() == "ENABLE_OFF"
-    rig.counts["LeverLeft"] = number
-    feed(rig, rig.lever())
+    rig.counts["JoystickLeft"] = number
+    feed(rig, rig.joystick())
     assert rig.state() is State.READY
 
 
 def test_only_off_is_released(rig: Rig) -> None:
     """An error code out of sequence is no news: it neither stops nor enables."""
     rig.moving()
-    number = rig.counts["LeverLeft"]
+    number = rig.counts["JoystickLeft"]
     for enable in (1, 2, 3):
-        feed(rig, rig.lever(Slew=1000, AliveCounter=number, Enable=enable))
+        feed(rig, rig.joystick(Slew=1000, AliveCounter=number, Enable=enable))
         assert rig.state() is State.ACTIVE

@@ -38,12 +38,12 @@ def test_a_reset_that_was_pressed_in_silence(rig: Rig) -> None:
 
 
 def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
-    """A glitch, or somebody else with the lever's id."""
+    """A glitch, or somebody else with the joystick's id."""
     tripped(rig)
-    count = rig.counts["LeverLeft"]
-    rig.counts["LeverLeft"] = (count + 100) % 256
-    rig.receive(rig.lever("LeverLeft", Enable=0))
-    rig.counts["LeverLeft"] = count
+    count = rig.counts["JoystickLeft"]
+    rig.counts["JoystickLeft"] = (count + 100) % 256
+    rig.receive(rig.joystick("JoystickLeft", Enable=0))
+    rig.counts["JoystickLeft"] = count
     rig.tick()
     rig.run(5)
     assert rig.state() is State.TRIPPED
@@ -65,10 +65,10 @@ def test_an_enable_that_comes_back_with_the_measurement_of_its_stick_is_one(rig:
 
 def test_an_enable_that_was_off_out_of_sequence_and_on_again_in_one_tick(rig: Rig) -> None:
     tripped(rig)
-    count = rig.counts["LeverLeft"]
-    rig.counts["LeverLeft"] = (count + 100) % 256
-    rig.receive(rig.lever("LeverLeft", Enable=0))
-    rig.counts["LeverLeft"] = count
+    count = rig.counts["JoystickLeft"]
+    rig.counts["JoystickLeft"] = (count + 100) % 256
+    rig.receive(rig.joystick("JoystickLeft", Enable=0))
+    rig.counts["JoystickLeft"] = count
     rig.run(1)  # the good frame of this tick has it on
     rig.run(5)
     assert rig.state() is State.TRIPPED
@@ -79,10 +79,10 @@ def test_an_enable_that_was_off_in_a_frame_after_which_the_counter_goes_on_in_it
 ) -> None:
     """Frames of a sender that starts anew: the first is out of sequence, the next ones are not."""
     tripped(rig)
-    rig.counts["LeverLeft"] = (rig.counts["LeverLeft"] + 100) % 256
-    rig.receive(rig.lever("LeverLeft", Enable=0))
+    rig.counts["JoystickLeft"] = (rig.counts["JoystickLeft"] + 100) % 256
+    rig.receive(rig.joystick("JoystickLeft", Enable=0))
     for _ in range(5):
-        rig.receive(rig.lever("LeverLeft"))
+        rig.receive(rig.joystick("JoystickLeft"))
     rig.run(1)
     rig.run(5)
     assert rig.state() is State.TRIPPED
@@ -91,7 +91,7 @@ def test_an_enable_that_was_off_in_a_frame_after_which_the_counter_goes_on_in_it
 def test_a_reset_that_is_held_while_the_loop_is_late(rig: Rig) -> None:
     tripped(rig)
     for _ in range(12):
-        rig.receive(rig.lever("LeverLeft"), rig.lever("LeverRight"))
+        rig.receive(rig.joystick("JoystickLeft"), rig.joystick("JoystickRight"))
         rig.tick(1)
     rig.run(80, Reset=1)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")

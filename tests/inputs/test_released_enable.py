@@ -13,24 +13,24 @@ def test_a_released_enable_is_no_fault_of_the_frame(rig: Rig) -> None:
     assert rig.count("InvalidSignals") == 0
     assert rig.controller.counters.last_fault is FrameFault.NONE
     rig.run(1, Enable=2)
-    assert rig.count("InvalidSignals") == 2  # both levers
+    assert rig.count("InvalidSignals") == 2  # both joysticks
     assert rig.controller.counters.last_fault is FrameFault.INVALID_SIGNAL
 
 
 def test_a_release_counts_in_one_tick_only(rig: Rig) -> None:
     rig.run(3)
     rig.run(10, Slew=1000)
-    rig.receive(rig.lever(Enable=0))
+    rig.receive(rig.joystick(Enable=0))
     rig.run(1)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
     rig.run(1)
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
 
 
-def test_of_a_lever_that_is_silent_since_then_silence_is_told(
+def test_of_a_joystick_that_is_silent_since_then_silence_is_told(
     changed_rig: Callable[..., Rig],
 ) -> None:
-    """A valve of 200 ms on a lever that is old after 100 ms."""
+    """A valve of 200 ms on a joystick that is old after 100 ms."""
     rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(30)
     assert rig.state() is State.READY
@@ -69,13 +69,13 @@ def test_with_a_broken_stick_and_the_enable_released_a_trip_is_still_told(rig: R
 def test_it_stays_released_while_the_frames_after_it_cannot_be_trusted(rig: Rig) -> None:
     """A counter that stands still says nothing new, and least of all that somebody enabled."""
     rig.run(5)
-    rig.receive(rig.lever(Enable=0), rig.lever("LeverRight"))
+    rig.receive(rig.joystick(Enable=0), rig.joystick("JoystickRight"))
     rig.tick()
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
-    rig.counts["LeverLeft"] -= 1
-    frozen = rig.lever(Enable=1)
+    rig.counts["JoystickLeft"] -= 1
+    frozen = rig.joystick(Enable=1)
     for _ in range(20):
-        rig.receive(frozen, rig.lever("LeverRight"))
+        rig.receive(frozen, rig.joystick("JoystickRight"))
         rig.tick()
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "ENABLE_OFF")
     rig.run(1)

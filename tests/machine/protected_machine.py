@@ -10,12 +10,12 @@ IDS = list(range(0x10, 0x20))
 
 DBC = """VERSION ""
 
-BU_: LEVERS SHAPER VALVES
+BU_: JOYSTICKS SHAPER VALVES
 
-BO_ 64 Stop: 3 LEVERS
+BO_ 64 Stop: 3 JOYSTICKS
  SG_ Pressed : 16|2@1+ (1,0) [0|3] "" SHAPER
 
-BO_ 272 Lever: 8 LEVERS
+BO_ 272 Joystick: 8 JOYSTICKS
  SG_ Crc : 0|8@1+ (1,0) [0|255] "" SHAPER
  SG_ Seq : 8|4@1+ (1,0) [0|15] "" SHAPER
  SG_ Top : 12|4@1+ (1,0) [0|15] "" SHAPER
@@ -32,36 +32,36 @@ BO_ 512 Valves: 6 SHAPER
  SG_ Check : 40|8@1+ (1,0) [0|255] "" VALVES
 
 BO_ 768 SlewStatus: 8 SHAPER
- SG_ State : 12|4@1+ (1,0) [0|15] "" LEVERS
- SG_ Reason : 16|8@1+ (1,0) [0|255] "" LEVERS
- SG_ RawCommand : 24|8@1- (1,0) [-100|100] "%" LEVERS
- SG_ ShapedCommand : 32|8@1- (1,0) [-100|100] "%" LEVERS
- SG_ PredictedSway : 40|8@1- (1,0) [-100|100] "deg" LEVERS
+ SG_ State : 12|4@1+ (1,0) [0|15] "" JOYSTICKS
+ SG_ Reason : 16|8@1+ (1,0) [0|255] "" JOYSTICKS
+ SG_ RawCommand : 24|8@1- (1,0) [-100|100] "%" JOYSTICKS
+ SG_ ShapedCommand : 32|8@1- (1,0) [-100|100] "%" JOYSTICKS
+ SG_ PredictedSway : 40|8@1- (1,0) [-100|100] "deg" JOYSTICKS
 
 BO_ 784 ShaperStatus: 7 SHAPER
- SG_ LastFault : 0|8@1+ (1,0) [0|255] "" LEVERS
- SG_ MissedDeadlines : 8|8@1+ (1,0) [0|255] "" LEVERS
- SG_ WrongLength : 16|4@1+ (1,0) [0|15] "" LEVERS
- SG_ UnknownId : 20|4@1+ (1,0) [0|15] "" LEVERS
- SG_ ErrorFrames : 24|8@1+ (1,0) [0|255] "" LEVERS
- SG_ InvalidSignals : 32|8@1+ (1,0) [0|255] "" LEVERS
- SG_ SendFailures : 40|4@1+ (1,0) [0|15] "" LEVERS
- SG_ Alive : 44|3@1+ (1,0) [0|7] "" LEVERS
- SG_ Check : 55|8@0+ (1,0) [0|255] "" LEVERS
+ SG_ LastFault : 0|8@1+ (1,0) [0|255] "" JOYSTICKS
+ SG_ MissedDeadlines : 8|8@1+ (1,0) [0|255] "" JOYSTICKS
+ SG_ WrongLength : 16|4@1+ (1,0) [0|15] "" JOYSTICKS
+ SG_ UnknownId : 20|4@1+ (1,0) [0|15] "" JOYSTICKS
+ SG_ ErrorFrames : 24|8@1+ (1,0) [0|255] "" JOYSTICKS
+ SG_ InvalidSignals : 32|8@1+ (1,0) [0|255] "" JOYSTICKS
+ SG_ SendFailures : 40|4@1+ (1,0) [0|15] "" JOYSTICKS
+ SG_ Alive : 44|3@1+ (1,0) [0|7] "" JOYSTICKS
+ SG_ Check : 55|8@0+ (1,0) [0|255] "" JOYSTICKS
 
-BO_ 1025 TipPosition: 4 LEVERS
+BO_ 1025 TipPosition: 4 JOYSTICKS
  SG_ Radius : 16|16@1+ (0.001,0) [0|60] "m" SHAPER
 
-BO_ 1026 Short: 1 LEVERS
+BO_ 1026 Short: 1 JOYSTICKS
  SG_ Radius : 0|8@1+ (0.2,0) [0|50] "m" SHAPER
 
-BO_ 1027 Half: 4 LEVERS
+BO_ 1027 Half: 4 JOYSTICKS
  SG_ Radius : 11|13@1+ (0.01,0) [0|60] "m" SHAPER
 
-BO_ 1028 Big: 4 LEVERS
+BO_ 1028 Big: 4 JOYSTICKS
  SG_ Radius : 11|12@0+ (0.02,0) [0|60] "m" SHAPER
 
-BO_ 1029 Beside: 4 LEVERS
+BO_ 1029 Beside: 4 JOYSTICKS
  SG_ Radius : 23|16@0+ (0.001,0) [0|60] "m" SHAPER
 
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
@@ -74,7 +74,7 @@ BA_ "GenMsgCycleTime" BO_ 784 100;
 BA_ "GenMsgCycleTime" BO_ 1025 20;
 """
 
-LEVER = "{ profile: p01, data_id: 0x123, data_id_mode: both }"
+JOYSTICK = "{ profile: p01, data_id: 0x123, data_id_mode: both }"
 STOP = "{ profile: p01, data_id: 0xA42, data_id_mode: nibble }"
 VALVES = f"{{ profile: p02, data_ids: {IDS} }}"
 STATUS = "{ profile: p01, data_id: 0x234, data_id_mode: alternating }"
@@ -83,17 +83,17 @@ RADIUS = "{ profile: p01, data_id: 0x77, data_id_mode: low }"
 YAML = f"""buses:
   crane: {{ interface: socketcan, channel: vcan0 }}
 dbc: [machine.dbc]
-levers:
+joysticks:
   hand:
     bus: crane
-    message: Lever
+    message: Joystick
     timeout_ms: 100
     enable: Enable
-    e2e: {LEVER}
+    e2e: {JOYSTICK}
     qualify: 2
 axes:
   slew:
-    stick: {{ lever: hand, signal: Slew }}
+    command: {{ joystick: hand, signal: Slew }}
     valve:
       bus: crane
       message: Valves
@@ -116,7 +116,7 @@ axes:
         timeout_ms: 100
         e2e: {RADIUS}
   near_far:
-    stick: {{ lever: hand, signal: NearFar }}
+    command: {{ joystick: hand, signal: NearFar }}
     valve:
       bus: crane
       message: Valves

@@ -26,7 +26,7 @@ MESSAGES = ", ".join(sorted(re.findall(r"^BO_ \d+ (\w+)", SHIPPED, re.MULTILINE)
 
 def test_the_shipped_machine_binds(machine: Machine) -> None:
     deployment = machine.load()
-    assert {n: lever.key for n, lever in deployment.levers.items()} == {
+    assert {n: joystick.key for n, joystick in deployment.joysticks.items()} == {
         "left": ("crane", 0x110, False),
         "right": ("crane", 0x111, False),
     }
@@ -40,14 +40,15 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
     [
         # names that are not there, with those that are
         (
-            "message: LeverLeft",
-            "message: LeverLeeft",
-            f"levers.left.message: found 'LeverLeeft', messages of the DBC files are {MESSAGES}",
+            "message: JoystickLeft",
+            "message: JoystickLeeft",
+            f"joysticks.left.message: found 'JoystickLeeft', messages of the DBC files are"
+            f" {MESSAGES}",
         ),
         (
             "signal: Slew,",
             "signal: Sleww,",
-            "axes.slew.stick.signal: found 'Sleww', signals of LeverLeft are"
+            "axes.slew.command.signal: found 'Sleww', signals of JoystickLeft are"
             " Slew, NearFar, Enable, AntiSwayOff, Reset, AliveCounter",
         ),
         (
@@ -61,10 +62,18 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
             "message: Nothing",
             f"axes.slew.status.message: found 'Nothing', messages of the DBC files are {MESSAGES}",
         ),
-        ("bus: crane", "bus: boom", "levers.left.bus: found 'boom', buses are crane"),
-        ("lever: left", "lever: mid", "axes.slew.stick.lever: found 'mid', levers are left, right"),
-        ("enable: Enable", "enable: On", "levers.left.enable: found 'On', signals of LeverLeft"),
-        ("reset: Reset", "reset: R", "levers.left.reset: found 'R', signals of LeverLeft"),
+        ("bus: crane", "bus: boom", "joysticks.left.bus: found 'boom', buses are crane"),
+        (
+            "joystick: left",
+            "joystick: mid",
+            "axes.slew.command.joystick: found 'mid', joysticks are left, right",
+        ),
+        (
+            "enable: Enable",
+            "enable: On",
+            "joysticks.left.enable: found 'On', signals of JoystickLeft",
+        ),
+        ("reset: Reset", "reset: R", "joysticks.left.reset: found 'R', signals of JoystickLeft"),
         ("anti_sway_off: AntiSwayOff", "anti_sway_off: O", "anti_sway_off: found 'O', signals"),
         # one id for two purposes
         (
@@ -74,9 +83,9 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
         ),
         (
             "message: SlewStatus",
-            "message: LeverRight",
-            "axes.slew.status.message: LeverRight has the id 0x111 on bus crane, which is used"
-            " already by levers.right",
+            "message: JoystickRight",
+            "axes.slew.status.message: JoystickRight has the id 0x111 on bus crane, which is used"
+            " already by joysticks.right",
         ),
         # one signal for two purposes: each of these would move the axis by itself
         (
@@ -87,14 +96,14 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
         (
             "anti_sway_off: AntiSwayOff",
             "anti_sway_off: Enable",
-            "levers.left.anti_sway_off: found 'Enable', which is enable already",
+            "joysticks.left.anti_sway_off: found 'Enable', which is enable already",
         ),
         # times and filters
         (
             "timeout_ms: 100",
             "timeout_ms: 39",
-            "levers.left.timeout_ms: found 39, allowed is 40 ms or more: twice the cycle of"
-            " LeverLeft",
+            "joysticks.left.timeout_ms: found 39, allowed is 40 ms or more: twice the cycle of"
+            " JoystickLeft",
         ),
         (
             "a1: 0.708, a2: 0.12",
@@ -112,9 +121,9 @@ def test_what_the_dbc_does_not_have(machine: Machine, old: str, new: str, says: 
 
 def test_one_name_gone_is_one_problem(machine: Machine) -> None:
     machine.in_yaml("message: SlewCommand", "message: Slew")
-    machine.in_yaml("message: LeverRight", "message: Right")
+    machine.in_yaml("message: JoystickRight", "message: Right")
     assert [p.split(": ")[1] for p in machine.problems()] == [
-        "levers.right.message",
+        "joysticks.right.message",
         "axes.slew.valve.message",
     ]
 
@@ -123,25 +132,25 @@ def test_a_stick_that_is_the_enable_switch_too(machine: Machine) -> None:
     machine.in_yaml("enable: Enable", "enable: Slew")
     line = machine.in_yaml("signal: Slew,", "signal: Slew,")
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.stick.signal: found 'Slew', which is enable already"
+        f"machine.yaml:{line}: axes.slew.command.signal: found 'Slew', which is enable already"
     ]
 
 
-def test_two_levers_that_are_one_message(machine: Machine) -> None:
-    line = machine.in_yaml("message: LeverRight", "message: LeverLeft")
+def test_two_joysticks_that_are_one_message(machine: Machine) -> None:
+    line = machine.in_yaml("message: JoystickRight", "message: JoystickLeft")
     assert machine.problems()[0] == (
-        f"machine.yaml:{line}: levers.right.message: LeverLeft has the id 0x110 on bus crane,"
-        " which is used already by levers.left"
+        f"machine.yaml:{line}: joysticks.right.message: JoystickLeft has the id 0x110 on bus crane,"
+        " which is used already by joysticks.left"
     )
 
 
-def test_a_lever_and_a_valve_of_one_id(machine: Machine) -> None:
+def test_a_joystick_and_a_valve_of_one_id(machine: Machine) -> None:
     machine.in_yaml("[machine.dbc]", "[machine.dbc, valve.dbc]")
     line = machine.in_yaml("message: SlewCommand", "message: Valve")
     (machine.directory / "valve.dbc").write_text(VALVE.replace("1536", "273"), encoding="cp1252")
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.slew.valve.message: Valve has the id 0x111 on bus crane,"
-        " which is used already by levers.right"
+        " which is used already by joysticks.right"
     ]
 
 
@@ -189,5 +198,5 @@ def test_an_age_limit_of_less_than_two_ticks_would_make_each_tick_a_standstill(
 ) -> None:
     machine.in_yaml("tick_ms: 20", "tick_ms: 50")
     line = machine.in_yaml("timeout_ms: 100", "timeout_ms: 99")
-    says = "levers.left.timeout_ms: found 99, allowed is 100 ms or more: twice tick_ms"
+    says = "joysticks.left.timeout_ms: found 99, allowed is 100 ms or more: twice tick_ms"
     assert [p for p in machine.problems() if p.endswith(says)] == [f"machine.yaml:{line}: {says}"]

@@ -36,7 +36,7 @@ def test_every_message_of_the_deployment_counts_and_no_other(machine: Machine) -
     deployment = machine.load()
     load = deployment.load("crane")
     assert load is not None
-    used = ("Lever", "Command", "Status", "Identity")
+    used = ("Joystick", "Command", "Status", "Identity")
     cycles = [
         (m.length, m.cycle_time)
         for m in deployment.messages.all()

@@ -58,16 +58,18 @@ def test_a_filter_without_sway_data_stays(machine: Machine) -> None:
 def test_an_axis_with_a_choice_of_filters_stays(machine: Machine) -> None:
     machine.in_yaml(
         STATUS,
-        f"{STATUS}feel: {{ bus: crane, message: LeverRight, timeout_ms: 100,\n"
+        f"{STATUS}profile: {{ bus: crane, message: JoystickRight, timeout_ms: 100,\n"
         "  signal: Rotate, codes: { calm: 1 } }\n",
     )
     machine.in_yaml(
         "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n",
         "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
-        "    feels: { calm: { filter: { kind: gff, a1: 0.9, a2: 0.2 } } }\n",
+        "    profiles: { calm: { filter: { kind: gff, a1: 0.9, a2: 0.2 } } }\n",
     )
     adjustable(machine, "axes.slew.filter.a1: [0.6, 1]")
-    assert any("axis slew has sets or feels" in problem for problem in machine.problems())
+    assert any(
+        "axis slew has a gain schedule or profiles" in problem for problem in machine.problems()
+    )
 
 
 @pytest.mark.parametrize(

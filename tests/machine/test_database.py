@@ -21,7 +21,7 @@ SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
             "machine.dbc:6: not a DBC file that can be used: Invalid syntax at line 6",
         ),
         (
-            'VERSION "1"\n\nBO_ 1 LeverLeft: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n',
+            'VERSION "1"\n\nBO_ 1 JoystickLeft: 1 A\n SG_ S : 0|16@1- (1,0) [0|0] "" A\n',
             "machine.dbc:3: not a DBC file that can be used: The signal S does not fit",
         ),
         (
@@ -71,7 +71,7 @@ def test_a_dbc_file_without_messages(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "number"),
     [
-        ("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft : 2147483920", "2147483920"),
+        ("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft : 2147483920", "2147483920"),
         ("SG_ Slew : 0|16@1-", "SG_ Slew : 100000000|16@1-", "100000000"),
         ("SG_ Slew : 0|16@1-", "SG_ Slew m0: 0 | 100000@1-", "100000"),
     ],
@@ -89,7 +89,7 @@ def test_overlapping_signals_are_told_at_their_message(machine: Machine) -> None
     line = machine.in_dbc("BO_ 272", "BO_ 272")
     assert machine.problems() == [
         f"machine.dbc:{line}: not a DBC file that can be used:"
-        " The signals NearFar and Slew are overlapping in message LeverLeft."
+        " The signals NearFar and Slew are overlapping in message JoystickLeft."
     ]
 
 
@@ -120,11 +120,11 @@ def test_one_id_twice_in_one_file(machine: Machine) -> None:
 
 def test_one_message_in_two_files(machine: Machine) -> None:
     line = machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]") + 5
-    other = 'VERSION ""\n\nBU_: A\n\nBO_ 7 LeverLeft: 1 A\n SG_ S : 0|8@1- (1,0) [0|0] "" A\n'
+    other = 'VERSION ""\n\nBU_: A\n\nBO_ 7 JoystickLeft: 1 A\n SG_ S : 0|8@1- (1,0) [0|0] "" A\n'
     (machine.directory / "other.dbc").write_text(other, encoding="cp1252")
     assert machine.problems() == [
-        f"machine.yaml:{line}: levers.left.message: 'LeverLeft' stands more than once in the DBC"
-        " files: machine.dbc, other.dbc"
+        f"machine.yaml:{line}: joysticks.left.message: 'JoystickLeft' stands more than once in the"
+        " DBC files: machine.dbc, other.dbc"
     ]
 
 
@@ -159,8 +159,8 @@ def test_messages_of_several_files_come_together(machine: Machine) -> None:
     ("changes", "says"),
     [
         (
-            [("LeverLeft: 8", "LeverLeft: 9")],
-            "levers.left.message: LeverLeft has 9 bytes, allowed are 8",
+            [("JoystickLeft: 8", "JoystickLeft: 9")],
+            "joysticks.left.message: JoystickLeft has 9 bytes, allowed are 8",
         ),
         (
             [("SlewCommand: 2", "SlewCommand: 12")],
@@ -168,7 +168,7 @@ def test_messages_of_several_files_come_together(machine: Machine) -> None:
         ),
         (
             [("Slew : 0|16", "Slew m0 : 0|16"), ("Enable : 32", "Enable M : 32")],
-            "levers.left.message: LeverLeft is multiplexed; nothing can be taken from it",
+            "joysticks.left.message: JoystickLeft is multiplexed; nothing can be taken from it",
         ),
         (
             [("Velocity : 0|8", "Velocity m0 : 0|8"), ("Counter : 8|8", "Counter M : 8|8")],
@@ -190,15 +190,20 @@ def test_messages_of_another_kind(
     ("old", "new", "of", "says"),
     [
         # full scale
-        (SLEW_STICK, "Slew : 0|16@1- (0.1,0) [0|0]", "LeverLeft", "Slew has no range in the DBC"),
+        (
+            SLEW_STICK,
+            "Slew : 0|16@1- (0.1,0) [0|0]",
+            "JoystickLeft",
+            "Slew has no range in the DBC",
+        ),
         (
             SLEW_STICK,
             "Slew : 0|16@1- (0.1,0) [-100|102]",
-            "LeverLeft",
+            "JoystickLeft",
             "Slew has the range [-100|102]; allowed is a symmetrical one",
         ),
-        (SLEW_STICK, "Slew : 0|16@1+ (0.1,0) [-100|100]", "LeverLeft", "Slew cannot reach its"),
-        (SLEW_STICK, "Slew : 0|16@1- (0,0) [-100|100]", "LeverLeft", "Slew has a scale of 0"),
+        (SLEW_STICK, "Slew : 0|16@1+ (0.1,0) [-100|100]", "JoystickLeft", "Slew cannot reach its"),
+        (SLEW_STICK, "Slew : 0|16@1- (0,0) [-100|100]", "JoystickLeft", "Slew has a scale of 0"),
         (SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [0|0]", "SlewCommand", "Velocity has no range"),
         (SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [0|100]", "SlewCommand", "the range [0|100]"),
         (
@@ -215,7 +220,7 @@ def test_messages_of_another_kind(
             "Velocity has no raw value for zero",
         ),
         # cycle times
-        ("BO_ 272 20;", "BO_ 272 0;", "LeverLeft", "has no GenMsgCycleTime"),
+        ("BO_ 272 20;", "BO_ 272 0;", "JoystickLeft", "has no GenMsgCycleTime"),
         (
             "BO_ 512 20;",
             "BO_ 512 0;",
@@ -304,7 +309,7 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
                 ("Counter : 56|8@1+", "Counter : 32|32@1-"),
             ],
             "272 AliveCounter",
-            "levers.left.alive_counter: AliveCounter is a float, allowed is an unsigned",
+            "joysticks.left.alive_counter: AliveCounter is a float, allowed is an unsigned",
         ),
     ],
 )
@@ -331,11 +336,16 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "message", "says"),
     [
-        ("Slew : 0|16", "Slew : -1|16", "LeverLeft", "Slew begins at bit -1, allowed is 0 or more"),
+        (
+            "Slew : 0|16",
+            "Slew : -1|16",
+            "JoystickLeft",
+            "Slew begins at bit -1, allowed is 0 or more",
+        ),
         (
             '"GenMsgCycleTime" INT',  # a type that there is not: everything is text
             '"GenMsgCycleTime" nanINT',
-            "LeverLeft",
+            "JoystickLeft",
             "GenMsgCycleTime is '20', allowed is a whole number of ms",
         ),
     ],

@@ -244,7 +244,7 @@ def test_a_message_too_long_for_any_protocol_is_not_compared(machine: Machine) -
 
 def test_an_id_that_a_used_message_has_is_a_problem(machine: Machine) -> None:
     line = machine.in_dbc("CM_ ", OTHER.replace("BO_ 5", "BO_ 272") + "\nCM_ ")
-    assert machine.problems() == [f"machine.dbc:{line}: Other: has the id 0x110 of LeverLeft"]
+    assert machine.problems() == [f"machine.dbc:{line}: Other: has the id 0x110 of JoystickLeft"]
 
 
 def test_all_warnings_are_counted_and_the_first_kept(machine: Machine) -> None:
@@ -402,7 +402,7 @@ def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.Monk
         most = {"MOST_PARSED": count, "MOST_WORDS": count // 3, "MOST_PAYLOAD": 200}[name]
         monkeypatch.setattr(dbc_parse, name, most)
     machine.load()
-    machine.in_dbc("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft: 208")
+    machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 208")
     (problem,) = machine.problems()
     assert problem.endswith("bytes in its messages, allowed are 200 at most")
     monkeypatch.setattr(dbc_parse, "MOST_WORDS", 10)

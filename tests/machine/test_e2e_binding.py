@@ -9,7 +9,7 @@ from canshaper.codec.e2e import Profile1, Profile2
 from canshaper.codec.protection import Protection
 from tests.machine.protected_machine import (
     IDS,
-    LEVER,
+    JOYSTICK,
     RADIUS,
     STATUS,
     VALVES,
@@ -26,9 +26,9 @@ VALVE_OF = {
 
 def test_every_message_has_its_protection(tmp_path: Path) -> None:
     deployment = load(tmp_path)
-    lever = deployment.levers["hand"].protection
-    assert (lever.counter, lever.counts) == (None, 15)
-    assert isinstance(lever.check, Profile1)
+    joystick = deployment.joysticks["hand"].protection
+    assert (joystick.counter, joystick.counts) == (None, 15)
+    assert isinstance(joystick.check, Profile1)
     slew, near_far = deployment.axes.values()
     assert slew.valve.message is near_far.valve.message
     valves = slew.valve.message.sender.protection
@@ -54,42 +54,46 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
     ("old", "new", "says"),
     [
         # the section itself
-        (LEVER, "{ profile: p05, data_id: 1 }", ".profile: found 'p05', allowed is 'p01' or 'p02'"),
-        (LEVER, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
         (
-            LEVER,
+            JOYSTICK,
+            "{ profile: p05, data_id: 1 }",
+            ".profile: found 'p05', allowed is 'p01' or 'p02'",
+        ),
+        (JOYSTICK, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
+        (
+            JOYSTICK,
             "{ profile: p01, data_id: 1 }",
             ": found data_id; profile p01 needs data_id and data_id_mode",
         ),
         (
-            LEVER,
+            JOYSTICK,
             "{ profile: p01, data_id_mode: low }",
             ": found data_id_mode; profile p01 needs data_id and data_id_mode",
         ),
-        (LEVER, "{ profile: p02 }", ": found no data ID; profile p02 needs data_ids"),
+        (JOYSTICK, "{ profile: p02 }", ": found no data ID; profile p02 needs data_ids"),
         (
-            LEVER,
+            JOYSTICK,
             "{ profile: p02, data_id: 1, data_id_mode: low }",
             ": found data_id and data_id_mode; profile p02 needs data_ids",
         ),
         (
-            LEVER,
+            JOYSTICK,
             f"{{ profile: p01, data_id: 1, data_id_mode: low, data_ids: {IDS} }}",
             ": found data_id and data_id_mode and data_ids; profile p01 needs data_id and",
         ),
         (
-            LEVER,
+            JOYSTICK,
             f"{{ profile: p02, data_ids: {IDS[:15]} }}",
             ".data_ids: found [16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30],"
             " allowed are 16 or more entries",
         ),
         (
-            LEVER,
+            JOYSTICK,
             f"{{ profile: p02, data_ids: {[*IDS, 1]} }}",
             "allowed are 16 entries at most",
         ),
         (
-            LEVER,
+            JOYSTICK,
             f"{{ profile: p02, data_ids: {[*IDS[:15], 256]} }}",
             ".data_ids.15: found 256, allowed is a whole number, 0 to 255",
         ),
@@ -118,7 +122,7 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
 )
 def test_what_a_header_may_not_say(tmp_path: Path, old: str, new: str, says: str) -> None:
     (problem,) = problems(tmp_path, (old, new))
-    assert problem.startswith(f"machine.yaml:{line_of('e2e:')}: levers.hand.e2e")
+    assert problem.startswith(f"machine.yaml:{line_of('e2e:')}: joysticks.hand.e2e")
     assert says in problem
 
 
@@ -132,12 +136,12 @@ HEADER = "its header takes the first 12 bits of"
         (
             [("enable: Enable", "enable: Seq")],
             "e2e:",
-            f"levers.hand.e2e: {HEADER} Lever, where Seq lies, which is enable",
+            f"joysticks.hand.e2e: {HEADER} Joystick, where Seq lies, which is enable",
         ),
         (
             [("enable: Enable", "enable: Top"), ("both", "nibble")],
             "e2e:",
-            "levers.hand.e2e: its header takes the first 16 bits of Lever, where Top lies",
+            "joysticks.hand.e2e: its header takes the first 16 bits of Joystick, where Top lies",
         ),
         (
             [
@@ -147,7 +151,7 @@ HEADER = "its header takes the first 12 bits of"
                 )
             ],
             "stick:",
-            "axes.slew.stick.signal: found 'Crc', which is in the header of e2e already",
+            "axes.slew.command.signal: found 'Crc', which is in the header of e2e already",
         ),
         (
             [("message: TipPosition", "message: Short")],
@@ -164,18 +168,18 @@ HEADER = "its header takes the first 12 bits of"
         (
             [("qualify: 2", "alive_counter: Alive")],
             "qualify: 2",
-            "levers.hand.alive_counter: found besides e2e, which has its own; allowed is one",
+            "joysticks.hand.alive_counter: found besides e2e, which has its own; allowed is one",
         ),
         (
             [("qualify: 2", "checksum: { signal: Alive, kind: xor }")],
             "qualify: 2",
-            "levers.hand.checksum: found besides e2e, which has its own; allowed is one",
+            "joysticks.hand.checksum: found besides e2e, which has its own; allowed is one",
         ),
         # the counter of the header
         (
             [("qualify: 2", "alive_max_step: 8")],
             "qualify: 2",
-            "levers.hand.alive_max_step: is 8, allowed is up to 7: its counter has 15 values",
+            "joysticks.hand.alive_max_step: is 8, allowed is up to 7: its counter has 15 values",
         ),
         # axes that share a message
         (
@@ -247,7 +251,7 @@ def test_one_bit_of_a_signal_in_the_header_is_too_many(
         ("alive_counter: NearFar", "alive_counter: NearFar has a sign, allowed is an unsigned"),
         ("checksum: { signal: Low, kind: xor }", "Low is no unsigned byte of its own"),
         (
-            f"e2e: {LEVER.replace('both', 'nibble')}\n"
+            f"e2e: {JOYSTICK.replace('both', 'nibble')}\n"
             "      direction: { signal: Low, neutral: 0, positive: 1, negative: 2 }",
             "direction.signal: found 'Low', which is in the header of e2e already",
         ),

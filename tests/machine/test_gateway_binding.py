@@ -17,7 +17,7 @@ from canshaper.protocols.gateway.passing import EFF
 from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
 
 ROOT = Path(__file__).parents[2]
-SLEW = "bus: machine, message: LeverLeft, signal: Slew, timeout_ms: 200,"
+SLEW = "bus: machine, message: JoystickLeft, signal: Slew, timeout_ms: 200,"
 COUNTER = "alive_counter: AliveCounter"
 
 
@@ -49,19 +49,20 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("[levers, machine]", "[levers, levers]", "has levers twice"),
-        ("[levers, machine]", "[levers, crane]", "found 'crane', buses are levers, machine"),
-        ("passing: kernel", "passing: daemon", "only passing: kernel can do"),
+        ("[joysticks, machine]", "[joysticks, joysticks]", "has joysticks twice"),
+        ("[joysticks, machine]", "[joysticks, crane]",
+         "found 'crane', buses are joysticks, machine"),
+        ("forwarding: kernel", "forwarding: daemon", "only forwarding: kernel can do"),
         ("fallback: neutral", "fallback: neutral\n  blocked: [Nobody]", "found 'Nobody'"),
         (SLEW, SLEW.replace("Slew", "NearFar"), "allowed is that of the stick, 'Slew'"),
-        (f"{SLEW} {COUNTER}", f"{SLEW}", "alive_counter: differs from that of lever left"),
-        (SLEW, SLEW.replace("200", "100"), "more than the 100 ms of lever left"),
+        (f"{SLEW} {COUNTER}", f"{SLEW}", "alive_counter: differs from that of joystick left"),
+        (SLEW, SLEW.replace("200", "100"), "more than the 100 ms of joystick left"),
         (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
-         "direction: found in the message of lever left"),
+         "direction: found in the message of joystick left"),
         (f"{SLEW} {COUNTER}",
          "bus: machine, message: SlewCommand, signal: Velocity, timeout_ms: 200",
          "with this stick unshaped in them"),
-        ("lever: left, signal: Slew", "lever: right, signal: Rotate",
+        ("joystick: left, signal: Slew", "joystick: right, signal: Rotate",
          "whose frames leave with its own sticks"),
     ],
 )  # fmt: skip
@@ -70,7 +71,7 @@ def test_what_cannot_be_is_told(tmp_path: Path, old: str, new: str, told: str) -
     assert any(told in problem for problem in found), found
 
 
-def test_a_fallback_needs_a_lever_that_is_passed_on(tmp_path: Path) -> None:
+def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
     text = (ROOT / "config" / "forwarder.yaml").read_text()
     text = text.replace("../dbc", str(ROOT / "dbc")).replace(
         "\ndbc:", "  far: { interface: socketcan, channel: vcan1 }\n"
@@ -78,7 +79,7 @@ def test_a_fallback_needs_a_lever_that_is_passed_on(tmp_path: Path) -> None:
     )  # fmt: skip
     file = tmp_path / "machine.yaml"
     file.write_text(text)
-    with pytest.raises(DeploymentError, match="no valve has the message of a lever"):
+    with pytest.raises(DeploymentError, match="no valve has the message of a joystick"):
         load_deployment(file)
 
 
@@ -108,7 +109,7 @@ def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -
     assert load(tmp_path, *changes, ("fallback: neutral", "fallback: stop"), dbc=dbc)
 
 
-def test_rules_pass_what_is_not_ours_and_neutral_levers(tmp_path: Path) -> None:
+def test_rules_pass_what_is_not_ours_and_neutral_joysticks(tmp_path: Path) -> None:
     deployment = load(tmp_path)
     ours = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310, 0x311}
     assert {p.value for p in excluded(deployment)} == ours
@@ -124,7 +125,7 @@ def test_rules_pass_what_is_not_ours_and_neutral_levers(tmp_path: Path) -> None:
     assert right.changes[0][1][8:16] == b"\0\0\xff\xff\xff\xff\xff\xff"
 
 
-def test_without_a_fallback_there_is_no_rule_for_a_lever(tmp_path: Path) -> None:
+def test_without_a_fallback_there_is_no_rule_for_a_joystick(tmp_path: Path) -> None:
     assert fallback_rules(load(tmp_path, ("fallback: neutral", "fallback: stop"))) == []
 
 
@@ -150,11 +151,11 @@ def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_pat
     """Magnitude and flags are ours, the address is the joystick's, who is not on that bus."""
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
     found = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
-    lever = next(iter(found.config.levers))
-    axis = next(a for a in found.config.axes.values() if a.stick.lever == lever)
-    assert axis.stick.flags
-    flags = axis.stick.flags
-    message = found.levers[lever].message
+    joystick = next(iter(found.config.joysticks))
+    axis = next(a for a in found.config.axes.values() if a.command.joystick == joystick)
+    assert axis.command.flags
+    flags = axis.command.flags
+    message = found.joysticks[joystick].message
     file = tmp_path / "machine.yaml"
     file.write_text(f"""
 buses:
@@ -162,14 +163,14 @@ buses:
   far: {{ interface: socketcan, channel: vcan1 }}
 dbc: [{", ".join(str((ROOT / "config" / d).resolve()) for d in found.config.dbc)}]
 gateway: {{ between: [near, far], fallback: neutral }}
-levers:
+joysticks:
   left: {{ bus: near, message: {message.name}, timeout_ms: 100, source: 51,
-    enable: {found.config.levers[lever].enable} }}
+    enable: {found.config.joysticks[joystick].enable} }}
 axes:
   slew:
-    stick: {{ lever: left, signal: {axis.stick.signal}, flags: {{ neutral: {flags.neutral},
+    command: {{ joystick: left, signal: {axis.command.signal}, flags: {{ neutral: {flags.neutral},
       positive: {flags.positive}, negative: {flags.negative} }} }}
-    valve: {{ bus: far, message: {message.name}, signal: {axis.stick.signal}, timeout_ms: 200 }}
+    valve: {{ bus: far, message: {message.name}, signal: {axis.command.signal}, timeout_ms: 200 }}
     filter: {{ kind: 'off' }}
 """)
     assert text
@@ -177,7 +178,7 @@ axes:
     sent = deployment.axes["slew"].valve.message
     assert isinstance(sent, RewrittenMessage)
     assert sent.sender.key[1] & 0xFF == 51
-    assert sent.ours == {axis.stick.signal, flags.neutral, flags.positive, flags.negative}
+    assert sent.ours == {axis.command.signal, flags.neutral, flags.positive, flags.negative}
     group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
     assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF
     assert group.mask == 0x03FFFFFF | EFF
@@ -193,14 +194,16 @@ axes:
     )
     assert isinstance(values, dict)
     assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (0, 0, 1)
-    assert values[axis.stick.signal] == pytest.approx(100.0, abs=0.5)
+    assert values[axis.command.signal] == pytest.approx(100.0, abs=0.5)
 
 
 def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path: Path) -> None:
-    """A lever and a valve of J1939 with a destination: what is theirs at one priority is at all."""
+    """A joystick and a valve of J1939 with a destination: what is theirs once is theirs at all."""
     dbc = (ROOT / "dbc" / "j1939-bjm-avc.dbc").read_text("cp1252")
-    lever, valve = 0x0CEF2733, 0x0CEF3000
-    dbc = dbc.replace("2365445886", str(lever | EFF)).replace("2365468926", str(valve | 0xFE | EFF))
+    joystick, valve = 0x0CEF2733, 0x0CEF3000
+    dbc = dbc.replace("2365445886", str(joystick | EFF)).replace(
+        "2365468926", str(valve | 0xFE | EFF)
+    )
     (tmp_path / "machine.dbc").write_text(dbc, "cp1252")
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
     text = text.replace("../dbc/j1939-bjm-avc.dbc", "machine.dbc").replace(
@@ -214,7 +217,7 @@ def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path:
     assert own is not None
     rules = passing_rules(deployment)
     for priority in range(8):
-        for can_id in (lever, valve | own.address):
+        for can_id in (joystick, valve | own.address):
             word = can_id & 0x03FFFFFF | priority << 26 | EFF
             assert not [rule for rule in rules if rule.pattern.fits(word)], hex(word)
         other = 0x00EF2744 | priority << 26 | EFF

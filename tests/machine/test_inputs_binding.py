@@ -1,4 +1,4 @@
-"""Protection of levers and the emergency stop in a deployment: every problem with file and line."""
+"""Protection of joysticks and emergency stop in a deployment: each problem with file and line."""
 
 import pytest
 
@@ -10,13 +10,13 @@ from tests.codec.checksum_reference import PLACES
 from tests.rigs.files import Machine
 
 COUNTER = "alive_counter: AliveCounter"
-# Signals that the tests add to the left lever, in bytes that it does not use.
+# Signals that the tests add to the left joystick, in bytes that it does not use.
 SIGNALS = """ SG_ Check : 48|8@1+ (1,0) [0|255] "" SHAPER
  SG_ Half : 40|4@1+ (1,0) [0|15] "" SHAPER
  SG_ Count2 : 44|2@1+ (1,0) [0|3] "" SHAPER
  SG_ Count1 : 46|1@1+ (1,0) [0|1] "" SHAPER
 """
-STOP_DBC = """BO_ 64 Stop: 8 LEVERS
+STOP_DBC = """BO_ 64 Stop: 8 JOYSTICKS
  SG_ Pressed : 0|2@1+ (1,0) [0|3] "" SHAPER
  SG_ Count : 8|4@1+ (1,0) [0|15] "" SHAPER
  SG_ Check : 16|8@1+ (1,0) [0|255] "" SHAPER
@@ -28,7 +28,7 @@ STOP = "emergency_stop: { bus: crane, message: Stop, signal: Pressed, timeout_ms
 
 @pytest.fixture
 def protected(machine: Machine) -> Machine:
-    """The shipped machine with room for a checksum in the left lever."""
+    """The shipped machine with room for a checksum in the left joystick."""
     last = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'
     machine.in_dbc(last, last + SIGNALS)
     return machine
@@ -44,8 +44,8 @@ def stoppable(machine: Machine) -> Machine:
     return machine
 
 
-def lever(machine: Machine, *lines: str) -> int:
-    """Add lines to the left lever; the number of the first of them."""
+def joystick(machine: Machine, *lines: str) -> int:
+    """Add lines to the left joystick; the number of the first of them."""
     return machine.in_yaml(COUNTER, "\n    ".join((COUNTER, *lines))) + 1
 
 
@@ -55,30 +55,30 @@ def stop(machine: Machine, text: str) -> int:
     return machine.in_yaml(last, f"{text}\n{last}")
 
 
-# -- levers ----------------------------------------------------------------------------------------
+# -- joysticks ------------------------------------------------------------------------------------
 
 
-def test_a_lever_without_protection(machine: Machine) -> None:
+def test_a_joystick_without_protection(machine: Machine) -> None:
     machine.in_yaml(COUNTER, "")
-    bound = machine.load().levers["left"]
+    bound = machine.load().joysticks["left"]
     assert bound.protection == UNPROTECTED
     config = bound.config
-    assert (config.alive_max_step, config.qualify, config.frozen_s) == (None, 1, 20.0)
+    assert (config.alive_max_step, config.qualify, config.stuck_s) == (None, 1, 20.0)
 
 
 @pytest.mark.parametrize("kind", CHECKSUMS)
-def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
+def test_a_joystick_with_everything(protected: Machine, kind: str) -> None:
     place = PLACES[CHECKSUMS[kind].bits]
     protected.in_dbc(SIGNALS, f' SG_ Check : {place} (1,0) [0|1] "" SHAPER\n')
-    lever(
+    joystick(
         protected,
         f"checksum: {{ signal: Check, kind: {kind} }}",
         "alive_max_step: 128",
         "qualify: 20",
-        "frozen_s: 3600",
+        "stuck_s: 3600",
     )
     deployment = protected.load()
-    left, right = deployment.levers.values()
+    left, right = deployment.joysticks.values()
     byte = int(place.partition("|")[0]) // 8
     assert left.protection == Protection("AliveCounter", 256, Checksum(kind, byte))
     check = left.protection.check
@@ -94,8 +94,8 @@ def test_a_lever_with_everything(protected: Machine, kind: str) -> None:
 )
 def test_a_checksum_in_either_byte_order(protected: Machine, signal: str, byte: int) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|255] "" SHAPER\n')
-    lever(protected, "checksum: { signal: Check, kind: xor }")
-    assert protected.load().levers["left"].protection.check == Checksum("xor", byte)
+    joystick(protected, "checksum: { signal: Check, kind: xor }")
+    assert protected.load().joysticks["left"].protection.check == Checksum("xor", byte)
 
 
 @pytest.mark.parametrize(
@@ -104,10 +104,10 @@ def test_a_checksum_in_either_byte_order(protected: Machine, signal: str, byte: 
 )
 def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
-    line = lever(protected, "checksum: { signal: Check, kind: xor }")
+    line = joystick(protected, "checksum: { signal: Check, kind: xor }")
     assert protected.problems() == [
-        f"machine.yaml:{line}: levers.left.checksum.signal: Check is no unsigned byte of its own;"
-        " allowed is one that is"
+        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check is no unsigned byte of its own"
+        "; allowed is one that is"
     ]
 
 
@@ -124,8 +124,8 @@ def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
 )
 def test_a_checksum_of_another_width(protected: Machine, signal: str, place: Checksum) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
-    lever(protected, f"checksum: {{ signal: Check, kind: {place.kind} }}")
-    assert protected.load().levers["left"].protection.check == place
+    joystick(protected, f"checksum: {{ signal: Check, kind: {place.kind} }}")
+    assert protected.load().joysticks["left"].protection.check == place
 
 
 @pytest.mark.parametrize(
@@ -146,10 +146,10 @@ def test_a_checksum_that_fills_no_such_part(
     protected: Machine, kind: str, signal: str, part: str
 ) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
-    line = lever(protected, f"checksum: {{ signal: Check, kind: {kind} }}")
+    line = joystick(protected, f"checksum: {{ signal: Check, kind: {kind} }}")
     assert protected.problems() == [
-        f"machine.yaml:{line}: levers.left.checksum.signal: Check is no unsigned {part} of its own;"
-        " allowed is one that is"
+        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check is no unsigned {part} of its"
+        " own; allowed is one that is"
     ]
 
 
@@ -159,10 +159,10 @@ def test_an_algorithm_that_fails_is_a_problem_of_the_file(
     """Not of the first tick."""
     row = ChecksumKind("", 8, lambda _id, _place, data: data[99])
     monkeypatch.setitem(CHECKSUMS, "fails", row)
-    line = lever(protected, "checksum: { signal: Check, kind: fails }")
+    line = joystick(protected, "checksum: { signal: Check, kind: fails }")
     assert protected.problems() == [
-        f"machine.yaml:{line}: levers.left.checksum.kind: found 'fails', which fails on LeverLeft:"
-        " IndexError: index out of range"
+        f"machine.yaml:{line}: joysticks.left.checksum.kind: found 'fails', which fails on"
+        " JoystickLeft: IndexError: index out of range"
     ]
 
 
@@ -171,37 +171,41 @@ def test_an_algorithm_that_fails_is_a_problem_of_the_file(
     [
         (
             "checksum: { signal: Crc, kind: xor }",
-            "levers.left.checksum.signal: found 'Crc', signals of LeverLeft are Slew, NearFar,"
-            " Enable, AntiSwayOff, Reset, Half, Count2, Count1, Check, AliveCounter",
+            "joysticks.left.checksum.signal: found 'Crc', signals of JoystickLeft are Slew,"
+            " NearFar, Enable, AntiSwayOff, Reset, Half, Count2, Count1, Check, AliveCounter",
         ),
         (
             "checksum: { signal: Check, kind: crc8 }",
-            "levers.left.checksum.kind: found 'crc8', allowed is"
+            "joysticks.left.checksum.kind: found 'crc8', allowed is"
             f" {', '.join(map(repr, [*CHECKSUMS][:-1]))} or {[*CHECKSUMS][-1]!r}",
         ),
-        ("checksum: { signal: Check }", "levers.left.checksum.kind: "),
-        ("checksum: { kind: xor }", "levers.left.checksum.signal: "),
-        ("checksum: { signal: Check, kind: xor, byte: 6 }", "levers.left.checksum.byte: "),
+        ("checksum: { signal: Check }", "joysticks.left.checksum.kind: "),
+        ("checksum: { kind: xor }", "joysticks.left.checksum.signal: "),
+        ("checksum: { signal: Check, kind: xor, byte: 6 }", "joysticks.left.checksum.byte: "),
         (
             "checksum: { signal: AliveCounter, kind: xor }",
-            "levers.left.checksum.signal: found 'AliveCounter', which is alive_counter already",
+            "joysticks.left.checksum.signal: found 'AliveCounter', which is alive_counter already",
         ),
         (
             "alive_max_step: 129",
-            "levers.left.alive_max_step: is 129, allowed is up to 128: its counter has 256 values",
+            "joysticks.left.alive_max_step: is 129, allowed is up to 128: its counter has 256"
+            " values",
         ),
-        ("alive_max_step: 0", "levers.left.alive_max_step: found 0, allowed is a whole number,"),
-        ("alive_max_step: 256", "levers.left.alive_max_step: found 256, allowed is a whole"),
-        ("alive_max_step: 1.5", "levers.left.alive_max_step: found 1.5, allowed is a whole"),
-        ("qualify: 0", "levers.left.qualify: found 0, allowed is a whole number, 1 to 20 messages"),
-        ("qualify: 21", "levers.left.qualify: found 21, allowed is a whole number, 1 to 20"),
-        ("frozen_s: 0.9", "levers.left.frozen_s: found 0.9, allowed is 1 to 3600 s"),
-        ("frozen_s: 3601", "levers.left.frozen_s: found 3601, allowed is 1 to 3600 s"),
-        ("alive_step: 3", "levers.left.alive_step: "),
+        ("alive_max_step: 0", "joysticks.left.alive_max_step: found 0, allowed is a whole number,"),
+        ("alive_max_step: 256", "joysticks.left.alive_max_step: found 256, allowed is a whole"),
+        ("alive_max_step: 1.5", "joysticks.left.alive_max_step: found 1.5, allowed is a whole"),
+        (
+            "qualify: 0",
+            "joysticks.left.qualify: found 0, allowed is a whole number, 1 to 20 messages",
+        ),
+        ("qualify: 21", "joysticks.left.qualify: found 21, allowed is a whole number, 1 to 20"),
+        ("stuck_s: 0.9", "joysticks.left.stuck_s: found 0.9, allowed is 1 to 3600 s"),
+        ("stuck_s: 3601", "joysticks.left.stuck_s: found 3601, allowed is 1 to 3600 s"),
+        ("alive_step: 3", "joysticks.left.alive_step: "),
     ],
 )
-def test_what_a_lever_may_not_say(protected: Machine, text: str, says: str) -> None:
-    line = lever(protected, text)
+def test_what_a_joystick_may_not_say(protected: Machine, text: str, says: str) -> None:
+    line = joystick(protected, text)
     (problem,) = protected.problems()
     assert problem.startswith(f"machine.yaml:{line}: {says}")
 
@@ -211,7 +215,7 @@ def test_what_a_lever_may_not_say(protected: Machine, text: str, says: str) -> N
 )
 def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, usual: int) -> None:
     protected.in_yaml(COUNTER, f"alive_counter: {counter}")
-    bound = protected.load().levers["left"]
+    bound = protected.load().joysticks["left"]
     for step in range(1, bound.protection.counts):
         guard = bound.guard()
         assert guard.judge(b"", 0) is FrameFault.NONE
@@ -227,7 +231,7 @@ def test_a_step_is_at_most_half_of_the_counters_range(
 ) -> None:
     """A step back must not look like one forward."""
     protected.in_yaml(COUNTER, f"alive_counter: {counter}\n    alive_max_step: {most}")
-    assert protected.load().levers["left"].config.alive_max_step == most
+    assert protected.load().joysticks["left"].config.alive_max_step == most
     protected.in_yaml(f"alive_max_step: {most}", f"alive_max_step: {most + 1}")
     (problem,) = protected.problems()
     values = {1: 2, 2: 4, 8: 16, 128: 256}[most]
@@ -240,12 +244,12 @@ def test_a_stick_that_is_protection_too(protected: Machine, key: str) -> None:
     """A stick that counts up with every frame would move the axis by itself."""
     protected.in_dbc(SIGNALS, ' SG_ Check : 48|8@1- (1,0) [-100|100] "" SHAPER\n')
     use = {"checksum": "checksum: { signal: Check, kind: sum }", "alive_counter": "qualify: 1"}
-    lever(protected, use[key])
+    joystick(protected, use[key])
     if key == "alive_counter":
         protected.in_yaml(COUNTER, "alive_counter: Check")
     line = protected.in_yaml("signal: Slew,", "signal: Check,")
     problems = protected.problems()
-    wanted = f"axes.slew.stick.signal: found 'Check', which is {key} already"
+    wanted = f"axes.slew.command.signal: found 'Check', which is {key} already"
     assert f"machine.yaml:{line}: {wanted}" in problems
 
 
@@ -254,10 +258,11 @@ def test_a_switch_that_is_protection_too(protected: Machine, key: str) -> None:
     signal = {"enable": "Enable", "reset": "Reset", "anti_sway_off": "AntiSwayOff"}[key]
     line = protected.in_yaml(COUNTER, f"alive_counter: {signal}\n    alive_max_step: 2")
     assert protected.problems() == [
-        f"machine.yaml:{line}: levers.left.alive_counter: found '{signal}', which is {key} already"
+        f"machine.yaml:{line}: joysticks.left.alive_counter: found '{signal}', which is {key}"
+        " already"
     ]
     protected.in_yaml(f"alive_counter: {signal}", f"checksum: {{ signal: {signal}, kind: xor }}")
-    wanted = f"levers.left.checksum.signal: found '{signal}', which is {key} already"
+    wanted = f"joysticks.left.checksum.signal: found '{signal}', which is {key} already"
     assert f"machine.yaml:{line}: {wanted}" in protected.problems()
 
 
@@ -278,8 +283,8 @@ def test_a_counter_that_cannot_count(machine: Machine, signal: str, says: str) -
                 if not row.startswith(f"VAL_ 272 {switch}")
             )
     machine.in_dbc("AliveCounter : 56|8@1+", f"AliveCounter : {signal}")
-    line = lever(machine) - 1
-    assert f"machine.yaml:{line}: levers.left.alive_counter: {says}, allowed is an unsigned" in (
+    line = joystick(machine) - 1
+    assert f"machine.yaml:{line}: joysticks.left.alive_counter: {says}, allowed is an unsigned" in (
         "\n".join(machine.problems())
     )
 
@@ -338,7 +343,7 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
             f"{STOP}, alive_counter: Check, checksum: {{ signal: Check, kind: xor }}",
             "emergency_stop.checksum.signal: found 'Check', which is alive_counter already",
         ),
-        (f"{STOP}, frozen_s: 5", "emergency_stop.frozen_s: "),
+        (f"{STOP}, stuck_s: 5", "emergency_stop.stuck_s: "),
         (f"{STOP}, enable: Pressed", "emergency_stop.enable: "),
         (
             STOP.replace("Stop", "SlewCommand").replace("Pressed", "Velocity"),
@@ -346,9 +351,9 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
             " already by axes.slew.valve",
         ),
         (
-            STOP.replace("Stop", "LeverLeft").replace("Pressed", "Reset"),
-            "emergency_stop.message: LeverLeft has the id 0x110 on bus crane, which is used already"
-            " by levers.left",
+            STOP.replace("Stop", "JoystickLeft").replace("Pressed", "Reset"),
+            "emergency_stop.message: JoystickLeft has the id 0x110 on bus crane, which is used"
+            " already by joysticks.left",
         ),
     ],
 )
@@ -372,8 +377,8 @@ def test_an_emergency_stop_without_a_cycle_is_a_problem_of_the_dbc(stoppable: Ma
     assert stoppable.problems() == [f"machine.dbc:{line}: Stop: has no GenMsgCycleTime"]
 
 
-def test_problems_of_levers_and_stop_are_told_together(stoppable: Machine) -> None:
+def test_problems_of_joysticks_and_stop_are_told_together(stoppable: Machine) -> None:
     stoppable.in_yaml("enable: Enable", "enable: On")
     stop(stoppable, STOP.replace("Pressed", "Button").replace("100", "20") + " }")
     places = [p.split(": ")[1] for p in stoppable.problems()]
-    assert places == ["levers.left.enable", "emergency_stop.timeout_ms", "emergency_stop.signal"]
+    assert places == ["joysticks.left.enable", "emergency_stop.timeout_ms", "emergency_stop.signal"]

@@ -39,7 +39,7 @@ def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
 
 def test_a_fault_is_at_its_line(machine: Machine, text: str) -> None:
     machine.dbc = text
-    line = machine.in_dbc("BO_ 272 LeverLeft: 8", "BO_ 272 LeverLeft: 1")
+    line = machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 1")
     assert line > COUNT * 10
     (problem,) = machine.problems()
     assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: The signal")

@@ -65,7 +65,10 @@ def measured(**changes: str) -> str:
         (measured(signal="Reach"), ".radius.signal: found 'Reach', signals of TipPosition are"),
         (measured(message="Tip"), ".radius.message: found 'Tip', messages of the DBC files are"),
         (measured(bus="boom"), ".radius.bus: found 'boom', buses are crane"),
-        (measured(message="LeverLeft", signal="Slew"), "which is used already by levers.left"),
+        (
+            measured(message="JoystickLeft", signal="Slew"),
+            "which is used already by joysticks.left",
+        ),
         (measured(timeout_ms="30"), ".radius.timeout_ms: found 30, allowed is 40 ms or more"),
         (measured(timeout_ms="5"), ".radius.timeout_ms: found 5, allowed is a whole number, 10 to"),
     ],
@@ -75,8 +78,8 @@ def test_what_does_not_fit_is_told_with_its_line(machine: Machine, text: str, sa
     found = machine.problems()
     assert says in found[0]
     assert found[0].startswith(f"machine.yaml:{line}: axes.slew.radial_compensation")
-    # the signal of a lever is no radius either
-    assert len(found) == (2 if "LeverLeft" in text else 1)
+    # the signal of a joystick is no radius either
+    assert len(found) == (2 if "JoystickLeft" in text else 1)
 
 
 def test_an_axis_without_sway_data_of_its_own_cannot_compensate(machine: Machine) -> None:

@@ -13,7 +13,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import script_named
 
 START_NS = 1_763_750_000_000_000_000
@@ -27,10 +27,10 @@ class Hardness:
         think_ns: from reading to the valve frame, at most.
         late_ns: of a usual tick, at most.
         miss: how probable it is that a tick misses deadlines.
-        lever_phase_ns: when a joystick frame comes after the deadline of a tick.
-        drift: of the lever's clock against the daemon's.
-        before_s: seconds that the levers run before the daemon starts.
-        silent: from when to when after its start the levers send nothing, s.
+        joystick_phase_ns: when a joystick frame comes after the deadline of a tick.
+        drift: of the joystick's clock against the daemon's.
+        before_s: seconds that the joysticks run before the daemon starts.
+        silent: from when to when after its start the joysticks send nothing, s.
         stands_s: when the loop stands still for a fifth of a second.
         reload: when its files are read again, and how long a bus takes to open then, s.
     """
@@ -38,7 +38,7 @@ class Hardness:
     think_ns: int = 200_000
     late_ns: int = 100_000
     miss: float = 0.0
-    lever_phase_ns: int = 7_000_000
+    joystick_phase_ns: int = 7_000_000
     drift: float = 0.0
     before_s: float = 1.0
     silent: tuple[float, float] = (0.0, 0.0)
@@ -69,7 +69,7 @@ def log_of(
         can_id = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
         lines.append((time_ns // 1000, next(order), f"{text}{can_id}#{frame.data.hex().upper()}\n"))
 
-    frames = _levers(load(), seed, chance, hardness, seconds=seconds, script=script)
+    frames = _joysticks(load(), seed, chance, hardness, seconds=seconds, script=script)
     begin_ns = round(hardness.before_s * 1e9)
     for at_ns, frame in frames:
         logged(at_ns, frame)
@@ -124,7 +124,7 @@ def _read(
         yield frame, at_ns if stamped else min(before_ns, now_ns)
 
 
-def _levers(
+def _joysticks(
     deployment: Deployment,
     seed: int,
     chance: random.Random,
@@ -134,13 +134,15 @@ def _levers(
     script: str | None,
 ) -> list[tuple[int, Frame]]:
     """What the joysticks send, and when."""
-    levers = LeverNode(deployment, script_named(script or f"random-{seed}", list(deployment.axes)))
+    joysticks = JoystickNode(
+        deployment, script_named(script or f"random-{seed}", list(deployment.axes))
+    )
     frames: list[tuple[int, Frame]] = []
-    for number in range(round((seconds + hardness.before_s) * 1000 / levers.cycle_ms)):
-        at_ns = round(number * levers.cycle_ms * 1e6 * (1 + hardness.drift))
-        at_ns += hardness.lever_phase_ns + chance.randrange(50_000)
+    for number in range(round((seconds + hardness.before_s) * 1000 / joysticks.cycle_ms)):
+        at_ns = round(number * joysticks.cycle_ms * 1e6 * (1 + hardness.drift))
+        at_ns += hardness.joystick_phase_ns + chance.randrange(50_000)
         quiet = hardness.silent[0] <= at_ns / 1e9 - hardness.before_s < hardness.silent[1]
-        for frame in levers.frames(number * levers.cycle_ms):
+        for frame in joysticks.frames(number * joysticks.cycle_ms):
             at_ns += 60_000
             if not quiet:
                 frames.append((at_ns, frame))

@@ -105,7 +105,7 @@ def test_a_bundle_is_replayed_with_its_own_deployment(tmp_path: Path) -> None:
     ("rows", "text"),
     [
         ("", "found no data frame"),
-        ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (LeverLeft"),
+        ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (JoystickLeft"),
         ("(1.0) can3 110#00\n(2.0) can4 110#00\n", "bus crane: found the channels 'can3', 'can4'"),
         ("(2.0) vcan0 110#00\n(1.0) vcan0 110#00\n", "found mixed clocks: a time 1.000 s before"),
         ("nothing\n", "x.log:1: found 'nothing', allowed is a line of candump -L"),

@@ -124,7 +124,7 @@ Begin Triggerblock Sat Nov 21 10:15:30.400 am 2026
    0.255000 CANFD   2 Rx ErrorFrame   Not Acknowledge error, dominant error flag   fffe c7 31ca Rx
    0.260000 2  7FF             Rx   r 3
    0.300000 1  Statistic: D 1 R 0 XD 0 XR 0 E 0 O 0 B 0.00%
-   0.300000 CANFD   2 Rx        111                       Lever 0 0 8  3 01 02 03   0    0   0 0 0 0
+   0.300000 CANFD   2 Rx        111                    Joystick 0 0 8  3 01 02 03   0    0   0 0 0 0
    0.310000 CANFD   2 Rx        112                           0 0 2  2 01 02   120000  130   0 0 0 0
    0.320000 CANFD   2 Rx        113                           1 0 2  2 01 02   120000  130   3000 0
    0.330000 CANFD   2 Rx        113                  1 0 9 12 1 2 3 4 5 6 7 8 9 A B C  120 130 3000
@@ -237,7 +237,7 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         ("a.log", "(1.0) can0 110#R\n", "found no data frame"),
         ("a.log", "x" * 70_000, "65536 bytes without a line end"),
         ("a.asc", "base hex timestamps relative\n", "found times relative to the line before"),
-        ("a.asc", "1.0 1 Lever Rx d 1 01\n", "allowed is a line of an ASC log, such as"),
+        ("a.asc", "1.0 1 Joystick Rx d 1 01\n", "allowed is a line of an ASC log, such as"),
         ("a.asc", "1.0 1 110 Rx d 3 01 02\n", "found 2 of 3 bytes"),
         ("a.asc", "1.0 1 110 Rx d 1 1FF\n", "with numbers"),
         ("a.asc", "1.0 1 900 Rx d 1 1F\n", "found id 0x900"),

@@ -47,12 +47,12 @@ def written(tmp_path: Path, rows: list[str]) -> Path:
 
 CASES = {
     "usual": Hardness(),
-    "a lever's frames come while the daemon thinks": Hardness(
-        think_ns=400_000, lever_phase_ns=100_000
+    "a joystick's frames come while the daemon thinks": Hardness(
+        think_ns=400_000, joystick_phase_ns=100_000
     ),
     "ticks are missed": Hardness(miss=0.03),
     "clocks drift, ticks are late": Hardness(drift=2e-4, think_ns=1_000_000, late_ns=2_000_000),
-    "a lever is silent for longer than its timeout": Hardness(silent=(4.0, 4.5)),
+    "a joystick is silent for longer than its timeout": Hardness(silent=(4.0, 4.5)),
     "all of it": Hardness(
         drift=2e-4, think_ns=1_000_000, late_ns=2_000_000, miss=0.01, silent=(4.0, 4.5)
     ),
@@ -70,7 +70,7 @@ def test_every_frame_is_the_same(tmp_path: Path, name: str, case: str) -> None:
 
 @pytest.mark.parametrize("phase_ns", [7_000_000, 16_000_000])
 @pytest.mark.parametrize("interface", ["socketcan", "slcan"])
-def test_a_lever_is_lost_in_the_same_tick_wherever_its_frames_lie(
+def test_a_joystick_is_lost_in_the_same_tick_wherever_its_frames_lie(
     tmp_path: Path, interface: str, phase_ns: int
 ) -> None:
     """By the stamp of its last frame; without stamps by the tick before the one that read it."""
@@ -79,7 +79,7 @@ def test_a_lever_is_lost_in_the_same_tick_wherever_its_frames_lie(
     text = text.replace("timeout_ms: 100", "timeout_ms: 110")  # an age of whole ticks is no tie
     (tmp_path / "machine.yaml").write_text(text.replace("../dbc", str(ROOT / "dbc")))
     load = loader(str(tmp_path / "machine.yaml"))
-    hard = Hardness(lever_phase_ns=phase_ns, silent=(4.0, 4.5))
+    hard = Hardness(joystick_phase_ns=phase_ns, silent=(4.0, 4.5))
     replay = same(load, written(tmp_path, log_of(load, 1, hard, seconds=6.0)))
     assert replay.verdict.settled == 0
 
@@ -108,7 +108,7 @@ def test_of_a_node_of_j1939_every_valve_frame_is_the_same(tmp_path: Path) -> Non
 def test_what_was_read_is_settled_by_what_was_sent(tmp_path: Path) -> None:
     """Frames that stand before the valve frames in the log, but were read a tick later."""
     load = loader("forwarder.yaml")
-    hard = Hardness(think_ns=400_000, lever_phase_ns=100_000)
+    hard = Hardness(think_ns=400_000, joystick_phase_ns=100_000)
     replay = same(load, written(tmp_path, log_of(load, 3, hard, seconds=12.0)))
     assert replay.verdict.settled > 10
 
@@ -237,16 +237,18 @@ def test_a_log_without_joystick_frames_is_told_with_what_it_has(tmp_path: Path) 
     load = loader("forwarder.yaml")
     rows = [row for row in log_of(load, 1, Hardness(), seconds=4.0) if " 11" not in row]
     replay = replayed(load, written(tmp_path, rows))
-    with pytest.raises(LogError, match=r"none of its joystick messages \(LeverLeft, id 0x110 on"):
-        replay.check_levers()
+    with pytest.raises(
+        LogError, match=r"none of its joystick messages \(JoystickLeft, id 0x110 on"
+    ):
+        replay.check_joysticks()
 
 
-def test_one_missing_lever_is_a_warning(tmp_path: Path) -> None:
+def test_one_missing_joystick_is_a_warning(tmp_path: Path) -> None:
     load = loader("forwarder.yaml")
     rows = [row for row in log_of(load, 1, Hardness(), seconds=4.0) if " 111#" not in row]
     replay = replayed(load, written(tmp_path, rows))
-    replay.check_levers()
-    assert list(replay.warnings()) == ["no joystick frame of LeverRight, id 0x111 on crane"]
+    replay.check_joysticks()
+    assert list(replay.warnings()) == ["no joystick frame of JoystickRight, id 0x111 on crane"]
 
 
 def test_a_log_that_is_cut_off_is_replayed_up_to_there(tmp_path: Path) -> None:

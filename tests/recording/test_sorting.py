@@ -55,7 +55,7 @@ def test_a_bus_without_a_channel_is_told_with_what_there_is(
 def test_what_a_frame_is_to_the_daemon(one: Deployment) -> None:
     sorter = Sorter(one)
     kinds = {
-        0x110: Kind.TAKEN,  # a lever
+        0x110: Kind.TAKEN,  # a joystick
         0x200: Kind.SENT,  # a valve
         0x300: Kind.SENT,  # a status
         0x310: Kind.SENT,

@@ -13,9 +13,9 @@ from canshaper.machine.binding import load_deployment
 ROOT = Path(__file__).parents[2]
 FILE, DBC_FILE = "canopen-forwarder.yaml", "canopen-cia401-cia408.dbc"
 TICK_NS = 20_000_000
-LEVERS = {"left": 0x10, "right": 0x11}
+JOYSTICKS = {"left": 0x10, "right": 0x11}
 VALVES = {"slew": 0x20, "near_far": 0x21, "lift": 0x22}
-NODES = {**LEVERS, **VALVES}
+NODES = {**JOYSTICKS, **VALVES}
 OURS = 0x7E
 BOOT_UP, STOPPED, OPERATIONAL, PRE_OPERATIONAL = 0, 4, 5, 127
 INIT, DISABLED, HOLD, ACTIVE, RESET = 0x8, 0x9, 0xB, 0xF, 0x3

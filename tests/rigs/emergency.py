@@ -21,7 +21,7 @@ STOP = (
 CYCLE = 'BA_ "GenMsgCycleTime" BO_ 272 20;\n'
 DBC = {
     "BO_ 512 SlewCommand": (
-        "BO_ 64 Stop: 3 LEVERS\n"
+        "BO_ 64 Stop: 3 JOYSTICKS\n"
         ' SG_ Pressed : 0|2@1+ (1,0) [0|3] "" SHAPER\n'
         ' SG_ Count : 8|8@1+ (1,0) [0|255] "" SHAPER\n'
         ' SG_ Check : 16|8@1+ (1,0) [0|255] "" SHAPER\n'

@@ -1,4 +1,4 @@
-"""A controller on real frames: levers are encoded and valves decoded by plain cantools."""
+"""A controller on real frames: joysticks are encoded and valves decoded by plain cantools."""
 
 import re
 from collections.abc import Callable
@@ -15,9 +15,9 @@ from canshaper.shaping.states import State
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
 
-# What a lever sends that nobody touches, raw.
+# What a joystick sends that nobody touches, raw.
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
-STICKS = {"LeverLeft": ("Slew", "NearFar"), "LeverRight": ("Lift", "Rotate")}
+STICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
 
 # For the DBC: the slew axis has its turn in every tenth tick.
 SLOW_VALVE = {"BO_ 512 20;": "BO_ 512 200;"}
@@ -26,27 +26,27 @@ NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus")
 
 
 class Rig:
-    """A controller with its clock and the two levers of the shipped machine."""
+    """A controller with its clock and the two joysticks of the shipped machine."""
 
     def __init__(self, path: Path) -> None:
         self.deployment = load_deployment(path)
         self.controller = Controller(self.deployment)
         self.now_ns = 0
         self.messages = {name: self.message(name) for name in NAMES}
-        self.counts = {"LeverLeft": 0, "LeverRight": 0}
+        self.counts = {"JoystickLeft": 0, "JoystickRight": 0}
 
     def message(self, name: str) -> Any:
         found = self.deployment.messages.find(name)
         assert not isinstance(found, str)
         return found[1]
 
-    def lever(self, name: str = "LeverLeft", **raw: int) -> Frame:
-        """The next frame of a lever; sticks in 0.1 %, centred and enabled unless told."""
+    def joystick(self, name: str = "JoystickLeft", **raw: int) -> Frame:
+        """The next frame of a joystick; sticks in 0.1 %, centred and enabled unless told."""
         self.counts[name] = (self.counts[name] + 1) % 256
         values = {**dict.fromkeys(STICKS[name], 0), **CENTRED, "AliveCounter": self.counts[name]}
         message = self.messages[name]
         data = message.encode({**values, **raw}, scaling=False, strict=False)
-        bus = next(v.bus for v in self.deployment.config.levers.values() if v.message == name)
+        bus = next(v.bus for v in self.deployment.config.joysticks.values() if v.message == name)
         return Frame(bus, message.frame_id, message.is_extended_frame, data)
 
     def receive(self, *frames: Frame) -> None:
@@ -71,12 +71,14 @@ class Rig:
         return sent
 
     def run(self, ticks: int = 1, **raw: int) -> dict[str, dict[str, Any]]:
-        """Both levers and a tick, so many times; what the last one sent."""
+        """Both joysticks and a tick, so many times; what the last one sent."""
         sent: dict[str, dict[str, Any]] = {}
         for _ in range(ticks):
-            left = {k: v for k, v in raw.items() if k not in STICKS["LeverRight"]}
-            right = {k: v for k, v in raw.items() if k not in STICKS["LeverLeft"]}
-            self.receive(self.lever("LeverLeft", **left), self.lever("LeverRight", **right))
+            left = {k: v for k, v in raw.items() if k not in STICKS["JoystickRight"]}
+            right = {k: v for k, v in raw.items() if k not in STICKS["JoystickLeft"]}
+            self.receive(
+                self.joystick("JoystickLeft", **left), self.joystick("JoystickRight", **right)
+            )
             sent = self.tick()
         return sent
 

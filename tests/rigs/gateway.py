@@ -11,14 +11,14 @@ from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
-STICKS = {"LeverLeft": ("Slew", "NearFar"), "LeverRight": ("Lift", "Rotate")}
+STICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
 
 
 class GatewayRig:
     """A controller, its clock, both joysticks, and all that leaves towards the ECU.
 
-    ``left`` holds every frame of the lever messages on the machine's bus, in order.
+    ``left`` holds every frame of the joystick messages on the machine's bus, in order.
     """
 
     def __init__(
@@ -39,7 +39,7 @@ class GatewayRig:
         self.counts = dict.fromkeys(STICKS, 0)
         self.left: list[Frame] = []
 
-    def lever(self, name: str = "LeverLeft", junk: int = 0, **raw: int) -> Frame:
+    def joystick(self, name: str = "JoystickLeft", junk: int = 0, **raw: int) -> Frame:
         """The next frame of a joystick; ``junk`` are bits that no signal has."""
         self.counts[name] = (self.counts[name] + 1) % 256
         message = self.dbc.get_message_by_name(name)
@@ -47,7 +47,7 @@ class GatewayRig:
         rest = {s.name: 0 for s in message.signals if s.name not in values}
         data = message.encode({**values, **rest, **raw}, scaling=False, strict=False)
         word = int.from_bytes(data, "little") | junk
-        return Frame("levers", message.frame_id, False, word.to_bytes(8, "little"))
+        return Frame("joysticks", message.frame_id, False, word.to_bytes(8, "little"))
 
     def receive(self, frame: Frame) -> Frame | None:
         """What a frame from the joysticks leaves as."""
@@ -57,7 +57,7 @@ class GatewayRig:
         return passed
 
     def tick(self, missed: int = 0) -> list[Frame]:
-        """One tick; the frames of lever messages that it sends by itself."""
+        """One tick; the frames of joystick messages that it sends by itself."""
         self.now_ns += missed * TICK_NS
         frames = list(self.controller.tick(self.now_ns, missed))
         self.now_ns += TICK_NS
@@ -69,10 +69,10 @@ class GatewayRig:
     def run(self, ticks: int = 1, **raw: int) -> dict[str, Any]:
         """Both joysticks and a tick, so many times; the last frame of the left one, decoded."""
         for _ in range(ticks):
-            mine = {k: v for k, v in raw.items() if k not in STICKS["LeverRight"]}
-            other = {k: v for k, v in raw.items() if k not in STICKS["LeverLeft"]}
-            self.receive(self.lever("LeverLeft", **mine))
-            self.receive(self.lever("LeverRight", **other))
+            mine = {k: v for k, v in raw.items() if k not in STICKS["JoystickRight"]}
+            other = {k: v for k, v in raw.items() if k not in STICKS["JoystickLeft"]}
+            self.receive(self.joystick("JoystickLeft", **mine))
+            self.receive(self.joystick("JoystickRight", **other))
             assert self.tick() == []
         return self.decoded(next(f for f in reversed(self.left) if f.can_id == 0x110))
 
@@ -83,7 +83,7 @@ class GatewayRig:
         return self
 
     def decoded(self, frame: Frame) -> dict[str, Any]:
-        """Raw values of a lever message."""
+        """Raw values of a joystick message."""
         values = self.dbc.decode_message(
             frame.can_id, frame.data, decode_choices=False, scaling=False
         )

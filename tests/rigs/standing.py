@@ -21,19 +21,19 @@ class Machine:
     """
 
     def __init__(
-        self, make: Make, tick_ms: int, *, period_ticks: int = 1, levers_ms: int, valve_ms: int
+        self, make: Make, tick_ms: int, *, period_ticks: int = 1, joysticks_ms: int, valve_ms: int
     ) -> None:
         def cycle(can_id: int, before_ms: int, cycle_ms: int) -> tuple[str, str]:
             name = f"BO_ {can_id} "
             return f"{name}{before_ms};", f"{name}{cycle_ms};"
 
-        levers, valves = (0x110, 0x111), (0x200, 0x201, 0x202)
-        dbc = dict(cycle(can_id, 20, tick_ms) for can_id in levers)
+        joysticks, valves = (0x110, 0x111), (0x200, 0x201, 0x202)
+        dbc = dict(cycle(can_id, 20, tick_ms) for can_id in joysticks)
         dbc |= dict(cycle(can_id, 20, tick_ms * period_ticks) for can_id in valves)
         yaml = {
             "tick_ms: 20 ": f"tick_ms: {tick_ms} ",
-            "timeout_ms: 100 #": f"timeout_ms: {levers_ms} #",
-            "timeout_ms: 100\n": f"timeout_ms: {levers_ms}\n",
+            "timeout_ms: 100 #": f"timeout_ms: {joysticks_ms} #",
+            "timeout_ms: 100\n": f"timeout_ms: {joysticks_ms}\n",
             "timeout_ms: 600": f"timeout_ms: {valve_ms}",
         }
         self.rig = make(yaml, dbc)
@@ -51,7 +51,7 @@ class Machine:
     def tick(self, gap_ns: int, missed: int = 0) -> None:
         """One tick so long after the one before, with both joysticks out."""
         self.now_ns += gap_ns
-        self.port.queue = [self.rig.lever(Slew=self.slew), self.rig.lever("LeverRight")]
+        self.port.queue = [self.rig.joystick(Slew=self.slew), self.rig.joystick("JoystickRight")]
         exchange(self.rig.controller, {"crane": self.port}, self.now_ns, missed, self.standstill)
 
     def moving(self) -> "Machine":

@@ -265,7 +265,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
         assert self.overtime <= math.ceil(self.limits.maximum / self.fall)
 
     def check_speed(self, before: float) -> None:
-        """Not faster than asked within the tail, not against the lever, except while falling."""
+        """Not faster than asked within the tail, not against the joystick, except while falling."""
         limits, sent = self.limits, self.axis.sent
         high = max([0.0, *(c for _, c in self.asked)])
         low = max([0.0, *(-c for _, c in self.asked)])

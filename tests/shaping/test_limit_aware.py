@@ -46,7 +46,7 @@ RATE = OutputLimits(rise_per_s=2.0, fall_per_s=2.0, tail_s=3.0)
 CLIP = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, maximum=0.6, tail_s=3.0)
 FREE = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=3.0)
 RELEASE = [1.0] * 100 + [0.0] * 600
-# Held against the swing in the middle of its run: the output may not go against the lever.
+# Held against the swing in the middle of its run: the output may not go against the joystick.
 REVERSAL = [1.0] * 100 + [-0.3] * 30 + [0.8] * 60 + [0.0] * 600
 
 
@@ -54,7 +54,7 @@ REVERSAL = [1.0] * 100 + [-0.3] * 30 + [0.8] * 60 + [0.0] * 600
 @pytest.mark.parametrize(
     ("limits", "commands", "most_of_bare"),
     [(RATE, REVERSAL, 0.02), (CLIP, REVERSAL, 0.02), (FREE, REVERSAL, 0.02)],
-    ids=["rate", "clip", "lever"],
+    ids=["rate", "clip", "joystick"],
 )
 def test_residual_swing_where_a_limit_acts(
     mode: SwayMode, limits: OutputLimits, commands: list[float], most_of_bare: float

@@ -87,7 +87,7 @@ BOTH = OutputLimits(allow_faster=True, allow_reverse=True)
         (DEFAULT, 0.2, (0.0, 0.8), (0.0, 0.8)),  # as fast as asked within the tail
         (DEFAULT, 0.0, (0.0, 0.8), (0.0, 0.8)),  # run-on after release
         (DEFAULT, 0.0, (-0.3, 0.8), (-0.3, 0.8)),
-        (DEFAULT, 0.5, (-0.8, 0.5), (0.0, 0.5)),  # never against the lever
+        (DEFAULT, 0.5, (-0.8, 0.5), (0.0, 0.5)),  # never against the joystick
         (DEFAULT, -0.5, (-0.5, 0.8), (-0.5, 0.0)),
         (FASTER, 0.2, (0.0, 0.2), (0.0, 1.0)),
         (FASTER, 0.2, (-0.3, 0.2), (0.0, 1.0)),

@@ -1,4 +1,4 @@
-"""What a hand does with the levers is in their frames, as a daemon reads them."""
+"""What a hand does with the joysticks is in their frames, as a daemon reads them."""
 
 from pathlib import Path
 from typing import Any
@@ -34,10 +34,12 @@ def test_a_daemon_reads_what_the_hand_holds(
     hand = Hand(deployment)
     sticks = dict.fromkeys(deployment.axes, position)
     frames = {frame[:3]: frame for frame in hand.frames(0, Held(sticks, anti_sway=anti_sway))}
-    moved = {axis.config.stick.signal for axis in deployment.axes.values()}
-    for lever in deployment.levers.values():
-        raw, commands = lever.codec.decode(_frame_of(frames, lever.key).data)
-        assert lever.config.anti_sway_off is None or raw[lever.config.anti_sway_off] != anti_sway
+    moved = {axis.config.command.signal for axis in deployment.axes.values()}
+    for joystick in deployment.joysticks.values():
+        raw, commands = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        assert (
+            joystick.config.anti_sway_off is None or raw[joystick.config.anti_sway_off] != anti_sway
+        )
         for signal, command in commands.items():
             assert command == pytest.approx(position if signal in moved else 0.0, abs=0.005)
 
@@ -45,20 +47,20 @@ def test_a_daemon_reads_what_the_hand_holds(
 def test_at_rest_nothing_is_enabled(deployment: Deployment) -> None:
     hand = Hand(deployment)
     frames = {frame[:3]: frame for frame in hand.frames(0, Held())}
-    for lever in deployment.levers.values():
-        raw, commands = lever.codec.decode(_frame_of(frames, lever.key).data)
-        assert raw[lever.config.enable] == 0
-        assert lever.config.reset is None or raw[lever.config.reset] == 0
+    for joystick in deployment.joysticks.values():
+        raw, commands = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        assert raw[joystick.config.enable] == 0
+        assert joystick.config.reset is None or raw[joystick.config.reset] == 0
         assert set(commands.values()) == {0.0}
 
 
 def test_reset_and_enable_are_in_the_frame(deployment: Deployment) -> None:
     hand = Hand(deployment)
     frames = {frame[:3]: frame for frame in hand.frames(0, Held(enable=True, reset=True))}
-    for lever in deployment.levers.values():
-        raw, _ = lever.codec.decode(_frame_of(frames, lever.key).data)
-        assert raw[lever.config.enable] == 1
-        assert lever.config.reset is None or raw[lever.config.reset] == 1
+    for joystick in deployment.joysticks.values():
+        raw, _ = joystick.codec.decode(_frame_of(frames, joystick.key).data)
+        assert raw[joystick.config.enable] == 1
+        assert joystick.config.reset is None or raw[joystick.config.reset] == 1
 
 
 def _fits(frame: Frame, key: tuple[int, bool]) -> bool:

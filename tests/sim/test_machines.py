@@ -15,7 +15,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import JOINT_AXES, TIP_AXES
 from canshaper_sim.joints import JointBoom
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.machines import MACHINES, TipControlledCrane, build_machine, machine_for
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.parameters import changed_parameters, parameter_names
@@ -138,10 +138,10 @@ def test_parameters_by_name() -> None:
 
 def test_a_script_for_the_other_kind_of_crane_is_refused() -> None:
     tip, joints = load_deployment(TIP_FILE), load_deployment(JOINT_FILE)
-    LeverNode(tip, SCRIPTS["pulse-slew"])
-    LeverNode(joints, SCRIPTS["pulse-slew"])
+    JoystickNode(tip, SCRIPTS["pulse-slew"])
+    JoystickNode(joints, SCRIPTS["pulse-slew"])
     with pytest.raises(ValueError, match="script demo moves slew, near_far, lift; the deployment"):
-        LeverNode(joints, SCRIPTS["demo"])
+        JoystickNode(joints, SCRIPTS["demo"])
     with pytest.raises(DriveError, match="script pulse-knuckle moves knuckle; the deployment has"):
         drive(tip, SCRIPTS["pulse-knuckle"])
     with pytest.raises(DriveError, match="machine 'crab'"):
@@ -151,7 +151,7 @@ def test_a_script_for_the_other_kind_of_crane_is_refused() -> None:
 def test_an_axis_that_the_deployment_merely_lacks_is_left_out(tmp_path: Path) -> None:
     text = TIP_FILE.read_text()
     lift = text[text.index("\n  lift:") : text.index("\nstatus:")]
-    LeverNode(renamed(tmp_path, TIP_FILE, (lift, "\n")), SCRIPTS["demo"])
+    JoystickNode(renamed(tmp_path, TIP_FILE, (lift, "\n")), SCRIPTS["demo"])
 
 
 @pytest.mark.parametrize("file", [TIP_FILE, JOINT_FILE])

@@ -1,4 +1,4 @@
-"""The simulated machine under protection: what its valves refuse, what levers and radius send."""
+"""The simulated machine under protection: what valves refuse, what joysticks and radius send."""
 
 import struct
 from pathlib import Path
@@ -11,7 +11,7 @@ from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 from canshaper_sim.plant import PlantNode
 from tests.machine import protected_machine
@@ -105,10 +105,10 @@ def test_a_controller_that_starts_again_is_followed_again(machine: Deployment) -
 
 def test_the_controller_is_followed(machine: Deployment) -> None:
     plant, controller = PlantNode(machine), Controller(machine)
-    levers = LeverNode(machine, random_script(1))
+    joysticks = JoystickNode(machine, random_script(1))
     fastest = 0.0
     for time_ms in range(0, 10_000, 20):
-        for sent in levers.frames(time_ms):
+        for sent in joysticks.frames(time_ms):
             controller.receive(sent, time_ms * 1_000_000)
         for sent in controller.tick(time_ms * 1_000_000):
             plant.receive(sent)
@@ -117,13 +117,13 @@ def test_the_controller_is_followed(machine: Deployment) -> None:
     assert fastest > 0.1
 
 
-def test_the_levers_of_a_machine_with_headers_are_taken(tmp_path: Path) -> None:
+def test_the_joysticks_of_a_machine_with_headers_are_taken(tmp_path: Path) -> None:
     deployment = protected_machine.load(tmp_path)
     controller = Controller(deployment)
-    levers = LeverNode(deployment, random_script(1))
+    joysticks = JoystickNode(deployment, random_script(1))
     states, counts = set(), []
     for time_ms in range(0, 6_000, 20):
-        for sent in levers.frames(time_ms):
+        for sent in joysticks.frames(time_ms):
             controller.receive(sent, time_ms * 1_000_000)
             if sent.can_id == 272:
                 counts.append(sent.data[1] & 0x0F)

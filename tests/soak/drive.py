@@ -178,8 +178,8 @@ class Soak:
 
     def _stop_process(self) -> None:
         self._daemon.process.send_signal(signal.SIGSTOP)
-        for _ in range(self._random.randrange(15, 60)):  # more than the levers' timeout
-            wait_for(self._bus, "LeverLeft", lambda v: True)
+        for _ in range(self._random.randrange(15, 60)):  # more than the joysticks' timeout
+            wait_for(self._bus, "JoystickLeft", lambda v: True)
         self._witness.mark()
         self._witness.until_mark()  # judged is what comes after
         self._daemon.process.send_signal(signal.SIGCONT)

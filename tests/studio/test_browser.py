@@ -60,7 +60,7 @@ def swing(page: Page, crane: str) -> float:
 
 
 def undisturbed(page: Page, drive: Callable[[], None]) -> None:
-    """Drive; where a busy machine held up page or levers for too long, let go and drive again."""
+    """Drive; where a busy machine held up page or joysticks too long, let go and drive again."""
     disturbed = page.locator("#events li", has_text=DISTURBED)
     for _ in range(TRIES):
         if page.inner_text("#seat") != "you drive":

@@ -1,4 +1,4 @@
-"""The driver's seat: what a page may do to the levers, and when it loses them."""
+"""The driver's seat: what a page may do to the joysticks, and when it loses them."""
 
 import math
 from typing import Any

@@ -73,7 +73,7 @@ def settled(page: Page) -> None:
 def test_it_shows_both_cranes(shared: Studio) -> None:
     with shared.page() as page:
         at_rest = ("waiting for neutral", "enable is off")
-        shown = page.until(  # the daemons, the levers and the cranes do not begin at once
+        shown = page.until(  # the daemons, the joysticks and the cranes do not begin at once
             lambda s: all(
                 c["crane"] and {(a["state"], a["reason"]) for a in c["axes"].values()} == {at_rest}
                 for c in s["cranes"].values()

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.sets import Feel
+from canshaper.config.schedule import Profile
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
@@ -87,8 +87,8 @@ def test_the_daemon_takes_both_ends(name: str, tmp_path: Path) -> None:
 def test_an_axis_with_feels_has_no_sliders() -> None:
     """What is in force there changes with the machine, and the daemon refuses to adjust it."""
     config = load_deployment(CONFIG / "forwarder.yaml").config
-    calm = Feel.model_validate({"filter": {"kind": "gff", "a1": 1.2, "a2": 0.3}})
-    slew = config.axes["slew"].model_copy(update={"feels": {"calm": calm}})
+    calm = Profile.model_validate({"filter": {"kind": "gff", "a1": 1.2, "a2": 0.3}})
+    slew = config.axes["slew"].model_copy(update={"profiles": {"calm": calm}})
     config = config.model_copy(update={"axes": {**config.axes, "slew": slew}})
     keys = {number.key.split(".")[1] for numbers in sliders(config).values() for number in numbers}
     assert keys == {"near_far"}

@@ -7,7 +7,7 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.hil.machine import Levers, levers_on, open_bus
+from tests.hil.machine import Joysticks, joysticks_on, open_bus
 from tests.systemd.packages import FIRST, install, path
 from tests.systemd.unit import DROP_IN, Unit
 
@@ -51,6 +51,6 @@ def bus() -> Iterator[can.BusABC]:
 
 
 @pytest.fixture
-def levers() -> Iterator[Levers]:
-    with levers_on("vcan0") as running:
+def joysticks() -> Iterator[Joysticks]:
+    with joysticks_on("vcan0") as running:
         yield running

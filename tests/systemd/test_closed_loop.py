@@ -9,8 +9,8 @@ from tests.systemd.unit import Unit
 DWELL_S = 2.5  # after the release, as in the reports of the demo
 # The same pulse without anti-sway leaves more than 10 degrees: tests/hil/test_closed_loop.py.
 MOST_DEG = 1.5
-# A machine that stands still for longer than the timeout of the lever in the deployment: the axis
-# stops, as it must, and there is nothing to judge. The daemon names it too.
+# A machine that stands still for longer than the timeout of the joystick in the deployment: the
+# axis stops, as it must, and there is nothing to judge. The daemon names it too.
 HELD_UP_S = 0.1
 HELD_UP = {"LOOP_OVERRUN", "LOOP_STALLED"}
 DRIVES = 5
@@ -37,14 +37,14 @@ def drive(folder: Path) -> list[tuple[float, str, dict]]:
 def test_after_a_pulse_the_grapple_hangs_still(forwarder: Unit, tmp_path: Path) -> None:
     for _ in range(DRIVES):
         heard = drive(tmp_path)
-        levers = [t for t, name, _ in heard if name == "LeverLeft"]
-        longest_s = max(later - t for t, later in pairwise(levers))
+        joysticks = [t for t, name, _ in heard if name == "JoystickLeft"]
+        longest_s = max(later - t for t, later in pairwise(joysticks))
         told = [str(s["Reason"]) for _, name, s in heard if name == "NearFarStatus"]
         if longest_s < HELD_UP_S and not HELD_UP & {*told}:
             break
         print(f"once more: {longest_s:.2f} s between two frames of the hand; {sorted({*told})}")
         forwarder.systemctl("restart")  # a stall is latched
-    released = max(t for t, name, s in heard if name == "LeverLeft" and s["NearFar"] != 0.0)
+    released = max(t for t, name, s in heard if name == "JoystickLeft" and s["NearFar"] != 0.0)
     swings = [(t, max(map(abs, s.values()))) for t, name, s in heard if name == "GrappleSway"]
     after = [swing for t, swing in swings if t > released + DWELL_S]
     fastest = max(s["RadialSpeed"] for _, name, s in heard if name == "TipVelocity")

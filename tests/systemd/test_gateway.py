@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.hil.machine import levers_on, open_bus, wait_for
+from tests.hil.machine import joysticks_on, open_bus, wait_for
 from tests.systemd.unit import Unit, run
 
 EXAMPLE = Path("/usr/share/canshaper/gateway.conf")
@@ -41,10 +41,10 @@ def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
     effective = dict(line.split(":", 1) for line in (process / "status").read_text().splitlines())
     assert effective["CapEff"].strip("\t0") == ""  # rules are made by others
     cursor = gateway.cursor()
-    with levers_on("vcan0") as levers, open_bus("vcan1") as far:
-        wait_for(far, "LeverLeft", lambda v: v["Slew"] == 0.0)
+    with joysticks_on("vcan0") as joysticks, open_bus("vcan1") as far:
+        wait_for(far, "JoystickLeft", lambda v: v["Slew"] == 0.0)
         before = gateway.number("NRestarts")
-        levers.values["Slew"] = 80.0
+        joysticks.values["Slew"] = 80.0
         gateway.systemctl("kill", "--signal=KILL")
         gateway.wait_journal("away, 2 rules added", cursor)
         gateway.wait_restart(before)
@@ -55,4 +55,4 @@ def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
         while far.recv(0) is not None:
             pass
         for _ in range(10):
-            assert wait_for(far, "LeverLeft", lambda _: True)["Slew"] == 0.0
+            assert wait_for(far, "JoystickLeft", lambda _: True)["Slew"] == 0.0

@@ -10,7 +10,7 @@ import can
 
 from tests.hil.machine import (
     VALVES,
-    Levers,
+    Joysticks,
     candump,
     drive,
     logged,
@@ -76,16 +76,16 @@ def test_exposure_of_the_loaded_unit(forwarder: Unit) -> None:
     assert float(found[1]) <= MOST_EXPOSURE
 
 
-def test_lever_moves_the_valve_and_the_status_tells(
-    forwarder: Unit, bus: can.BusABC, levers: Levers
+def test_joystick_moves_the_valve_and_the_status_tells(
+    forwarder: Unit, bus: can.BusABC, joysticks: Joysticks
 ) -> None:
-    forwarder.wait(partial(drive, bus, levers), StatusText=".*slew ACTIVE.*")
+    forwarder.wait(partial(drive, bus, joysticks), StatusText=".*slew ACTIVE.*")
 
 
 def test_killed_in_motion_it_comes_back_and_waits_for_neutral(
-    forwarder: Unit, bus: can.BusABC, levers: Levers, tmp_path: Path
+    forwarder: Unit, bus: can.BusABC, joysticks: Joysticks, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     before = forwarder.number("NRestarts")
     forwarder.systemctl("kill", "--signal=KILL")
     forwarder.wait(ActiveState="(?!active).*")  # from here on every frame is the next process's
@@ -96,7 +96,7 @@ def test_killed_in_motion_it_comes_back_and_waits_for_neutral(
     slew = [m.data[0] for m in logged(tmp_path / "after.log") if message_name(m) == "SlewCommand"]
     assert set(slew) == {0}
     with open_bus("vcan0") as later:
-        drive(later, levers)
+        drive(later, joysticks)
 
 
 def test_hang_is_ended_by_the_watchdog_and_the_journal_tells_where(forwarder: Unit) -> None:
@@ -150,7 +150,7 @@ def test_wrong_file_at_start_fails_once_and_says_where(installed: None) -> None:
     unit.file.unlink()
 
 
-def test_reload_applies_a_good_file(forwarder: Unit, bus: can.BusABC, levers: Levers) -> None:
+def test_reload_applies_a_good_file(forwarder: Unit, bus: can.BusABC, joysticks: Joysticks) -> None:
     pid, cursor, text = forwarder.show("MainPID"), forwarder.cursor(), forwarder.file.read_text()
     forwarder.file.write_text(text.replace("limits: {", "limits: { max_pct: 24,"))
     try:
@@ -158,31 +158,31 @@ def test_reload_applies_a_good_file(forwarder: Unit, bus: can.BusABC, levers: Le
         forwarder.wait_journal("reload=applied", cursor)
     finally:
         forwarder.file.write_text(text)
-    assert drive(bus, levers, faster_than=23.0) == 24.0
+    assert drive(bus, joysticks, faster_than=23.0) == 24.0
     assert forwarder.show("MainPID") == pid
-    levers.values["Slew"] = 0.0
+    joysticks.values["Slew"] = 0.0
     wait_for(bus, "SlewStatus", lambda s: str(s["State"]) == "READY")
     forwarder.systemctl("restart")
 
 
 def test_reload_in_motion_is_one_only_when_it_is_applied(
-    forwarder: Unit, bus: can.BusABC, levers: Levers
+    forwarder: Unit, bus: can.BusABC, joysticks: Joysticks
 ) -> None:
     """systemd ends a reload after TimeoutStartSec; a crane may move for longer."""
     cursor = forwarder.cursor()
-    drive(bus, levers)
+    drive(bus, joysticks)
     forwarder.systemctl("reload")
     forwarder.wait_journal("reload=waiting until every axis is neutral", cursor)
     forwarder.wait(StatusText=".*slew ACTIVE.*", ActiveState="active", SubState="running")
     assert "reload=applied" not in forwarder.text(cursor)
-    levers.values["Slew"] = 0.0
+    joysticks.values["Slew"] = 0.0
     forwarder.wait_journal("reload=applied", cursor)
     forwarder.wait(ActiveState="active", StatusText=".*slew (READY|NEUTRAL_WAIT).*")
-    drive(bus, levers)
+    drive(bus, joysticks)
 
 
 def test_reload_of_a_wrong_file_fails_and_changes_nothing(
-    forwarder: Unit, bus: can.BusABC, levers: Levers
+    forwarder: Unit, bus: can.BusABC, joysticks: Joysticks
 ) -> None:
     pid, cursor, text = forwarder.show("MainPID"), forwarder.cursor(), forwarder.file.read_text()
     forwarder.file.write_text(text + "nonsense: 1\n")
@@ -196,14 +196,14 @@ def test_reload_of_a_wrong_file_fails_and_changes_nothing(
         forwarder.wait_journal(rf"reload=refused .*forwarder.yaml:{line}: nonsense", cursor)
     finally:
         forwarder.file.write_text(text)
-    drive(bus, levers)
+    drive(bus, joysticks)
     assert forwarder.show("MainPID") == pid
 
 
 def test_stop_in_motion_ends_neutral(
-    forwarder: Unit, bus: can.BusABC, levers: Levers, tmp_path: Path
+    forwarder: Unit, bus: can.BusABC, joysticks: Joysticks, tmp_path: Path
 ) -> None:
-    drive(bus, levers)
+    drive(bus, joysticks)
     with candump(tmp_path / "end.log", "vcan0"):
         forwarder.systemctl("stop")
     last = {message_name(m): m.data[0] for m in logged(tmp_path / "end.log")}

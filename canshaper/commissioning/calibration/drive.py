@@ -12,7 +12,7 @@ from canshaper.commissioning.calibration.fit import Calibration, CalibrationErro
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.speed import SpeedFeedback
 from canshaper.controller.controller import Controller
-from canshaper.inputs.lever import LeverInput
+from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
@@ -25,29 +25,29 @@ NEUTRAL_BAND = 1e-4
 FALL_PER_S = 5.0
 
 
-class _RampLever:
-    """A lever that is held in neutral with its enable on; the ramp stands for its stick.
+class _RampJoystick:
+    """A joystick that is held in neutral with its enable on; the ramp stands for its stick.
 
     Attributes:
         command: of the ramp; that of an axis which is not measured stays 0.
         moved: whether the stick itself is not in neutral.
     """
 
-    def __init__(self, lever: LeverInput) -> None:
-        self._lever = lever
+    def __init__(self, joystick: JoystickInput) -> None:
+        self._joystick = joystick
         self.command = 0.0
         self.moved = False
 
     @property
     def releases(self) -> int:
         """How often its enable was seen released."""
-        return self._lever.releases
+        return self._joystick.releases
 
     def stick(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> StickInput:
         """What the axis may use now."""
-        found = self._lever.stick(signal, now_ns, releases, trip, neutral_band)
+        found = self._joystick.stick(signal, now_ns, releases, trip, neutral_band)
         usable = found.fault is None and found.enabled
         self.moved = usable and abs(found.command) > neutral_band
         if not usable:
@@ -91,12 +91,12 @@ class CalibrationDrive:
             grid_steps=runner.bound.valve.steps,
         )
         # Nothing moves but this axis: no other one gets its stick, nor moves for another one.
-        self._levers: dict[str, _RampLever] = {}
+        self._joysticks: dict[str, _RampJoystick] = {}
         for name, one in self._controller.axes.items():
-            lever = _RampLever(self._controller.levers[one.bound.config.stick.lever])
-            one.isolate(lever, measured if one is runner else None)
-            self._levers[name] = lever
-        self._lever = self._levers.pop(axis)
+            joystick = _RampJoystick(self._controller.joysticks[one.bound.config.command.joystick])
+            one.isolate(joystick, measured if one is runner else None)
+            self._joysticks[name] = joystick
+        self._joystick = self._joysticks.pop(axis)
         self._ramp = ramp
         self._begun_ns: int | None = None
         self._samples: dict[str, list[Sample]] = {}
@@ -116,7 +116,7 @@ class CalibrationDrive:
     @property
     def _moved(self) -> str:
         """Axes that are not measured and whose stick is not in neutral."""
-        return " and ".join(name for name, lever in self._levers.items() if lever.moved)
+        return " and ".join(name for name, joystick in self._joysticks.items() if joystick.moved)
 
     @property
     def moves(self) -> bool:
@@ -138,7 +138,7 @@ class CalibrationDrive:
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
             self.progress = min(1.0, time_s / self._ramp.duration_s)
-            self._lever.command = self._ramp.command(time_s)
+            self._joystick.command = self._ramp.command(time_s)
             self._sample(time_s)
             if time_s >= self._ramp.duration_s:
                 self.ended = "done"
@@ -149,7 +149,7 @@ class CalibrationDrive:
             elif not heard:
                 self.ended = "stopped: the feedback fell silent, or tells an error"
             if self.ended:
-                self._lever.command = 0.0
+                self._joystick.command = 0.0
         yield from self._controller.tick(now_ns, missed)
         self._controller.events.clear()
 

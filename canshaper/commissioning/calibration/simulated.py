@@ -5,7 +5,7 @@ from collections.abc import Callable
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 
@@ -25,12 +25,12 @@ def run_simulated(
         DeploymentError: the deployment does not fit the machine.
     """
     plant = PlantNode(deployment, parameters)
-    levers = LeverNode(deployment, Script("held", (), 1e9))
+    joysticks = JoystickNode(deployment, Script("held", (), 1e9))
     tick_ms = deployment.config.tick_ms
     time_ms = 0
     while not drive.ended:
         now_ns = time_ms * 1_000_000
-        for frame in levers.frames_of_tick(time_ms, tick_ms):
+        for frame in joysticks.frames_of_tick(time_ms, tick_ms):
             if (passed := drive.receive(frame, now_ns)) is not None:
                 plant.receive(passed)
         for frame in drive.tick(now_ns):

@@ -2,7 +2,7 @@
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import LeverCodec
+from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import NULL, group_of
 from canshaper.codec.protection import UNPROTECTED
@@ -93,7 +93,7 @@ def _bound(
         return of_axis
     bus = deployment.axes[axis].config.valve.bus
     config = Input(bus=bus, message=name, timeout_ms=SILENT_MS)
-    return BoundInput(config, message, LeverCodec(message, []), UNPROTECTED)
+    return BoundInput(config, message, JoystickCodec(message, []), UNPROTECTED)
 
 
 def _problem(deployment: Deployment, text: str) -> DeploymentError:

@@ -113,7 +113,7 @@ def motion(name: str, run: Run, axes: list[str]) -> Finding:
     if OVERLOADED & {reason for _, _, reason in run.events}:
         return Finding(subject, Level.BAD, f"the loop was too late: {text}", _held_up(run))
     if stops:
-        remedy = "these levers are a program of this PC: it was too late with their frames"
+        remedy = "these joysticks are a program of this PC: it was too late with their frames"
         return Finding(subject, Level.WARNING, f"stopped: {text}", remedy)
     still = [axis for axis in axes if axis not in run.moved]
     if still:

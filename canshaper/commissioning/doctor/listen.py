@@ -1,4 +1,4 @@
-"""The levers on the real bus, only listened to: are they there, and how regular are they?"""
+"""The joysticks on the real bus, only listened to: are they there, and how regular are they?"""
 
 import select
 import socket
@@ -21,7 +21,7 @@ LOOK_S = 0.2
 
 def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
     """Messages that the deployment needs all the time, by a name for people."""
-    found: dict[str, BoundInput] = {f"lever {n}": lv for n, lv in deployment.levers.items()}
+    found: dict[str, BoundInput] = {f"joystick {n}": lv for n, lv in deployment.joysticks.items()}
     if deployment.emergency_stop:
         found["emergency stop"] = deployment.emergency_stop
     return found

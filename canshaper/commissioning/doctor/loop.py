@@ -95,7 +95,7 @@ class Loop:
         self._moved: set[str] = set()
 
     def run(self) -> None:
-        """Run, as the daemon does, once the first frame of a lever is there."""
+        """Run, as the daemon does, once the first frame of a joystick is there."""
         self._collector.freeze()
         say_ready()
         select.select(list(self._ports.values()), [], [])

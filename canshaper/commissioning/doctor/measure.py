@@ -1,4 +1,4 @@
-"""One run of the loop with levers, and the times that come of it."""
+"""One run of the loop with joysticks, and the times that come of it."""
 
 import json
 import socket
@@ -27,8 +27,8 @@ class Run:
         late_ns: how late each tick began after its deadline; without the first, which sets them.
         valve_ns: from the begin of a tick to its last valve frame, where it sent one.
         tick_ns: from begin to end of each tick.
-        joystick_ns: from each frame of a lever to the next valve frame computed with it, for each
-            axis of the lever.
+        joystick_ns: from each frame of a joystick to the next valve frame computed with it, for
+            each axis of the joystick.
         missed: deadlines missed.
         events: changes of state (axis, new state, reason).
         moved: axes that were in motion.
@@ -64,14 +64,14 @@ def measure(
         MeasureError: a process failed.
     """
     with Children() as children, ExitStack() as ends:
-        loops, levers = {}, {}
+        loops, joysticks = {}, {}
         for name in deployment.config.buses:
             pair = socket.socketpair(socket.AF_UNIX, socket.SOCK_DGRAM)
-            loops[name], levers[name] = pair
+            loops[name], joysticks[name] = pair
             for end in pair:
                 ends.enter_context(end)
         file = str(deployment.path.resolve())
-        hand = children.start("levers", {n: s.fileno() for n, s in levers.items()}, file=file)
+        hand = children.start("joysticks", {n: s.fileno() for n, s in joysticks.items()}, file=file)
         loop = children.start(
             "loop", {n: s.fileno() for n, s in loops.items()}, file=file, seconds=seconds
         )
@@ -80,7 +80,9 @@ def measure(
         for process in [children.start("load", kind=kind) for kind in load_kinds() if load]:
             ready(process)
         for one in loops.values():
-            one.send(bytes(CAN_FRAME.size))  # the levers begin, and the loop with their first frame
+            one.send(
+                bytes(CAN_FRAME.size)
+            )  # the joysticks begin, and the loop with their first frame
         ends.close()  # the children see each other end
         record = _result(loop, hand, seconds, tell)
         return run_of(deployment, record, json.loads(output(hand, PATIENCE_S)))
@@ -106,12 +108,12 @@ def _result(
 def run_of(
     deployment: Deployment, record: dict[str, Any], hand: dict[str, list[tuple[int, int]]]
 ) -> Run:
-    """Bring together what loop and levers noted.
+    """Bring together what loop and joysticks noted.
 
     Args:
         deployment: what was run.
         record: output of the loop process.
-        hand: output of the levers process.
+        hand: output of the joysticks process.
     """
     began, ended = record["began_ns"], record["ended_ns"]
     sent = list(zip(*[iter(record["sent"])] * 3, strict=True))  # tick, axis, ns
@@ -136,18 +138,18 @@ def _joystick_ns(
     sent: list[tuple[int, int, int]],
     hand: dict[str, list[tuple[int, int]]],
 ) -> list[int]:
-    """From each lever frame to the valve frames that are computed with it.
+    """From each joystick frame to the valve frames that are computed with it.
 
-    A bus keeps the order of its frames: the n-th one that a lever sent on it is the n-th that the
-    loop took. Frames from before the first tick are too old, those after the last valve frame have
-    no answer.
+    A bus keeps the order of its frames: the n-th one that a joystick sent on it is the n-th that
+    the loop took. Frames from before the first tick are too old, those after the last valve frame
+    have no answer.
     """
     buses = list(deployment.config.buses)
-    levers = list(deployment.config.levers)
+    joysticks = list(deployment.config.joysticks)
     found: list[int] = []
     for number, axis in enumerate(deployment.axes.values()):
-        lever = axis.config.stick.lever
-        bus = deployment.config.levers[lever].bus
+        joystick = axis.config.command.joystick
+        bus = deployment.config.joysticks[joystick].bus
         counts = taken[buses.index(bus) :: len(buses)]  # frames taken, up to and with each tick
         answers = [(tick, at_ns) for tick, valve, at_ns in sent if valve == number]
         i = 0
@@ -156,6 +158,6 @@ def _joystick_ns(
                 i += 1
             if i == len(answers):
                 break
-            if which == levers.index(lever) and place >= counts[0]:
+            if which == joysticks.index(joystick) and place >= counts[0]:
                 found.append(answers[i][1] - at_ns)
     return found

@@ -14,10 +14,10 @@ from typing import Any, Self
 
 # linux/prctl.h
 PR_SET_PDEATHSIG = 1
-# The loop has the priority that the service's unit gives it; the levers come after it, so that
+# The loop has the priority that the service's unit gives it; the joysticks come after it, so that
 # they never delay it.
 LOOP_PRIORITY = 40
-LEVERS_PRIORITY = LOOP_PRIORITY - 1
+JOYSTICKS_PRIORITY = LOOP_PRIORITY - 1
 
 _CODE = f"import sys; sys.path[:] = {{path!r}}; from {__name__} import be; be()"
 

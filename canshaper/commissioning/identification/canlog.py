@@ -122,10 +122,10 @@ def read_can(
         LogError: the log cannot be read.
     """
     readers = {axis: _Reader(name, *bind(name, messages)) for axis, name in wanted.items()}
-    grapple = deployment.grapple if deployment else None
+    grapple = deployment.load_state if deployment else None
     weight = None
     if grapple and (signal := find_signal(grapple.message, grapple.config.signal)):
-        weight = _Reader("grapple", grapple.message, signal, Unit(Kind.OTHER, 1.0, ""))
+        weight = _Reader("load state", grapple.message, signal, Unit(Kind.OTHER, 1.0, ""))
     commands = Commands(deployment)
     all_readers = [*readers.values(), *([weight] if weight else [])]
     takers: dict[tuple[int, bool], list[_Reader]] = {}

@@ -13,7 +13,7 @@ from canshaper.commissioning.identification.driven import STANDS
 from canshaper.commissioning.identification.series import Array, Command
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import BoundAxis, Deployment
-from canshaper.machine.inputs import BoundLever
+from canshaper.machine.inputs import BoundJoystick
 
 # Silence of a command's message after which nothing is known of the command, s.
 _SILENT_S = 2.0
@@ -37,7 +37,7 @@ class Samples:
 
 
 class Commands:
-    """Commands of the axes of a deployment, from valve frames, else from levers."""
+    """Commands of the axes of a deployment, from valve frames, else from joysticks."""
 
     def __init__(self, deployment: Deployment | None) -> None:
         self._axes = dict(deployment.axes) if deployment else {}
@@ -50,9 +50,9 @@ class Commands:
             self._by_valve.setdefault(key, []).append(bound)
             self._layouts[key] = Layout(bound.valve_message), bound.valve_message.length
         self._curves = {n: a.config.limits.curve() for n, a in self._axes.items()}
-        levers = list(deployment.levers.values()) if deployment else []
-        self._lever_buses = {lever.key[0] for lever in levers}
-        self._finder = InputFinder(deployment.config.buses if deployment else {}, levers)
+        joysticks = list(deployment.joysticks.values()) if deployment else []
+        self._joystick_buses = {joystick.key[0] for joystick in joysticks}
+        self._finder = InputFinder(deployment.config.buses if deployment else {}, joysticks)
 
     def take(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
         """Take a frame."""
@@ -66,18 +66,18 @@ class Commands:
                         part = steps / bound.valve.steps
                         speed = self._speed(bound, part)
                         self._valves[bound.name].add(time_s, speed)
-        for bus in self._lever_buses:  # which one a channel of the log is, nobody has said
-            if lever := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
-                self._take_lever(lever, time_s, data)
+        for bus in self._joystick_buses:  # which one a channel of the log is, nobody has said
+            if joystick := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
+                self._take_joystick(joystick, time_s, data)
 
-    def _take_lever(self, lever: BoundLever, time_s: float, data: bytes) -> None:
+    def _take_joystick(self, joystick: BoundJoystick, time_s: float, data: bytes) -> None:
         try:
-            _, sticks = lever.codec.decode(data)
+            _, sticks = joystick.codec.decode(data)
         except WrongLengthError:
             return
         for name, bound in self._axes.items():
-            stick = bound.config.stick
-            value = sticks.get(stick.signal) if stick.lever == lever.name else None
+            stick = bound.config.command
+            value = sticks.get(stick.signal) if stick.joystick == joystick.name else None
             if type(value) is float:
                 moved = abs(value) > stick.neutral_pct / 100.0
                 self._sticks[name].add(time_s, value if moved else 0.0)

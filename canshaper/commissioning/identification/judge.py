@@ -37,8 +37,8 @@ LEAST_EXPLAINED_ALONE = 0.9
 # Periods from which a driven swing is looked for, each some 30 % around, s.
 STARTS_S = (1.2, 1.7, 2.3, 3.2, 4.5)
 SWING_FREELY = (
-    "drive the axis shortly, let go of the levers so that it swings by some 10 degrees, and touch"
-    " nothing for ten swings"
+    "drive the axis shortly, let go of the joysticks so that it swings by some 10 degrees, and"
+    " touch nothing for ten swings"
 )
 
 

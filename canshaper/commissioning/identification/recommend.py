@@ -22,7 +22,7 @@ class Advice:
         sway: values for the section ``sway``; empty where nothing can be used.
         spread_pct: lengths of the pendulum around that value, +- %.
         cover_pct: range of lengths for the robust shaper, +- %; 0 where one value will do.
-        sets: (value of the grapple's signal or None, label, sway) where sets are recommended.
+        gain_schedule: (value of the load state or None, label, sway) where sets are recommended.
         text: one sentence for people.
     """
 
@@ -30,7 +30,7 @@ class Advice:
     sway: dict[str, float]
     spread_pct: float
     cover_pct: int
-    sets: list[tuple[float | None, str, dict[str, float]]]
+    gain_schedule: list[tuple[float | None, str, dict[str, float]]]
     text: str
 
 
@@ -74,9 +74,9 @@ def advise(
     sets = [(f.at, f.label, v) for f, v in _pairs(usable, values)]
     if has_grapple or spread > ONE_VALUE_PCT:
         text = (
-            f"The lengths differ by ±{spread:.0f} % ({names}): give {axis} sets, one for each"
-            f" state{'' if has_grapple else ', with a grapple signal'}; until then sway:"
-            f" {flow(sway)}."
+            f"The lengths differ by ±{spread:.0f} % ({names}): give {axis} a gain schedule,"
+            f" a breakpoint for each state{'' if has_grapple else ', with a load_state signal'};"
+            f" until then sway: {flow(sway)}."
         )
         return Advice(axis, sway, spread, cover, sets, text)
     text = (

@@ -57,18 +57,18 @@ def _basis(finding: Finding) -> list[str]:
             f" {driven.delay_s:.2f} s late"
         )
     if finding.at is not None:
-        texts.append(f"signal of the grapple: {finding.at:g}")
+        texts.append(f"load state: {finding.at:g}")
     return texts
 
 
 def set_lines(advice: Advice) -> list[str]:
-    """The lines of ``sets`` for the deployment file; each still needs its filter."""
-    if not advice.sets:
+    """The lines of ``gain_schedule`` for the deployment file; each still needs its filter."""
+    if not advice.gain_schedule:
         return []
-    told = ["    sets:"]
-    for at, label, sway in sorted(advice.sets, key=lambda s: (s[0] is None, s[0])):
+    told = ["    gain_schedule:"]
+    for at, label, sway in sorted(advice.gain_schedule, key=lambda s: (s[0] is None, s[0])):
         shown = "?" if at is None else f"{at:g}"
-        told.append(f"      - at: {shown} # {label or 'value of the grapple signal'}")
+        told.append(f"      - breakpoint: {shown} # {label or 'value of the grapple signal'}")
         told.append(f"        sway: {flow(sway)}")
         told.append("        filter: # design it for this sway data")
     return told
@@ -97,7 +97,9 @@ def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, 
             a.axis: {
                 "sway": a.sway,
                 "spread_pct": round(a.spread_pct, 2),
-                "sets": [{"at": at, "label": label, "sway": sway} for at, label, sway in a.sets],
+                "gain_schedule": [
+                    {"at": at, "label": label, "sway": sway} for at, label, sway in a.gain_schedule
+                ],
                 "recommendation": a.text,
             }
             for a in advice

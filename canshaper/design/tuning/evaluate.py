@@ -1,7 +1,7 @@
-"""What a filter setting does: to the lever and to the swing, also when the sway data is wrong.
+"""What a filter setting does: to the joystick and to the swing, also when the sway data is wrong.
 
 Pure and for every filter: the running code is asked, tick by tick. Times in s, speeds as fractions
-of full speed, residual sway as a fraction of what the same movement of the lever leaves without
+of full speed, residual sway as a fraction of what the same movement of the joystick leaves without
 the filter.
 """
 

@@ -77,7 +77,7 @@ def draw(
 def finding(axis: str, found: Setting) -> str:
     """Say what the setting does: "Slew: 4 % of the swing is left, ...".
 
-    Shares are of what the same movement of the lever leaves without the filter.
+    Shares are of what the same movement of the joystick leaves without the filter.
     """
     m = found.measures
     return (

@@ -124,7 +124,7 @@ class RemoteNode:
 
 
 class NodeGate:
-    """Why an axis may not move, by the node of its lever or of its valve.
+    """Why an axis may not move, by the node of its joystick or of its valve.
 
     Args:
         node: that node.
@@ -231,13 +231,13 @@ def _name(state: int) -> str:
 def canopen_buses(
     deployment: Deployment, axes: "Mapping[str, AxisRunner]"
 ) -> dict[str, CanopenBus]:
-    """Our node on each bus of CANopen; axes are told the nodes of their lever and valve."""
+    """Our node on each bus of CANopen; axes are told the nodes of their joystick and valve."""
     buses = {n: CanopenBus(n, b.canopen) for n, b in deployment.config.buses.items() if b.canopen}
     for runner in axes.values():
         config = runner.bound.config
-        lever, valve = deployment.config.levers[config.stick.lever], config.valve
-        if lever.node:
-            node = buses[lever.bus].nodes[lever.node]
+        joystick, valve = deployment.config.joysticks[config.command.joystick], config.valve
+        if joystick.node:
+            node = buses[joystick.bus].nodes[joystick.node]
             runner.add_interlock(NodeGate(node, Reason.NODE_FAULT), first=True)
         if valve.cia408 and valve.cia408.node:
             node = buses[valve.bus].nodes[valve.cia408.node]

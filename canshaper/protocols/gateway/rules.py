@@ -7,7 +7,7 @@ from canshaper.codec.kernel_check import kernel_check
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundLever
+from canshaper.machine.inputs import BoundJoystick
 from canshaper.protocols.gateway.cangw import Rule, changed_bytes
 from canshaper.protocols.gateway.passing import EFF, Pattern, all_but, exactly
 
@@ -15,12 +15,16 @@ from canshaper.protocols.gateway.passing import EFF, Pattern, all_but, exactly
 def excluded(deployment: Deployment) -> frozenset[Pattern]:
     """Frames that nobody passes on, in neither direction.
 
-    Those of the levers, which only we pass on; all that we send ourselves, so that nobody can send
-    it through us; and what the deployment blocks.
+    Those of the joysticks, which only we pass on; all that we send ourselves, so that nobody can
+    send it through us; and what the deployment blocks.
     """
     gateway = deployment.config.gateway
     assert gateway is not None  # only such deployments are asked
-    found = {_of(lever) for lever in deployment.levers.values() if lever.key[0] in gateway.between}
+    found = {
+        _of(joystick)
+        for joystick in deployment.joysticks.values()
+        if joystick.key[0] in gateway.between
+    }
     for bus in gateway.between:
         j1939 = deployment.is_j1939(bus)
         found |= {
@@ -50,36 +54,36 @@ def passing_rules(deployment: Deployment) -> list[Rule]:
 
 
 def fallback_rules(deployment: Deployment) -> list[Rule]:
-    """Rules for the frames of the levers while the daemon is away."""
+    """Rules for the frames of the joysticks while the daemon is away."""
     gateway = deployment.config.gateway
     assert gateway is not None
     found = []
-    for lever, message in _passed(deployment):
-        source = deployment.config.buses[lever.key[0]].channel
+    for joystick, message in _passed(deployment):
+        source = deployment.config.buses[joystick.key[0]].channel
         destination = deployment.config.buses[message.sender.key[0]].channel
         if gateway.fallback == "pass":
-            found.append(Rule(source, destination, _of(lever)))
+            found.append(Rule(source, destination, _of(joystick)))
         elif gateway.fallback == "neutral":
-            found.append(Rule(source, destination, _of(lever), _neutral(message)))
+            found.append(Rule(source, destination, _of(joystick), _neutral(message)))
     return found
 
 
-def _passed(deployment: Deployment) -> Iterator[tuple[BoundLever, RewrittenMessage]]:
-    """Levers whose frames leave on the other bus, with what they leave as."""
+def _passed(deployment: Deployment) -> Iterator[tuple[BoundJoystick, RewrittenMessage]]:
+    """Joysticks whose frames leave on the other bus, with what they leave as."""
     seen = set()
     for axis in deployment.axes.values():
-        lever, message = deployment.levers[axis.config.stick.lever], axis.valve.message
-        if isinstance(message, RewrittenMessage) and lever.name not in seen:
-            seen.add(lever.name)
-            yield lever, message
+        joystick, message = deployment.joysticks[axis.config.command.joystick], axis.valve.message
+        if isinstance(message, RewrittenMessage) and joystick.name not in seen:
+            seen.add(joystick.name)
+            yield joystick, message
 
 
-def _of(lever: BoundLever) -> Pattern:
-    """Frames of a lever, of J1939 whatever their priority."""
-    _, can_id, extended = lever.key
-    if lever.by_group:
-        return _group(can_id, None if lever.any_source else can_id & 0xFF)
-    return _whatever_priority(can_id) if is_j1939(lever.message) else exactly(can_id, extended)
+def _of(joystick: BoundJoystick) -> Pattern:
+    """Frames of a joystick, of J1939 whatever their priority."""
+    _, can_id, extended = joystick.key
+    if joystick.by_group:
+        return _group(can_id, None if joystick.any_source else can_id & 0xFF)
+    return _whatever_priority(can_id) if is_j1939(joystick.message) else exactly(can_id, extended)
 
 
 def _whatever_priority(can_id: int) -> Pattern:
@@ -102,7 +106,7 @@ def channels(deployment: Deployment) -> tuple[str, str]:
 
 
 def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
-    """Changes that make a frame of a lever one with all its sticks in neutral."""
+    """Changes that make a frame of a joystick one with all its sticks in neutral."""
     length = message.sender.fields.message.length
     checks, clear = kernel_check(message.sender.protection, length)
     return (

@@ -50,7 +50,7 @@ class AnySource:
         message: name of the message.
         taken: the input.
         timeout_ns: its age limit.
-        runners: axes that it moves. A lever that takes over is another lever: neutral comes first.
+        runners: axes that it moves. One that takes over is another joystick: neutral comes first.
 
     Attributes:
         events: addresses that are new here, since the owner emptied the list.
@@ -74,7 +74,7 @@ class AnySource:
         self._heard_ns = 0
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Take a frame; two levers that send the same group cannot be told apart."""
+        """Take a frame; two joysticks that send the same group cannot be told apart."""
         source = frame.can_id & 0xFF
         if source != self._source:
             if self._source is not None:

@@ -10,7 +10,7 @@ from canshaper.config.bus import J1939
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Following
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput, BoundLever
+from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.protocols.j1939.claim import ClaimState
 from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.protocols.j1939.groups import (
@@ -97,8 +97,8 @@ class Network:
         if not bound.any_source:
             entry.of[can_id & 0xFF] = one
             return
-        name = bound.name if isinstance(bound, BoundLever) else None
-        moved = [r for r in self._axes.values() if r.bound.config.stick.lever == name]
+        name = bound.name if isinstance(bound, BoundJoystick) else None
+        moved = [r for r in self._axes.values() if r.bound.config.command.joystick == name]
         timeout_ns = bound.config.timeout_ms * 1_000_000
         entry.rest = AnySource(bus, bound.message.name, one, timeout_ns, moved)
         self._any[bus, group_of(can_id)] = entry.rest, one

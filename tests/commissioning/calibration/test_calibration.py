@@ -14,7 +14,7 @@ from canshaper.commissioning.calibration.simulated import run_simulated
 from canshaper.config.source import DeploymentError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script, Stroke
 from canshaper_sim.parameters import changed_parameters
 
@@ -106,20 +106,20 @@ def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
     assert curve.velocity(0.06) > 0.0 > curve.velocity(-0.115)
 
 
-def hands(deployment: Deployment, **stroke: float) -> LeverNode:
+def hands(deployment: Deployment, **stroke: float) -> JoystickNode:
     strokes = tuple(Stroke("slew", 3.0, 1.0, v, ramp_s=0.0) for v in stroke.values())
-    return LeverNode(deployment, Script("hand", strokes, 60.0))
+    return JoystickNode(deployment, Script("hand", strokes, 60.0))
 
 
 def run(
-    drive: CalibrationDrive, levers: LeverNode, seconds: float, *, spoil: str = ""
+    drive: CalibrationDrive, joysticks: JoystickNode, seconds: float, *, spoil: str = ""
 ) -> list[Frame]:
     """The daemon's side alone: feedback stands at zero."""
     speed = Frame("crane", 0x402, False, bytes(6))
     sent: list[Frame] = []
     for tick in range(round(seconds / 0.02)):
         now_ns = tick * TICK_NS
-        for frame in levers.frames(tick * 20):
+        for frame in joysticks.frames(tick * 20):
             if spoil == "silent" and tick > 150:
                 continue
             if spoil == "enable" and tick > 150:
@@ -155,9 +155,9 @@ def test_what_stops_the_daemon_ends_it_in_neutral(
 
 def test_it_does_not_begin_without_feedback(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    levers = hands(deployment)
+    joysticks = hands(deployment)
     for tick in range(100):
-        for frame in levers.frames(tick * 20):
+        for frame in joysticks.frames(tick * 20):
             drive.receive(frame, tick * TICK_NS)
         assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
     assert drive.waiting_for == "feedback"
@@ -166,9 +166,9 @@ def test_it_does_not_begin_without_feedback(deployment: Deployment) -> None:
 def test_it_does_not_begin_with_feedback_of_long_ago(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
     drive.receive(Frame("crane", 0x402, False, bytes(6)), 0)
-    levers = hands(deployment)
+    joysticks = hands(deployment)
     for tick in range(50, 150):
-        for frame in levers.frames(tick * 20):
+        for frame in joysticks.frames(tick * 20):
             drive.receive(frame, tick * TICK_NS)
         assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200)
     assert (drive.waiting_for, drive.ended) == ("feedback", "")
@@ -176,9 +176,9 @@ def test_it_does_not_begin_with_feedback_of_long_ago(deployment: Deployment) -> 
 
 def test_no_other_valve_moves(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    levers = hands(deployment)
+    joysticks = hands(deployment)
     for tick in range(300):
-        for frame in levers.frames(tick * 20):
+        for frame in joysticks.frames(tick * 20):
             drive.receive(frame, tick * TICK_NS)
         drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
         for frame in drive.tick(tick * TICK_NS):
@@ -239,15 +239,15 @@ def test_a_frame_not_sent_and_a_loop_that_stood_still_end_it(
     deployment: Deployment, what: str, reason: str
 ) -> None:
     drive = CalibrationDrive(deployment, "slew", SPEED, RAMP)
-    levers = hands(deployment)
-    (*_, moving) = run(drive, levers, 4.0)
+    joysticks = hands(deployment)
+    (*_, moving) = run(drive, joysticks, 4.0)
     assert moving.data[0]
     if what == "send":
         drive.send_failed(moving)
     else:
         drive.stalled()
     for tick in range(200, 203):
-        for frame in levers.frames(tick * 20):
+        for frame in joysticks.frames(tick * 20):
             drive.receive(frame, tick * TICK_NS)
         assert [f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id == 0x200] == [0]
     assert drive.ended == f"stopped: {reason}"

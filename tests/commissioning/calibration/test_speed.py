@@ -50,7 +50,7 @@ def with_messages(folder: Path) -> Deployment:
 def drive_on(
     deployment: Deployment, axis: str, speed: tuple[str, str], heard: list[Frame], ticks: int = 400
 ) -> CalibrationDrive:
-    """Levers held in neutral with their enable; the speed is ``heard``, the last for ever."""
+    """Joysticks held in neutral with their enable; the speed is ``heard``, the last for ever."""
     drive, hand = CalibrationDrive(deployment, axis, speed, RAMP), Hand(deployment)
     for tick in range(ticks):
         now_ns = tick * TICK_NS
@@ -136,12 +136,12 @@ def test_it_waits_for_every_stick() -> None:
     assert drive.waiting_for == "the stick of near_far"
 
 
-def test_in_a_gateway_the_frames_of_the_lever_move_the_crane() -> None:
+def test_in_a_gateway_the_frames_of_the_joystick_move_the_crane() -> None:
     deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
     run_simulated(drive, deployment, None, lambda _: None)
     assert drive.result().positive.opens == pytest.approx(0.05, abs=0.008)
-    assert drive.neutral_frames() == []  # the last frame of the lever was
+    assert drive.neutral_frames() == []  # the last frame of the joystick was
 
 
 def test_the_end_in_a_gateway_can_be_told_more_than_once() -> None:

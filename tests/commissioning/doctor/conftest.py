@@ -12,7 +12,7 @@ ROOT = Path(__file__).parents[3]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
 TICK_NS = 20_000_000
 
-# A second bus with a lever of another cycle, a quicker tick, and an emergency stop.
+# A second bus with a joystick of another cycle, a quicker tick, and an emergency stop.
 YAML = {
     "tick_ms: 20": "tick_ms: 10",
     "  crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }\n": (
@@ -29,7 +29,8 @@ YAML = {
 }
 DBC = {
     "BO_ 512 SlewCommand": (
-        'BO_ 64 Stop: 1 LEVERS\n SG_ Pressed : 0|2@1+ (1,0) [0|3] "" SHAPER\n\nBO_ 512 SlewCommand'
+        'BO_ 64 Stop: 1 JOYSTICKS\n SG_ Pressed : 0|2@1+ (1,0) [0|3] "" SHAPER\n\n'
+        "BO_ 512 SlewCommand"
     ),
     'BA_ "GenMsgCycleTime" BO_ 273 20;\n': (
         'BA_ "GenMsgCycleTime" BO_ 273 30;\nBA_ "GenMsgCycleTime" BO_ 64 20;\n'

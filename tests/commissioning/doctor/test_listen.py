@@ -1,4 +1,4 @@
-"""What was heard of the levers, against their cycle and their timeout."""
+"""What was heard of the joysticks, against their cycle and their timeout."""
 
 import errno
 import os
@@ -32,9 +32,9 @@ def at(gaps_ms: Iterable[float]) -> list[int]:
 
 
 def judged(gaps_ms: Iterable[float]) -> Finding:
-    heard = {"lever left": at(gaps_ms), "lever right": at([20.0] * 50)}
+    heard = {"joystick left": at(gaps_ms), "joystick right": at([20.0] * 50)}
     left, right = heard_findings(DEPLOYMENT, heard)
-    assert (right.subject, right.level) == ("lever right", Level.OK)
+    assert (right.subject, right.level) == ("joystick right", Level.OK)
     return left
 
 
@@ -65,11 +65,11 @@ def test_what_is_said() -> None:
 
 
 def test_other_buses_are_not_listened_to(two_buses: Path) -> None:
-    heard = {"lever left": at([20.0] * 50)}
+    heard = {"joystick left": at([20.0] * 50)}
     found = heard_findings(load_deployment(two_buses), heard)
     assert [(f.subject, f.level) for f in found] == [
-        ("lever left", Level.OK),
-        ("lever right", Level.NOTE),
+        ("joystick left", Level.OK),
+        ("joystick right", Level.NOTE),
         ("emergency stop", Level.NOTE),
     ]
 
@@ -101,7 +101,9 @@ class Packets:
         os.close(self._end)
 
 
-def test_levers_of_j1939_are_heard_from_whatever_address(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_joysticks_of_j1939_are_heard_from_whatever_address(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     frames = []
     for _ in range(20):
         frames += [(bjm("BJM1", 0x33, 6), 0), (bjm("BJM2", 0x34), 0)]
@@ -114,8 +116,8 @@ def test_levers_of_j1939_are_heard_from_whatever_address(monkeypatch: pytest.Mon
     deployment = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
     heard = listening.listen(deployment, 0.1, lambda _passed: None)
     assert {name: len(times) for name, times in heard.items()} == {
-        "lever left": 20,
-        "lever right": 20,
+        "joystick left": 20,
+        "joystick right": 20,
     }
     assert {f.level for f in heard_findings(deployment, heard)} == {Level.OK}
 
@@ -135,5 +137,5 @@ def test_an_interface_that_cannot_be_listened_to_is_a_finding(
 
     monkeypatch.setattr(listening, "open_sockets", refuse)
     (finding,) = _listened(DEPLOYMENT, 0.1)
-    assert (finding.subject, finding.level) == ("levers", Level.BAD)
+    assert (finding.subject, finding.level) == ("joysticks", Level.BAD)
     assert finding.found.startswith(f"cannot listen: {why}")

@@ -1,4 +1,4 @@
-"""Notes of loop and levers brought together; the hand that moves every axis."""
+"""Notes of loop and joysticks brought together; the hand that moves every axis."""
 
 import math
 import os
@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from canshaper.commissioning.doctor.levers import LARGEST, NEUTRAL_S, STROKE_S, Waving
+from canshaper.commissioning.doctor.joysticks import LARGEST, NEUTRAL_S, STROKE_S, Waving
 from canshaper.commissioning.doctor.measure import measure, run_of
 from canshaper.commissioning.doctor.processes import Children, MeasureError, ready
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from tests.commissioning.doctor.conftest import ROOT, SHIPPED
 
 MS = 1_000_000
@@ -34,7 +34,9 @@ def ms(values: Iterable[int]) -> list[float]:
 
 
 def test_a_joystick_frame_is_answered_by_the_valve_frame_of_the_tick_that_took_it() -> None:
-    deployment = load_deployment(SHIPPED)  # slew and near_far on the left lever, lift on the right
+    deployment = load_deployment(
+        SHIPPED
+    )  # slew and near_far on the left joystick, lift on the right
     left, right = 0, 1
     sent = [[left, 1], [left, 4], [right, 5], [left, 13], [left, 18], [right, 19], [left, 45]]
     notes = record(
@@ -90,7 +92,7 @@ def test_the_hand_moves_every_axis(name: str, request: pytest.FixtureRequest) ->
     shipped = ROOT / "config" / f"{name}.yaml"
     path = shipped if shipped.exists() else request.getfixturevalue(name)
     deployment = load_deployment(path)
-    controller, node = Controller(deployment), LeverNode(deployment, WAVING)
+    controller, node = Controller(deployment), JoystickNode(deployment, WAVING)
     tick_ms = deployment.config.tick_ms
     moved: dict[str, set[bool]] = {name: set() for name in controller.axes}
     for time_ms in range(0, 3000, 10):

@@ -79,10 +79,10 @@ def test_commands_that_fall_silent_are_not_taken_for_standing(
     assert [b for _, b in slew.idle] == pytest.approx([2.0, 6.0, 8.0, 12.0], abs=0.05)
 
 
-def test_levers_tell_the_commands_where_no_valve_does(
+def test_joysticks_tell_the_commands_where_no_valve_does(
     tmp_path: Path, deployment: Deployment
 ) -> None:
-    """A machine on which canshaper does not run yet: the lever goes to the valve as it is."""
+    """A machine on which canshaper does not run yet: the joystick goes to the valve as it is."""
     log = candump(tmp_path / "a.log", TOLD, valves=False)
     lines = log.read_text().splitlines()
     for tick in range(600):
@@ -220,7 +220,7 @@ def test_the_signal_of_the_grapple_is_read_beside(tmp_path: Path) -> None:
     text = FILE.read_text().replace("../dbc/forwarder.dbc", str(ROOT / "dbc" / "forwarder.dbc"))
     file = tmp_path / "machine.yaml"
     # Any cyclic message will do for the weight.
-    grapple = "grapple: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
+    grapple = "load_state: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
     file.write_text(text + grapple)
     deployment = load_deployment(file)
     log = candump(tmp_path / "a.log", TOLD)

@@ -122,15 +122,15 @@ def test_sets_where_the_deployment_knows_the_grapple(
     tmp_path: Path, file: Path, logs: Path
 ) -> None:
     """Numbers as labels are the values of its signal."""
-    text = "grapple: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
+    text = "load_state: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
     file.write_text(file.read_text() + text)
     labelled = f"300={logs / 'empty.log'}", f"1200={logs / 'loaded.log'}"
     result = run(tmp_path, *labelled, "--file", file)
     assert result.exit_code == 0, result.output
-    assert "give slew sets, one for each state" in said(result)
+    assert "give slew a gain schedule, a breakpoint for each state" in said(result)
     assert f"canshaper robust {file} --axis slew --range 1" in said(result)
-    assert "- at: 300 # 300 sway: { period_s: 2.35" in said(result)
-    assert "- at: 1200 # 1200 sway: { period_s: 2.7" in said(result)
+    assert "- breakpoint: 300 # 300 sway: { period_s: 2.35" in said(result)
+    assert "- breakpoint: 1200 # 1200 sway: { period_s: 2.7" in said(result)
 
 
 def test_a_log_without_a_deployment(tmp_path: Path, logs: Path) -> None:
@@ -171,7 +171,7 @@ def test_too_poor_is_told_and_not_written(tmp_path: Path, file: Path, logs: Path
     result = run(tmp_path, logs / "still.log", "--file", file, "--write")
     assert result.exit_code == 1
     assert "too poor" in result.output
-    assert "drive the axis shortly, let go of the levers" in result.output
+    assert "drive the axis shortly, let go of the joysticks" in result.output
     assert "Written" not in result.output
     assert file.read_bytes() == before
 

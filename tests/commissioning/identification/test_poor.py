@@ -132,7 +132,7 @@ def test_two_directions_in_one_signal() -> None:
     refused(series(time, both + noise(len(time), 0.05)), "two swings are mixed, of 2.0")
 
 
-def test_the_levers_were_never_left_alone() -> None:
+def test_the_joysticks_were_never_left_alone() -> None:
     time = times(30.0)
     idle = [(3.0 * k, 3.0 * k + 1.5) for k in range(10)]
     found = refused(series(time, decay(time), idle=idle), "never left to swing freely")

@@ -72,7 +72,7 @@ def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: 
     for n, priority in enumerate((3, 6, 0)):
         monitor.take(heard(bjm("BJM1", 0x33, priority), NOW + n * MS))
     monitor.take(heard(bjm("BJM1", 0x35), NOW + 9 * MS))
-    rate = monitor.messages[deployment.levers["left"].key]
+    rate = monitor.messages[deployment.joysticks["left"].key]
     assert (len(rate.times), rate.last_ns) == (3, NOW + 2 * MS)
 
 
@@ -121,7 +121,7 @@ def test_before_anything_is_heard_it_says_so(deployment: Deployment) -> None:
     assert "SILENT" in lines[0]
     assert sum("no status heard" in line for line in lines) == 3
     assert any("no counters heard" in line for line in lines)
-    assert any("LeverLeft 0 (50) NEVER" in line for line in lines)
+    assert any("JoystickLeft 0 (50) NEVER" in line for line in lines)
 
 
 def test_what_is_stale_says_stale(deployment: Deployment) -> None:
@@ -144,8 +144,8 @@ def test_rates_are_told_beside_those_of_the_dbc(deployment: Deployment) -> None:
         if i % 2:
             monitor.take(Heard(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), ""))
     lines = "\n".join(text(monitor, NOW + 199 * 20 * MS))
-    assert "LeverLeft 50 (50)  " in lines
-    assert "LeverRight 25 (50) SLOW" in lines
+    assert "JoystickLeft 50 (50)  " in lines
+    assert "JoystickRight 25 (50) SLOW" in lines
     assert monitor.frames_per_s("crane", NOW + 199 * 20 * MS) == pytest.approx(75, abs=1)
     assert monitor.frames_per_s("crane", NOW + 10**10) == 0.0
 

@@ -132,7 +132,7 @@ def test_a_lost_heartbeat_of_a_valve_is_neutral_and_latched(rig: CanopenRig) -> 
     assert rig.axis()[0] == "READY"
 
 
-def test_a_lost_heartbeat_of_a_lever_is_a_shaped_stop(rig: CanopenRig) -> None:
+def test_a_lost_heartbeat_of_a_joystick_is_a_shaped_stop(rig: CanopenRig) -> None:
     """Its PDOs still come: it is the node that cannot be trusted."""
     rig.moving()
     rig.states["left"] = OPERATIONAL | 0x100  # its PDOs come, its heartbeat does not
@@ -204,7 +204,7 @@ def test_boot_up_ends_an_emergency(rig: CanopenRig) -> None:
     rig.ready()
 
 
-def test_an_emergency_of_a_lever_is_a_shaped_stop(rig: CanopenRig) -> None:
+def test_an_emergency_of_a_joystick_is_a_shaped_stop(rig: CanopenRig) -> None:
     rig.moving()
     rig.emergency("left", 0x5000)
     assert rig.run(Slew=30000)["slew"]["SetPoint"] > 0

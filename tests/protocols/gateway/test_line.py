@@ -16,7 +16,7 @@ from tests.rigs.gateway import TICK_NS, GatewayRig
 
 VELOCITIES = 0xFFFFFFFF  # Slew and NearFar: the first four bytes
 COUNTER = 0xFF << 56
-FREE = 0x00FF_FFC0_0000_0000  # bits of LeverLeft that no signal has
+FREE = 0x00FF_FFC0_0000_0000  # bits of JoystickLeft that no signal has
 
 
 @pytest.fixture
@@ -29,7 +29,7 @@ def word(frame: Frame) -> int:
 
 
 def test_it_leaves_at_once_on_the_other_bus_with_its_own_id(rig: GatewayRig) -> None:
-    passed = rig.receive(rig.lever())
+    passed = rig.receive(rig.joystick())
     assert passed is not None
     assert passed[:3] == ("machine", 0x110, False)
 
@@ -41,7 +41,7 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> GatewayRig:
 
 @given(st.integers(0, 2**64 - 1), st.integers(-1000, 1000), st.integers(0, 1))
 def test_every_other_bit_is_untouched(quick: GatewayRig, bits: int, stick: int, reset: int) -> None:
-    frame = quick.lever(junk=bits & FREE, NearFar=stick, Reset=reset)
+    frame = quick.joystick(junk=bits & FREE, NearFar=stick, Reset=reset)
     passed = quick.receive(frame)
     assert passed is not None
     mine = VELOCITIES | COUNTER
@@ -60,7 +60,7 @@ def test_the_velocity_is_the_shaped_one_of_the_last_tick(rig: GatewayRig) -> Non
 def test_the_counter_is_ours_and_has_no_gap(rig: GatewayRig) -> None:
     """Where the joystick's has one: a lost frame is one that we have not passed on."""
     rig.run(3)
-    rig.lever()  # is lost
+    rig.joystick()  # is lost
     rig.run(300)
     counts = [rig.decoded(f)["AliveCounter"] for f in rig.left if f.can_id == 0x110]
     assert [(b - a) % 256 for a, b in itertools.pairwise(counts)] == [1] * 302
@@ -69,7 +69,7 @@ def test_the_counter_is_ours_and_has_no_gap(rig: GatewayRig) -> None:
 @pytest.mark.parametrize("cut", [True, False], ids=["short", "twice"])
 def test_what_does_not_count_does_not_pass(rig: GatewayRig, cut: bool) -> None:
     rig.run(3)
-    frame = rig.lever()
+    frame = rig.joystick()
     if cut:
         frame = frame._replace(data=frame.data[:7])
     else:
@@ -79,7 +79,7 @@ def test_what_does_not_count_does_not_pass(rig: GatewayRig, cut: bool) -> None:
 
 def test_a_frame_of_another_message_makes_none(rig: GatewayRig) -> None:
     rig.run(3)
-    assert rig.receive(Frame("levers", 0x400, False, bytes(4))) is None
+    assert rig.receive(Frame("joysticks", 0x400, False, bytes(4))) is None
     assert rig.receive(Frame("machine", 0x400, False, bytes(4))) is None
 
 
@@ -145,7 +145,7 @@ def test_a_joystick_that_comes_back_is_passed_on_in_the_stop(rig: GatewayRig) ->
     rig.moving()
     for _ in range(12):
         rig.tick()
-    passed = rig.receive(rig.lever(Slew=1000))
+    passed = rig.receive(rig.joystick(Slew=1000))
     assert passed is not None
     assert 0 < rig.decoded(passed)["Slew"] < 1000
     assert rig.state()[0] == "STOPPING"
@@ -166,7 +166,7 @@ def test_a_trip_that_is_noted_makes_the_next_frame_neutral(rig: GatewayRig) -> N
     """The last frame did not reach the ECU: the velocity of the last tick goes no further."""
     rig.moving()
     rig.controller.send_failed(rig.left[-2])
-    passed = rig.receive(rig.lever(Slew=1000))
+    passed = rig.receive(rig.joystick(Slew=1000))
     assert passed is not None
     assert rig.decoded(passed)["Slew"] == 0
     assert rig.tick() == []
@@ -182,7 +182,7 @@ def test_neutral_after_a_trip_does_not_wait_for_a_joystick_that_is_late(rig: Gat
     assert (values["Slew"], values["Enable"]) == (0, 0)
 
 
-def test_another_sender_of_the_lever_behind_us_trips(rig: GatewayRig) -> None:
+def test_another_sender_of_the_joystick_behind_us_trips(rig: GatewayRig) -> None:
     rig.moving()
     foreign = Frame("machine", 0x110, False, bytes(8))
     assert rig.receive(foreign) is None
@@ -200,7 +200,7 @@ def test_a_trip_before_the_first_joystick_frame_sends_nothing(rig: GatewayRig) -
 
 def test_a_frame_that_did_not_go_out_trips(rig: GatewayRig) -> None:
     rig.moving()
-    passed = rig.receive(rig.lever(Slew=1000))
+    passed = rig.receive(rig.joystick(Slew=1000))
     assert passed is not None
     rig.controller.send_failed(passed)
     rig.tick()
@@ -209,7 +209,7 @@ def test_a_frame_that_did_not_go_out_trips(rig: GatewayRig) -> None:
 
 def test_ids_that_nobody_knows_are_no_fault_in_the_line(rig: GatewayRig) -> None:
     rig.run(3)
-    for bus in ("levers", "machine"):
+    for bus in ("joysticks", "machine"):
         assert rig.receive(Frame(bus, 0x7E8, False, bytes(8))) is None
     assert rig.controller.counters.values["UnknownId"] == 0
 
@@ -229,11 +229,12 @@ CHECKSUM = (
     ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273',
 )
 PROTECTED = (
-    ("left:\n    bus: levers", "left:\n    checksum: { signal: Checksum, kind: crc8_sae_j1850 }\n"
-     "    bus: levers"),
-    ("LeverLeft, signal: Slew, timeout_ms: 200,", "LeverLeft, signal: Slew, timeout_ms: 200, "
+    ("left:\n    bus: joysticks",
+     "left:\n    checksum: { signal: Checksum, kind: crc8_sae_j1850 }\n    bus: joysticks"),
+    ("JoystickLeft, signal: Slew, timeout_ms: 200,", "JoystickLeft, signal: Slew, timeout_ms: 200, "
      "checksum: { signal: Checksum, kind: crc8_sae_j1850 },"),
-    ("LeverLeft, signal: NearFar, timeout_ms: 200,", "LeverLeft, signal: NearFar, timeout_ms: 200, "
+    ("JoystickLeft, signal: NearFar, timeout_ms: 200,",
+     "JoystickLeft, signal: NearFar, timeout_ms: 200, "
      "checksum: { signal: Checksum, kind: crc8_sae_j1850 },"),
     ("fallback: neutral", "fallback: stop"),
 )  # fmt: skip
@@ -246,10 +247,10 @@ def crc(data: bytes) -> int:
 
 def test_the_checksum_is_made_anew(tmp_path: Path) -> None:
     rig = GatewayRig(tmp_path, yaml=PROTECTED, dbc=(CHECKSUM,))
-    bad = rig.lever()
+    bad = rig.joystick()
     assert rig.receive(bad) is None
     for stick in (0, 0, 1000, 1000, 1000):
-        frame = rig.lever(Slew=stick)
+        frame = rig.joystick(Slew=stick)
         right = frame.data[:6] + bytes((crc(frame.data),)) + frame.data[7:]
         passed = rig.receive(frame._replace(data=right))
         assert passed is not None
@@ -279,8 +280,8 @@ def test_e2e_is_made_anew(tmp_path: Path) -> None:
         ),
     )  # fmt: skip
     for count in range(1, 40):
-        data = profile.seal(rig.lever(Slew=1000 if count > 3 else 0).data, count % 16)
-        passed = rig.receive(Frame("levers", 0x110, False, data))
+        data = profile.seal(rig.joystick(Slew=1000 if count > 3 else 0).data, count % 16)
+        passed = rig.receive(Frame("joysticks", 0x110, False, data))
         assert passed is not None
         assert profile.right(passed.data)
         assert passed.data[1] & 0x0F == count % 16
@@ -291,22 +292,22 @@ def test_e2e_is_made_anew(tmp_path: Path) -> None:
 def test_ten_late_frames_in_one_tick_leave_in_their_order(rig: GatewayRig) -> None:
     rig.run(3)
     for stick in range(10):
-        rig.receive(rig.lever(Reset=stick % 2))
+        rig.receive(rig.joystick(Reset=stick % 2))
     assert [rig.decoded(f)["Reset"] for f in rig.left[-10:]] == [0, 1] * 5
     assert rig.now_ns == 3 * TICK_NS
 
 
 def test_a_pressed_emergency_stop_makes_the_next_frame_neutral(tmp_path: Path) -> None:
     """It leaves before the tick in which the axes trip."""
-    stop = STOP.replace("bus: crane", "bus: levers").replace("60", "1000")
+    stop = STOP.replace("bus: crane", "bus: joysticks").replace("60", "1000")
     last = "status: { bus: machine, message: ShaperStatus }"
     rig = GatewayRig(tmp_path, yaml=((last, stop + last),), dbc=tuple(DBC.items()))
-    free, pressed = (Frame("levers", STOP_ID, False, bytes((n, n, 0))) for n in (0, 1))
+    free, pressed = (Frame("joysticks", STOP_ID, False, bytes((n, n, 0))) for n in (0, 1))
     rig.receive(free)
     rig.run(3)
     assert rig.run(30, Slew=1000)["Slew"] > 300
     rig.receive(pressed)
-    passed = rig.receive(rig.lever(Slew=1000))
+    passed = rig.receive(rig.joystick(Slew=1000))
     assert passed is not None
     assert (rig.decoded(passed)["Slew"], rig.decoded(passed)["Enable"]) == (0, 1)
     rig.tick()

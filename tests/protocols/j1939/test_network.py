@@ -64,7 +64,7 @@ def test_the_other_joystick_takes_over_after_silence_and_never_in_motion(rig: Ri
 
 @pytest.mark.parametrize("gap", range(4, 9))
 def test_a_change_of_joysticks_always_stops_however_the_ticks_fall(rig: Rig, gap: int) -> None:
-    """Silence may begin and end between two looks at the input; the other lever is another one."""
+    """Silence may begin and end between two looks at the input; the other is another one."""
     rig.moving()
     for _ in range(gap):
         rig.tick(bjm("BJM2"))

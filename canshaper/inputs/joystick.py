@@ -1,30 +1,30 @@
-"""What is known of one lever now: its last good frame, and what an axis may use of it."""
+"""What is known of one joystick now: its last good frame, and what an axis may use of it."""
 
 from typing import Any, Self
 
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input
-from canshaper.machine.inputs import BoundLever
+from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.states import Reason, StickInput
 
 _new = tuple.__new__  # StickInput(...) in half the time
 
 
-class LeverInput(Input):
-    """Takes the frames of one lever; answers what an axis may use of them at a moment.
+class JoystickInput(Input):
+    """Takes the frames of one joystick; answers what an axis may use of them at a moment.
 
     Attributes:
         releases: how often its enable was seen released. A release counts when it is read, however
             long ago its frame arrived; all that has an age is as old as its arrival.
     """
 
-    def __init__(self, lever: BoundLever) -> None:
-        super().__init__(lever)
-        config = lever.config
+    def __init__(self, joystick: BoundJoystick) -> None:
+        super().__init__(joystick)
+        config = joystick.config
         self._enable = config.enable
         self._reset = config.reset
         self._off = config.anti_sway_off
-        self._frozen_ns = round(config.frozen_s * 1e9)
+        self._frozen_ns = round(config.stuck_s * 1e9)
         self._changed_ns: dict[str, int] = {}
         self.releases = 0
         self._released = False

@@ -1,4 +1,4 @@
-"""The simulated levers: what they send is right for every protection that a deployment may ask."""
+"""The simulated joysticks: what they send is right for every protection a deployment may ask."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -12,7 +12,7 @@ from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import SCRIPTS, random_script
 from tests.codec.checksum_reference import PLACES, with_checksum
 
@@ -27,7 +27,7 @@ STOP = (
     " alive_counter: Count, checksum: { signal: Check, kind: crc8_autosar } }\n"
 )
 STOP_DBC = (
-    "BO_ 64 Stop: 3 LEVERS\n"
+    "BO_ 64 Stop: 3 JOYSTICKS\n"
     ' SG_ Pressed : 0|2@1+ (1,0) [0|3] "" SHAPER\n'
     ' SG_ Count : 8|4@1+ (1,0) [0|15] "" SHAPER\n'
     ' SG_ Check : 16|8@1+ (1,0) [0|255] "" SHAPER\n\n'
@@ -39,7 +39,7 @@ Make = Callable[..., Deployment]
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Make:
-    """The shipped machine with its levers protected, and with an emergency stop."""
+    """The shipped machine with its joysticks protected, and with an emergency stop."""
 
     def make(kind: str = "xor", cycles: tuple[int, int, int] = (20, 20, 50)) -> Deployment:
         text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
@@ -59,7 +59,7 @@ def machine(tmp_path: Path) -> Make:
     return make
 
 
-def frames(node: LeverNode, milliseconds: int) -> dict[int, list[tuple[int, bytes]]]:
+def frames(node: JoystickNode, milliseconds: int) -> dict[int, list[tuple[int, bytes]]]:
     """(time in ms, data) of every frame by id, as the node is called in real time."""
     found: dict[int, list[tuple[int, bytes]]] = {}
     for time_ms in range(0, milliseconds, node.cycle_ms):
@@ -70,7 +70,7 @@ def frames(node: LeverNode, milliseconds: int) -> dict[int, list[tuple[int, byte
 
 @pytest.mark.parametrize("kind", CHECKSUMS)
 def test_every_frame_has_the_next_counter_and_its_checksum(machine: Make, kind: str) -> None:
-    sent = frames(LeverNode(machine(kind), SCRIPT), 20_000)
+    sent = frames(JoystickNode(machine(kind), SCRIPT), 20_000)
     for can_id, modulus in ((0x110, 256), (0x40, 16)):
         counter = 7 if can_id == 0x110 else 1
         counts = [data[counter] for _, data in sent[can_id]]
@@ -85,20 +85,20 @@ def test_every_frame_has_the_next_counter_and_its_checksum(machine: Make, kind: 
 
 @pytest.mark.parametrize("cycles", [(20, 20, 50), (20, 50, 20), (10, 20, 100), (30, 20, 50)])
 def test_every_message_keeps_its_cycle(machine: Make, cycles: tuple[int, int, int]) -> None:
-    sent = frames(LeverNode(machine(cycles=cycles), SCRIPT), 600)
+    sent = frames(JoystickNode(machine(cycles=cycles), SCRIPT), 600)
     for can_id, cycle_ms in zip((0x110, 0x111, 0x40), cycles, strict=True):
         assert [time_ms for time_ms, _ in sent[can_id]] == list(range(0, 600, cycle_ms))
 
 
 def test_the_emergency_stop_is_never_pressed(machine: Make) -> None:
-    assert {data[0] for _, data in frames(LeverNode(machine(), SCRIPT), 30_000)[0x40]} == {0}
+    assert {data[0] for _, data in frames(JoystickNode(machine(), SCRIPT), 30_000)[0x40]} == {0}
 
 
 @pytest.mark.parametrize("bypass", [False, True])
 def test_a_controller_takes_every_frame(machine: Make, bypass: bool) -> None:
     deployment = machine("crc8_sae_j1850")
     controller = Controller(deployment)
-    node = LeverNode(deployment, SCRIPT, bypass=bypass)
+    node = JoystickNode(deployment, SCRIPT, bypass=bypass)
     states = set()
     for time_ms in range(0, 10_000, 20):
         for earlier in range(max(0, time_ms - 10), time_ms + 1, node.cycle_ms):
@@ -117,7 +117,7 @@ def test_protection_changes_nothing_of_the_drive(machine: Make) -> None:
 
 
 def test_no_script_holds_a_stick_for_so_long_that_it_counts_as_broken() -> None:
-    """frozen_s is 20 s by default; half of that leaves room."""
+    """stuck_s is 20 s by default; half of that leaves room."""
     for script in (*SCRIPTS.values(), *(random_script(seed) for seed in range(20))):
         for axis in script.axes:
             last, since_s = 0.0, 0.0

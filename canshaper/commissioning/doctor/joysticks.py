@@ -1,4 +1,4 @@
-"""The operator's levers as a process: their frames at their cycle time, each with its moment."""
+"""The operator's joysticks as a process: their frames at their cycle time, each with its moment."""
 
 import json
 import math
@@ -10,14 +10,14 @@ from typing import Any
 
 from canshaper.bus.clock import boottime_ns
 from canshaper.bus.raw import CAN_FRAME
-from canshaper.commissioning.doctor.processes import LEVERS_PRIORITY, real_time, say_ready
+from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper_sim.levers import LeverNode
+from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.strokes import Script
 
-# Clock of the levers, slower than ours by so much: their frames pass through every phase of the
+# Clock of the joysticks, slower than ours by so much: their frames pass through every phase of the
 # tick, as those of a real joystick do over the hours.
 SLOWER = 1.01
 # The hand: neutral for a moment, out and back in a triangle, then the other way.
@@ -41,20 +41,20 @@ class Waving(Script):
         return side * (1.0 - abs(2.0 * way - 1.0))
 
 
-class Levers:
-    """All levers of a deployment on sockets that stand for its buses.
+class Joysticks:
+    """All joysticks of a deployment on sockets that stand for its buses.
 
     Attributes:
-        sent: for each bus and frame, in order: number of its lever in the deployment (-1 for
+        sent: for each bus and frame, in order: number of its joystick in the deployment (-1 for
             other messages), ns by ``boottime_ns``.
     """
 
     def __init__(self, deployment: Deployment, sockets: dict[str, socket.socket]) -> None:
-        self._node = LeverNode(deployment, Waving("waving", (), math.inf))
+        self._node = JoystickNode(deployment, Waving("waving", (), math.inf))
         self._sockets = sockets
-        levers = list(deployment.levers.values())
-        inputs = [*levers, *([deployment.emergency_stop] if deployment.emergency_stop else [])]
-        self._numbers = {lever.key: number for number, lever in enumerate(levers)}
+        joysticks = list(deployment.joysticks.values())
+        inputs = [*joysticks, *([deployment.emergency_stop] if deployment.emergency_stop else [])]
+        self._numbers = {joystick.key: number for number, joystick in enumerate(joysticks)}
         self._step_ms = math.gcd(*(i.message.cycle_time or 0 for i in inputs))
         self._time_ms = 0
         self.sent: dict[str, list[tuple[int, int]]] = {name: [] for name in sockets}
@@ -93,9 +93,9 @@ def main(options: dict[str, Any]) -> None:
     sockets = {name: socket.socket(fileno=fd) for name, fd in options["sockets"].items()}
     for one in sockets.values():
         one.setblocking(False)
-    levers = Levers(load_deployment(Path(options["file"])), sockets)
-    real_time(LEVERS_PRIORITY)
+    joysticks = Joysticks(load_deployment(Path(options["file"])), sockets)
+    real_time(JOYSTICKS_PRIORITY)
     say_ready()
     select.select(list(sockets.values()), [], [])
-    levers.run()
-    print(json.dumps(levers.sent))
+    joysticks.run()
+    print(json.dumps(joysticks.sent))

@@ -1,4 +1,4 @@
-"""The operator's levers as a node on CAN: a script in, joystick frames out."""
+"""The operator's joysticks as a node on CAN: a script in, joystick frames out."""
 
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
@@ -7,8 +7,8 @@ from canshaper_sim.hand import Hand, Held
 from canshaper_sim.strokes import Script
 
 
-class LeverNode:
-    """All levers of a deployment, moved by a script, with the enable switch held.
+class JoystickNode:
+    """All joysticks of a deployment, moved by a script, with the enable switch held.
 
     Args:
         deployment: names the joystick messages and their switches.
@@ -41,7 +41,7 @@ class LeverNode:
         return self._hand.frames(time_ms, held)
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
-        """Frames that came since the last tick, in order; the newest of each lever counts."""
+        """Frames that came since the last tick, in order; the newest of each joystick counts."""
         return [
             frame
             for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1)
