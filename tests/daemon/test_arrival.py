@@ -4,15 +4,13 @@ Frames wait while the loop does something else. What is fresh or lost is decided
 arrived; a release, a press, a foreign sender in them counts in the next tick, however old it is.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
 
-from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import CanopenNode
 from canshaper.controller.runner import FOREIGN_NS
-from canshaper.daemon.exchange import exchange
-from canshaper.daemon.standstill import Standstill
 from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import State
 from tests.inputs.test_press import tripped
@@ -21,57 +19,12 @@ from tests.rigs.emergency import PRESSED, Machine
 from tests.rigs.forwarder import SLOW_VALVE, TICK_NS, Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
+from tests.rigs.waiting import Waiting, both, tick
 
 MS = 1_000_000
 LIMIT_NS = 100 * MS  # of both joysticks
 FOREIGN = Frame("crane", 0x200, False, b"\x00\xee")
 Make = Callable[..., Rig]
-
-
-class Waiting:
-    """A bus with frames that arrived some time ago; it hands out no more than ``most`` at once."""
-
-    name = "crane"
-    state = BusState.UP
-
-    def __init__(self, most: int = 1000) -> None:
-        self.queue: list[tuple[int, Frame]] = []
-        self.sent: list[Frame] = []
-        self.arrived_ns = 0
-        self._most = most
-
-    def frames(self) -> Iterator[Frame]:
-        for _ in range(min(self._most, len(self.queue))):
-            self.arrived_ns, frame = self.queue.pop(0)
-            yield frame
-
-    def others(self) -> Iterator[Frame]:
-        return iter(())
-
-    def send(self, frame: Frame) -> bool:
-        self.sent.append(frame)
-        return True
-
-    def watch(self, name: str, ids: object) -> None: ...
-
-    def fileno(self) -> int:
-        return -1
-
-    def close(self) -> None: ...
-
-
-def tick(rig: Rig, port: Waiting) -> None:
-    """A tick of the daemon, a period after the one before."""
-    standstill = Standstill(rig.deployment)
-    standstill.clock = lambda: rig.now_ns
-    exchange(rig.controller, {"crane": port}, rig.now_ns, 0, standstill)
-    rig.now_ns += TICK_NS
-
-
-def both(rig: Rig, arrived_ns: int, **raw: int) -> list[tuple[int, Frame]]:
-    """A frame of each joystick."""
-    frames = rig.joystick("JoystickLeft", **raw), rig.joystick("JoystickRight")
-    return [(arrived_ns, frame) for frame in frames]
 
 
 # -- ages ------------------------------------------------------------------------------------------
@@ -83,7 +36,7 @@ def test_silence_counts_from_the_arrival_of_the_last_frame(rig: Rig, early_ns: i
     rig.moving()
     port = Waiting()
     arrived_ns = rig.now_ns - early_ns
-    port.queue = both(rig, arrived_ns, Slew=1000)
+    port.wait(*both(rig, Slew=1000), arrived_ns=arrived_ns)
     found_ns = rig.now_ns
     tick(rig, port)
     while rig.state() is State.ACTIVE:
@@ -100,7 +53,7 @@ def test_a_frame_that_is_too_old_when_it_is_read_moves_nothing(
     rig.moving()
     port = Waiting()
     rig.now_ns += 4 * TICK_NS
-    port.queue = both(rig, rig.now_ns - age_ns, Slew=1000)
+    port.wait(*both(rig, Slew=1000), arrived_ns=rig.now_ns - age_ns)
     tick(rig, port)
     assert rig.state() is (State.ACTIVE if known else State.STOPPING)
 
@@ -109,7 +62,7 @@ def test_no_frame_is_younger_than_the_tick_that_reads_it(rig: Rig) -> None:
     """One that came while the tick was held up before its read, or its age would be found late."""
     rig.moving()
     port = Waiting()
-    port.queue = both(rig, rig.now_ns + TICK_NS, Slew=1000)
+    port.wait(*both(rig, Slew=1000), arrived_ns=rig.now_ns + TICK_NS)
     for _ in range(6):
         tick(rig, port)
         assert rig.state() is State.ACTIVE
@@ -123,9 +76,9 @@ def test_a_counter_is_not_expected_to_run_on_over_a_silence_between_two_arrivals
     """Both are read by one tick: the gap counts, not that they were read together."""
     rig.moving()
     port = Waiting()
-    port.queue = both(rig, rig.now_ns - LIMIT_NS - 1, Slew=1000)
+    port.wait(*both(rig, Slew=1000), arrived_ns=rig.now_ns - LIMIT_NS - 1)
     rig.counts = {name: count + 100 for name, count in rig.counts.items()}
-    port.queue += both(rig, rig.now_ns, Slew=1000)
+    port.wait(*both(rig, Slew=1000), arrived_ns=rig.now_ns)
     tick(rig, port)
     assert rig.controller.counters.last_fault is FrameFault.NONE
     assert rig.state() is State.ACTIVE
@@ -160,7 +113,7 @@ def test_a_release_that_is_over_counts_when_it_is_read(rig: Rig, age_ns: int) ->
     rig.moving()
     port = Waiting()
     arrived_ns = rig.now_ns - age_ns
-    port.queue = both(rig, arrived_ns, Enable=0, Slew=1000) + both(rig, arrived_ns, Slew=1000)
+    port.wait(*both(rig, Enable=0, Slew=1000), *both(rig, Slew=1000), arrived_ns=arrived_ns)
     tick(rig, port)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
     assert port.sent[0].data[0] == 0
@@ -171,7 +124,7 @@ def test_a_release_behind_more_frames_than_a_tick_takes_counts_in_the_next(rig: 
     port = Waiting(most=4)
     arrived_ns = rig.now_ns
     for enable in (1, 1, 0, 1):
-        port.queue += both(rig, arrived_ns, Enable=enable, Slew=1000)
+        port.wait(*both(rig, Enable=enable, Slew=1000), arrived_ns=arrived_ns)
     tick(rig, port)
     assert rig.state() is State.ACTIVE
     tick(rig, port)
@@ -182,7 +135,7 @@ def test_a_release_that_is_too_old_to_be_believed_is_no_shaped_stop(rig: Rig) ->
     """Nothing in it is known any more but that: neutral at once, not through the filter."""
     rig.moving()
     port = Waiting()
-    port.queue = both(rig, rig.now_ns - LIMIT_NS - 1, Enable=0)
+    port.wait(*both(rig, Enable=0), arrived_ns=rig.now_ns - LIMIT_NS - 1)
     tick(rig, port)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
@@ -194,9 +147,9 @@ def test_a_release_that_does_not_count_is_no_press_when_it_is_over(rig: Rig, age
     port = Waiting()
     arrived_ns = rig.now_ns - age_ns
     rig.counts["JoystickLeft"] = (rig.counts["JoystickLeft"] + 100) % 256
-    port.queue = both(rig, arrived_ns, Enable=0)
+    port.wait(*both(rig, Enable=0), arrived_ns=arrived_ns)
     for _ in range(5):
-        port.queue += both(rig, arrived_ns)
+        port.wait(*both(rig), arrived_ns=arrived_ns)
     tick(rig, port)
     rig.run(5)
     assert rig.state() is State.TRIPPED
@@ -210,8 +163,8 @@ def test_a_press_of_the_emergency_stop_that_is_over_counts_when_it_is_read(
     machine.run(3)
     port, rig = Waiting(), machine.rig
     arrived_ns = rig.now_ns - age_ns
-    port.queue = [(arrived_ns, machine.stop(pressed)) for pressed in (1, 0)]
-    port.queue += both(rig, rig.now_ns)
+    port.wait(*(machine.stop(pressed) for pressed in (1, 0)), arrived_ns=arrived_ns)
+    port.wait(*both(rig), arrived_ns=rig.now_ns)
     tick(rig, port)
     assert machine.states() == PRESSED
 
@@ -221,7 +174,7 @@ def test_every_axis_of_a_joystick_sees_a_release_once(changed_rig: Make) -> None
     rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(31)
     port = Waiting()
-    port.queue = both(rig, rig.now_ns, Enable=0) + both(rig, rig.now_ns)
+    port.wait(*both(rig, Enable=0), *both(rig), arrived_ns=rig.now_ns)
     tick(rig, port)
     assert rig.controller.axes["slew"]._releases == 0
     rig.run(10)
@@ -233,7 +186,8 @@ def test_every_axis_of_a_joystick_sees_a_release_once(changed_rig: Make) -> None
 def test_a_second_sender_trips_however_long_ago_it_sent(rig: Rig, age_ns: int) -> None:
     rig.moving()
     port = Waiting()
-    port.queue = [(rig.now_ns - age_ns, FOREIGN), *both(rig, rig.now_ns, Slew=1000)]
+    port.wait(FOREIGN, arrived_ns=rig.now_ns - age_ns)
+    port.wait(*both(rig, Slew=1000), arrived_ns=rig.now_ns)
     tick(rig, port)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SECOND_SENDER")
 
@@ -244,7 +198,8 @@ def test_the_second_of_its_silence_counts_from_its_arrival(
 ) -> None:
     rig.moving()
     port = Waiting()
-    port.queue = [(rig.now_ns - age_ns, FOREIGN), *both(rig, rig.now_ns)]
+    port.wait(FOREIGN, arrived_ns=rig.now_ns - age_ns)
+    port.wait(*both(rig), arrived_ns=rig.now_ns)
     tick(rig, port)
     rig.run(3)
     rig.run(1, Reset=1)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.codec.frame import BusState, Frame
+from canshaper.codec.frame import Frame
 from canshaper.daemon.exchange import exchange
 from canshaper.daemon.standstill import Standstill
 from canshaper.shaping.states import State
@@ -14,6 +14,7 @@ from tests.rigs.forwarder import ROOT, SLOW_VALVE, TICK_NS, Rig
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
+from tests.rigs.waiting import Waiting, both, tick
 
 Make = Callable[..., Rig]
 
@@ -21,51 +22,11 @@ Make = Callable[..., Rig]
 PATIENT = {"timeout_ms: 100 #": "timeout_ms: 900 #", "timeout_ms: 100\n": "timeout_ms: 900\n"}
 
 
-class Waiting:
-    """A bus on which frames wait; it hands out no more than ``most`` of them at a time."""
-
-    name = "crane"
-    state = BusState.UP
-    arrived_ns = 10**18  # younger than the clock of the rig: as old as the tick
-
-    def __init__(self, most: int = 1000) -> None:
-        self.queue: list[Frame] = []
-        self.sent: list[Frame] = []
-        self._most = most
-
-    def frames(self) -> Iterator[Frame]:
-        for _ in range(min(self._most, len(self.queue))):
-            yield self.queue.pop(0)
-
-    def others(self) -> Iterator[Frame]:
-        return iter(())
-
-    def send(self, frame: Frame) -> bool:
-        self.sent.append(frame)
-        return True
-
-    def watch(self, name: str, ids: object) -> None: ...
-
-    def fileno(self) -> int:
-        return -1
-
-    def close(self) -> None: ...
-
-
-def tick(rig: Rig, port: Waiting, missed: int = 0) -> None:
-    """A tick as the daemon has it, after one in time."""
-    standstill = Standstill(rig.deployment)
-    standstill.last_ns = rig.now_ns
-    rig.now_ns += TICK_NS * (1 + missed)
-    standstill.clock = lambda: rig.now_ns
-    exchange(rig.controller, {"crane": port}, rig.now_ns, missed, standstill)
-
-
 def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: Make) -> None:
     rig = changed_rig(PATIENT)
     rig.moving()
     port = Waiting()
-    port.queue = [rig.joystick(Slew=1000)]
+    port.wait(rig.joystick(Slew=1000))
     tick(rig, port, missed=31)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "LOOP_STALLED")
     assert port.sent[0].data[0] == 0
@@ -74,20 +35,16 @@ def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: 
 # -- what waited while the loop stood still --------------------------------------------------------
 
 
-def joysticks(rig: Rig, **raw: int) -> list[Frame]:
-    return [rig.joystick("JoystickLeft", **raw), rig.joystick("JoystickRight")]
-
-
 def test_what_waited_is_read_to_its_end_and_not_believed(rig: Rig) -> None:
     """However much it is: neutral is among it, and the stick has been out for long."""
     rig.run(3)
     port = Waiting(most=10)
-    port.queue = [frame for _ in range(100) for frame in joysticks(rig)]
+    port.wait(*(frame for _ in range(100) for frame in both(rig)))
     tick(rig, port, missed=100)
     assert port.queue == []
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_TIMEOUT")
     for _ in range(10):
-        port.queue = joysticks(rig, Slew=1000)
+        port.wait(*both(rig, Slew=1000))
         tick(rig, port)
         assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
 
@@ -107,7 +64,7 @@ def test_a_frame_that_waited_is_not_passed_on(tmp_path: Path) -> None:
     gateway = GatewayRig(tmp_path).moving()
     before = gateway.decoded(gateway.left[-2])
     port, machine = Waiting(), Waiting()
-    port.queue = [gateway.joystick(Slew=1000) for _ in range(10)]
+    port.wait(*(gateway.joystick(Slew=1000) for _ in range(10)))
     standstill = Standstill(gateway.deployment)
     standstill.last_ns = gateway.now_ns
     gateway.now_ns += 10 * TICK_NS
@@ -126,11 +83,11 @@ def test_an_emergency_stop_of_a_standstill_is_latched(changed_rig: Make) -> None
     assert machine.states() == READY
     port, rig = Waiting(), machine.rig
     for pressed in (0, 0, 1, 1, 1, 0, 0, 0):
-        port.queue += [machine.stop(pressed), *joysticks(rig)]
+        port.wait(machine.stop(pressed), *both(rig))
     tick(rig, port, missed=8)
     assert machine.states() == PRESSED
     for _ in range(3):
-        port.queue = [machine.stop(0), *joysticks(rig)]
+        port.wait(machine.stop(0), *both(rig))
         tick(rig, port)
     assert machine.states() == PRESSED
 
@@ -155,13 +112,13 @@ def test_an_emergency_stop_that_was_free_in_a_standstill_is_not_known(changed_ri
     machine = Machine(changed_rig)
     machine.run(3)
     port, rig = Waiting(), machine.rig
-    port.queue = [machine.stop(0), *joysticks(rig)] * 8
+    port.wait(*(machine.stop(0), *both(rig)) * 8)
     tick(rig, port, missed=8)
     for _ in range(3):
-        port.queue = joysticks(rig)
+        port.wait(*both(rig))
         tick(rig, port)
     assert machine.states() == [(State.NEUTRAL_WAIT, "EMERGENCY_STOP_LOST")] * 3
-    port.queue = [machine.stop(0), *joysticks(rig)]
+    port.wait(machine.stop(0), *both(rig))
     tick(rig, port)
     assert machine.states() == READY
 
@@ -186,9 +143,9 @@ def test_a_frame_that_does_not_go_out_is_a_trip(rig: Rig) -> None:
 
     rig.moving()
     port = Full()
-    port.queue = [rig.joystick(Slew=1000)]
+    port.wait(rig.joystick(Slew=1000))
     tick(rig, port)
     assert (rig.state(), rig.controller.counters.values["SendFailures"]) == (State.ACTIVE, 1)
-    port.queue = [rig.joystick(Slew=1000)]
+    port.wait(rig.joystick(Slew=1000))
     tick(rig, port)
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")

@@ -11,10 +11,10 @@ from canshaper.controller.controller import Controller
 from canshaper.daemon.exchange import exchange, take
 from canshaper.daemon.gateway import InLine
 from canshaper.daemon.standstill import LEAST_LEAVE_NS, Standstill
-from tests.daemon.test_exchange import Waiting
 from tests.rigs.forwarder import ROOT
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.standing import MS, Machine, Make, valves
+from tests.rigs.waiting import Waiting
 
 
 @pytest.mark.parametrize(("held_ms", "leaves"), [(20, True), (21, False), (80, False)])
@@ -124,7 +124,7 @@ class InGateway:
         """Frames that leave of one that is taken so long after the tick, when it is held up."""
         self.now_ns = self.last_ns + after_ms * MS
         self.standstill.clock = lambda: self.now_ns + held_ms * MS
-        self.joysticks.queue = [self.rig.joystick(Slew=self.slew)]
+        self.joysticks.wait(self.rig.joystick(Slew=self.slew))
         assert not self.standstill.over(self.now_ns)
         take(self.rig.controller, self.ports, self.now_ns, self.standstill)
         assert self.joysticks.queue == []
@@ -163,7 +163,7 @@ def test_between_two_ticks_of_a_gateway_a_standstill_is_left_to_the_tick(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     gateway = InGateway(tmp_path)
-    gateway.joysticks.queue = [gateway.rig.joystick(Slew=1000)]
+    gateway.joysticks.wait(gateway.rig.joystick(Slew=1000))
     times = iter((0, 0, 101 * MS))
     gateway.standstill.clock = lambda: gateway.last_ns + next(times)
     monkeypatch.setattr("canshaper.daemon.gateway.select.select", lambda *_: ([1], [], []))

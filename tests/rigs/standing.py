@@ -5,8 +5,8 @@ from collections.abc import Callable
 from canshaper.codec.frame import Frame
 from canshaper.daemon.exchange import exchange
 from canshaper.daemon.standstill import Standstill
-from tests.daemon.test_exchange import Waiting
 from tests.rigs.forwarder import Rig
+from tests.rigs.waiting import Waiting, both
 
 Make = Callable[..., Rig]
 MS = 1_000_000
@@ -51,7 +51,7 @@ class Machine:
     def tick(self, gap_ns: int, missed: int = 0) -> None:
         """One tick so long after the one before, with both joysticks out."""
         self.now_ns += gap_ns
-        self.port.queue = [self.rig.joystick(Slew=self.slew), self.rig.joystick("JoystickRight")]
+        self.port.wait(*both(self.rig, Slew=self.slew))
         exchange(self.rig.controller, {"crane": self.port}, self.now_ns, missed, self.standstill)
 
     def moving(self) -> "Machine":
