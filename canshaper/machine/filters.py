@@ -4,66 +4,59 @@ from collections.abc import Sequence
 from typing import Any
 
 from canshaper.config.adjust import Key, faults
-from canshaper.config.control import Control
 from canshaper.config.filters import Filter
 from canshaper.config.schedule import Breakpoint, Profile
-from canshaper.config.schema import AxisConfig
+from canshaper.config.schema import AxisConfig, DeploymentConfig
 from canshaper.config.source import Place
 from canshaper.config.sway import Sway
-from canshaper.machine.valves import ValveBinder
+from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.lookup import Lookup
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 
-class FilterBinder(ValveBinder):
-    """Checks them, or notes every problem."""
+def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: float) -> None:
+    """Every filter that the axis may get has to run at the period of its valve."""
+    add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
+    parts: list[tuple[Place, AxisConfig | Profile]] = [(place, axis)]
+    parts += [((*place, "profiles", name), profile) for name, profile in axis.profiles.items()]
+    filters: list[tuple[Place, Filter, Sway | None]] = []
+    for at, part in parts:
+        filters.append(((*at, "filter"), part.filter, axis.sway))
+        for i, one in enumerate(part.gain_schedule):
+            filters.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
+        if part.gain_schedule and not lookup.config.load_state:
+            add((*at, "gain_schedule"), "need the signal that chooses them; found no load_state")
+    wrong = {at: filter_fault(chosen, sway, period_s, rate) for at, chosen, sway in filters}
+    for at, fault in wrong.items():
+        if fault:
+            add(at, fault)
+    for at, part in () if any(wrong.values()) else parts:
+        if fault := _fault_between(part.gain_schedule, period_s, rate):
+            add((*at, "gain_schedule"), fault)
+    if len(filters) > 1 and axis.sway is None:
+        add(place, "has profiles or a gain schedule, and no sway data of its own; found no sway")
+    codes = lookup.config.profile.codes if lookup.config.profile else {}
+    for name in axis.profiles:
+        if name not in codes:
+            allowed = ", ".join(codes) or "none: there is no profile at the top level"
+            add((*place, "profiles", name), f"found {name!r}, profiles are {allowed}")
 
-    def check_filters(self, place: Place, axis: AxisConfig, period_s: float) -> None:
-        """Every filter that the axis may get has to run at the period of its valve."""
-        rate = axis.limits.slowest_per_s
-        found: list[tuple[Place, Filter, Sway | None]] = []
-        parts: list[tuple[Place, AxisConfig | Profile]] = [(place, axis)]
-        parts += [((*place, "profiles", name), profile) for name, profile in axis.profiles.items()]
-        for at, part in parts:
-            found.append(((*at, "filter"), part.filter, axis.sway))
-            for i, one in enumerate(part.gain_schedule):
-                found.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
-            if part.gain_schedule and not self.config.load_state:
-                self.add(
-                    (*at, "gain_schedule"), "need the signal that chooses them; found no load_state"
-                )
-        good = True
-        for at, chosen, sway in found:
-            if fault := filter_fault(chosen, sway, period_s, rate):
-                self.add(at, fault)
-                good = False
-        for at, part in parts if good else []:
-            if fault := _fault_between(part.gain_schedule, period_s, rate):
-                self.add((*at, "gain_schedule"), fault)
-        if len(found) > 1 and axis.sway is None:
-            self.add(
-                place, "has profiles or a gain schedule, and no sway data of its own; found no sway"
-            )
-        codes = self.config.profile.codes if self.config.profile else {}
-        for name in axis.profiles:
-            if name not in codes:
-                allowed = ", ".join(codes) or "none: there is no profile at the top level"
-                self.add((*place, "profiles", name), f"found {name!r}, profiles are {allowed}")
 
-    def check_control(self, control: Control) -> None:
-        """Every adjustable number has to be one that can be changed in motion."""
-        for text, (low, high) in control.adjustable.items():
-            place = ("control", "adjustable", text)
-            key = Key.parsed(text)
-            if key is None:
-                self.add(place, "found no key of an axis; allowed is axes.AXIS.SECTION.NAME")
-            elif key.axis not in self.config.axes:
-                names = ", ".join(self.config.axes)
-                self.add(place, f"found axis {key.axis!r}, axes are {names}")
-            else:
-                for fault in faults(key, self.config.axes[key.axis], low, high):
-                    self.add(place, fault)
+def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
+    """Every adjustable number has to be one that can be changed in motion."""
+    add, adjustable = diagnostics.add, config.control.adjustable if config.control else {}
+    for text, (low, high) in adjustable.items():
+        place = ("control", "adjustable", text)
+        key = Key.parsed(text)
+        if key is None:
+            add(place, "found no key of an axis; allowed is axes.AXIS.SECTION.NAME")
+        elif key.axis not in config.axes:
+            add(place, f"found axis {key.axis!r}, axes are {', '.join(config.axes)}")
+        else:
+            for fault in faults(key, config.axes[key.axis], low, high):
+                add(place, fault)
 
 
 def filter_fault(

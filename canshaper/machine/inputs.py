@@ -1,35 +1,30 @@
-"""Messages that are taken: joysticks and the emergency stop, bound to their DBC messages."""
+"""Messages that are received, bound to their DBC messages: all but the velocities of joysticks."""
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 from cantools.database.can import Message
 
 from canshaper.codec.codecs import JoystickCodec
-from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.j1939 import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Guard, Protection
-from canshaper.codec.signals import (
-    VelocitySignal,
-    magnitude_range,
-    radius_range,
-    symmetrical_range,
-)
+from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.input import Input
 from canshaper.config.schedule import LoadState, ProfileSwitch
-from canshaper.config.schema import Command, EmergencyStop, Feedback, Joystick, Radius, StatusWord
+from canshaper.config.schema import EmergencyStop, Feedback, Joystick, Radius, StatusWord
 from canshaper.config.source import Place
-from canshaper.machine.database import DbcFile
-from canshaper.machine.protections import ProtectionBinder
+from canshaper.machine.lookup import Lookup
+from canshaper.machine.protections import bind_protection
+from canshaper.machine.used_message import UsedMessage
 
-Velocity = VelocitySignal | FlaggedVelocity | RockerVelocity
 # Two frames may be lost in a row; more is no longer the noise of a bus.
 USUAL_MAX_STEP = 3
 
 
 @dataclass(frozen=True)
 class BoundInput:
-    """A message that is taken; ``key`` is (bus, id, extended)."""
+    """A message that is received; ``key`` is (bus, id, extended)."""
 
     config: Input
     message: Message
@@ -107,210 +102,110 @@ class BoundStatusWord(BoundInput):
 
 @dataclass(frozen=True)
 class BoundSwitch(BoundInput):
-    """The state of the grapple, or the operator's choice, with its message."""
+    """The load state, or the operator's choice, with its message."""
 
     config: LoadState | ProfileSwitch
 
 
-class InputBinder(ProtectionBinder):
-    """Binds them, or notes every problem."""
+Bound = TypeVar("Bound", bound=BoundInput)
 
-    def joystick(self, name: str, joystick: Joystick) -> BoundJoystick | None:
-        """A joystick; its velocities are those that the axes name."""
-        place: Place = ("joysticks", name)
-        before = len(self.problems)
-        use: dict[str, str] = {}
-        found = self._input(place, joystick, ("enable", "reset", "anti_sway_off"), use)
-        if not found:
-            return None
-        self.node(place, joystick.bus, joystick.node)
-        file, message, protection = found
-        velocities = self._velocities(name, file, message, use)
-        if len(self.problems) > before:
-            return None
-        return BoundJoystick(
-            joystick, message, JoystickCodec(message, velocities), protection, name
-        )
 
-    def _velocities(
-        self, joystick: str, file: DbcFile, message: Message, use: dict[str, str]
-    ) -> list[Velocity]:
-        """What the axes take from a joystick; ``use`` is what its other signals are."""
-        found: list[Velocity] = []
-        sticks = {
-            n: a.command for n, a in self.config.axes.items() if a.command.joystick == joystick
-        }
-        moves = {s.signal: f"the stick of {axis}" for axis, s in reversed(sticks.items())}
-        for axis, stick in sticks.items():
-            place: Place = ("axes", axis, "command")
-            if stick.negative:
-                if rocker := self._rocker(place, stick, file, message, (moves, use)):
-                    use[stick.negative] = f"the negative direction of {axis}"
-                    use[stick.signal] = moves[stick.signal]
-                    found.append(rocker)
-                continue
-            flags = stick.flags.model_dump() if stick.flags else {}
-            for key, name in flags.items():
-                if flag := self.signal((*place, "flags", key), message, name):
-                    self.integer((*place, "flags", key), flag, signed=False)
-                    self.alone((*place, "flags", key), flag, {**moves, **use})
-                    use[name] = f"the {key} flag of {axis}"
-            signal = self.signal((*place, "signal"), message, stick.signal)
-            if signal is None:
-                continue
-            if why := magnitude_range(signal) if flags else symmetrical_range(signal):
-                if not flags and not magnitude_range(signal):
-                    why += ", or direction flags with this one"
-                self.problems.append(file.problem(message, why))
-                continue
-            self.alone((*place, "signal"), signal, use)
-            velocity = VelocitySignal.of(signal)
-            if flags:
-                use[signal.name] = moves[signal.name]  # with other flags it would be another one
-            found.append(FlaggedVelocity(velocity, **flags) if flags else velocity)
-        return found
+def bind_input(
+    lookup: Lookup,
+    kind: type[Bound],
+    place: Place,
+    config: Input,
+    switches: tuple[str, ...] = (),
+    *,
+    value: str | None = None,
+) -> tuple[UsedMessage, Bound] | None:
+    """A message that is received: its switches, its cycle and its protection.
 
-    def _rocker(
-        self,
-        place: Place,
-        stick: Command,
-        file: DbcFile,
-        message: Message,
-        used: tuple[dict[str, str], dict[str, str]],
-    ) -> RockerVelocity | None:
-        """A rocker with a signal for each direction; ``used`` are sticks, and all else."""
-        moves, use = used
-        velocities = []
-        for key, name, others in (
-            ("signal", stick.signal, use),
-            ("negative", stick.negative, {**moves, **use}),
-        ):
-            signal = self.signal((*place, key), message, name)
-            if signal is None:
-                continue
-            if why := magnitude_range(signal):
-                self.problems.append(file.problem(message, why))
-                continue
-            self.alone((*place, key), signal, others)
-            velocities.append(VelocitySignal.of(signal))
-        return RockerVelocity(*velocities) if len(velocities) == 2 else None
+    Args:
+        lookup: what it is bound with.
+        kind: what it becomes.
+        place: of its section in the deployment file.
+        config: that section.
+        switches: keys of the section that name switches.
+        value: name of a signal that is a value and no switch.
+    """
+    used = lookup.message(place, config.bus, config.message, received=True, source=config.source)
+    if not used:
+        return None
+    if used.message.cycle_time or isinstance(config, Radius):  # which may come on change only
+        lookup.check_timeout(used, config.timeout_ms)
+    else:
+        used.add_fault("has no GenMsgCycleTime")
+    for key in switches:
+        used.integer((*place, key), getattr(config, key), key)
+    if value is not None:
+        used.uses[value] = "signal"
+    protection = bind_protection(used, config)
+    most = protection.counts // 2
+    # Beyond half of its range a step back could not be told from a step forward.
+    if protection.counts and (config.alive_max_step or 0) > most:
+        text = f"is {config.alive_max_step}, allowed is up to {most}: its counter has"
+        used.add("alive_max_step", f"{text} {protection.counts} values")
+    return used, kind(config, used.message, JoystickCodec(used.message, []), protection)
 
-    def stop(self, stop: EmergencyStop) -> BoundStop | None:
-        """The emergency stop."""
-        place: Place = ("emergency_stop",)
-        before = len(self.problems)
-        found = self._input(place, stop, ("signal",), {})
-        if not found or len(self.problems) > before:
-            return None
-        _, message, protection = found
-        bound = BoundStop(stop, message, JoystickCodec(message, []), protection)
-        self._known_source(place, bound, "the emergency stop")
-        return bound if len(self.problems) == before else None
 
-    def _known_source(self, place: Place, bound: BoundInput, what: str) -> None:
-        """From any source address the first that is heard would count, and no other."""
-        if bound.any_source:
-            text = f"missing: in the DBC {bound.message.name} may come from any source address"
-            self.add((*place, "source"), f"{text}; {what} needs a known one")
+def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> BoundStop | None:
+    """The emergency stop."""
+    if (result := bind_input(lookup, BoundStop, ("emergency_stop",), config, ("signal",))) is None:
+        return None
+    used, bound = result
+    _check_source(used, "the emergency stop")
+    return bound
 
-    def radius(self, place: Place, radius: Radius) -> BoundRadius | None:
-        """The measured radius of a radial compensation."""
-        before = len(self.problems)
-        source = radius.source
-        found = self.message(place, radius.bus, radius.message, takes=True, source=source)
-        if not found:
-            return None
-        file, message = found
-        signal = self.signal((*place, "signal"), message, radius.signal)
-        if signal and (why := radius_range(signal)):
-            self.problems.append(file.problem(message, why))
-        self.timeout(place, radius.timeout_ms, message)
-        use = {radius.signal: "signal"}
-        protection = self.input_protection(place, radius, message, use)
-        bound = BoundRadius(radius, message, JoystickCodec(message, []), protection)
-        self._known_source(place, bound, "the radius")
-        return bound if len(self.problems) == before else None
 
-    def status_word(self, place: Place, config: StatusWord) -> BoundStatusWord | None:
-        """The status word of a valve."""
-        before = len(self.problems)
-        found = self._input(place, config, ("signal",), {})
-        if not found:
-            return None
-        _, message, protection = found
-        if signal := self.signal((*place, "signal"), message, config.signal):
-            self.state_bits((*place, "signal"), signal)
-        if len(self.problems) > before:
-            return None
-        return BoundStatusWord(config, message, JoystickCodec(message, []), protection)
+def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundRadius | None:
+    """The measured radius of a radial compensation."""
+    result = bind_input(lookup, BoundRadius, place, config, value=config.signal)
+    if result is None:
+        return None
+    used, bound = result
+    if signal := used.find((*place, "signal"), config.signal):
+        used.add_fault(radius_range(signal))
+    _check_source(used, "the radius")
+    return bound
 
-    def switch(self, place: Place, config: LoadState | ProfileSwitch) -> BoundSwitch | None:
-        """The state of the grapple, or the operator's choice."""
-        before = len(self.problems)
-        found = self._input(place, config, (), {config.signal: "signal"})
-        if not found:
-            return None
-        _, message, protection = found
-        signal = self.signal((*place, "signal"), message, config.signal)
-        if signal and isinstance(config, ProfileSwitch):
-            self.integer((*place, "signal"), signal)
-        if len(self.problems) > before:
-            return None
-        return BoundSwitch(config, message, JoystickCodec(message, []), protection)
 
-    def node(self, place: Place, bus: str, name: str | None) -> None:
-        """A node of CANopen that is named has to be one of its bus."""
-        if name is None:
-            return
-        config = self.config.buses.get(bus)
-        nodes = config.canopen.nodes if config and config.canopen else {}
-        if name not in nodes:
-            text = f"found {name!r}, nodes of bus {bus} are {', '.join(nodes) or 'none'}"
-            self.add((*place, "node"), text)
+def bind_status_word(lookup: Lookup, place: Place, config: StatusWord) -> BoundStatusWord | None:
+    """The status word of a valve."""
+    if (result := bind_input(lookup, BoundStatusWord, place, config, ("signal",))) is None:
+        return None
+    used, bound = result
+    if signal := find_signal(used.message, config.signal):
+        used.check_state_bits((*place, "signal"), signal)
+    return bound
 
-    def feedback(self, place: Place, feedback: Feedback) -> BoundFeedback | None:
-        """What a valve says of itself."""
-        before = len(self.problems)
-        found = self._input(place, feedback, (), {feedback.signal: "signal"})
-        if not found:
-            return None
-        file, message, protection = found
-        signal = self.signal((*place, "signal"), message, feedback.signal)
-        if signal and feedback.full is None and not signal.maximum:
-            text = f"{signal.name} has no range in the DBC; allowed is that, or full"
-            self.problems.append(file.problem(message, text))
-        if len(self.problems) > before:
-            return None
-        return BoundFeedback(feedback, message, JoystickCodec(message, []), protection)
 
-    def _input(
-        self, place: Place, config: Input, switches: tuple[str, ...], use: dict[str, str]
-    ) -> tuple[DbcFile, Message, Protection] | None:
-        """Message, its switches (noted in ``use``), its protection."""
-        found = self.message(place, config.bus, config.message, takes=True, source=config.source)
-        if not found:
-            return None
-        file, message = found
-        if message.cycle_time:
-            self.timeout(place, config.timeout_ms, message)
-        else:
-            self.problems.append(file.problem(message, "has no GenMsgCycleTime"))
-        for key in switches:
-            if signal := self.signal((*place, key), message, getattr(config, key)):
-                self.integer((*place, key), signal)
-                self.alone((*place, key), signal, use)
-                use[signal.name] = key
-        return file, message, self.input_protection(place, config, message, use)
+def bind_switch(
+    lookup: Lookup, place: Place, config: LoadState | ProfileSwitch
+) -> BoundSwitch | None:
+    """The load state, or the operator's choice."""
+    if (result := bind_input(lookup, BoundSwitch, place, config, value=config.signal)) is None:
+        return None
+    used, bound = result
+    signal = used.find((*place, "signal"), config.signal)
+    if signal and isinstance(config, ProfileSwitch):
+        used.check_integer((*place, "signal"), signal)
+    return bound
 
-    def input_protection(
-        self, place: Place, config: Input, message: Message, use: dict[str, str]
-    ) -> Protection:
-        """Protection of a message that is taken, and the largest step of its counter."""
-        address = self.address(config.bus, message, takes=True, source=config.source)
-        protection = self.protection(place, config, message, use, address)
-        most = protection.counts // 2
-        # Beyond half of its range a step back could not be told from a step forward.
-        if protection.counts and (config.alive_max_step or 0) > most:
-            text = f"is {config.alive_max_step}, allowed is up to {most}: its counter has"
-            self.add((*place, "alive_max_step"), f"{text} {protection.counts} values")
-        return protection
+
+def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundFeedback | None:
+    """What a valve tells of itself."""
+    if (result := bind_input(lookup, BoundFeedback, place, config, value=config.signal)) is None:
+        return None
+    used, bound = result
+    signal = used.find((*place, "signal"), config.signal)
+    if signal and config.full is None and not signal.maximum:
+        used.add_fault(f"{signal.name} has no range in the DBC; allowed is that, or full")
+    return bound
+
+
+def _check_source(used: UsedMessage, what: str) -> None:
+    """From any source address the first that is received would count, and no other."""
+    if used.any_source:
+        text = f"missing: in the DBC {used.message.name} may come from any source address"
+        used.add("source", f"{text}; {what} needs a known one")

@@ -1,0 +1,31 @@
+"""The problems of a deployment's files: all of them are collected, each with its place."""
+
+from canshaper.config.source import DeploymentError, Place, Problem, Source
+
+
+class Diagnostics:
+    """Collects every problem, so that a person reads all of them at once.
+
+    Args:
+        source: the deployment file.
+
+    Attributes:
+        problems: what is wrong so far; those of DBC files are added with file and line of these.
+    """
+
+    def __init__(self, source: Source) -> None:
+        self._source = source
+        self.problems: list[Problem] = []
+
+    def add(self, place: Place, text: str) -> None:
+        """Note a problem at a place of the deployment file."""
+        self.problems.append(self._source.problem(place, text))
+
+    def raise_problems(self) -> None:
+        """End here if there is any problem.
+
+        Raises:
+            DeploymentError: with all of them.
+        """
+        if self.problems:
+            raise DeploymentError(self.problems)

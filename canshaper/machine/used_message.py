@@ -1,0 +1,94 @@
+"""A message that a part of a deployment uses, and its signals while they are bound."""
+
+from dataclasses import dataclass, field
+
+from cantools.database.can import Message, Signal
+
+from canshaper.codec.canopen import STATE_BITS
+from canshaper.codec.signals import find_signal
+from canshaper.config.source import Place
+from canshaper.machine.database import DbcFile
+from canshaper.machine.diagnostics import Diagnostics
+
+
+@dataclass(frozen=True)
+class UsedMessage:
+    """A message with the part of the deployment file that names it.
+
+    Attributes:
+        diagnostics: gets every problem.
+        place: of that part.
+        file: its DBC file.
+        message: the message.
+        can_id: its identifier on the bus; in J1939 with the source address, 254 for any.
+        any_source: whether it may come from any source address.
+        uses: what its signals are used for, by name: each has one use, or a switch could move an
+            axis.
+    """
+
+    diagnostics: Diagnostics
+    place: Place
+    file: DbcFile
+    message: Message
+    can_id: int
+    any_source: bool
+    uses: dict[str, str] = field(default_factory=dict)
+
+    def add(self, key: str, text: str) -> None:
+        """Note a problem at a key of its part of the deployment file."""
+        self.diagnostics.add((*self.place, key), text)
+
+    def add_fault(self, fault: str | None) -> None:
+        """Note a problem in the DBC file; None is no problem."""
+        if fault is not None:
+            self.diagnostics.problems.append(self.file.problem(self.message, fault))
+
+    def find(self, place: Place, name: str | None) -> Signal | None:
+        """The signal; None when there is none of that name, or none was named."""
+        if name is None:
+            return None
+        signal = find_signal(self.message, name)
+        if signal is None:
+            names = ", ".join(s.name for s in self.message.signals)
+            text = f"found {name!r}, signals of {self.message.name} are {names}"
+            self.diagnostics.add(place, text)
+        return signal
+
+    def integer(
+        self, place: Place, name: str | None, use: str, *, signed: bool = True
+    ) -> Signal | None:
+        """The signal of a switch, counter or code, which is known by its raw value."""
+        if signal := self.find(place, name):
+            self.check_integer(place, signal, signed=signed)
+            self.use(place, signal, use)
+        return signal
+
+    def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
+        """A raw value must be a whole number."""
+        if signal.is_float or (signal.is_signed and not signed):
+            fault = "is a float" if signal.is_float else "has a sign"
+            allowed = "an integer" if signed else "an unsigned integer"
+            self.diagnostics.add(place, f"{signal.name} {fault}, allowed is {allowed} signal")
+
+    def use(self, place: Place, signal: Signal, use: str) -> None:
+        """Note the one use of a signal."""
+        self.check_unused(place, signal)
+        self.uses[signal.name] = use
+
+    def check_unused(
+        self, place: Place, signal: Signal, also: dict[str, str] | None = None
+    ) -> None:
+        """Note a problem where the signal has a use already, by ``uses`` or by ``also``."""
+        if use := self.uses.get(signal.name) or (also or {}).get(signal.name):
+            self.diagnostics.add(place, f"found {signal.name!r}, which is {use} already")
+
+    def check_state_bits(self, place: Place, signal: Signal) -> None:
+        """Control and status word of CiA 408 have the state in their low bits."""
+        if signal.length < STATE_BITS:
+            text = f"{signal.name} has {signal.length} bits, allowed is {STATE_BITS} or more"
+            self.diagnostics.add(place, text)
+
+
+def key_path(place: Place) -> str:
+    """A place as it is written: axes.slew.valve."""
+    return ".".join(str(part) for part in place)
