@@ -5,26 +5,23 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 
 from collections.abc import Iterator
 
-from canshaper.codec.canopen import service_of
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.valve import ValveMessage
 from canshaper.controller.compensator import Compensator
 from canshaper.controller.counters import Counters
-from canshaper.controller.events import Event, FeedbackEvent, Told
+from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.carry_over import Key, Part, carry_over
 from canshaper.inputs.feedback import Feedback, Following
-from canshaper.inputs.input import EmergencyStopInput, Input
+from canshaper.inputs.input import EmergencyStopInput, Input, MessageInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.radius import RadiusInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
-from canshaper.protocols.canopen.nodes import canopen_buses
-from canshaper.protocols.gateway.line import Line
-from canshaper.protocols.j1939.groups import Received
-from canshaper.protocols.j1939.network import Network
+from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
+from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
@@ -44,6 +41,7 @@ class Controller:
     Attributes:
         counters: what went wrong so far.
         joysticks: the joysticks by name.
+        inputs: what receives a message that is known by its identifier.
         events: changes of state since the owner last emptied the list.
         moves: whether the frame that was handed out last is one of a valve, and any moves.
     """
@@ -51,12 +49,12 @@ class Controller:
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.counters = Counters()
-        self.events: list[Told] = []
+        self.events: list[Event] = []
         joysticks = {
             name: JoystickInput(joystick) for name, joystick in deployment.joysticks.items()
         }
         self.joysticks = joysticks
-        taken: list[tuple[BoundInput, Received]] = [
+        taken: list[tuple[BoundInput, MessageInput]] = [
             (joystick, joysticks[name]) for name, joystick in deployment.joysticks.items()
         ]
         self._stop: EmergencyStopInput | None = None
@@ -74,12 +72,7 @@ class Controller:
             for runner in self.axes.values()
             if runner.bound.feedback and runner.feedback
         ]
-        taken += [
-            (runner.bound.status_word, runner.control)
-            for runner in self.axes.values()
-            if runner.bound.status_word and runner.control
-        ]
-        self._inputs: dict[tuple[str, int, bool], Received] = {
+        self.inputs: dict[MessageKey, MessageInput] = {
             key: one for bound, one in taken if not bound.any_source for key in bound.keys
         }
         self._sent = {
@@ -90,30 +83,25 @@ class Controller:
                 radius = RadiusInput(radial)
                 if (measured := radial.radius) is not None:
                     taken.append((measured, radius))
-                    self._inputs |= dict.fromkeys(measured.keys, radius)
+                    self.inputs |= dict.fromkeys(measured.keys, radius)
                 target = self.axes[radial.config.axis]
                 runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
         # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
-        used = {(can_id, extended) for _, can_id, extended in (*self._inputs, *self._sent)}
+        used = {key[1:] for key in (*self.inputs, *self._sent)}
+        used |= {key[1:] for i in deployment.inputs() if not i.any_source for key in i.keys}
         self._others = deployment.messages.ids() - used
         # An axis that asks something of another one goes first.
         order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
-        self._by_message: dict[tuple[str, int, bool], list[AxisRunner]] = {}
+        self._by_message: dict[MessageKey, list[AxisRunner]] = {}
         for _, runner in order:
             key = runner.bound.valve.message.sender.key
             self._by_message.setdefault(key, []).append(runner)
-        self._lines = {
-            key: Line(runners[0].bound.valve.message, joysticks[_joystick(runners[0])], runners)
-            for key, runners in self._by_message.items()
-            if runners[0].bound.rewrites
-        }
+        self._protocols = protocols(deployment, self.axes, joysticks, taken)
+        self._forwarding: dict[MessageKey, ForwardingRule] = {}
+        for protocol in self._protocols:
+            self.inputs |= protocol.inputs
+            self._forwarding |= protocol.forwarding
         self._turns = [self._turn(name, runner) for name, runner in order]
-        self._in_line = {bus for bus in deployment.config.buses if deployment.in_line(bus)}
-        self._canopen = canopen_buses(deployment, self.axes)
-        for bus, nodes in self._canopen.items():
-            self._inputs |= {(bus, n, False): one for n, one in nodes.inputs.items()}
-        self._network = Network(deployment, self.axes, taken)
-        self._j1939 = {bus for bus in deployment.config.buses if deployment.is_j1939(bus)}
         self._last = -1  # number of the last deadline
         self._late = 0
         self._overrun = False
@@ -135,10 +123,10 @@ class Controller:
         for name, bus in self.deployment.config.buses.items():
             if bus not in open_before:
                 self._forget(name)
-                self._network.unheard(name)
+                self.on_bus_off(name)
 
     def _parts(self) -> dict[Key, Part]:
-        return parts(self.deployment, self._inputs, self.axes, self._canopen, self._network)
+        return parts(self.deployment, self.inputs, self.axes, self._protocols)
 
     @property
     def neutral(self) -> bool:
@@ -148,7 +136,7 @@ class Controller:
     @property
     def silent_buses(self) -> frozenset[str]:
         """Buses on which we have no address yet, or no longer."""
-        return self._network.silent if self._network.nodes else NOWHERE
+        return NOWHERE.union(*(protocol.silent for protocol in self._protocols))
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
         """Take a frame from a bus.
@@ -162,42 +150,41 @@ class Controller:
             What it leaves as on the other bus of a gateway, to be sent at once.
         """
         key = frame[:3]
-        entry = self._inputs.get(key)
+        entry = self.inputs.get(key)
         if entry is not None:
             fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
             for runner in self._by_message.get(key, ()):
                 runner.foreign_sender(arrived_ns)
-        elif frame.extended and (group := self._network.entry(key[0], key[1])):
-            fault = group.receive(frame, arrived_ns)
-        elif key[1:] in self._others or self._usual(frame):
+        elif (handler := self._handler(frame)) is not None:
+            fault = handler.receive(frame, arrived_ns)
+        elif key[1:] in self._others or any(one.usual(frame) for one in self._protocols):
             return None
         else:
             fault = FrameFault.UNKNOWN_ID
         if fault:
             self.counters.add(fault)
-        return self._passed_on(frame, arrived_ns) if self._lines else None
+        return self._forward(frame, arrived_ns) if self._forwarding else None
 
-    def _passed_on(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """What a frame leaves as on the other bus of a gateway, if it is news of its joystick."""
-        for line in self._lines.values():
-            if line.news():
+    def _handler(self, frame: Frame) -> FrameHandler | None:
+        """What receives a frame that is known by more than its identifier."""
+        for protocol in self._protocols:
+            if (handler := protocol.handler(frame)) is not None:
+                return handler
+        return None
+
+    def _forward(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        """What a frame leaves as on the other bus of a gateway, if its joystick received it."""
+        for rule in self._forwarding.values():
+            if rule.new_frame():
                 if self._stood_still:  # what has waited is not passed on later either
                     return None
                 stopped = self._stop is not None and self._stop.stops(arrived_ns)
-                passed = line.pass_on(frame.data, arrived_ns, stopped=stopped)
-                self.moves = line.moved
+                passed = rule.forward(frame.data, arrived_ns, stopped=stopped)
+                self.moves = rule.moves
                 return passed
         return None
-
-    def _usual(self, frame: Frame) -> bool:
-        """Whether such a frame is daily life of its bus, known to the DBC files or not."""
-        if frame.bus in self._in_line:
-            return True
-        if frame.extended:
-            return frame.bus in self._j1939
-        return frame.bus in self._canopen and service_of(frame.can_id) is not None
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """Run every axis that is due.
@@ -221,16 +208,16 @@ class Controller:
             self._forget()
         overrun = self._overruns(missed) if missed or self._late else False
         changed = []
-        silent = self.silent_buses
-        for name, runner, message, line in self._turns:
+        silent = self.silent_buses if self._protocols else NOWHERE
+        for name, runner, message, rule in self._turns:
             period = runner.period_ticks
             if passed := now // period - last // period:
                 if passed > 1:
                     runner.axis.hold(passed - 1)
                 transition = runner.tick(now_ns, self._stop, overrun)
                 self.moves |= runner.axis.raw != 0
-                if line is not None:
-                    if (frame := line.own(now_ns)) is not None:
+                if rule is not None:
+                    if (frame := rule.own(now_ns)) is not None:
                         yield frame
                 elif message is not None and message.bus not in silent:
                     yield message.frame()
@@ -238,27 +225,24 @@ class Controller:
                 if runner.feedback is not None:
                     self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:
-                    self.events.append(Event(name, transition))
+                    self.events.append(StateEvent(name, transition))
                     changed.append(runner)
         self.moves = False
         yield from self._statuses(changed, last, now, silent)
-        if self._network.nodes:
-            yield from self._network.frames(now_ns)
-        self.events += self._network.changes()
-        for nodes in self._canopen.values():
-            if nodes.lost(now_ns):
-                self.counters.add(FrameFault.HEARTBEAT_LOST)
-            yield from nodes.frames(now_ns)
-            self.events += nodes.changes()
+        for protocol in self._protocols:
+            if fault := protocol.silence(now_ns):
+                self.counters.add(fault)
+            yield from protocol.frames(now_ns)
+            self.events += protocol.changes()
 
     def _turn(
         self, name: str, runner: AxisRunner
-    ) -> tuple[str, AxisRunner, ValveMessage | None, Line | None]:
+    ) -> tuple[str, AxisRunner, ValveMessage | None, ForwardingRule | None]:
         """An axis, and the message that goes out when it has moved: the last one of the message."""
         message = runner.bound.valve.message
         if self._by_message[message.sender.key][-1] is not runner:
             return name, runner, None, None
-        return name, runner, message, self._lines.get(message.sender.key)
+        return name, runner, message, self._forwarding.get(message.sender.key)
 
     def _choose(self) -> list[tuple[BoundInput, Input]]:
         """Let load state and operator choose sway data and filter of axes that have a choice."""
@@ -314,26 +298,30 @@ class Controller:
         it. Bad news among it counts like any other, though it may be over by now.
         """
         self._stood_still = True
-        self._network.stalled()
+        for protocol in self._protocols:
+            protocol.stalled()
         for runner in self.axes.values():
             runner.invalidate()
             runner.trip_in_motion(Reason.LOOP_STALLED)
 
     def _forget(self, bus: str | None = None) -> None:
         """Every input has to come again before it counts: those of one bus, or all."""
-        for (where, _, _), entry in self._inputs.items():
+        for (where, _, _), entry in self.inputs.items():
             if bus in (None, where):
                 entry.forget()
-        self._network.forget(bus)
+        for protocol in self._protocols:
+            protocol.forget(bus)
 
-    def unheard(self, bus: str) -> None:
-        """We are not on a bus now: what was said there about addresses we have not heard."""
-        self._network.unheard(bus)
+    def on_bus_off(self, bus: str) -> None:
+        """We are not on a bus now: frames are missed there."""
+        for protocol in self._protocols:
+            protocol.on_bus_off(bus)
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus; the axes of a valve frame trip."""
         self.counters.add(FrameFault.SEND_FAILED)
-        self._network.send_failed(frame)
+        for protocol in self._protocols:
+            protocol.send_failed(frame)
         for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
             runner.trip_in_motion(Reason.SEND_FAILED)
 
@@ -365,19 +353,15 @@ class Controller:
         """A neutral frame for every valve: the last thing sent."""
         for runner in self.axes.values():
             runner.bound.valve.put(0)
-            if runner.control is not None:
-                runner.control.hold()
-        frames = []
+        for protocol in self._protocols:
+            protocol.leave()
+        frames, silent = [], self.silent_buses
         for key, runners in self._by_message.items():
-            if (line := self._lines.get(key)) is not None:
-                frames += line.last()
-            elif key[0] not in self._network.silent:
+            if (rule := self._forwarding.get(key)) is not None:
+                frames += rule.last()
+            elif key[0] not in silent:
                 frames.append(runners[-1].bound.valve.message.frame())
         return frames
-
-
-def _joystick(runner: AxisRunner) -> str:
-    return runner.bound.config.command.joystick
 
 
 def _passed(last: int, now: int, period: int) -> int:

@@ -1,24 +1,15 @@
 """What an administrator wants to read: changes of axes and valves."""
 
 from dataclasses import dataclass
-from typing import Protocol
 
 from canshaper.codec.frame import Frame
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Transition
 
 
-class Told(Protocol):
-    """Anything that is to be read."""
-
-    @property
-    def text(self) -> str:
-        """For the log."""
-
-
 @dataclass(frozen=True, slots=True)
-class Event:
-    """Something an administrator wants to read: a change of state of an axis."""
+class StateEvent:
+    """A change of state of an axis."""
 
     axis: str
     transition: Transition

@@ -1,20 +1,18 @@
 """The parts of a controller whose state outlives a reload, by what they are on the machine."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.canopen.nodes import CanopenBus
-from canshaper.protocols.j1939.network import Network
+from canshaper.protocols.interface import BusProtocol
 
 
 def parts(
     deployment: Deployment,
     inputs: Mapping[tuple[str, int, bool], Part],
     axes: Mapping[str, AxisRunner],
-    canopen: Mapping[str, CanopenBus],
-    network: Network,
+    protocols: Iterable[BusProtocol],
 ) -> dict[Key, Part]:
     """Every part by its key.
 
@@ -25,8 +23,7 @@ def parts(
         deployment: the machine.
         inputs: what receives a message, by bus and id.
         axes: the axes by name.
-        canopen: our node on each bus of CANopen.
-        network: our nodes of J1939, and inputs from any address.
+        protocols: those of the machine.
     """
     places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
 
@@ -41,8 +38,7 @@ def parts(
             signal = runner.bound.config.valve.signal
             yield ("valve", *places[bus], *message, signal), runner
             yield ("axis", name), runner
-        for bus, nodes in canopen.items():
-            yield ("canopen", *places[bus], nodes.own), nodes
-        yield from network.parts(places)
+        for protocol in protocols:
+            yield from protocol.parts(places)
 
     return dict(found())

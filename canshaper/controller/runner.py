@@ -1,7 +1,7 @@
 """One axis of a deployment at work."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import TYPE_CHECKING, Protocol, Self
 
@@ -12,7 +12,7 @@ from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import BoundAxis
-from canshaper.protocols.canopen.cia408 import ValveControl
+from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import Reason, State, StickInput, Transition
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
 FOREIGN_NS = 1_000_000_000
-# Called with whether the axis is neutral, and the time; why it may not move, or None.
-Gate = Callable[[bool, int], Reason | None]
 # Reasons from here on are for neutral at once.
 TRIPS = Reason.ENABLE_LOST
 
@@ -50,7 +48,6 @@ class AxisRunner:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
         added: velocity that another axis asks of this one, fraction of full speed.
-        control: the state machine of its valve, where that is one of CiA 408.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
         compensator: what this axis asks of another one, where it slews.
@@ -86,14 +83,9 @@ class AxisRunner:
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added = 0.0
-        self._gates: list[Gate] = []
+        self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
-        self.control: ValveControl | None = None
-        if bound.status_word and config.valve.cia408:
-            control = config.valve.cia408.control
-            self.control = ValveControl(bound.status_word, control, bound.valve.message)
-            self._gates.append(self.control.gate)
         self.compensator: Compensator | None = None
 
     @property
@@ -123,9 +115,9 @@ class AxisRunner:
         """Another axis asks for so much more from the next tick on, fraction of full speed."""
         self.added = velocity
 
-    def add_interlock(self, gate: Gate, *, first: bool = False) -> None:
-        """Let something else agree before the axis may move; ``first`` is asked before others."""
-        self._gates.insert(0 if first else len(self._gates), gate)
+    def add_interlock(self, interlock: Interlock) -> None:
+        """Let something else agree before the axis may move."""
+        self._interlocks.append(interlock)
 
     def add_compensator(self, compensator: "Compensator") -> None:
         """Let the axis ask something of another one."""
@@ -201,7 +193,7 @@ class AxisRunner:
             overrun: too many deadlines were missed lately.
         """
         fault = None
-        if emergency or self._gates or self._invalid or self._foreign_ns is not None:
+        if emergency or self._interlocks or self._invalid or self._foreign_ns is not None:
             fault = self._objections(now_ns, emergency)
         trip, self._trip = self._trip, None
         stick = self._joystick.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
@@ -236,8 +228,8 @@ class AxisRunner:
             else:
                 self._foreign_ns = None
         neutral, fault = self.axis.neutral, None
-        for gate in self._gates:
-            found = gate(neutral, now_ns)
+        for interlock in self._interlocks:
+            found = interlock(neutral, now_ns)
             if found is not None and found >= TRIPS:
                 trip = trip or found
             else:

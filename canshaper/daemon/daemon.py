@@ -145,7 +145,7 @@ class Daemon:
         controller.events.clear()
         for name, port in self._ports.items():
             if port.state in OFF_BUS:
-                controller.unheard(name)
+                controller.on_bus_off(name)
             if port.state is not self._bus_states[name]:
                 self._bus_states[name] = port.state
                 level = logging.INFO if port.state is BusState.UP else logging.WARNING

@@ -1,15 +1,30 @@
 """A message that is taken: is it whole, right, in sequence, and still fresh?"""
 
 from abc import ABC, abstractmethod
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from canshaper.codec.codecs import WrongLengthError
 from canshaper.codec.frame import FrameFault
+from canshaper.inputs.carry_over import Part
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
 # A member by way of its class takes ten times as long as a name, for every frame.
 GOOD, CHECKSUM = FrameFault.NONE, FrameFault.CHECKSUM
+
+
+class Receiver(Protocol):
+    """Receives the frames of one message."""
+
+    def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
+        """Receive one; what is wrong with it."""
+
+    def forget(self) -> None:
+        """Nothing received so far counts any more."""
+
+
+class MessageInput(Receiver, Part, Protocol):
+    """The same, with a state that a reload carries over."""
 
 
 class Input(ABC):

@@ -67,7 +67,7 @@ def test_of_a_bus_that_we_are_not_on_the_controller_knows(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
 ) -> None:
     off: list[str] = []
-    monkeypatch.setattr(module.Controller, "unheard", lambda _, bus: off.append(bus))
+    monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
     at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
     assert set(off) == {"crane"}
 
@@ -77,7 +77,7 @@ def test_a_bus_that_only_has_trouble_is_one_that_we_are_on(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
 ) -> None:
     off: list[str] = []
-    monkeypatch.setattr(module.Controller, "unheard", lambda _, bus: off.append(bus))
+    monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
     at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
     assert off == []
 

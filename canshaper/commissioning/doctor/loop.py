@@ -13,7 +13,7 @@ from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, say_ready
 from canshaper.controller.controller import Controller
-from canshaper.controller.events import Event
+from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.exchange import exchange
 from canshaper.daemon.loop import run_at_deadlines
@@ -121,7 +121,7 @@ class Loop:
 
     def _housekeeping(self, now_ns: int) -> None:
         for event in self._controller.events:
-            if isinstance(event, Event):
+            if isinstance(event, StateEvent):
                 t = event.transition
                 self._events.append((event.axis, t.new.name, t.reason.name))
         self._controller.events.clear()

@@ -1,8 +1,8 @@
 """Our node on a bus of CANopen: heartbeats, emergencies, and starting the others (CiA 301)."""
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Self
+from typing import Self
 
 from canshaper.codec.canopen import (
     EMERGENCY,
@@ -16,12 +16,8 @@ from canshaper.codec.canopen import (
 )
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import Canopen, CanopenNode
-from canshaper.machine.deployment import Deployment
 from canshaper.protocols.canopen.cia408 import ValveControl
 from canshaper.shaping.states import Reason
-
-if TYPE_CHECKING:
-    from canshaper.controller.runner import AxisRunner
 
 # Between two commands to start one node: what it needs to answer with a heartbeat.
 START_AGAIN_NS = 500_000_000
@@ -226,21 +222,3 @@ class CanopenBus:
 def _name(state: int) -> str:
     known = {s.value: s.name for s in NodeState}
     return known.get(state, f"unknown ({state})")
-
-
-def canopen_buses(
-    deployment: Deployment, axes: "Mapping[str, AxisRunner]"
-) -> dict[str, CanopenBus]:
-    """Our node on each bus of CANopen; axes are told the nodes of their joystick and valve."""
-    buses = {n: CanopenBus(n, b.canopen) for n, b in deployment.config.buses.items() if b.canopen}
-    for runner in axes.values():
-        config = runner.bound.config
-        joystick, valve = deployment.config.joysticks[config.command.joystick], config.valve
-        if joystick.node:
-            node = buses[joystick.bus].nodes[joystick.node]
-            runner.add_interlock(NodeGate(node, Reason.NODE_FAULT), first=True)
-        if valve.cia408 and valve.cia408.node:
-            node = buses[valve.bus].nodes[valve.cia408.node]
-            gate = NodeGate(node, Reason.VALVE_FAULT, runner.control)
-            runner.add_interlock(gate, first=True)
-    return buses

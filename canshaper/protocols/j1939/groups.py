@@ -2,28 +2,12 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.j1939 import GLOBAL
-from canshaper.inputs.carry_over import Part
-
-if TYPE_CHECKING:
-    from canshaper.controller.runner import AxisRunner
-
-
-class Taken(Protocol):
-    """Takes the frames of one message."""
-
-    def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
-        """Take one."""
-
-    def forget(self) -> None:
-        """Nothing received so far counts any more."""
-
-
-class Received(Taken, Part, Protocol):
-    """An input of a controller."""
+from canshaper.inputs.input import Receiver
+from canshaper.protocols.interface import DrivenAxis
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,9 +44,9 @@ class AnySource:
         self,
         bus: str,
         message: str,
-        taken: Taken,
+        taken: Receiver,
         timeout_ns: int,
-        runners: "Sequence[AxisRunner]" = (),
+        runners: Sequence[DrivenAxis] = (),
     ) -> None:
         self.events: list[SourceEvent] = []
         self._bus, self._message = bus, message
@@ -119,7 +103,7 @@ class TakenGroup:
 
     def __init__(self, own: int | None) -> None:
         self._own = own
-        self.of: dict[int, Taken] = {}
+        self.of: dict[int, Receiver] = {}
         self.rest: AnySource | None = None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
@@ -135,7 +119,7 @@ class TakenGroup:
 class CommandedByOthers:
     """Commands to valves of ours that are not ours: another address, or another priority."""
 
-    def __init__(self, runners: "Sequence[AxisRunner]") -> None:
+    def __init__(self, runners: Sequence[DrivenAxis]) -> None:
         self._runners = [
             (runner, _destination(runner.bound.valve.message.sender.key[1])) for runner in runners
         ]

@@ -2,28 +2,25 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import CLAIMED, group_of, name_bytes, pgn_of
 from canshaper.config.bus import J1939
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Following
+from canshaper.inputs.input import MessageInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
+from canshaper.protocols.interface import BusProtocol, DrivenAxis, FrameHandler
 from canshaper.protocols.j1939.claim import ClaimState
 from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.protocols.j1939.groups import (
     AnySource,
     CommandedByOthers,
-    Received,
     SourceEvent,
     TakenGroup,
 )
 from canshaper.protocols.j1939.node import GROUPS, Node
-
-if TYPE_CHECKING:
-    from canshaper.controller.runner import AxisRunner
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,12 +37,12 @@ class AddressEvent:
         return f"bus={self.bus} address={self.address:#04x} state={self.state.value}"
 
 
-class Network:
+class J1939Network(BusProtocol):
     """Nodes and groups of all buses.
 
     Args:
         deployment: the machine.
-        axes: its axes, which are told the node on the bus of their valve.
+        axes: its axes, whose interlock is the node on the bus of their valve.
         taken: its inputs with their messages.
 
     Attributes:
@@ -55,8 +52,8 @@ class Network:
     def __init__(
         self,
         deployment: Deployment,
-        axes: "Mapping[str, AxisRunner]",
-        taken: Sequence[tuple[BoundInput, Received]],
+        axes: Mapping[str, DrivenAxis],
+        taken: Sequence[tuple[BoundInput, MessageInput]],
     ) -> None:
         buses = deployment.config.buses
         self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
@@ -68,7 +65,8 @@ class Network:
             for name, config in self._configs.items()
         }
         self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
-        self._groups: dict[tuple[str, int], Node | TakenGroup | CommandedByOthers] = {}
+        self._buses = {bus for bus in buses if deployment.is_j1939(bus)}
+        self._groups: dict[tuple[str, int], FrameHandler] = {}
         self._any: dict[tuple[str, int], tuple[AnySource, Part]] = {}
         for bus, node in self.nodes.items():
             self._groups |= {(bus, group): node for group in GROUPS}
@@ -87,7 +85,7 @@ class Network:
             if bound.by_group:
                 self._take(bound, one)
 
-    def _take(self, bound: BoundInput, one: Received) -> None:
+    def _take(self, bound: BoundInput, one: MessageInput) -> None:
         bus, can_id = bound.config.bus, bound.key[1]
         entry = self._groups.get((bus, group_of(can_id)))
         if not isinstance(entry, TakenGroup):
@@ -103,9 +101,15 @@ class Network:
         entry.rest = AnySource(bus, bound.message.name, one, timeout_ns, moved)
         self._any[bus, group_of(can_id)] = entry.rest, one
 
-    def entry(self, bus: str, can_id: int) -> Node | TakenGroup | CommandedByOthers | None:
-        """Who takes a message, by its group."""
-        return self._groups.get((bus, group_of(can_id)))
+    def handler(self, frame: Frame) -> FrameHandler | None:
+        """What receives a frame, by its group."""
+        if not frame.extended:
+            return None
+        return self._groups.get((frame.bus, group_of(frame.can_id)))
+
+    def usual(self, frame: Frame) -> bool:
+        """Others send groups there that no DBC file knows."""
+        return frame.extended and frame.bus in self._buses
 
     @property
     def silent(self) -> frozenset[str]:
@@ -133,15 +137,15 @@ class Network:
         if node := self.nodes.get(frame.bus):
             node.send_failed(claim=frame.extended and pgn_of(frame.can_id) == CLAIMED)
 
-    def unheard(self, bus: str) -> None:
+    def on_bus_off(self, bus: str) -> None:
         """Claims of others were missed on this bus: claim anew before anything else."""
         if node := self.nodes.get(bus):
-            node.unheard()
+            node.on_bus_off()
 
     def stalled(self) -> None:
         """Claims were missed on all buses."""
         for node in self.nodes.values():
-            node.unheard()
+            node.on_bus_off()
 
     def forget(self, bus: str | None = None) -> None:
         """Of inputs from any address nothing received so far counts; of one bus, or of all."""

@@ -84,6 +84,6 @@ class Node:
         """Continue with the same address and NAME."""
         self._claim.copy_state(before._claim)
 
-    def unheard(self) -> None:
+    def on_bus_off(self) -> None:
         """Claims of others were missed."""
         self._claim.anew()

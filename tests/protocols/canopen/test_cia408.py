@@ -4,6 +4,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from canshaper.protocols.canopen.cia408 import ValveControl
 from tests.rigs.canopen import (
     ACTIVE,
     DISABLED,
@@ -229,8 +230,9 @@ def test_whatever_valve_and_stick_say_float_is_never_sent(
 def test_a_status_word_that_does_not_count_stops_and_does_not_start() -> None:
     """It may be out of sequence: that the valve has left its state takes no trust."""
     rig = CanopenRig().moving()
-    control = rig.controller.axes["slew"].control
-    assert control is not None
+    key = rig.deployment.axes["slew"].status_word.key  # type: ignore[union-attr]
+    control = rig.controller.inputs[key]
+    assert isinstance(control, ValveControl)
     control.heard({"StatusWord": HOLD}, {}, rig.now_ns, False)
     assert control.gate(False, rig.now_ns).name == "VALVE_FAULT"  # type: ignore[union-attr]
     assert control.gate(False, rig.now_ns) is None  # what counted last still says active

@@ -212,7 +212,7 @@ def test_a_frame_that_did_not_go_out_has_us_say_our_address_again(rig: Rig) -> N
 
 def test_off_the_bus_no_axis_goes_on_and_the_address_is_claimed_anew(rig: Rig) -> None:
     rig.moving()
-    rig.controller.unheard("crane")
+    rig.controller.on_bus_off("crane")
     assert ids(rig.tick()) == [CLAIM]
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "SEND_FAILED")
     began_ns = rig.now_ns - TICK_NS
@@ -236,7 +236,7 @@ def test_claims_missed_in_a_stall_are_provoked_again(rig: Rig) -> None:
 def test_a_lost_address_stays_lost_off_the_bus_and_after_a_stall(rig: Rig) -> None:
     rig.claimed().tick(rig.claim(-1))
     rig.run(20)
-    rig.controller.unheard("crane")
+    rig.controller.on_bus_off("crane")
     rig.controller.stalled()
     assert [f for frames in rig.run(50) for f in frames] == []
 

@@ -158,7 +158,7 @@ def test_a_broadcast_is_begun_anew_after_the_address_was_not_ours() -> None:
     rig = Rig().claimed()
     while BROADCAST not in ids(rig.run(1)[0]):
         pass
-    rig.controller.unheard("crane")
+    rig.controller.on_bus_off("crane")
     sent = [f for frames in rig.run(20) for f in frames]
     under_way = [i for i in ids(sent) if i in (BROADCAST, PACKET)]
     assert under_way[0] == BROADCAST

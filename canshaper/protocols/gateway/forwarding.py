@@ -1,22 +1,20 @@
-"""The frames of one joystick on their way through a gateway, and what is sent when none come."""
+"""The frames of joysticks on their way through a gateway, and what is sent when none come."""
 
-from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Mapping, Sequence
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.valve import ValveMessage
 from canshaper.inputs.joystick import JoystickInput
+from canshaper.machine.deployment import Deployment
+from canshaper.protocols.interface import BusProtocol, DrivenAxis, MessageKey
 from canshaper.shaping.states import MOVING, State
-
-if TYPE_CHECKING:
-    from canshaper.controller.runner import AxisRunner
 
 # Cycles without a frame of the joystick after which a trip does not wait for the next one.
 LATE_CYCLES = 2
 
 
-class Line:
+class ForwardedJoystick:
     """One joystick message between two buses.
 
     A frame of the joystick that counts leaves at once with the velocities of the last tick. Without
@@ -29,28 +27,28 @@ class Line:
         runners: the axes with their velocities in it.
 
     Attributes:
-        moved: whether the last frame may move a valve.
+        moves: whether the last frame may move a valve.
     """
 
     def __init__(
-        self, message: ValveMessage, joystick: JoystickInput, runners: "Sequence[AxisRunner]"
+        self, message: ValveMessage, joystick: JoystickInput, runners: Sequence[DrivenAxis]
     ) -> None:
         assert isinstance(message, RewrittenMessage)  # only such axes have one
         self._message = message
         self._joystick = joystick
         self._runners = runners
         self._seen = joystick.raw
-        self.moved = False
+        self.moves = False
         self._passed_ns = 0
         cycle_ms = message.sender.fields.message.cycle_time or 0
         self._late_ns = LATE_CYCLES * cycle_ms * 1_000_000
 
-    def news(self) -> bool:
-        """Whether a frame of the joystick has counted since this was asked last."""
+    def new_frame(self) -> bool:
+        """Whether a valid frame of the joystick came since the last call."""
         before, self._seen = self._seen, self._joystick.raw
         return self._seen is not before
 
-    def pass_on(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
+    def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
         """A frame of the joystick as it leaves; nothing else in it is changed.
 
         Args:
@@ -63,7 +61,7 @@ class Line:
         for runner in self._runners:
             if stopped or runner.tripping:  # the loop stood still, or the like: this is old
                 runner.bound.valve.put(0)
-        self.moved = self._moves() and not stopped
+        self.moves = self._any_moves() and not stopped
         return self._message.onto(data)
 
     def own(self, now_ns: int) -> Frame | None:
@@ -72,14 +70,47 @@ class Line:
         tripped = any(runner.axis.state is State.TRIPPED for runner in self._runners)
         lost = self._joystick.lost(now_ns) is not None
         late = tripped and now_ns - self._passed_ns > self._late_ns
-        if not (lost or late) or not (stopping or self.moved):
+        if not (lost or late) or not (stopping or self.moves):
             return None
-        self.moved = self._moves()
+        self.moves = self._any_moves()
         return self._message.own(enabled=stopping)
 
     def last(self) -> list[Frame]:
         """What is sent before we go: neutral, where the last frame was not."""
-        return [self._message.own(enabled=False)] if self.moved else []
+        return [self._message.own(enabled=False)] if self.moves else []
 
-    def _moves(self) -> bool:
+    def _any_moves(self) -> bool:
         return any(runner.axis.raw and not runner.tripping for runner in self._runners)
+
+
+class Gateway(BusProtocol):
+    """All joysticks whose frames leave as commands.
+
+    Args:
+        deployment: one with a gateway.
+        axes: its axes.
+        joysticks: its joysticks.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        axes: Mapping[str, DrivenAxis],
+        joysticks: Mapping[str, JoystickInput],
+    ) -> None:
+        gateway = deployment.config.gateway
+        assert gateway is not None  # only such deployments have one
+        self._buses = gateway.between
+        by_message: dict[MessageKey, list[DrivenAxis]] = {}
+        for runner in axes.values():
+            if runner.bound.rewrites:
+                by_message.setdefault(runner.bound.valve.message.sender.key, []).append(runner)
+        self.forwarding: dict[MessageKey, ForwardedJoystick] = {}
+        for key, runners in by_message.items():
+            bound = runners[0].bound
+            joystick = joysticks[bound.config.command.joystick]
+            self.forwarding[key] = ForwardedJoystick(bound.valve.message, joystick, runners)
+
+    def usual(self, frame: Frame) -> bool:
+        """What nobody knows there is what is passed on."""
+        return frame.bus in self._buses

@@ -1,0 +1,136 @@
+"""What the controller needs of a protocol, and what a protocol may do with an axis."""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from typing import Protocol
+
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.inputs.carry_over import Key, Part
+from canshaper.inputs.feedback import Feedback
+from canshaper.inputs.input import MessageInput
+from canshaper.machine.deployment import BoundAxis
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.states import Reason
+
+MessageKey = tuple[str, int, bool]
+"""Bus, identifier, and whether that has 29 bits."""
+Interlock = Callable[[bool, int], Reason | None]
+"""Called with whether the axis is neutral, and the time; why it may not move, or None."""
+
+
+class Event(Protocol):
+    """Anything that is logged."""
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+
+
+class DrivenAxis(Protocol):
+    """An axis as a protocol sees it."""
+
+    @property
+    def bound(self) -> BoundAxis:
+        """The axis with its codecs."""
+
+    @property
+    def axis(self) -> Axis:
+        """Its state machine."""
+
+    @property
+    def feedback(self) -> Feedback | None:
+        """What its valve says of itself."""
+
+    @property
+    def tripping(self) -> bool:
+        """Whether the next tick trips it."""
+
+    def invalidate(self) -> None:
+        """Its input was lost, though it may be back by the next tick."""
+
+    def foreign_sender(self, now_ns: int) -> None:
+        """A frame with the id of its valve came from another sender."""
+
+    def add_interlock(self, interlock: Interlock) -> None:
+        """Let something else agree before it may move; asked after those that were added before."""
+
+
+class FrameHandler(Protocol):
+    """Receives frames that are known by more than their identifier."""
+
+    def receive(self, frame: Frame, arrived_ns: int, /) -> FrameFault:
+        """Receive one; what is wrong with it."""
+
+
+class ForwardingRule(Protocol):
+    """Frames of a joystick that leave as commands to valves."""
+
+    @property
+    def moves(self) -> bool:
+        """Whether the last frame may move a valve."""
+
+    def new_frame(self) -> bool:
+        """Whether a valid frame of the joystick came since the last call."""
+
+    def forward(self, data: bytes, arrived_ns: int, *, stopped: bool) -> Frame:
+        """A frame of the joystick as it leaves; neutral where ``stopped``."""
+
+    def own(self, now_ns: int) -> Frame | None:
+        """A frame of our own, where the axes have just moved and the joystick sends none."""
+
+    def last(self) -> list[Frame]:
+        """What is sent before we go."""
+
+
+class BusProtocol:
+    """One protocol on all buses of a machine; by default it does nothing.
+
+    Attributes:
+        inputs: what receives its own messages, by their identifiers.
+        forwarding: what leaves in the place of a valve message, by the identifier of that.
+    """
+
+    inputs: Mapping[MessageKey, MessageInput] = {}
+    forwarding: Mapping[MessageKey, ForwardingRule] = {}
+
+    @property
+    def silent(self) -> frozenset[str]:
+        """Buses on which nothing but frames of this protocol may be sent now."""
+        return frozenset()
+
+    def handler(self, frame: Frame) -> FrameHandler | None:
+        """What receives a frame that is none of ``inputs``."""
+
+    def usual(self, frame: Frame) -> bool:
+        """Whether such a frame is no fault though no DBC file knows it."""
+        return False
+
+    def silence(self, now_ns: int) -> FrameFault:
+        """A fault because something has just fallen silent."""
+        return FrameFault.NONE
+
+    def frames(self, now_ns: int) -> Iterable[Frame]:
+        """What is due now, besides commands and status."""
+        return ()
+
+    def changes(self) -> Iterable[Event]:
+        """What is to be logged since the last call."""
+        return ()
+
+    def stalled(self) -> None:
+        """The loop stood still: frames were missed on all buses."""
+
+    def on_bus_off(self, bus: str) -> None:
+        """We are not on this bus now: frames are missed there."""
+
+    def send_failed(self, frame: Frame) -> None:
+        """A frame did not reach its bus."""
+
+    def forget(self, bus: str | None = None) -> None:
+        """Nothing received so far counts any more; of one bus, or of all. Not for ``inputs``."""
+
+    def leave(self) -> None:
+        """The next frame of every valve is the last one."""
+
+    def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
+        """What a reload carries over besides ``inputs``; ``places`` is what the buses are."""
+        yield from ()
