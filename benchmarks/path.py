@@ -1,7 +1,7 @@
 """Where the way from joystick frame to valve frame goes: bytecodes by function.
 
 One axis at 1 ms, in motion, a new stick position in every tick. Counted are the bytecodes that
-Python executes from the begin of the tick's exchange until the valve frame is handed to the kernel;
+Python executes from begin of the tick's I/O cycle until the valve frame is handed to the kernel;
 frames are the kernel's, on a pair of sockets. The same on every machine that has the same Python.
 
     python benchmarks/path.py
@@ -24,7 +24,7 @@ from rig import Row, print_table, slew_only
 from canshaper.bus.raw import CAN_FRAME, RawPort
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.hand import Hand, Held
@@ -78,7 +78,7 @@ def count() -> Counted:
             far.send(CAN_FRAME.pack(frame.can_id, len(frame.data), frame.data))
         if tick == TICKS - 1:
             sys.settrace(counted.trace)
-        exchange(controller, {"crane": port}, tick * TICK_NS, 0, standstill)
+        io_cycle(controller, {"crane": port}, tick * TICK_NS, 0, standstill)
         with suppress(BlockingIOError):
             while True:
                 far.recv(CAN_FRAME.size)

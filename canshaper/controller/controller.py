@@ -108,7 +108,7 @@ class Controller:
         self._stood_still = False
         self.moves = False
 
-    def follow(self, before: "Controller") -> None:
+    def carry_over(self, before: "Controller") -> None:
         """Continue where the controller that ran before a reload has ended.
 
         What is latched, what other nodes reported and every alive counter stay as they are. A bus
@@ -221,7 +221,7 @@ class Controller:
                         yield frame
                 elif message is not None and message.bus not in silent:
                     yield message.frame()
-                runner.settle(now_ns)
+                runner.post_step(now_ns)
                 if runner.feedback is not None:
                     self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:

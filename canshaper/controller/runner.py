@@ -185,7 +185,7 @@ class AxisRunner:
     ) -> Transition | None:
         """One step of the axis; a trip cause noted since the last one acts now.
 
-        ``settle`` has to follow, before another axis moves.
+        ``post_step`` has to follow, before another axis moves.
 
         Args:
             now_ns: monotonic time.
@@ -213,7 +213,7 @@ class AxisRunner:
         self.bound.valve.put(self.axis.raw)
         return transition
 
-    def settle(self, now_ns: int) -> None:
+    def post_step(self, now_ns: int) -> None:
         """What can wait until the valve was told: the model, and what is asked of another axis."""
         self.axis.advance()
         if self.compensator is not None:

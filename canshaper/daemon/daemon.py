@@ -13,9 +13,10 @@ from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
+from canshaper.daemon.config_reload import ConfigReload
 from canshaper.daemon.control_server import ControlServer
-from canshaper.daemon.exchange import exchange
-from canshaper.daemon.gateway import InLine
+from canshaper.daemon.gateway import InlineGateway
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.notify import ServiceManager
 from canshaper.daemon.ports import (
@@ -25,7 +26,6 @@ from canshaper.daemon.ports import (
     received_at_first,
     waiting,
 )
-from canshaper.daemon.reading import Reading
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
@@ -64,7 +64,7 @@ class Daemon:
         self._load = load
         self._stop = False
         self._reload = False  # asked for and not yet begun
-        self._reading: Reading | None = None
+        self._reading: ConfigReload | None = None
         self._next: Deployment | None = None  # read, and good
         self._waiting_told = False
         self._manager = ServiceManager()
@@ -85,7 +85,7 @@ class Daemon:
         """Run until SIGTERM or SIGINT; then every valve is told neutral and the buses close."""
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
-        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # ignored, the end of a Reading would be lost
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else its reader's end is lost
         names = ",".join(self._controller.axes)
         if self._controller.deployment.listen_only:
             log.warning("listen-only=yes valves=none: nothing is sent but status")
@@ -121,7 +121,7 @@ class Daemon:
         A reload, refused or not, has taken its time as all else has: the next tick sees it.
         """
         controller = self._controller
-        exchange(self._guarded, self._ports, now_ns, missed, self._standstill)
+        io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
         self._latest_ns = max(self._latest_ns, late_ns)
@@ -201,16 +201,16 @@ class Daemon:
     def _use(self, deployment: Deployment, before: Controller | None = None) -> None:
         self._controller = Controller(deployment)
         if before:
-            self._controller.follow(before)
+            self._controller.carry_over(before)
         self._guarded = Guarded(self._controller)
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
 
-    def _in_line(self, deployment: Deployment) -> InLine | None:
+    def _in_line(self, deployment: Deployment) -> InlineGateway | None:
         """What passes frames on, where we stand in a line."""
         in_line = deployment.config.gateway and not deployment.listen_only
-        return InLine(deployment, self._on_fault) if in_line else None
+        return InlineGateway(deployment, self._on_fault) if in_line else None
 
     def _open_control(self, deployment: Deployment) -> ControlServer | None:
         """The control socket, where there shall be one; a machine works without it too."""
@@ -235,7 +235,7 @@ class Daemon:
                 self._reading.end()
             self._reload, self._reading, self._next = False, None, None
             try:
-                self._reading = Reading(self._load)
+                self._reading = ConfigReload(self._load)
             except OSError as error:
                 self._refuse(f"cannot read: {error.strerror}")
         elif self._reading and (found := self._reading.result()) is not None:

@@ -14,7 +14,7 @@ from canshaper.bus.raw import GONE, REOPEN_NS, SIZE
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
-from canshaper.daemon.exchange import Reckons, take
+from canshaper.daemon.io_cycle import FrameProcessor, receive_waiting
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import GatewayError, Rule, between, difference, rules
@@ -120,7 +120,7 @@ class Bridge:
         self.sockets = []
 
 
-class InLine:
+class InlineGateway:
     """What a gateway asks of the daemon besides its ticks.
 
     Args:
@@ -149,7 +149,7 @@ class InLine:
     def wait(
         self,
         seconds: float,
-        reckons: Reckons,
+        processor: FrameProcessor,
         ports: Mapping[str, Port],
         standstill: Standstill,
     ) -> None:
@@ -172,7 +172,9 @@ class InLine:
             now_ns = clock()
             if not ready or now_ns >= until_ns or standstill.over(now_ns):
                 return
-            empty += not (take(reckons, ports, now_ns, standstill) + self.pass_others())
+            empty += not (
+                receive_waiting(processor, ports, now_ns, standstill) + self.pass_others()
+            )
 
     def pass_others(self) -> int:
         """Pass on a few frames of others, where that is our part; how many there were."""

@@ -137,7 +137,7 @@ class Stepper:
             before, last_ns = self.controller, self.standstill.last_ns
             self._begin(self._load())
             if tick.reloaded:
-                self.controller.follow(before)
+                self.controller.carry_over(before)
                 self.standstill.last_ns = last_ns
         self.fresh = False
         if tick.starts:

@@ -49,7 +49,7 @@ def reload(rig: Any, *changes: tuple[str, str]) -> None:
     rig.deployment = load_deployment(file)
     before.neutral_frames()
     rig.controller = Controller(rig.deployment)
-    rig.controller.follow(before)
+    rig.controller.carry_over(before)
 
 
 @pytest.fixture
@@ -102,7 +102,7 @@ def test_every_counter_of_e2e_goes_on(tmp_path: Path) -> None:
     sent: Sent = {}
     for number in range(6):
         sent |= last_of(list(first.tick(number * TICK_NS)))
-    second.follow(first)
+    second.carry_over(first)
     later = counts(after, last_of(list(second.tick(6 * TICK_NS))))
     assert later == {key: count + 1 for key, count in counts(before, sent).items()}
     assert sorted(later.values()) == [3, 3, 7]

@@ -192,7 +192,7 @@ def test_a_short_press_just_before_a_reload_is_one_behind_it(machine: Machine) -
     rig.receive(machine.stop(1))
     rig.receive(machine.stop(0))
     before, rig.controller = rig.controller, Controller(rig.deployment)
-    rig.controller.follow(before)
+    rig.controller.carry_over(before)
     machine.run(3)
     assert machine.states() == PRESSED
 
@@ -201,6 +201,6 @@ def test_without_a_press_a_reload_trips_nothing(machine: Machine) -> None:
     rig = machine.rig
     machine.run(3)
     before, rig.controller = rig.controller, Controller(rig.deployment)
-    rig.controller.follow(before)
+    rig.controller.carry_over(before)
     machine.run(3)
     assert machine.states() == READY

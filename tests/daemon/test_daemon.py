@@ -266,7 +266,7 @@ def test_a_read_that_is_overtaken_is_ended_and_so_is_the_last_one(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Slow.all.clear()
-    monkeypatch.setattr(module, "Reading", Slow)
+    monkeypatch.setattr(module, "ConfigReload", Slow)
     at(bench, {5: bench.reload, 10: bench.reload})
     assert [one.ended for one in Slow.all] == [True, True]
 
@@ -277,7 +277,7 @@ def test_without_a_process_to_read_in_a_reload_is_refused(
     def none(_load: object) -> None:
         raise BlockingIOError(11, "no more processes")
 
-    monkeypatch.setattr(module, "Reading", none)
+    monkeypatch.setattr(module, "ConfigReload", none)
     at(bench, {5: bench.reload})
     assert [line for line in log() if "reload=" in line] == [
         "ERROR reload=refused cannot read: no more processes"
@@ -291,7 +291,7 @@ def test_what_cannot_be_read_is_refused_line_by_line(
         def result(self) -> str:  # type: ignore[override]
             return "machine.yaml:1: one\nmachine.yaml:2: two"
 
-    monkeypatch.setattr(module, "Reading", Broken)
+    monkeypatch.setattr(module, "ConfigReload", Broken)
     at(bench, {5: bench.reload})
     assert [line for line in log() if "reload=" in line] == [
         "ERROR reload=refused machine.yaml:1: one",
@@ -354,7 +354,7 @@ def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
         lines.append(Beside(bench))
         return lines[-1]
 
-    monkeypatch.setattr(module, "InLine", in_line)
+    monkeypatch.setattr(module, "InlineGateway", in_line)
     at(bench, {5: bench.reload})
     assert [one.closed for one in lines] == [1, 1]  # the old one, and the last one at the end
     assert sum(one.passes for one in lines) == sum(one.checks for one in lines) == 21

@@ -12,7 +12,7 @@ from canshaper.bus.port import open_port
 from canshaper.bus.raw import CAN_FRAME, RawPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
-from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InLine
+from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway
 from canshaper.daemon.standstill import Standstill
 from canshaper.protocols.gateway.cangw import GatewayError, Rule
 from tests.rigs.gateway import GatewayRig
@@ -56,7 +56,9 @@ def test_a_joystick_frame_does_not_wait_for_the_tick(rig: GatewayRig, ends: Ends
     frames = [rig.joystick() for _ in range(3)]
     for frame in frames:
         others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
+    InlineGateway(rig.deployment, ignore).wait(
+        WAIT_S, rig.controller, ports, Standstill(rig.deployment)
+    )
     for frame in frames:
         word, length, data = CAN_FRAME.unpack(others["machine"].recv(CAN_FRAME.size))
         assert (word, length) == (0x110, 8)
@@ -82,7 +84,7 @@ def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
     monkeypatch.setattr(gateway.select, "select", stopped)
     standstill = Standstill(rig.deployment)
     standstill.clock = lambda: now_ns[0]
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, standstill)
+    InlineGateway(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, standstill)
     with pytest.raises(BlockingIOError):
         others["machine"].recv(CAN_FRAME.size)
     assert [one.can_id for one in ports["joysticks"].frames()] == [frame.can_id]
@@ -100,7 +102,9 @@ def test_what_is_of_no_use_does_not_keep_the_loop_busy(
     monkeypatch.setattr(
         gateway.select, "select", lambda *a: asked.append(1) or select(*a), raising=True
     )
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
+    InlineGateway(rig.deployment, ignore).wait(
+        WAIT_S, rig.controller, ports, Standstill(rig.deployment)
+    )
     assert len(asked) <= MOST_EMPTY + 1
     assert set(faults) == {FrameFault.WRONG_LENGTH}
 
@@ -110,7 +114,9 @@ def test_a_port_that_is_gone_is_waited_for(rig: GatewayRig, ends: Ends) -> None:
     ports["machine"].close()
     frame = rig.joystick()
     others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
-    InLine(rig.deployment, ignore).wait(WAIT_S, rig.controller, ports, Standstill(rig.deployment))
+    InlineGateway(rig.deployment, ignore).wait(
+        WAIT_S, rig.controller, ports, Standstill(rig.deployment)
+    )
     assert rig.controller.counters.last_fault is FrameFault.SEND_FAILED
 
 
@@ -119,7 +125,9 @@ def test_ports_without_a_file_descriptor_are_read_with_the_tick(rig: GatewayRig)
     buses = rig.deployment.config.buses
     ports = {name: open_port(name, bus, ignore) for name, bus in buses.items()}
     assert [port.fileno() for port in ports.values()] == [-1, -1]
-    InLine(rig.deployment, ignore).wait(0.001, rig.controller, ports, Standstill(rig.deployment))
+    InlineGateway(rig.deployment, ignore).wait(
+        0.001, rig.controller, ports, Standstill(rig.deployment)
+    )
     for port in ports.values():
         port.close()
 
@@ -127,7 +135,7 @@ def test_ports_without_a_file_descriptor_are_read_with_the_tick(rig: GatewayRig)
 def test_without_socketcan_it_says_that_others_do_not_pass(
     rig: GatewayRig, caplog: pytest.LogCaptureFixture
 ) -> None:
-    line = InLine(rig.deployment, ignore)
+    line = InlineGateway(rig.deployment, ignore)
     line.check(0, neutral=True)  # nor are there rules to look at
     assert line.pass_others() == 0
     line.close()
@@ -140,7 +148,7 @@ def test_rules_are_looked_at_while_nothing_moves_and_told_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)
-    line = InLine(GatewayRig(tmp_path).deployment, ignore)
+    line = InlineGateway(GatewayRig(tmp_path).deployment, ignore)
     found: list[Rule] = []
     asked: list[int] = []
     monkeypatch.setattr(gateway, "rules", lambda: asked.append(1) or list(found))

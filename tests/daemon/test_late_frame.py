@@ -8,8 +8,8 @@ import pytest
 from canshaper.codec.layout import Layout
 from canshaper.codec.protection import Protection, Protector
 from canshaper.controller.controller import Controller
-from canshaper.daemon.exchange import exchange, take
-from canshaper.daemon.gateway import InLine
+from canshaper.daemon.gateway import InlineGateway
+from canshaper.daemon.io_cycle import io_cycle, receive_waiting
 from canshaper.daemon.standstill import LEAST_LEAVE_NS, Standstill
 from tests.rigs.forwarder import ROOT
 from tests.rigs.gateway import GatewayRig
@@ -126,7 +126,7 @@ class InGateway:
         self.standstill.clock = lambda: self.now_ns + held_ms * MS
         self.joysticks.wait(self.rig.joystick(Slew=self.slew))
         assert not self.standstill.over(self.now_ns)
-        take(self.rig.controller, self.ports, self.now_ns, self.standstill)
+        receive_waiting(self.rig.controller, self.ports, self.now_ns, self.standstill)
         assert self.joysticks.queue == []
         return len(self.machine.sent)
 
@@ -151,7 +151,7 @@ def test_after_a_stop_in_a_gateway_its_axes_trip_and_neutral_leaves(tmp_path: Pa
     gateway.now_ns += 91 * MS
     gateway.standstill.clock = lambda: gateway.now_ns
     controller: Controller = gateway.rig.controller
-    exchange(controller, gateway.ports, gateway.now_ns, 3, gateway.standstill)
+    io_cycle(controller, gateway.ports, gateway.now_ns, 3, gateway.standstill)
     (own,) = (f for f in gateway.machine.sent if f.can_id == 0x110)
     values, before = gateway.rig.decoded(own), gateway.rig.decoded(gateway.rig.left[-2])
     assert values["AliveCounter"] == (before["AliveCounter"] + 1) % 256
@@ -167,7 +167,7 @@ def test_between_two_ticks_of_a_gateway_a_standstill_is_left_to_the_tick(
     times = iter((0, 0, 101 * MS))
     gateway.standstill.clock = lambda: gateway.last_ns + next(times)
     monkeypatch.setattr("canshaper.daemon.gateway.select.select", lambda *_: ([1], [], []))
-    line = InLine(gateway.rig.deployment, lambda _fault: None)
+    line = InlineGateway(gateway.rig.deployment, lambda _fault: None)
     line.wait(0.2, gateway.rig.controller, gateway.ports, gateway.standstill)
     assert len(gateway.joysticks.queue) == 1
     assert gateway.machine.sent == []

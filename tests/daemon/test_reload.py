@@ -104,7 +104,7 @@ class Bench:
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         monkeypatch.setattr(service_ports, "open_port", self._open)
-        monkeypatch.setattr(module, "Reading", Read)
+        monkeypatch.setattr(module, "ConfigReload", Read)
         monkeypatch.setattr(module, "Collector", Uncollected)
         for name in ("lock_memory", "refuse_huge_pages"):
             monkeypatch.setattr(module, name, lambda: None)
@@ -346,7 +346,7 @@ def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:
     rig.run(3)
     assert [rig.state(axis) for axis in axes] == [State.TRIPPED, State.TRIPPED, State.READY]
     before, rig.controller = rig.controller, Controller(rig.deployment)
-    rig.controller.follow(before)
+    rig.controller.carry_over(before)
     assert rig.state("near_far") is State.NEUTRAL_WAIT
     rig.run(3)
     assert (rig.state("slew"), rig.reason("slew")) == (State.TRIPPED, "EMERGENCY_STOP")
@@ -360,14 +360,14 @@ def test_a_reset_that_is_held_through_a_reload_is_no_press(rig: Rig) -> None:
     rig.controller.axes["slew"].trip(Reason.EMERGENCY_STOP)
     rig.run(3, Reset=1)
     before, rig.controller = rig.controller, Controller(rig.deployment)
-    rig.controller.follow(before)
+    rig.controller.carry_over(before)
     rig.run(10, Reset=1)
     assert rig.state("slew") is State.TRIPPED
 
 
 def test_an_axis_that_is_new_begins_as_ever(changed_rig: Callable[..., Rig], rig: Rig) -> None:
     other = changed_rig({"  lift:\n": "  boom:\n"})
-    other.controller.follow(rig.controller)
+    other.controller.carry_over(rig.controller)
     other.run(3)
     assert other.state("boom") is State.READY
 
@@ -384,7 +384,7 @@ def test_nothing_is_left_of_the_controller_before(kind: str) -> None:
         for _ in controller.tick(now_ns):
             pass
     after = Controller(load_deployment(deployment.path))
-    after.follow(controller)
+    after.carry_over(controller)
     adjuster = Adjuster(controller)
     parts = [controller, deployment, *controller.axes.values()]
     gone = [weakref.ref(part) for part in parts]

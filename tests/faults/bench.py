@@ -232,7 +232,7 @@ class Bench:
         yield time, "sleep", self.sleep
         yield module.signal, "signal", self._handlers.__setitem__
         yield ports_module, "open_port", self._open
-        yield module, "Reading", self._read
+        yield module, "ConfigReload", self._read
         yield module, "Controller", Unrefused
         yield module, "Collector", Uncollected
         yield module, "ControlServer", self._control

@@ -67,7 +67,7 @@ def _caught(name: str, tell: Callable[[Sequence], None]) -> int:
     raise AssertionError("not caught")
 
 
-@pytest.mark.parametrize("method", ["follow", "stalled", "send_failed"])
+@pytest.mark.parametrize("method", ["carry_over", "stalled", "send_failed"])
 def test_the_rules_catch_what_the_controller_does_not_do(method: str) -> None:
     """A reload that forgets; a standstill, or a frame that was not sent, that does not matter."""
     with patch.object(Controller, method, lambda *_: None):

@@ -107,7 +107,7 @@ def log_of(
             for number, frame in enumerate(controller.neutral_frames()):
                 logged(at_ns + 50_000 * number, frame)
             before, controller = controller, Controller(load())
-            controller.follow(before)
+            controller.carry_over(before)
             now = deadline = at_ns + 500_000 + opens_ns
     for number, frame in enumerate(controller.neutral_frames()):
         logged(at_ns + 50_000 * number, frame)

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from tests.rigs.forwarder import Rig
 from tests.rigs.waiting import Waiting, both
@@ -52,7 +52,7 @@ class Machine:
         """One tick so long after the one before, with both joysticks out."""
         self.now_ns += gap_ns
         self.port.wait(*both(self.rig, Slew=self.slew))
-        exchange(self.rig.controller, {"crane": self.port}, self.now_ns, missed, self.standstill)
+        io_cycle(self.rig.controller, {"crane": self.port}, self.now_ns, missed, self.standstill)
 
     def moving(self) -> "Machine":
         for slew, ticks in ((0, 3), (900, round(1e9 / self.tick_ns))):

@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 
 from canshaper.codec.frame import BusState, Frame
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from tests.rigs.forwarder import TICK_NS, Rig
 
@@ -58,7 +58,7 @@ def tick(rig: Rig, port: Waiting, missed: int = 0) -> None:
     standstill.last_ns = rig.now_ns - TICK_NS
     rig.now_ns += TICK_NS * missed
     standstill.clock = lambda: rig.now_ns
-    exchange(rig.controller, {"crane": port}, rig.now_ns, missed, standstill)
+    io_cycle(rig.controller, {"crane": port}, rig.now_ns, missed, standstill)
     rig.now_ns += TICK_NS
 
 

@@ -9,7 +9,7 @@ from types import FrameType
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
@@ -52,7 +52,7 @@ def run_live(
 
     def body(now_ns: int, missed: int, _late_ns: int) -> bool:
         nonlocal told_ns
-        exchange(drive, ports, now_ns, missed, standstill)
+        io_cycle(drive, ports, now_ns, missed, standstill)
         if now_ns >= told_ns:
             told_ns = now_ns + 200_000_000
             tell(drive)

@@ -15,7 +15,7 @@ from canshaper.commissioning.doctor.processes import LOOP_PRIORITY, real_time, s
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.standstill import Standstill
@@ -105,7 +105,7 @@ class Loop:
             port.close()
 
     def _body(self, now_ns: int, missed: int, late_ns: int) -> bool:
-        exchange(self._guarded, self._ports, now_ns, missed, self._standstill)
+        io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)

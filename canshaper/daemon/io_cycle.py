@@ -1,9 +1,8 @@
-"""One tick between the buses and what reckons: the same for all that drives a machine."""
+"""One tick between the buses and a frame processor: the same for all that drives a machine."""
 
 from collections.abc import Iterator, Mapping
 from typing import Protocol
 
-from canshaper.bus.port import Port
 from canshaper.codec.frame import Frame
 from canshaper.daemon.standstill import Standstill
 
@@ -12,7 +11,7 @@ from canshaper.daemon.standstill import Standstill
 MOST_ROUNDS = 50
 
 
-class Reckons(Protocol):
+class FrameProcessor(Protocol):
     """Frames in, frames out: a ``Controller``, or what stands around one."""
 
     @property
@@ -35,11 +34,30 @@ class Reckons(Protocol):
         """A valve frame comes too late: whether it moves one, and so must not leave."""
 
 
-def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: Standstill) -> int:
+class FramePort(Protocol):
+    """What a cycle needs of a bus, see ``Port``; or of what stands for one."""
+
+    @property
+    def arrived_ns(self) -> int:
+        """When the frame arrived that ``frames`` has just handed out."""
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits, in order."""
+
+    def others(self) -> Iterator[Frame]:
+        """What can wait until the valves have been told."""
+
+    def send(self, frame: Frame) -> bool:
+        """Send now or not at all; whether the frame went out."""
+
+
+def receive_waiting(
+    processor: FrameProcessor, ports: Mapping[str, FramePort], now_ns: int, standstill: Standstill
+) -> int:
     """Take all waiting frames; those of a joystick that pass a gateway leave at once or not at all.
 
     Args:
-        reckons: what the frames are for.
+        processor: what the frames are for.
         ports: the buses by name.
         now_ns: time by ``boottime_ns``; no frame is younger.
         standstill: until when a frame that moves a valve may leave.
@@ -52,19 +70,19 @@ def take(reckons: Reckons, ports: Mapping[str, Port], now_ns: int, standstill: S
         for frame in port.frames():
             count += 1
             arrived_ns = port.arrived_ns
-            passed = reckons.receive(frame, arrived_ns if arrived_ns < now_ns else now_ns)
+            passed = processor.receive(frame, arrived_ns if arrived_ns < now_ns else now_ns)
             if passed is None:
                 continue
-            if reckons.moves and standstill.late() and reckons.withhold(passed):
+            if processor.moves and standstill.late() and processor.withhold(passed):
                 continue
             if not ports[passed.bus].send(passed):
-                reckons.send_failed(passed)
+                processor.send_failed(passed)
     return count
 
 
-def exchange(
-    reckons: Reckons,
-    ports: Mapping[str, Port],
+def io_cycle(
+    processor: FrameProcessor,
+    ports: Mapping[str, FramePort],
     now_ns: int,
     missed: int,
     standstill: Standstill,
@@ -75,26 +93,26 @@ def exchange(
     after that. Its tick is none that was made, so the next one sees how long the loop stood still.
 
     Args:
-        reckons: what the frames are for.
+        processor: what the frames are for.
         ports: the buses by name.
         now_ns: time of this tick, by ``boottime_ns``.
         missed: deadlines missed since the last one.
         standstill: when the last tick was.
     """
     if standstill.over(now_ns):
-        reckons.stalled()
+        processor.stalled()
         for _ in range(MOST_ROUNDS):
-            if not take(reckons, ports, now_ns, standstill):
+            if not receive_waiting(processor, ports, now_ns, standstill):
                 break
     else:
-        take(reckons, ports, now_ns, standstill)
+        receive_waiting(processor, ports, now_ns, standstill)
     made_ns = now_ns
-    for frame in reckons.tick(now_ns, missed):
-        if reckons.moves and standstill.late() and reckons.withhold(frame):
+    for frame in processor.tick(now_ns, missed):
+        if processor.moves and standstill.late() and processor.withhold(frame):
             made_ns = standstill.last_ns
         elif not ports[frame.bus].send(frame):
-            reckons.send_failed(frame)
+            processor.send_failed(frame)
     standstill.last_ns = made_ns
     for port in ports.values():
         for frame in port.others():
-            reckons.receive(frame, now_ns)
+            processor.receive(frame, now_ns)

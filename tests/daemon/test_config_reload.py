@@ -15,8 +15,8 @@ from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.config.source import DeploymentError, Problem
 from canshaper.controller.controller import Controller
-from canshaper.daemon import reading as reading_module
-from canshaper.daemon.reading import Reading
+from canshaper.daemon import config_reload as reading_module
+from canshaper.daemon.config_reload import ConfigReload
 from canshaper.machine.deployment import Deployment
 from tests.rigs.forwarder import ROOT, TICK_NS
 
@@ -28,10 +28,10 @@ CHANNELS = ["crane=x"]
 
 
 def read(load: Callable[[], Deployment]) -> Deployment | str:
-    return answer(Reading(load))
+    return answer(ConfigReload(load))
 
 
-def answer(reading: Reading) -> Deployment | str:
+def answer(reading: ConfigReload) -> Deployment | str:
     until = time.monotonic() + ANSWER_S
     while (found := reading.result()) is None:
         assert time.monotonic() < until
@@ -90,7 +90,7 @@ def test_nothing_waits_for_it() -> None:
         select.select([waits], [], [], ANSWER_S)
         return loader(str(SHIPPED[0]))()
 
-    reading = Reading(load)
+    reading = ConfigReload(load)
     assert [reading.result() for _ in range(100)] == [None] * 100
     os.close(ends)
     assert isinstance(answer(reading), Deployment)
@@ -157,7 +157,7 @@ def test_a_reader_that_never_ends_is_a_refusal_and_leaves_nothing(
         signal.pause()
         raise AssertionError
 
-    reading = Reading(load)
+    reading = ConfigReload(load)
     now_s[0] += 59.9
     assert reading.result() is None
     now_s[0] += 0.1
@@ -177,7 +177,7 @@ def test_its_reader_never_has_the_priority_of_the_loop() -> None:
     except PermissionError:
         pytest.skip("no right to real-time priority")
     try:
-        reading = Reading(load)
+        reading = ConfigReload(load)
     finally:
         os.sched_setscheduler(0, before, parameters)
     assert answer(reading) == f"RuntimeError: policy {os.SCHED_OTHER}"
@@ -204,7 +204,7 @@ def test_given_up_it_ends_at_once() -> None:
         raise AssertionError
 
     before = descriptors(), children()
-    Reading(load).end()
+    ConfigReload(load).end()
     assert (descriptors(), children()) == before
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.daemon.exchange import exchange
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.shaping.states import State
 from tests.rigs.emergency import PRESSED, READY, Machine
@@ -69,7 +69,7 @@ def test_a_frame_that_waited_is_not_passed_on(tmp_path: Path) -> None:
     standstill.last_ns = gateway.now_ns
     gateway.now_ns += 10 * TICK_NS
     ports = {"joysticks": port, "machine": machine}
-    exchange(gateway.controller, ports, gateway.now_ns, 10, standstill)
+    io_cycle(gateway.controller, ports, gateway.now_ns, 10, standstill)
     (own,) = (f for f in machine.sent if f.can_id == 0x110)
     after = gateway.decoded(own)
     assert (after["Slew"], after["Enable"]) == (0, 0)

@@ -26,7 +26,7 @@ MOST_S = 60.0  # by the clock: it runs behind the loop and all else
 MOST_BYTES = 140 << 20  # more than the daemon has, which it shares with it
 
 
-class Reading:
+class ConfigReload:
     """A deployment that is being read.
 
     Args:
