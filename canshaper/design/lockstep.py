@@ -3,10 +3,13 @@
 The controller is the daemon's own, and everything passes through the same frames.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 
+from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
+from canshaper.daemon.io_cycle import FrameProcessor, io_cycle
+from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
@@ -20,6 +23,96 @@ from canshaper_sim.recording import Recording
 
 class DriveError(ValueError):
     """The drive could not be made; the message says why."""
+
+
+class PlantPort:
+    """All buses of a machine at once, between the plant and those who hold its joysticks.
+
+    Args:
+        plant: the crane, which gets what is sent.
+        on_frame: called with every frame and its time in s.
+
+    Attributes:
+        arrived_ns: every frame that waits came just before the tick.
+    """
+
+    def __init__(self, plant: PlantNode, on_frame: Callable[[Frame, float], object]) -> None:
+        self.arrived_ns = 0
+        self._plant = plant
+        self._on_frame = on_frame
+        self._waiting: list[Frame] = []
+        self._time_s = 0.0
+
+    def begin(self, time_ms: int, frames: Sequence[Frame]) -> None:
+        """A tick begins; these come from the joysticks, behind what the plant has sent."""
+        self.arrived_ns, self._time_s = time_ms * 1_000_000, time_ms / 1000.0
+        for frame in frames:
+            self._on_frame(frame, self._time_s)
+        self._waiting += frames
+
+    def end(self, step_s: float) -> None:
+        """It is over: the plant moves until the next one, and sends what it measures."""
+        self._plant.advance(step_s)
+        self._waiting = self._plant.feedback()
+        for frame in self._waiting:
+            self._on_frame(frame, self._time_s + step_s)
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits."""
+        waiting, self._waiting = self._waiting, []
+        return iter(waiting)
+
+    def others(self) -> Iterator[Frame]:
+        """There are none."""
+        return iter(())
+
+    def send(self, frame: Frame) -> bool:
+        """Send to the plant."""
+        self._plant.receive(frame)
+        self._on_frame(frame, self._time_s)
+        return True
+
+
+class LockStep:
+    """A controller and a plant, tick by tick, through the I/O cycle of the daemon.
+
+    Args:
+        deployment: the machine.
+        processor: the controller, or what stands around one.
+        plant: the crane.
+        joysticks: those who hold the joysticks.
+        on_frame: called with every frame and its time in s.
+
+    Attributes:
+        time_ms: when the next tick is.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        processor: FrameProcessor,
+        plant: PlantNode,
+        joysticks: Sequence[JoystickNode],
+        on_frame: Callable[[Frame, float], object] = lambda _frame, _time_s: None,
+    ) -> None:
+        self.time_ms = 0
+        self._tick_ms = deployment.config.tick_ms
+        self._processor = processor
+        self._joysticks = joysticks
+        self._port = PlantPort(plant, on_frame)
+        self._ports = dict.fromkeys(deployment.config.buses, self._port)
+        self._standstill = Standstill(deployment)
+        self._standstill.clock = lambda: 0  # nothing is ever late here
+
+    def step(self) -> None:
+        """One tick, and the time until the next one."""
+        time_ms, tick_ms = self.time_ms, self._tick_ms
+        hands = self._joysticks
+        frames = [frame for hand in hands for frame in hand.frames_of_tick(time_ms, tick_ms)]
+        self._port.begin(time_ms, frames)
+        io_cycle(self._processor, self._ports, time_ms * 1_000_000, 0, self._standstill)
+        self._port.end(tick_ms / 1000.0)
+        self.time_ms = time_ms + tick_ms
 
 
 def drive(
@@ -69,24 +162,11 @@ def drive(
     except ValueError as error:
         raise DriveError(str(error)) from None
     recorder = Recorder(driven, parameters)
-    tick_ms = deployment.config.tick_ms
-    step_s = tick_ms / 1000.0
-    for time_ms in range(0, round(script.duration_s * 1000.0), tick_ms):
-        time_s = time_ms / 1000.0
-        now_ns = time_ms * 1_000_000
-        for frame in (f for hand in hands for f in hand.frames_of_tick(time_ms, tick_ms)):
-            recorder.receive(frame, time_s)
-            if (passed := guarded.receive(frame, now_ns)) is not None:  # by a gateway
-                plant.receive(passed)
-                recorder.receive(passed, time_s)
-        for frame in guarded.tick(now_ns):
-            plant.receive(frame)
-            recorder.receive(frame, time_s)
+    lock_step = LockStep(deployment, guarded, plant, hands, recorder.receive)
+    end_ms = round(script.duration_s * 1000.0)
+    while (time_ms := lock_step.time_ms) < end_ms:
+        lock_step.step()
         controller.events.clear()
-        plant.advance(step_s)
-        for frame in plant.feedback():
-            guarded.receive(frame, now_ns + tick_ms * 1_000_000)
-            recorder.receive(frame, time_s + step_s)
         if progress and time_ms % 1000 == 0:
-            progress(time_s)
+            progress(time_ms / 1000.0)
     return recorder.recording()

@@ -3,6 +3,7 @@
 from collections.abc import Callable
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.design.lockstep import LockStep
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode
@@ -26,20 +27,10 @@ def run_simulated(
     """
     plant = PlantNode(deployment, parameters)
     joysticks = JoystickNode(deployment, Script("held", (), 1e9))
-    tick_ms = deployment.config.tick_ms
-    time_ms = 0
+    lock_step = LockStep(deployment, drive, plant, [joysticks])
     while not drive.ended:
-        now_ns = time_ms * 1_000_000
-        for frame in joysticks.frames_of_tick(time_ms, tick_ms):
-            if (passed := drive.receive(frame, now_ns)) is not None:
-                plant.receive(passed)
-        for frame in drive.tick(now_ns):
-            plant.receive(frame)
-        plant.advance(tick_ms / 1000.0)
-        for frame in plant.feedback():
-            drive.receive(frame, now_ns + tick_ms * 1_000_000)
-        time_ms += tick_ms
-        if drive.waiting_for and time_ms > 1000 * LONGEST_WAIT_S:
+        lock_step.step()
+        if drive.waiting_for and lock_step.time_ms > 1000 * LONGEST_WAIT_S:
             drive.ended = f"stopped: waits for {drive.waiting_for}"
-        if time_ms % 1000 == 0:
+        if lock_step.time_ms % 1000 == 0:
             tell(drive)
