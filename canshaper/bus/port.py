@@ -20,7 +20,7 @@ from canshaper.bus.raw import MOST_FRAMES, RawPort
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
 MOST_ECHOES = 256
@@ -71,7 +71,7 @@ class Port(Protocol):
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus, its messages."""
 
     def fileno(self) -> int:
@@ -82,7 +82,7 @@ class Port(Protocol):
 
 
 def open_port(
-    name: str, config: Bus, on_fault: Callable[[FrameFault], None], ids: Ids | None = None
+    name: str, config: Bus, on_fault: Callable[[FrameFault], None], ids: BusRoutes | None = None
 ) -> Port:
     """Open a bus.
 
@@ -123,7 +123,7 @@ class ListeningPort:
     The last thing before the bus: whatever is asked of it, no valve hears of it.
     """
 
-    def __init__(self, port: Port, ids: Ids) -> None:
+    def __init__(self, port: Port, ids: BusRoutes) -> None:
         self._port = port
         self._sent = ids.sent | ids.claims
         self.name = port.name
@@ -150,7 +150,7 @@ class ListeningPort:
         """Send a status; of anything else only say so."""
         return frame[1:3] not in self._sent or self._port.send(frame)
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment."""
         self.name, self._sent = name, ids.sent | ids.claims
         self._port.watch(name, ids)
@@ -228,7 +228,7 @@ class PythonCanPort:
             self._echoes.append(frame)
         return True
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus."""
         self.name = name
 

@@ -17,7 +17,7 @@ from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
 from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.socketcan import dropped_frames, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 
 CAN_FRAME = struct.Struct("=IB3x8s")  # linux/can.h, struct can_frame
 SIZE = CAN_FRAME.size
@@ -79,8 +79,8 @@ class RawPort:
     def __init__(
         self,
         name: str,
-        open_sockets: Callable[[Ids | None], list[socket.socket]],
-        ids: Ids | None,
+        open_sockets: Callable[[BusRoutes | None], list[socket.socket]],
+        ids: BusRoutes | None,
         on_fault: Callable[[FrameFault], None],
         *,
         confirms: bool,
@@ -323,7 +323,7 @@ class RawPort:
             self.state = UP
         return True
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus, its messages."""
         self.name, self._ids = name, ids
         self._valves, self._claims = _words(ids.valves), _words(ids.claims)

@@ -12,7 +12,7 @@ from canshaper.bus.device import WrongDeviceError, check_device
 from canshaper.codec.canopen import SERVICES
 from canshaper.codec.j1939 import group_mask
 from canshaper.config.bus import Bus
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 
 # linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.
 CAN_RAW_ERR_FILTER = 2
@@ -29,7 +29,7 @@ _FILTER = struct.Struct("=II")
 _MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
 
 
-def open_sockets(bus: Bus, ids: Ids | None) -> list[socket.socket]:
+def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     """Open the sockets of one interface, and look at its device where the deployment names one.
 
     With ``ids`` there are three: for the messages that are taken; for those that we send, which
@@ -66,16 +66,16 @@ def open_sockets(bus: Bus, ids: Ids | None) -> list[socket.socket]:
     return opened
 
 
-def set_filters(sockets: list[socket.socket], ids: Ids) -> None:
+def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
     """Let the three sockets hear these messages."""
     # What the DBC files know besides is left to the reader where it is too much.
-    ours = ids.taken | ids.sent
+    ours = ids.received | ids.sent
     all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]
     whole_kinds = ids.j1939 + len(SERVICES) * ids.canopen
     others = all_known if len(all_known) + whole_kinds <= MOST_FILTERS else ours
-    groups: tuple[Iterable[int], ...] = ids.taken_groups, ids.sent_groups, ()
+    groups: tuple[Iterable[int], ...] = ids.received_groups, ids.sent_groups, ()
     for one, messages, some, flag in zip(
-        sockets, (ids.taken, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
+        sockets, (ids.received, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
     ):
         words = [_word_and_mask(message) for message in messages]
         words += [(group | EFF, group_mask(group) | EFF) for group in some]

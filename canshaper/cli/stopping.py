@@ -15,7 +15,8 @@ from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.joystick import JoystickInput
-from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.deployment import Deployment
 from canshaper.machine.stopping import FullSpeed, full_speed, stop_fault
 from canshaper.shaping.stopping import Travel, allowed_s, travel
 

@@ -18,7 +18,8 @@ if TYPE_CHECKING:
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task
     from canshaper.design.tuning.optimal import Tuning
-    from canshaper.machine.deployment import BoundAxis, Deployment
+    from canshaper.machine.bound_axis import BoundAxis
+    from canshaper.machine.deployment import Deployment
 
 
 def tune(

@@ -72,30 +72,26 @@ class Controller:
             for runner in self.axes.values()
             if runner.bound.feedback and runner.feedback
         ]
-        self.inputs: dict[MessageKey, MessageInput] = {
-            key: one for bound, one in taken if not bound.any_source for key in bound.keys
-        }
-        self._sent = {
-            (bus, *key) for bus in deployment.config.buses for key in deployment.ids(bus).sent
-        }
         for runner in self.axes.values():
             if (radial := runner.bound.radial) is not None:
                 radius = RadiusInput(radial)
                 if (measured := radial.radius) is not None:
                     taken.append((measured, radius))
-                    self.inputs |= dict.fromkeys(measured.keys, radius)
                 target = self.axes[radial.config.axis]
                 runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
-        # Messages of the DBC files that are neither taken nor sent: other traffic, and no fault.
-        used = {key[1:] for key in (*self.inputs, *self._sent)}
-        used |= {key[1:] for i in deployment.inputs() if not i.any_source for key in i.keys}
-        self._others = deployment.messages.ids() - used
+        routing = deployment.routing
+        handlers = {id(bound): one for bound, one in taken}
+        self.inputs: dict[MessageKey, MessageInput] = {
+            key: handlers[id(route.input)]
+            for key, route in routing.routes.items()
+            if id(route.input) in handlers
+        }
+        self._sent, self._others = routing.sent, routing.others
+        self._by_message: dict[MessageKey, list[AxisRunner]] = {
+            key: [self.axes[name] for name in names] for key, names in routing.valves.items()
+        }
         # An axis that asks something of another one goes first.
         order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
-        self._by_message: dict[MessageKey, list[AxisRunner]] = {}
-        for _, runner in order:
-            key = runner.bound.valve.message.sender.key
-            self._by_message.setdefault(key, []).append(runner)
         self._protocols = protocols(deployment, self.axes, joysticks, taken)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
         for protocol in self._protocols:

@@ -11,7 +11,7 @@ from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.value import ValueInput
-from canshaper.machine.deployment import BoundAxis
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper

@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
 from canshaper.inputs.value import ValueInput
-from canshaper.machine.deployment import BoundAxis
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.filters import parameter_sets
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper

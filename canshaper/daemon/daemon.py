@@ -278,7 +278,7 @@ class Daemon:
         new = new_ports(ports, opened)
         waited = received_at_first(new, deployment) if new else []
         for name, port in ports.items():
-            port.watch(name, deployment.ids(name))
+            port.watch(name, deployment.routing.buses[name])
         self._ports = ports
         if self._line:
             self._line.close()

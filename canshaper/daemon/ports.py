@@ -28,7 +28,7 @@ def open_ports(
     ports: dict[str, Port] = {}
     try:
         for name, bus in deployment.config.buses.items():
-            ids = deployment.ids(name)
+            ids = deployment.routing.buses[name]
             port = opened.get(bus) or open_port(name, bus, on_fault, ids)
             listens = deployment.listen_only and bus not in opened
             ports[name] = ListeningPort(port, ids) if listens else port
@@ -57,7 +57,7 @@ def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame
     They cannot know it for ours, and it would look like a second sender of every valve's id.
     """
     time.sleep(ON_THE_BUS_S)
-    ours = {port.name: deployment.ids(port.name) for port in new}
+    ours = deployment.routing.buses
     return [
         frame
         for port in new

@@ -14,7 +14,8 @@ from canshaper.guard.inputs import (
     largest,
 )
 from canshaper.guard.opening import openings
-from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.deployment import Deployment
 
 # Part of full speed; less than any step, more than the rounding of floats.
 EPSILON = 1e-6

@@ -5,7 +5,7 @@ from typing import Self
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.signals import find_signal
 from canshaper.inputs.value import ValueInput
-from canshaper.machine.deployment import BoundRadial
+from canshaper.machine.bound_axis import BoundRadial
 from canshaper.machine.inputs import BoundRadius
 
 

@@ -3,7 +3,7 @@
 from canshaper.codec.codecs import AxisStatusCodec
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
-from canshaper.machine.deployment import BoundAxis, BoundRadial
+from canshaper.machine.bound_axis import BoundAxis, BoundRadial
 from canshaper.machine.filters import check_filters
 from canshaper.machine.inputs import bind_feedback, bind_radius, bind_status_word
 from canshaper.machine.lookup import Lookup

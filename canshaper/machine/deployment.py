@@ -1,77 +1,21 @@
 """A deployment, checked: what its files say, with the codecs of its messages."""
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from pathlib import Path
 
 from cantools.database.can import Message
 
-from canshaper.codec.canopen import EMERGENCY, HEARTBEAT, NMT
 from canshaper.codec.codecs import AxisStatusCodec, IdentityCodec, Sender, ServiceStatusCodec
-from canshaper.codec.j1939 import (
-    CLAIMED,
-    NULL,
-    REQUEST,
-    claims_of,
-    group_of,
-    identifier,
-    sent_by,
-)
 from canshaper.codec.layout import is_j1939
-from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.codec.valve import ValveCodec
-from canshaper.config.schema import (
-    AxisConfig,
-    DeploymentConfig,
-    RadialConfig,
-)
+from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Source
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.bus_load import BusLoad, bus_load
 from canshaper.machine.database import Messages
 from canshaper.machine.identity import Identity
-from canshaper.machine.ids import Ids
-from canshaper.machine.inputs import (
-    BoundFeedback,
-    BoundInput,
-    BoundJoystick,
-    BoundRadius,
-    BoundStatusWord,
-    BoundStop,
-    BoundSwitch,
-)
-
-
-@dataclass(frozen=True)
-class BoundRadial:
-    """Radial compensation with the message of its radius, where that is measured."""
-
-    config: RadialConfig
-    radius: BoundRadius | None
-
-    @property
-    def key(self) -> tuple[str, int, bool] | None:
-        """Where the frames of the radius are found."""
-        return self.radius.key if self.radius else None
-
-
-@dataclass(frozen=True)
-class BoundAxis:
-    """An axis with its valve message and, where it has one, its status message."""
-
-    name: str
-    config: AxisConfig
-    valve_message: Message
-    valve: ValveCodec
-    period_ticks: int
-    status: AxisStatusCodec | None
-    status_ticks: int
-    radial: BoundRadial | None = None
-    feedback: BoundFeedback | None = None
-    status_word: BoundStatusWord | None = None
-
-    @property
-    def rewrites(self) -> bool:
-        """Whether its command leaves in the frames of its own joystick, through a gateway."""
-        return isinstance(self.valve.message, RewrittenMessage)
+from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop, BoundSwitch
+from canshaper.machine.routing import Routing, build_routing
 
 
 @dataclass(frozen=True)
@@ -101,53 +45,20 @@ class Deployment:
         bitrate = self.config.buses[bus].bitrate
         return bus_load(self.on_bus.get(bus, []), bitrate) if bitrate else None
 
-    def ids(self, bus: str) -> Ids:
-        """Messages that matter on a bus."""
+    @cached_property
+    def routing(self) -> Routing:
+        """What each frame on the buses is, looked up by everybody who receives or sends."""
         radii = [a.radial.radius for a in self.axes.values() if a.radial and a.radial.radius]
-        inputs = [i for i in (*self.inputs(), *radii) if i.key[0] == bus]
-        taken = [key for i in inputs if not i.by_group for key in i.keys]
-        valves = [a.valve.message.sender.key for a in self.axes.values()]
-        if self.listen_only:  # they are those of another
-            valves = []
-        sent = valves + [s.sender.key for s in self._statuses()]
-        canopen = self.config.buses[bus].canopen
-        if canopen:
-            nodes = [n.id for n in canopen.nodes.values()]
-            taken += [(bus, base + n, False) for n in nodes for base in (HEARTBEAT, EMERGENCY)]
-            if not self.listen_only:
-                sent.append((bus, HEARTBEAT + canopen.node, False))
-                sent += [(bus, NMT, False)] if canopen.master else []
-        own = self.config.buses[bus].j1939
-        claims: list[int] = []
-        if own:
-            claims = claims_of(own.address)
-            if self.listen_only:
-                claims.append(identifier(REQUEST, NULL))
-            else:
-                sent += [(bus, can_id, True) for can_id in sent_by(own.address)]
-        groups = {group_of(i.key[1]) for i in inputs if i.by_group}
-        return Ids(
-            frozenset(key[1:] for key in taken if key[0] == bus),
-            frozenset(key[1:] for key in sent if key[0] == bus),
-            frozenset(key[1:] for key in valves if key[0] == bus),
-            frozenset(self.messages.ids()),
-            frozenset(groups | ({CLAIMED << 8, REQUEST << 8} if own else set())),
-            frozenset(self.sent_groups(bus)),
-            frozenset((can_id, True) for can_id in claims),
-            self.is_j1939(bus),
-            canopen is not None,
-            self.in_line(bus),
+        used = {bus for bus, messages in self.on_bus.items() if any(map(is_j1939, messages))}
+        return build_routing(
+            self.config,
+            inputs=[*self.inputs(), *radii],
+            axes=self.axes.values(),
+            statuses=[status.sender.key for status in self._statuses()],
+            known=self.messages.ids(),
+            j1939=used,
+            listen_only=self.listen_only,
         )
-
-    def in_line(self, bus: str) -> bool:
-        """Whether a bus is one of the gateway: what nobody knows there is what it passes on."""
-        gateway = self.config.gateway
-        return gateway is not None and bus in gateway.between
-
-    def is_j1939(self, bus: str) -> bool:
-        """Whether a bus is one of J1939: we have an address there, or know a message of it."""
-        has_node = self.config.buses[bus].j1939 is not None
-        return has_node or any(is_j1939(message) for message in self.on_bus.get(bus, ()))
 
     def inputs(self) -> list[BoundInput]:
         """Joysticks, switches, feedback and status words of the valves."""
@@ -161,18 +72,6 @@ class Deployment:
         valves = [axis.valve.message.sender for axis in self.axes.values()]
         statuses = [status.sender for status in self._statuses()]
         return list({sender.key: sender for sender in (*valves, *statuses)}.values())
-
-    def sent_groups(self, bus: str) -> set[int]:
-        """Groups of J1939 that command a valve of ours, from whatever address they come.
-
-        Not those of joysticks whose frames we pass on: others send the same group.
-        """
-        return {
-            group_of(axis.valve.message.sender.key[1])
-            for axis in self.axes.values()
-            if axis.config.valve.bus == bus and is_j1939(axis.valve_message)
-            if not axis.rewrites and not self.listen_only
-        }
 
     def listening(self) -> "Deployment":
         """The same machine for one who only listens, and tells what it would do.

@@ -7,7 +7,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import MessageInput
-from canshaper.machine.deployment import BoundAxis
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.states import Reason
 

@@ -26,10 +26,9 @@ def protocols(
         joysticks: its joysticks.
         inputs: its inputs with their messages.
     """
-    buses = deployment.config.buses
     spoken: list[BusProtocol] = []
     canopen = CanopenNetwork(deployment, axes)  # its interlocks are asked first
-    if any(deployment.is_j1939(bus) for bus in buses):
+    if any(routes.j1939 for routes in deployment.routing.buses.values()):
         spoken.append(J1939Network(deployment, axes, [*inputs, *canopen.bound]))
     if canopen.inputs or canopen.nodes:
         spoken.append(canopen)

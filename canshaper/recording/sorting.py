@@ -60,7 +60,7 @@ class Sorter:
     """Tells what frames are to a deployment; each kind of frame is looked at once."""
 
     def __init__(self, deployment: Deployment) -> None:
-        self._ids = {bus: deployment.ids(bus) for bus in deployment.config.buses}
+        self._buses = deployment.routing.buses
         # Other interfaces hand out all there is before the valves are told.
         self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
         # It carries the digest of the program that ran, which need not be this one.
@@ -76,11 +76,11 @@ class Sorter:
 
     def _judge(self, key: Key) -> Kind:
         bus, message = key[0], key[1:]
-        ids = self._ids[bus]
+        ids = self._buses[bus]
         if message in ids.sent or message in ids.claims:
             return Kind.SENT
         group = group_of(message[0]) if message[1] else -1
-        if message in ids.taken or group in ids.taken_groups:
+        if message in ids.received or group in ids.received_groups:
             return Kind.TAKEN
         if group not in ids.sent_groups and (message in ids.known or (message[1] and ids.j1939)):
             return Kind.IGNORED

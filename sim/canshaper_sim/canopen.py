@@ -6,7 +6,8 @@ from typing import Any
 from canshaper.codec.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
-from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.deployment import Deployment
 
 # Heartbeats are sent three times as often as they are asked for.
 HEARTBEATS_IN_TIME = 3

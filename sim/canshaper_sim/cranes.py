@@ -6,7 +6,8 @@ The crane of an axis is the first part of its name, where what follows is the na
 
 from dataclasses import replace
 
-from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import ALL_AXES, ROTATOR
 
 

@@ -14,7 +14,7 @@ from can.interfaces.socketcan.socketcan import build_can_frame
 from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.raw import SIZE, RawPort
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 
 TICK_NS = 20_000_000
 MARK_AT = 5  # a byte of the structure that is padding
@@ -23,7 +23,7 @@ VALVE = Frame("crane", 0x200, False, b"\x05\x01")
 OTHER = Frame("crane", 0x201, False, b"\x00\x01")
 STATUS = Frame("crane", 0x300, False, bytes(8))
 SENT = frozenset((f.can_id, f.extended) for f in (VALVE, OTHER, STATUS))
-IDS = Ids(frozenset(), SENT, SENT - {(STATUS.can_id, STATUS.extended)}, frozenset())
+IDS = BusRoutes(frozenset(), SENT, SENT - {(STATUS.can_id, STATUS.extended)}, frozenset())
 # The sockets of a port that is told its ids, by what they hear.
 TAKEN, SENT_BACK, UNKNOWN = range(3)
 
@@ -61,9 +61,9 @@ class Line:
         matched: the deployment names the device of the bus.
     """
 
-    def __init__(self, ids: Ids | None = IDS, *, matched: bool = False) -> None:
+    def __init__(self, ids: BusRoutes | None = IDS, *, matched: bool = False) -> None:
         self.faults: list[FrameFault] = []
-        self.asked: list[Ids | None] = []
+        self.asked: list[BusRoutes | None] = []
         self.refuse: OSError | WrongDeviceError | None = None
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
@@ -77,7 +77,7 @@ class Line:
             matched=matched,
         )
 
-    def _open(self, ids: Ids | None) -> list[socket.socket]:
+    def _open(self, ids: BusRoutes | None) -> list[socket.socket]:
         self.asked.append(ids)
         if self.refuse:
             raise self.refuse

@@ -24,7 +24,7 @@ from canshaper.bus.device import (
 from canshaper.bus.port import BusError, WrongBusError, open_port
 from canshaper.bus.socketcan import open_sockets
 from canshaper.config.bus import Bus, Match
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 from tests.bus.fake_devices import HUB, PCI, SPI, USB, FakeDevices
 from tests.bus.raw_line import IDS
 
@@ -344,7 +344,7 @@ class Opened(Bound):
 
 @pytest.mark.parametrize("ids", [None, IDS])
 def test_sockets_of_another_device_are_closed_at_once(
-    here: FakeDevices, monkeypatch: pytest.MonkeyPatch, ids: Ids | None
+    here: FakeDevices, monkeypatch: pytest.MonkeyPatch, ids: BusRoutes | None
 ) -> None:
     made: list[Opened] = []
     monkeypatch.setattr(Opened, "made", made, raising=False)

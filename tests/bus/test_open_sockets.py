@@ -15,11 +15,11 @@ from canshaper.bus.port import BusError, ListeningPort, WrongBusError, open_port
 from canshaper.bus.socketcan import open_sockets, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 
 BUS = Bus(interface="socketcan", channel="can0", bitrate=250000)
-IDS = Ids(
-    taken=frozenset({(0x110, False)}),
+IDS = BusRoutes(
+    received=frozenset({(0x110, False)}),
     sent=frozenset({(0x200, False), (0x300, False)}),
     valves=frozenset({(0x200, False)}),
     known=frozenset({(0x110, False), (0x200, False), (0x300, False), (0x400, False)}),
@@ -107,7 +107,7 @@ MASK = 0x7FF | 0x80000000
 NOT = 0x20000000
 
 
-def filtered(ids: Ids) -> list[set[tuple[int, int]]]:
+def filtered(ids: BusRoutes) -> list[set[tuple[int, int]]]:
     made = [Made(), Made(), Made()]
     set_filters(made, ids)  # type: ignore[arg-type]
     return [filters(one) for one in made]
@@ -122,12 +122,12 @@ def test_filters_name_ids_in_their_own_width() -> None:
 
 
 def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() -> None:
-    ids = Ids(
-        taken=frozenset({(0x0CFDD633, True)}),
+    ids = BusRoutes(
+        received=frozenset({(0x0CFDD633, True)}),
         sent=frozenset(),
         valves=frozenset(),
         known=frozenset({(0x0CFDD633, True), (0x110, False)}),
-        taken_groups=frozenset({0xEE00 << 8}),
+        received_groups=frozenset({0xEE00 << 8}),
         sent_groups=frozenset({0xFE30 << 8}),
         j1939=True,
     )
@@ -140,18 +140,20 @@ def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() ->
 
 
 def test_services_of_canopen_are_not_unknown() -> None:
-    unknown = filtered(Ids(frozenset(), frozenset(), frozenset(), frozenset(), canopen=True))[2]
+    unknown = filtered(BusRoutes(frozenset(), frozenset(), frozenset(), frozenset(), canopen=True))[
+        2
+    ]
     assert unknown == {(base | NOT, mask | 0x80000000) for base, mask, _ in socketcan.SERVICES}
 
 
 def test_in_the_line_nothing_is_unknown() -> None:
-    ids = Ids(IDS.taken, IDS.sent, IDS.valves, IDS.known, in_line=True)
+    ids = BusRoutes(IDS.received, IDS.sent, IDS.valves, IDS.known, in_line=True)
     assert filtered(ids)[2] == set()
 
 
-def many(count: int) -> Ids:
+def many(count: int) -> BusRoutes:
     known = frozenset((i, False) for i in range(count))
-    return Ids(frozenset({(0, False)}), frozenset({(1, False)}), frozenset(), known)
+    return BusRoutes(frozenset({(0, False)}), frozenset({(1, False)}), frozenset(), known)
 
 
 def test_more_filters_than_the_kernel_takes_are_left_to_the_reader() -> None:
@@ -221,7 +223,7 @@ class Below:
 
     def __init__(self) -> None:
         self.sent: list[Frame] = []
-        self.watched: list[tuple[str, Ids]] = []
+        self.watched: list[tuple[str, BusRoutes]] = []
         self.closed = False
 
     def frames(self) -> Iterator[Frame]:
@@ -234,7 +236,7 @@ class Below:
         self.sent.append(frame)
         return frame.data != b"full"
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         self.watched.append((name, ids))
 
     def fileno(self) -> int:
@@ -244,7 +246,7 @@ class Below:
         self.closed = True
 
 
-LISTENS = Ids(frozenset(), frozenset({(0x300, False)}), frozenset(), frozenset())
+LISTENS = BusRoutes(frozenset(), frozenset({(0x300, False)}), frozenset(), frozenset())
 
 
 def test_a_port_that_listens_is_the_port_below_it() -> None:
@@ -264,7 +266,7 @@ def test_a_port_that_listens_is_the_port_below_it() -> None:
 
 def test_a_port_that_listens_sends_only_what_it_may() -> None:
     below = Below()
-    claims = Ids(
+    claims = BusRoutes(
         frozenset(), frozenset(), frozenset(), frozenset(), claims=frozenset({(0x18EEFF9C, True)})
     )
     port = ListeningPort(below, LISTENS)

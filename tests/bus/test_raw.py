@@ -16,7 +16,7 @@ from canshaper.bus import raw
 from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
 from canshaper.bus.socketcan import CAN_INV_FILTER, MOST_FILTERS, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
 
 
@@ -47,7 +47,7 @@ EITHER = pytest.mark.parametrize("ids", [IDS, None])
 
 @EITHER
 def test_frames_come_in_order_and_a_call_ends_when_there_is_none(
-    make_line: Callable[..., Line], ids: Ids | None
+    make_line: Callable[..., Line], ids: BusRoutes | None
 ) -> None:
     line = make_line(ids)
     assert line.heard() == []
@@ -66,7 +66,7 @@ def test_frames_come_in_order_and_a_call_ends_when_there_is_none(
     [(0, False), (0x7FF, False), (0, True), (0x110, True), (2**29 - 1, True)],
 )
 def test_ids_of_both_widths_both_ways(
-    make_line: Callable[..., Line], ids: Ids | None, can_id: int, extended: bool
+    make_line: Callable[..., Line], ids: BusRoutes | None, can_id: int, extended: bool
 ) -> None:
     line = make_line(ids)
     line.put(message(can_id, b"\1\2\3", extended=extended))
@@ -100,7 +100,7 @@ def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: 
 @EITHER
 @pytest.mark.parametrize("kind", [0x20, 0x110, 0x200, 0x300])  # linux/can/error.h
 def test_an_error_frame_is_none_whatever_its_class_looks_like(
-    make_line: Callable[..., Line], ids: Ids | None, kind: int
+    make_line: Callable[..., Line], ids: BusRoutes | None, kind: int
 ) -> None:
     """The classes of errors stand where the id stands: 0x110 would be a joystick."""
     line = make_line(ids)
@@ -268,7 +268,7 @@ def test_each_message_is_heard_by_the_socket_that_is_for_it(
     """And by no other one, whatever ids of the two widths are alike."""
     sent -= taken  # checked with the deployment
     with Filtered() as first, Filtered() as second, Filtered() as third:
-        set_filters([first, second, third], Ids(taken, sent, sent, known))
+        set_filters([first, second, third], BusRoutes(taken, sent, sent, known))
         everything = taken | sent | known | others
         for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
             word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
@@ -290,7 +290,7 @@ def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
     for size, heard in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
         known = frozenset((0x1000 + i, True) for i in range(size))
         with Filtered() as first, Filtered() as second, Filtered() as third:
-            ids = Ids(taken, frozenset(), frozenset(), known)
+            ids = BusRoutes(taken, frozenset(), frozenset(), known)
             set_filters([first, second, third], ids)
             assert len(third.filters) <= MOST_FILTERS
             assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
@@ -299,8 +299,8 @@ def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
 
 
 CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
-NODE = Ids(
-    taken=frozenset(),
+NODE = BusRoutes(
+    received=frozenset(),
     sent=IDS.sent,
     valves=IDS.valves,
     known=frozenset(),

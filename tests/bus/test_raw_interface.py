@@ -11,7 +11,7 @@ from canshaper.bus import raw
 from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
 from canshaper.codec.frame import BusState, FrameFault
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import (
     IDS,
     SENT_BACK,
@@ -130,7 +130,7 @@ def test_a_socket_that_was_closed_under_the_port_is_replaced(line: Line, number:
 
 
 def test_a_bus_that_cannot_be_opened_is_no_port() -> None:
-    def refuse(_ids: Ids | None) -> list[socket.socket]:
+    def refuse(_ids: BusRoutes | None) -> list[socket.socket]:
         raise OSError(errno.ENODEV, "no such device")
 
     with pytest.raises(OSError, match="no such device"):
@@ -251,7 +251,7 @@ def test_a_try_that_fails_for_another_reason_waits_for_the_next(matched: Line) -
 
 
 def test_a_wrong_device_at_the_start_is_no_port() -> None:
-    def refuse(_ids: Ids | None) -> list[socket.socket]:
+    def refuse(_ids: BusRoutes | None) -> list[socket.socket]:
         raise WRONG
 
     with pytest.raises(WrongDeviceError, match="expected serial number 1"):

@@ -27,7 +27,7 @@ from canshaper.codec.j1939 import (
 from canshaper.config.source import DeploymentError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, VALVE, Line, message
 
 ROOT = Path(__file__).parents[2]
@@ -104,11 +104,11 @@ def test_identifiers_of_the_standards() -> None:
 
 def test_what_is_sent_goes_out_under_our_address(machine: Machine) -> None:
     deployment = machine.load()
-    ids = deployment.ids("crane")
+    ids = deployment.routing.buses["crane"]
     assert {i & 0xFF for i, _ in ids.sent} == {OWN}
     assert {pgn_of(i) for i, _ in ids.valves} == {0xFE30, 0xFE31, 0xFE32}
     assert ids.j1939
-    assert {group >> 8 for group in ids.taken_groups} >= {0xFDD6, 0xFDD8, 0xEE00, 0xEA00}
+    assert {group >> 8 for group in ids.received_groups} >= {0xFDD6, 0xFDD8, 0xEE00, 0xEA00}
 
 
 def test_a_valve_on_a_bus_without_our_address(machine: Machine) -> None:
@@ -198,7 +198,7 @@ def test_a_message_to_one_node_needs_its_sender(machine: Machine) -> None:
     (problem,) = machine.problems()
     assert "joysticks.left.source: missing: BJM1 is sent from one node to another" in problem
     machine.in_yaml("    message: BJM1\n", "    message: BJM1\n    source: 0x33\n")
-    assert (0x18EF9C33, True) in machine.load().ids("crane").taken
+    assert (0x18EF9C33, True) in machine.load().routing.buses["crane"].received
 
 
 def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
@@ -215,12 +215,12 @@ def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
 
 
 CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
-CLAIMING = Ids(
-    IDS.taken,
+CLAIMING = BusRoutes(
+    IDS.received,
     IDS.sent,
     IDS.valves,
     IDS.known,
-    taken_groups=frozenset((CLAIMED << 8,)),
+    received_groups=frozenset((CLAIMED << 8,)),
     claims=frozenset((i, True) for i in claims_of(OWN)),
     j1939=True,
 )
@@ -290,7 +290,7 @@ def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:
     known = frozenset((i, False) for i in range(505)) | frozenset((i, True) for i in range(600))
     sockets: Any = [Options() for _ in range(3)]
     groups = frozenset(0xFE0000 + (i << 8) for i in range(20))
-    ids = Ids(frozenset(), frozenset(), frozenset(), known, groups, groups, j1939=True)
+    ids = BusRoutes(frozenset(), frozenset(), frozenset(), known, groups, groups, j1939=True)
     set_filters(sockets, ids)
     for one in sockets:
         assert len(one.filters) // 8 <= MOST_FILTERS

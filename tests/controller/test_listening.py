@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 def sent(name: str) -> set[int]:
     deployment = load_deployment(ROOT / "config" / name).listening()
-    ids = [deployment.ids(bus) for bus in deployment.config.buses]
+    ids = [deployment.routing.buses[bus] for bus in deployment.config.buses]
     return {can_id for one in ids for can_id, _ in one.sent | one.claims}
 
 
@@ -45,13 +45,15 @@ def test_j1939_keeps_its_address_for_the_status_and_for_nothing_else(tmp_path: P
     assert told
     assert j1939.CLAIM in sent("j1939-forwarder.yaml")
     assert not sent("j1939-forwarder.yaml") & valves
-    assert listening.sent_groups("crane") == set()
+    assert listening.routing.buses["crane"].sent_groups == set()
     lines = machine.read_text().replace("../dbc", str(ROOT / "dbc")).splitlines()
     silent = tmp_path / "silent.yaml"
     status = ("status:", "identity:")
     silent.write_text("\n".join(line for line in lines if not line.strip().startswith(status)))
     without = load_deployment(silent).listening()
-    assert without.ids("crane").sent | without.ids("crane").claims == frozenset()
+    assert (
+        without.routing.buses["crane"].sent | without.routing.buses["crane"].claims == frozenset()
+    )
     assert without.config.buses["crane"].j1939 is None
 
 
@@ -107,7 +109,7 @@ def test_the_address_is_asked_for_before_it_is_claimed() -> None:
     assert sent_ids(rig, 1) == [j1939.CLAIM]
     assert sent_ids(rig, 12) == []
     found = set(sent_ids(rig, 100, X=100.0))
-    assert found & {i for i, _ in rig.deployment.ids("crane").sent}  # status
+    assert found & {i for i, _ in rig.deployment.routing.buses["crane"].sent}  # status
     assert j1939.DM1 not in found
 
 

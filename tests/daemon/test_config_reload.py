@@ -66,7 +66,7 @@ def test_it_is_the_deployment_that_reading_here_gives(path: Path) -> None:
     found, here = read(load), load()
     assert isinstance(found, Deployment)
     assert found.config == here.config
-    assert (found.path, found.ids("crane")) == (here.path, here.ids("crane"))
+    assert (found.path, found.routing.buses["crane"]) == (here.path, here.routing.buses["crane"])
     frames = drive(found)
     assert frames == drive(here)
     assert len({frame.data for frame in frames}) > 100  # something moved

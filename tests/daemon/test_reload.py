@@ -20,7 +20,7 @@ from canshaper.daemon import ports as service_ports
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.ids import Ids
+from canshaper.machine.routing import BusRoutes
 from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import ROOT, TICK_NS, Rig
 
@@ -67,7 +67,7 @@ class FakePort:
                 port.waiting.append((self._bench.now_ns + UNDER_WAY_NS, frame))
         return True
 
-    def watch(self, name: str, ids: Ids) -> None:
+    def watch(self, name: str, ids: BusRoutes) -> None:
         self.name = name
 
     def fileno(self) -> int:
@@ -129,7 +129,9 @@ class Bench:
 
         return scripted
 
-    def _open(self, name: str, bus: Bus, _fault: Callable[[FrameFault], None], _ids: Ids) -> Port:
+    def _open(
+        self, name: str, bus: Bus, _fault: Callable[[FrameFault], None], _ids: BusRoutes
+    ) -> Port:
         self.opening(bus.channel)
         self.ports.append(FakePort(name, bus.channel, self))
         return self.ports[-1]

@@ -182,7 +182,7 @@ axes:
     group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
     assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF
     assert group.mask == 0x03FFFFFF | EFF
-    assert deployment.sent_groups("far") == set()
+    assert deployment.routing.buses["far"].sent_groups == set()
     neutral = sent.onto(bytes(8))
     network = cantools.database.load_file((ROOT / "config" / found.config.dbc[0]).resolve())
     values = network.decode_message(message.frame_id, neutral.data, decode_choices=False)

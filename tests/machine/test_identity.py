@@ -83,7 +83,7 @@ def test_every_shipped_deployment_sends_it(name: str) -> None:
     assert status is not None
     frame = status.frame(deployment.identity.digest)
     assert status.digest(frame.data) == deployment.identity.digest
-    assert frame[1:3] in deployment.ids(frame.bus).sent
+    assert frame[1:3] in deployment.routing.buses[frame.bus].sent
     assert status.digest(frame.data[:1]) is None
 
 

@@ -307,7 +307,7 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
     assert bound is not None
     assert bound.key == ("crane", 0x40, False)
     assert bound.protection == Protection("Count", 16, Checksum("crc8_autosar", 2))
-    assert (0x40, False) in deployment.ids("crane").taken
+    assert (0x40, False) in deployment.routing.buses["crane"].received
     Controller(deployment)
 
 

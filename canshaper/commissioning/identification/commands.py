@@ -12,7 +12,8 @@ from canshaper.codec.layout import Layout
 from canshaper.commissioning.identification.driven import STANDS
 from canshaper.commissioning.identification.series import Array, Command
 from canshaper.controller.finder import InputFinder
-from canshaper.machine.deployment import BoundAxis, Deployment
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 
 # Silence of a command's message after which nothing is known of the command, s.

@@ -5,7 +5,8 @@ from dataclasses import dataclass, replace
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.schema import RadialConfig
 from canshaper.design.tuning.robust import RobustShaper, least_residual
-from canshaper.machine.deployment import BoundRadial, Deployment
+from canshaper.machine.bound_axis import BoundRadial
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 

@@ -26,10 +26,10 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
         if joystick.key[0] in gateway.between
     }
     for bus in gateway.between:
-        j1939 = deployment.is_j1939(bus)
+        routes = deployment.routing.buses[bus]
         found |= {
-            _whatever_priority(can_id) if j1939 and extended else exactly(can_id, extended)
-            for can_id, extended in deployment.ids(bus).sent
+            _whatever_priority(can_id) if routes.j1939 and extended else exactly(can_id, extended)
+            for can_id, extended in routes.sent
         }
     for name in gateway.blocked:
         message = deployment.messages.find(name)

@@ -20,7 +20,7 @@ from canshaper.protocols.j1939.groups import (
     SourceEvent,
     TakenGroup,
 )
-from canshaper.protocols.j1939.node import GROUPS, Node
+from canshaper.protocols.j1939.node import Node
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,22 +65,20 @@ class J1939Network(BusProtocol):
             for name, config in self._configs.items()
         }
         self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
-        self._buses = {bus for bus in buses if deployment.is_j1939(bus)}
+        routing = deployment.routing
+        self._buses = {bus for bus, routes in routing.buses.items() if routes.j1939}
         self._groups: dict[tuple[str, int], FrameHandler] = {}
         self._any: dict[tuple[str, int], tuple[AnySource, Part]] = {}
         for bus, node in self.nodes.items():
-            self._groups |= {(bus, group): node for group in GROUPS}
-            there = [
-                r for r in axes.values() if r.bound.config.valve.bus == bus and not r.bound.rewrites
-            ]
-            for runner in there:
-                if not deployment.listen_only:  # it reckons, whoever has the address
+            for runner in () if deployment.listen_only else axes.values():
+                if runner.bound.config.valve.bus == bus and not runner.bound.rewrites:
                     runner.add_interlock(node.gate)
-            for group in deployment.sent_groups(bus):
-                runners = [
-                    r for r in there if group_of(r.bound.valve.message.sender.key[1]) == group
-                ]
-                self._groups[bus, group] = CommandedByOthers(runners)
+        for (bus, group), route in routing.groups.items():
+            if route.axes:
+                commanded = [axes[name] for name in route.axes]
+                self._groups[bus, group] = CommandedByOthers(commanded)
+            elif route.claims:
+                self._groups[bus, group] = self.nodes[bus]
         for bound, one in taken:
             if bound.by_group:
                 self._take(bound, one)
@@ -182,4 +180,4 @@ class J1939Network(BusProtocol):
 
 def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
     """Groups that we send again and again under our address, by their number."""
-    return (pgn_of(can_id) for can_id, extended in deployment.ids(bus).sent if extended)
+    return (pgn_of(can_id) for can_id, extended in deployment.routing.buses[bus].sent if extended)

@@ -4,14 +4,11 @@ from collections.abc import Iterator, Sequence
 from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.j1939 import CLAIMED, DM1, REQUEST
+from canshaper.codec.j1939 import DM1
 from canshaper.config.bus import J1939
 from canshaper.protocols.j1939.claim import AddressClaim, ClaimState
 from canshaper.protocols.j1939.dm1 import ActiveFaults
 from canshaper.shaping.states import Reason
-
-GROUPS = (CLAIMED << 8, REQUEST << 8)
-"""Groups that a node listens to."""
 
 
 class Node:

@@ -174,7 +174,7 @@ def test_a_joystick_with_a_destination_is_known_whatever_its_priority(
         for _ in range(30):
             rig.tick(Frame("crane", can_id, True, data), bjm("BJM2"))
         assert rig.state() is state
-    taken = rig.deployment.ids("crane").taken
+    taken = rig.deployment.routing.buses["crane"].received
     assert (can_id, True) in taken  # or the kernel would keep it from us
 
 

@@ -1,0 +1,234 @@
+"""What each frame on the buses of a deployment is to us: one table, built once when it is bound.
+
+Sockets are filtered by it, the controller and the tools that only listen look frames up in it.
+"""
+
+from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+from canshaper.codec.canopen import EMERGENCY, HEARTBEAT, NMT
+from canshaper.codec.j1939 import CLAIMED, NULL, REQUEST, claims_of, group_of, identifier, sent_by
+from canshaper.codec.layout import is_j1939
+from canshaper.config.bus import Bus
+from canshaper.config.schema import DeploymentConfig
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.inputs import BoundInput
+
+Key = tuple[str, int, bool]
+"""Bus, id, and whether that is extended."""
+
+
+class Role(Enum):
+    """What a frame with a certain id is."""
+
+    RECEIVED = "received"
+    """An input."""
+    NODE = "node"
+    """Heartbeat or emergency of a node of CANopen."""
+    VALVE = "valve"
+    """Our command to a valve; from others it is that of a foreign sender."""
+    SENT = "sent"
+    """What we send besides; from others the same."""
+    CLAIM = "claim"
+    """What our node of J1939 says about its address: others say it too."""
+
+
+@dataclass(frozen=True, slots=True)
+class Route:
+    """One id on one bus; ``input`` is the input that is received by it."""
+
+    role: Role
+    input: BoundInput | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class GroupRoute:
+    """A group of J1939 on one bus.
+
+    Attributes:
+        inputs: those that are received by it, whatever their priority.
+        axes: names of those whose valves it commands, from whatever address it comes.
+        claims: whether nodes say by it what address they have.
+    """
+
+    inputs: tuple[BoundInput, ...] = ()
+    axes: tuple[str, ...] = ()
+    claims: bool = False
+
+
+@dataclass(frozen=True)
+class BusRoutes:
+    """The same of one bus as sets of (id, extended), for its sockets.
+
+    Attributes:
+        received: what is received by its id.
+        sent: what we send, and nobody else may.
+        valves: those of them that move something.
+        known: all that the DBC files know; one that they do not know is a fault.
+        received_groups: groups of J1939 that are received, from whatever address.
+        sent_groups: groups that we send, and nobody else may.
+        claims: what we send of the groups that are received: it comes back among them.
+        j1939: the bus is one of J1939, where unknown ids of 29 bits are daily life.
+        canopen: the bus is one of CANopen, where that is so for SDO, SYNC and the like.
+        in_line: the bus is one of an inline gateway, where that is so for all: it forwards them.
+    """
+
+    received: frozenset[tuple[int, bool]]
+    sent: frozenset[tuple[int, bool]]
+    valves: frozenset[tuple[int, bool]]
+    known: frozenset[tuple[int, bool]]
+    received_groups: frozenset[int] = frozenset()
+    sent_groups: frozenset[int] = frozenset()
+    claims: frozenset[tuple[int, bool]] = frozenset()
+    j1939: bool = False
+    canopen: bool = False
+    in_line: bool = False
+
+
+@dataclass(frozen=True)
+class Routing:
+    """All buses.
+
+    Attributes:
+        routes: what ids are, by bus, id and whether that is extended.
+        groups: what groups of J1939 are, by bus and group.
+        valves: names of the axes whose commands a message carries, those that compensate first;
+            also where another controller sends it.
+        others: messages of the DBC files that are neither received nor sent: other traffic.
+        buses: the same by bus.
+    """
+
+    routes: Mapping[Key, Route]
+    groups: Mapping[tuple[str, int], GroupRoute]
+    valves: Mapping[Key, tuple[str, ...]]
+    others: frozenset[tuple[int, bool]]
+    buses: Mapping[str, BusRoutes]
+
+    @property
+    def sent(self) -> frozenset[Key]:
+        """What we send, and nobody else may."""
+        return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
+
+
+def exact_inputs(inputs: Iterable[BoundInput]) -> dict[Key, BoundInput]:
+    """Inputs by every id that their frames may have, where their source is known."""
+    return {key: bound for bound in inputs if not bound.any_source for key in bound.keys}
+
+
+def grouped_inputs(inputs: Iterable[BoundInput]) -> dict[tuple[str, int], tuple[BoundInput, ...]]:
+    """Inputs that are known by their group, by bus and group."""
+    groups: dict[tuple[str, int], tuple[BoundInput, ...]] = {}
+    for bound in inputs:
+        if bound.by_group:
+            key = (bound.config.bus, group_of(bound.key[1]))
+            groups[key] = (*groups.get(key, ()), bound)
+    return groups
+
+
+def build_routing(
+    config: DeploymentConfig,
+    *,
+    inputs: Sequence[BoundInput],
+    axes: Iterable[BoundAxis],
+    statuses: Iterable[Key],
+    known: Iterable[tuple[int, bool]],
+    j1939: Container[str],
+    listen_only: bool,
+) -> Routing:
+    """The table of a deployment.
+
+    Args:
+        config: the deployment file.
+        inputs: every message that is received.
+        axes: the axes.
+        statuses: status messages that are sent.
+        known: every message of the DBC files.
+        j1939: buses on which a message of J1939 is used.
+        listen_only: nothing is sent but status, and the valves are those of another controller.
+    """
+    # An axis that asks something of another one goes first.
+    ordered = sorted(axes, key=lambda axis: axis.radial is None)
+    valves: dict[Key, tuple[str, ...]] = {}
+    for axis in ordered:
+        key = axis.valve.message.sender.key
+        valves[key] = (*valves.get(key, ()), axis.name)
+    routes = dict.fromkeys(statuses, Route(Role.SENT))
+    if not listen_only:
+        routes |= dict.fromkeys(valves, Route(Role.VALVE))
+    for name, bus in config.buses.items():
+        routes.update(_node_routes(name, bus, listen_only))
+    routes |= {key: Route(Role.RECEIVED, bound) for key, bound in exact_inputs(inputs).items()}
+    groups = _group_routes(config, inputs, () if listen_only else ordered)
+    used = {key[1:] for key, route in routes.items() if route.role not in (Role.CLAIM, Role.NODE)}
+    ids, in_line = frozenset(known), config.gateway.between if config.gateway else ()
+    buses = {
+        name: BusRoutes(
+            _ids(routes, name, Role.RECEIVED, Role.NODE),
+            _ids(routes, name, Role.VALVE, Role.SENT),
+            _ids(routes, name, Role.VALVE),
+            ids,
+            frozenset(
+                at[1] for at, g in groups.items() if at[0] == name and (g.inputs or g.claims)
+            ),
+            frozenset(at[1] for at, g in groups.items() if at[0] == name and g.axes),
+            _ids(routes, name, Role.CLAIM),
+            bus.j1939 is not None or name in j1939,
+            bus.canopen is not None,
+            name in in_line,
+        )
+        for name, bus in config.buses.items()
+    }
+    return Routing(routes, groups, valves, ids - used, buses)
+
+
+def _ids(routes: Mapping[Key, Route], bus: str, *roles: Role) -> frozenset[tuple[int, bool]]:
+    """Ids of one bus with these roles; without inputs that are received by their group."""
+    return frozenset(
+        key[1:]
+        for key, route in routes.items()
+        if key[0] == bus and route.role in roles and not (route.input and route.input.by_group)
+    )
+
+
+def _node_routes(name: str, bus: Bus, listen_only: bool) -> Iterator[tuple[Key, Route]]:
+    """What our node and others send on a bus of J1939 or CANopen about themselves."""
+    if bus.canopen:
+        for node in bus.canopen.nodes.values():
+            for base in (HEARTBEAT, EMERGENCY):
+                yield (name, base + node.id, False), Route(Role.NODE)
+        if not listen_only:
+            yield (name, HEARTBEAT + bus.canopen.node, False), Route(Role.SENT)
+            if bus.canopen.master:
+                yield (name, NMT, False), Route(Role.SENT)
+    if bus.j1939:
+        claims = claims_of(bus.j1939.address)
+        claims += [identifier(REQUEST, NULL)] if listen_only else []
+        for can_id in claims:
+            yield (name, can_id, True), Route(Role.CLAIM)
+        for can_id in () if listen_only else sent_by(bus.j1939.address):
+            yield (name, can_id, True), Route(Role.SENT)
+
+
+def _group_routes(
+    config: DeploymentConfig, inputs: Iterable[BoundInput], axes: Iterable[BoundAxis]
+) -> dict[tuple[str, int], GroupRoute]:
+    """Groups of J1939: commands to our valves, inputs, and what nodes say about addresses."""
+    commanded: dict[tuple[str, int], tuple[str, ...]] = {}
+    for axis in axes:
+        # Not those of joysticks whose frames we forward: others send the same group.
+        if is_j1939(axis.valve_message) and not axis.rewrites:
+            bus, can_id, _ = axis.valve.message.sender.key
+            at = (bus, group_of(can_id))
+            commanded[at] = (*commanded.get(at, ()), axis.name)
+    received = grouped_inputs(inputs)
+    nodes = [
+        (name, pgn << 8)
+        for name, bus in config.buses.items()
+        if bus.j1939
+        for pgn in (CLAIMED, REQUEST)
+    ]
+    return {
+        at: GroupRoute(received.get(at, ()), commanded.get(at, ()), at in nodes)
+        for at in (*commanded, *received, *nodes)
+    }
