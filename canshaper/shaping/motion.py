@@ -1,0 +1,227 @@
+"""Slew and near-far as one motion: the tip goes where a grapple on the commanded path needs it.
+
+The filters of both axes make a path of the grapple about the pillar, radius rho and angle phi; it
+is read from their sway models. A hanging grapple follows it without any other swing where the tip
+stands such that gravity makes the accelerations of the path (differential flatness; w5, w6: sway
+modes of slew and near-far, which pull across and along the boom; psi: angle of the boom ahead of
+the grapple)
+
+    a_r = rho'' - rho phi'^2        tan psi = a_t / (w5^2 rho + a_r)
+    a_t = rho phi'' + 2 rho' phi'   R = rho cos psi + (a_r cos psi + a_t sin psi) / w6^2
+
+By themselves the filters put the tip at the angle L = phi'' / w5^2 ahead and at the radius rho + D,
+D = rho'' / w6^2. The motion adds the rest, psi - L to slew and R - rho - D to near-far, as
+velocities from one position to the next. The dampers of the joints are in L and D by the models; of
+the rest they are taken to first order. Near-far alone gets nothing added; slew alone moves the tip
+in on its circle.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple
+
+from canshaper.shaping.sway import SwayModel
+
+# Time constant with which a measured radius corrects the one that is carried on: a jump of the
+# signal moves nothing at once.
+RADIUS_S = 1.0
+# Time in which the added part ends where one of the axes can no more.
+FADE_S = 0.2
+# Largest change of an added velocity between two ticks of an axis, fraction of full speed.
+MOST_STEP = 0.1
+_NOTHING = 1e-6
+# Least part of gravity that is left across the boom; beyond it the small angles are none.
+_LEAST = 0.5
+
+
+@dataclass(slots=True)
+class MovingAxis:
+    """One of the two axes, as the motion sees it.
+
+    Attributes:
+        full_speed: rad/s of slew, m/s of near-far.
+        period_s: time for which an added velocity is held.
+        sway: sway model, stepped without the added part.
+        applied: velocity that the model was driven by last, [-1, 1].
+        ahead_s: from now to the time of the model's state: to the end of the period that runs, 0
+            where the next one begins now.
+        commanded: the operator asked for motion within the tail.
+        able: it may carry out what is added.
+        added: velocity to add now, [-1, 1]; the result.
+        reached: position that the added velocities reach at the end of the period, rad or m.
+    """
+
+    full_speed: float
+    period_s: float
+    sway: SwayModel
+    applied: float = 0.0
+    ahead_s: float = 0.0
+    commanded: bool = False
+    able: bool = False
+    added: float = 0.0
+    reached: float = 0.0
+
+    def held(self, seconds: float) -> None:
+        """The last output was held for so much longer."""
+        self.reached += self.added * self.full_speed * seconds
+
+    def path(self, after_s: float) -> "_Path":
+        """The grapple's motion at a time from now, the applied velocity held until then."""
+        after_s -= self.ahead_s
+        sway, full = self.sway, self.full_speed
+        omega, angle = sway.mode.omega_rad_s, sway.angle
+        damping = 2.0 * sway.mode.damping_ratio * omega
+        rate = sway.rate + self.applied
+        acceleration = -omega * omega * angle - damping * rate
+        angle += after_s * (rate + 0.5 * after_s * acceleration)
+        rate += after_s * acceleration
+        # The grapple's speed is that of the tip less the lead's.
+        pull = omega * omega * angle + damping * rate
+        return _Path(full * angle, full * rate, full * (self.applied - rate), full * pull)
+
+    def add(self, target: float, weight: float) -> None:
+        """Run to a position of the added part within the period.
+
+        Args:
+            target: the position, rad or m.
+            weight: 1, or less where the added part ends.
+        """
+        way = self.period_s * self.full_speed
+        velocity = weight * (target - self.reached) / way
+        velocity = min(max(velocity, self.added - MOST_STEP), self.added + MOST_STEP)
+        if not abs(velocity) >= _NOTHING:  # or not a number
+            self.added = 0.0
+            return
+        self.added = min(max(velocity, -1.0), 1.0)
+        # What a fading part leaves out is owed to nobody.
+        self.reached = target if weight < 1.0 else self.reached + self.added * way
+
+
+class _Path(NamedTuple):
+    """Lead of the tip and its rate, speed and acceleration of the grapple; rad or m, per second."""
+
+    lead: float
+    lead_rate: float
+    speed: float
+    acceleration: float
+
+
+_REST = _Path(0.0, 0.0, 0.0, 0.0)
+
+
+class TwoAxisMotion:
+    """What both axes add so that the grapple stays on the path of its filters.
+
+    Args:
+        slew: the axis that turns.
+        near_far: the axis that moves the tip in and out, or None.
+        path_m: farthest that near-far is moved from where its own filter has it.
+    """
+
+    __slots__ = ("_near_far", "_path_m", "_radius_m", "_slew", "_weight")
+
+    def __init__(self, slew: MovingAxis, near_far: MovingAxis | None, path_m: float) -> None:
+        self._slew = slew
+        self._near_far = near_far
+        self._path_m = path_m
+        self._radius_m: float | None = None  # of the grapple
+        self._weight = 1.0
+
+    def step(self, elapsed_s: float, tip_m: float | None, circle_m: float | None = None) -> None:
+        """Find what is added from now on, by each axis whose period begins now: its ``added``.
+
+        Args:
+            elapsed_s: time since the last step.
+            tip_m: measured radius of the tip, or None where it is not known.
+            circle_m: instead of it: radius of the grapple, where that is a number of the file.
+        """
+        slew, near_far = self._slew, self._near_far
+        commanded = slew.commanded or (near_far is not None and near_far.commanded)
+        able = slew.able and (near_far is None or near_far.able)
+        fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
+        weight = self._weight = min(max(self._weight + fade, 0.0), 1.0)
+        if not commanded or not weight:
+            self._radius_m = None
+            for axis in (slew, near_far):
+                if axis is not None:
+                    axis.added = axis.reached = 0.0
+            return
+        if near_far is None:
+            radius_m = None
+        elif circle_m is None:
+            radius_m = self._carried_m(near_far, elapsed_s, tip_m)
+        else:
+            radius_m = circle_m
+        turn = slew.path(slew.period_s)
+        if near_far is None or radius_m is None:
+            if not slew.ahead_s:
+                slew.add(_psi(turn, slew.sway) - turn.lead, weight)
+            if near_far is not None:
+                near_far.add(near_far.reached, 0.0)
+            return
+        psi, way_m = self._tip(turn, slew.period_s, near_far, radius_m)
+        if not slew.ahead_s:
+            slew.add(psi - turn.lead, weight)
+        if near_far.ahead_s:
+            return
+        if near_far.period_s != slew.period_s:
+            turn = slew.path(near_far.period_s)
+            _, way_m = self._tip(turn, near_far.period_s, near_far, radius_m)
+        near_far.add(min(max(way_m, -self._path_m), self._path_m), weight)
+
+    def _carried_m(
+        self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None
+    ) -> float | None:
+        """Radius of the grapple: carried on by the near-far model, corrected by the tip's."""
+        sway, full = near_far.sway, near_far.full_speed
+        ahead_m = full * sway.angle + near_far.reached
+        if self._radius_m is None:
+            self._radius_m = None if tip_m is None else tip_m - ahead_m
+        else:
+            self._radius_m -= full * sway.rate * elapsed_s
+            if tip_m is not None:
+                error_m = tip_m - ahead_m - self._radius_m
+                self._radius_m += error_m * min(1.0, elapsed_s / RADIUS_S)
+        return self._radius_m
+
+    def _tip(
+        self, turn: _Path, after_s: float, near_far: MovingAxis, radius_m: float
+    ) -> tuple[float, float]:
+        """Where the tip has to be: psi, and R - rho - D.
+
+        Args:
+            turn: the path of slew at that time.
+            after_s: the time, from now.
+            near_far: the other axis. At rest it has no speed, whatever its model has left.
+            radius_m: radius of the grapple now.
+        """
+        lead, lead_rate, speed, acceleration = turn
+        out, _, out_rate, out_acceleration = near_far.path(after_s) if near_far.commanded else _REST
+        mode_5, mode_6 = self._slew.sway.mode, near_far.sway.mode
+        across_2, along_2 = mode_5.omega_rad_s**2, mode_6.omega_rad_s**2
+        radius_m += after_s * out_rate
+        # Coriolis and centripetal acceleration, and their rates for the dampers.
+        turning = 2.0 * out_rate * speed / radius_m
+        turning_rate = (
+            2.0 * (out_acceleration * speed + out_rate * acceleration) / radius_m
+            - turning * out_rate / radius_m
+        )
+        inwards = radius_m * speed * speed
+        inwards_rate = out_rate * speed * speed + 2.0 * radius_m * (
+            speed * acceleration - across_2 * lead * lead_rate
+        )
+        damping_5 = 2.0 * mode_5.damping_ratio / mode_5.omega_rad_s
+        damping_6 = 2.0 * mode_6.damping_ratio / mode_6.omega_rad_s
+        pull_t = radius_m * (across_2 * lead + turning - damping_5 * turning_rate)
+        pull_r = along_2 * out - inwards + damping_6 * inwards_rate
+        left = radius_m * across_2
+        psi = math.atan2(pull_t, max(left + pull_r, _LEAST * left))
+        cosine, sine = math.cos(psi), math.sin(psi)
+        tip_m = radius_m * cosine + (pull_r * cosine + pull_t * sine) / along_2
+        return psi, tip_m - radius_m - out
+
+
+def _psi(turn: _Path, sway: SwayModel) -> float:
+    """Angle of the boom ahead of a grapple that stays on its circle, of whatever radius."""
+    left = 1.0 - turn.speed * turn.speed / sway.mode.omega_rad_s**2
+    return math.atan2(turn.lead, max(left, _LEAST))
