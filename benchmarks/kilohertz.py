@@ -71,7 +71,7 @@ def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
     dbc = 'VERSION "1"\n\nNS_ :\n\nBS_:\n\nBU_: JOYSTICKS SHAPER VALVES\n'
     cycles = CYCLES
     buses = {"crane": {"interface": bus.interface, "channel": bus.channel}}
-    config: dict[str, Any] = {"tick_ms": tick_ms, "buses": buses, "dbc": ["many.dbc"]}
+    config: dict[str, Any] = {"version": 1, "tick_ms": tick_ms, "buses": buses, "dbc": ["many.dbc"]}
     config |= {"joysticks": {}, "axes": {}}
     for n in range(axes):
         dbc += JOYSTICK_TEXT.format(id=JOYSTICK + n, n=n) + VALVE_TEXT.format(id=VALVE + n, n=n)

@@ -139,6 +139,7 @@ def first_deployment(machine: FirstMachine) -> str:
 def _lines(machine: FirstMachine) -> Iterator[str]:
     yield "# Written by canshaper init. Every key: docs/deployment.md."
     yield ""
+    yield "version: 1 # of the file's format"
     yield "tick_ms: 20 # period of the control loop"
     yield ""
     yield "buses:"

@@ -12,6 +12,7 @@ from pydantic_core import ErrorDetails
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
 from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.config.version import moved_keys
 from canshaper.shaping.registry import FAULTS
 
 _S = TypeVar("_S", bound=Section)
@@ -34,7 +35,12 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
             filters has a fault, and which filters there are is not sure.
     """
     check_packages()
-    return load_section(path, DeploymentConfig)
+    source = Source(path)
+    moved = moved_keys(source)
+    config, problems = _validated(source, DeploymentConfig)
+    if config is None or moved:
+        raise DeploymentError(_sorted(moved + problems))
+    return config, source
 
 
 def check_packages() -> None:
@@ -54,11 +60,18 @@ def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:
         DeploymentError: with every problem of the file, each with its line.
     """
     source = Source(path)
+    config, problems = _validated(source, schema)
+    if config is None:
+        raise DeploymentError(_sorted(problems))
+    return config, source
+
+
+def _validated(source: Source, schema: type[_S]) -> tuple[_S | None, list[Problem]]:
+    """The section that a file is; None with every problem where it is none."""
     try:
-        return schema.model_validate(source.data), source
+        return schema.model_validate(source.data), []
     except ValidationError as error:
-        problems = [_problem(source, detail, schema) for detail in error.errors()]
-        raise DeploymentError(_unique(problems)) from None
+        return None, [_problem(source, detail, schema) for detail in error.errors()]
 
 
 def limits(schema: type[Section], key: str) -> tuple[float, float]:
@@ -164,6 +177,8 @@ class _Place:
             low, high = limits
             extras = [field.json_schema_extra for field in self._fields]
             units = [extra for extra in extras if isinstance(extra, dict)]
+            if low == high:
+                return f"{low:g}"
             whole = "a whole number, " if self._type is int else ""
             return f"{whole}{low:g} to {high:g} {units[0]['unit'] if units else ''}".rstrip()
         if isinstance(self._type, type) and issubclass(self._type, Section):
@@ -183,5 +198,5 @@ def _short(value: Any) -> str:
     return text if len(text) <= 60 else text[:57] + "..."
 
 
-def _unique(problems: list[Problem]) -> list[Problem]:
+def _sorted(problems: list[Problem]) -> list[Problem]:
     return sorted(set(problems), key=lambda p: (p.file, p.line or 0, p.where))

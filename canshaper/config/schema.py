@@ -13,6 +13,7 @@ from canshaper.config.protection import Protected
 from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
 from canshaper.config.sway import Sway
+from canshaper.config.version import VERSION
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.valve_curve import ValveCurve
@@ -291,6 +292,7 @@ class AxisConfig(Section):
 class DeploymentConfig(Section):
     """A machine: buses, DBC files, joysticks and axes."""
 
+    version: Annotated[int, number(VERSION, VERSION, "", "version of the file's format")]
     tick_ms: Annotated[int, number(1, 50, "ms", "period of the control loop")] = 20
     buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")

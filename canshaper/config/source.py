@@ -1,6 +1,7 @@
 """YAML with line numbers, and the problems found in files."""
 
 import re
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
@@ -119,6 +120,28 @@ class Source:
         return Problem(
             str(self.path), self._lines.get(near), ".".join(str(p) for p in path), message
         )
+
+    def places(self, pattern: Sequence[str]) -> Iterator[Place]:
+        """Places of the file that a pattern fits: names with | between, * for any."""
+        for place in self._lines:
+            if len(place) == len(pattern) and all(
+                names == "*" or part in names.split("|")
+                for names, part in zip(pattern, place, strict=True)
+            ):
+                yield place
+
+    def rename(self, place: Place, name: str) -> None:
+        """Give a key of the data another name; it keeps its value, and its line in problems."""
+        *inside, old = place
+        section = self.data
+        for part in inside:
+            section = section[part]
+        section.setdefault(name, section.pop(old))
+        end = len(inside)
+        for one, line in [*self._lines.items()]:
+            if one[: end + 1] == place:
+                self._lines.setdefault((*inside, name, *one[end + 1 :]), line)
+                del self._lines[one]
 
     def _build(self, node: yaml.Node, path: Place) -> Any:
         """Data of a node; only what is named here can come out, whatever tags the file has."""

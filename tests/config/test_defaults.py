@@ -18,6 +18,7 @@ from canshaper.shaping.limits import OutputLimits
 Load = Callable[[str | bytes], DeploymentConfig]
 
 SMALLEST = """
+version: 1
 buses: {b: {interface: virtual, channel: c}}
 dbc: [a.dbc]
 joysticks: {l: {bus: b, message: L, timeout_ms: 100, enable: E}}

@@ -14,8 +14,8 @@ Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
 TOP = (
-    "tick_ms, buses, dbc, joysticks, axes, gateway, emergency_stop, load_state, profile, status,"
-    " identity, control"
+    "version, tick_ms, buses, dbc, joysticks, axes, gateway, emergency_stop, load_state, profile,"
+    " status, identity, control"
 )
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (
@@ -190,7 +190,7 @@ def test_all_problems_are_told_at_once_in_the_order_of_the_file(
 @pytest.mark.parametrize("text", ["", "# nothing\n", "{}\n"])
 def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
     keys = [re.sub(r"^machine\.yaml(:1)?: ", "", p).split(": ", 1) for p in problems(text)]
-    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "joysticks"]
+    assert [k for k, _ in keys] == ["axes", "buses", "dbc", "joysticks", "version"]
     assert all(text.startswith("missing: ") for _, text in keys)
 
 

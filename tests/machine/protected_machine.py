@@ -80,7 +80,8 @@ VALVES = f"{{ profile: p02, data_ids: {IDS} }}"
 STATUS = "{ profile: p01, data_id: 0x234, data_id_mode: alternating }"
 RADIUS = "{ profile: p01, data_id: 0x77, data_id_mode: low }"
 
-YAML = f"""buses:
+YAML = f"""version: 1
+buses:
   crane: {{ interface: socketcan, channel: vcan0 }}
 dbc: [machine.dbc]
 joysticks:

@@ -158,6 +158,7 @@ def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_pat
     message = found.joysticks[joystick].message
     file = tmp_path / "machine.yaml"
     file.write_text(f"""
+version: 1
 buses:
   near: {{ interface: socketcan, channel: vcan0 }}
   far: {{ interface: socketcan, channel: vcan1 }}
