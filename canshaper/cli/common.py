@@ -103,6 +103,18 @@ def loader(
     return load
 
 
+def control_socket(deployment: Deployment) -> Path:
+    """Path of the control socket of its daemon; ends the command where the file has none."""
+    section = deployment.config.control
+    if section is None:
+        text = (
+            "this file has no control section; it says which numbers may be changed, for example"
+            " control: { adjustable: { axes.slew.sway.period_s: [1.8, 3.0] } }"
+        )
+        raise fail(ValueError(f"{deployment.path}: {text}"))
+    return section.path(deployment.path)
+
+
 def fail(error: Exception, code: int = EXIT_BAD_DEPLOYMENT) -> typer.Exit:
     """Print an error as it is and give the exit, that of a bad deployment unless told."""
     echo(str(error), err=True)

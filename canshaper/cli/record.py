@@ -2,6 +2,7 @@
 
 import signal
 import tempfile
+import time
 from datetime import datetime
 from pathlib import Path
 from types import FrameType
@@ -10,7 +11,16 @@ from typing import TYPE_CHECKING
 import typer
 from rich.live import Live
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
+from canshaper.cli.common import (
+    CHANNEL,
+    EXIT_NO_BUS,
+    FILE,
+    INTERFACE,
+    NETWORK,
+    control_socket,
+    fail,
+    loader,
+)
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
@@ -18,6 +28,7 @@ if TYPE_CHECKING:
     from canshaper.recording.record import Recording
 
 EXIT_NOT_WRITTEN = 1
+ASK_AGAIN_S = 0.2
 
 
 def record(
@@ -31,16 +42,24 @@ def record(
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
+    last: bool = typer.Option(
+        False, "--last", help="The last minute instead: the running daemon writes its black box."
+    ),
+    control: Path | None = typer.Option(
+        None, "--control", metavar="PATH", help="With --last: control socket instead of the file's."
+    ),
 ) -> None:
     """Record every frame on the buses of a deployment; nothing is sent.
 
     Makes a bundle for a bug report: the log, the deployment file with its DBC files, versions, and
-    what the status messages told. `canshaper replay BUNDLE` replays it. Begin before what is to be
-    seen, best before the daemon starts: what an axis did before is not in the log.
+    what the status messages told. `canshaper replay BUNDLE` replays it.
+
+    What has just happened is in the black box of the daemon: with --last it writes the last minute
+    of it, tick by tick, as soon as every axis is neutral. After a trip it does so by itself.
 
     Ctrl-C or SIGTERM end it. Exit code 0, also when nothing was heard, which is told; 1 when the
-    bundle or the log cannot be written, 2 when the deployment is wrong, 3 when a bus cannot be
-    opened or read.
+    bundle or the log cannot be written, or no daemon answers; 2 when the deployment is wrong; 3
+    when a bus cannot be opened or read.
 
     Examples:
 
@@ -49,11 +68,16 @@ def record(
       canshaper record machine.yaml --seconds 600 --out stop-at-the-tree.zip
 
       canshaper record machine.yaml --out drive.log
+
+      canshaper record machine.yaml --last
     """
     from canshaper.bus.port import BusError
     from canshaper.config.source import DeploymentError
     from canshaper.recording.record import Recording
 
+    if last:
+        _last(file, control)
+        return
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", ".log"):
         raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
@@ -91,6 +115,24 @@ def record(
         text = f"nothing was heard, {out} is without frames: is the bus up, and the machine on?"
         echo(text, err=True)
     echo(f"{out}: {_text(recording)}")
+
+
+def _last(file: str, control: Path | None) -> None:
+    """Let the daemon write what it has."""
+    from canshaper.config.source import DeploymentError
+    from canshaper.daemon.control_client import ControlError, write_black_box
+
+    try:
+        path = control or control_socket(loader(file)())
+        folder = write_black_box(path, lambda: time.sleep(ASK_AGAIN_S))
+    except DeploymentError as error:
+        raise fail(error) from None
+    except ControlError as error:
+        raise fail(error, EXIT_NOT_WRITTEN) from None
+    except KeyboardInterrupt:
+        echo("the daemon writes it when every axis is neutral", err=True)
+        raise typer.Exit(130) from None
+    echo(f"written in {folder}")
 
 
 def _beside(out: Path) -> Path:

@@ -21,14 +21,13 @@ if TYPE_CHECKING:
     from canshaper.recording.report import Replayed
 
 EXIT_DIFFERENT = 1
-DAEMON, CLOCK = "daemon", "clock"
 # Lines on standard output; all of them are in the folder.
 MOST_EVENTS = 12
 
 
 def replay(
-    log: Path = typer.Argument(..., help="candump .log, .asc, .blf, .mf4, .csv, each also .gz;"
-    " or a bundle of canshaper record."),
+    log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
+    " candump .log, .asc, .blf, .mf4, .csv, each also .gz."),
     configs: list[str] | None = typer.Option(
         None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
         " its own by default."
@@ -37,21 +36,20 @@ def replay(
         None, "--channel", metavar="BUS=CHANNEL", help="Channel of the log that is a bus."
     ),
     out: Path = typer.Option(Path("out/replay"), "--out", help="Folder for what is made."),
-    ticks: str | None = typer.Option(
-        None, "--ticks", help="daemon: the ticks of the daemon that the log is of; clock: a steady"
-        " clock. By default daemon where its frames are in the log."
-    ),
     verify: bool = typer.Option(
-        False, "--verify", help="Exit code 1 when the daemon has sent anything else."
+        False, "--verify", help="Of a black box: exit code 1 when a frame is not the same."
     ),
     begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Table and picture from here."),
     end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
 ) -> None:  # fmt: skip
-    """Drive the controller with the joystick frames of a log, at full speed.
+    """Drive the controller with a black box or a log, at full speed.
 
     Writes what would have been sent as a new log (candump), the events, a picture and all numbers;
-    prints a table. Where the log has the frames that canshaper sent itself, its ticks are found
-    again and every frame is compared. Nothing is sent on any bus.
+    prints a table. Nothing is sent on any bus.
+
+    A black box has every tick of the daemon and all that it received: every frame that is computed
+    is compared with the one that was sent then. With other files (--config), and with any other
+    log, the joystick frames drive the controller at the ticks of a clock.
 
     Exit code 0, with --verify 1 when anything is different, 2 when log or deployment are wrong.
 
@@ -69,8 +67,6 @@ def replay(
     from canshaper.recording.bundle import unpack
     from canshaper.recording.frames import LogError
 
-    if ticks not in (None, DAEMON, CLOCK):
-        raise typer.BadParameter(f"found {ticks}, allowed are {DAEMON} and {CLOCK}")
     console = SafeConsole()
     with tempfile.TemporaryDirectory() as folder:
         try:
@@ -81,9 +77,7 @@ def replay(
                     configs, inside = [str(own)], Path(folder)
             if not configs:
                 raise typer.BadParameter("--config is missing: which deployment?")
-            replays = _run(
-                log, configs, _channels(channel or []), ticks, (begin_s, end_s), out, inside
-            )
+            replays = _run(log, configs, _channels(channel or []), (begin_s, end_s), out, inside)
             for one in replays:
                 one.measure()
         except (LogError, DeploymentError) as error:
@@ -94,6 +88,9 @@ def replay(
         except KeyboardInterrupt:
             echo("interrupted; what was written so far stays", err=True)
             raise typer.Exit(130) from None
+    if verify and not all(one.replay.exact for one in replays):
+        text = f"--verify: {log} is no black box of these files; allowed is one, without --config"
+        raise fail(LogError(text))
     different = _show(replays, out, console)
     if verify and different:
         raise typer.Exit(EXIT_DIFFERENT)
@@ -103,7 +100,6 @@ def _run(
     log: Path,
     configs: list[str],
     channels: dict[str, str],
-    ticks: str | None,
     window: tuple[float, float | None],
     out: Path,
     inside: Path | None,
@@ -113,32 +109,26 @@ def _run(
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
 
-    loads = [loader(config, inside=inside) for config in configs]
     names = _names([deployment_path(config) for config in configs])
-    deployments = [load() for load in loads]
+    deployments = [loader(config, inside=inside)() for config in configs]
     for deployment in deployments:
         if unknown := channels.keys() - deployment.config.buses.keys():
             buses = ", ".join(deployment.config.buses)
             text = f"--channel: found the bus {', '.join(unknown)}, allowed are {buses}"
             raise LogError(text)
-    drives = [look(deployment, log, channels) for deployment in deployments]
+    drives = [look(one, log, channels, own=inside is not None) for one in deployments]
     out.mkdir(parents=True, exist_ok=True)
     replays: list[Replayed] = []
-    for name, load, deployment, drive in zip(names, loads, deployments, drives, strict=True):
-        if ticks == DAEMON and not drive.daemon:
-            raise LogError(f"{log}: --ticks daemon: found {drive.why_not}")
-        by_daemon = drive.daemon and ticks != CLOCK
+    for name, deployment, drive in zip(names, deployments, drives, strict=True):
         with _progress(name) as tell, _without_collector():
-            replays.append(_one(name, load, deployment, drive, by_daemon, window, out, tell))
+            replays.append(_one(name, deployment, drive, window, out, tell))
     return replays
 
 
 def _one(
     name: str,
-    load: "Callable[[], Deployment]",
     deployment: "Deployment",
     drive: "Drive",
-    by_daemon: bool,
     window: tuple[float, float | None],
     out: Path,
     tell: Callable[[float], None],
@@ -149,7 +139,7 @@ def _one(
     from canshaper.recording.trace import Trace
     from canshaper.recording.write import LogWriter
 
-    replay = Replay(load, drive, by_daemon=by_daemon)
+    replay = Replay(deployment, drive)
     done = Replayed(name, deployment, replay, Trace(deployment, *window))
     channel_of = {bus: channel for channel, bus in drive.channels.items()}
     number = None

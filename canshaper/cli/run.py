@@ -1,7 +1,9 @@
 """``canshaper run``: the daemon."""
 
+import os
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -23,7 +25,11 @@ def run(
     control: str | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
     ),
-) -> None:
+    black_box: Path | None = typer.Option(
+        None, "--black-box", metavar="FOLDER", help="Where black boxes are written; by default the"
+        " log directory that systemd gives the service, else nowhere."
+    ),
+) -> None:  # fmt: skip
     """Shape the joystick commands of a deployment until SIGTERM or Ctrl-C.
 
     SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral. An
@@ -34,6 +40,10 @@ def run(
 
     Limits that let an axis travel on for more than 2 m after release have to be meant: without a
     stop_distance_m in the file it does not start, and a reload is refused.
+
+    A trip or a stop for a fault leaves a black box behind, with the last minute before it and five
+    seconds after it: what was received and sent, tick by tick. The newest 20 are kept; canshaper
+    replay plays them.
 
     Exit code 0 after a stop, 2 when the file is wrong, 3 when a bus cannot be opened.
 
@@ -53,12 +63,19 @@ def run(
     journal.set_up()
     try:
         load = loader(file, interface, channel, network=network)
-        daemon = Daemon(_changed(load, listen_only=listen_only, control=control))
+        changed = _changed(load, listen_only=listen_only, control=control)
+        daemon = Daemon(changed, black_box or _log_folder())
     except DeploymentError as error:
         raise fail(error) from None
     except BusError as error:
         raise fail(error, EXIT_NO_BUS) from None
     daemon.run()
+
+
+def _log_folder() -> Path | None:
+    """Where systemd lets the service write its logs (systemd.exec(5), LogsDirectory=)."""
+    first = os.environ.get("LOGS_DIRECTORY", "").split(":")[0]
+    return Path(first) if first else None
 
 
 def _changed(

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING
 import typer
 from rich.table import Table
 
-from canshaper.cli.common import FILE, fail, loader, refuse_shipped
+from canshaper.cli.common import FILE, control_socket, fail, loader, refuse_shipped
 from canshaper.cli.console import SafeConsole, echo
 
 if TYPE_CHECKING:
-    from canshaper.machine.deployment import Deployment
+    pass
 
 EXIT_REFUSED = 1
 
@@ -53,7 +53,7 @@ def set_(
         deployment = loader(file)()
         if write:
             refuse_shipped(file)
-        path = control or _socket(deployment)
+        path = control or control_socket(deployment)
         values = dict(_parsed(change) for change in changes or [])
         before = client.table(path)
         if values:
@@ -75,17 +75,6 @@ def set_(
         echo(f"{key}: {before[key]['now']:g} -> {number:g}")
     lost = "lost when the daemon ends or reads its file again; --write keeps them"
     echo(f"Written to {deployment.path}." if write else f"Not written: {lost}.")
-
-
-def _socket(deployment: "Deployment") -> Path:
-    section = deployment.config.control
-    if section is None:
-        text = (
-            "this file has no control section; it says which numbers may be changed, for example"
-            " control: { adjustable: { axes.slew.sway.period_s: [1.8, 3.0] } }"
-        )
-        raise fail(ValueError(f"{deployment.path}: {text}"))
-    return section.path(deployment.path)
 
 
 def _parsed(text: str) -> tuple[str, float]:

@@ -26,7 +26,7 @@ class FilterSection(Section):
 
     def __reduce__(self) -> Any:
         # The class of a kind is in no module; another process has made its own from the same row.
-        return _unpickled, (self.kind, self.model_fields_set, self.__dict__)
+        return restored_filter, (self.kind, self.model_fields_set, self.__dict__)
 
 
 def _section(kind: ShaperKind) -> type[FilterSection]:
@@ -57,7 +57,8 @@ SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}
 """Section of each kind, by its name."""
 
 
-def _unpickled(kind: str, given: set[str], values: dict[str, Any]) -> FilterSection:
+def restored_filter(kind: str, given: set[str], values: dict[str, Any]) -> FilterSection:
+    """Make the section of a filter again that was taken apart with ``pickle``."""
     return SECTIONS[kind].model_construct(given, **values)
 
 

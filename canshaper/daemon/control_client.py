@@ -2,7 +2,7 @@
 
 import json
 import socket
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -38,6 +38,32 @@ def change(path: Path, values: Mapping[str, float]) -> None:
         ControlError: no daemon answers, or it refuses; then nothing has changed.
     """
     _ask(path, {"set": dict(values)})
+
+
+def write_black_box(path: Path, on_wait: Callable[[], None]) -> str:
+    """Let a running daemon write its black box, and wait for that.
+
+    It does so as soon as every axis is neutral.
+
+    Args:
+        path: its control socket.
+        on_wait: called again and again meanwhile; what it raises ends the waiting.
+
+    Returns:
+        The folder where it was written.
+
+    Raises:
+        ControlError: no daemon answers, or it cannot write.
+    """
+    before = _ask(path, {"black_box": "write"})["black_box"]
+    while True:
+        now = _ask(path, {"black_box": "report"})["black_box"]
+        if now["tried"] != before["tried"]:
+            break
+        on_wait()
+    if now["fault"]:
+        raise ControlError(f"{now['folder']}: {now['fault']}")
+    return str(now["folder"])
 
 
 def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:

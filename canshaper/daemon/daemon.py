@@ -4,9 +4,11 @@ import logging
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
+from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.clock import boottime_ns
 from canshaper.bus.port import BusError, Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
@@ -54,13 +56,14 @@ class Daemon:
     Args:
         load: reads the deployment, at the start and, in another process, at every SIGHUP.
             One that only listens sends no valve frame.
+        folder: where black boxes are written; None for nowhere.
 
     Raises:
         DeploymentError: the deployment is not valid.
         BusError: a bus cannot be opened.
     """
 
-    def __init__(self, load: Callable[[], Deployment]) -> None:
+    def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
         self._load = load
         self._stop = False
         self._reload = False  # asked for and not yet begun
@@ -69,6 +72,7 @@ class Daemon:
         self._waiting_told = False
         self._manager = ServiceManager()
         self._collector = Collector()
+        self._black_box = BlackBox(folder)
         self._logged_fault = FrameFault.NONE
         self._log_again_ns = 0
         self._told_ns = 0
@@ -94,6 +98,7 @@ class Daemon:
         log.info("memory=%s", f"not-locked ({why})" if why else "locked")
         self._collector.freeze()
         self._send_neutral()  # most valves want to see it before they listen to anything else
+        self._black_box.begin(boottime_ns())
         log.info("started file=%s axes=%s", self._controller.deployment.path, names)
         self._log_identity()
         self._manager.ready(f"started, axes {names}")
@@ -110,6 +115,7 @@ class Daemon:
                 self._reading.end()
             if self._control:
                 self._control.close()
+            self._black_box.close()
         listened = self._controller.deployment.listen_only
         log.info("stopped valves=%s", "not-sent" if listened else "neutral")
 
@@ -142,10 +148,11 @@ class Daemon:
         self._manager.ping(now_ns)
         for event in controller.events:
             log.info("%s", event.text)
+        self._black_box.after_tick(now_ns, controller.events, neutral=controller.neutral)
         controller.events.clear()
         for name, port in self._ports.items():
             if port.state in OFF_BUS:
-                controller.on_bus_off(name)
+                self._guarded.on_bus_off(name)
             if port.state is not self._bus_states[name]:
                 self._bus_states[name] = port.state
                 level = logging.INFO if port.state is BusState.UP else logging.WARNING
@@ -184,14 +191,20 @@ class Daemon:
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         """One request from the control socket."""
         values = request.get("set", {})
-        if request.keys() - {"set"} or not isinstance(values, dict):
-            raise ValueError('allowed is {} or {"set": {KEY: VALUE}}')
+        if request.keys() - {"set", "black_box"} or not isinstance(values, dict):
+            raise ValueError('allowed is {} or {"set": {KEY: VALUE}} or {"black_box": "write"}')
+        if "black_box" in request:
+            if request["black_box"] == "write":
+                self._black_box.ask()
+                log.info("black-box=asked %s", peer)
+            return {"black_box": self._black_box.report()}
         if "set" in request:
             try:
                 changes = self._adjuster.change(values)
             except ValueError as error:
                 log.warning("set=refused %s %s", peer, error)
                 raise
+            self._guarded.set(values)
             for change in changes:
                 log.info("set %s %s", change, peer)
         return {"adjustable": self._adjuster.table()}
@@ -202,7 +215,7 @@ class Daemon:
         self._controller = Controller(deployment)
         if before:
             self._controller.carry_over(before)
-        self._guarded = Guarded(self._controller)
+        self._guarded = self._black_box.around(Guarded(self._controller), self._controller)
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
@@ -288,6 +301,7 @@ class Daemon:
         self._use(deployment, before=self._controller)
         if new:
             self._read(waited)
+        self._black_box.begin(boottime_ns())
         self._standstill = Standstill(deployment, before=self._standstill)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
@@ -342,10 +356,10 @@ class Daemon:
         if status and status.sender.key[0] not in self._controller.silent_buses:
             frame = status.frame(deployment.identity.digest)
             if not self._ports[frame.bus].send(frame):
-                self._controller.send_failed(frame)
+                self._guarded.send_failed(frame)
 
     def _on_fault(self, fault: FrameFault) -> None:
-        self._controller.counters.add(fault)
+        self._guarded.fault(fault)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGHUP:

@@ -1,30 +1,24 @@
 """A recording in one file to attach to a report: log, deployment, DBC files, versions, history."""
 
 import json
-import os
-import platform
 import shutil
 import stat
 import zipfile
 from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path, PurePosixPath
 
-from canshaper import __version__
+from canshaper.blackbox.write import ABOUT, BOX, about_of, carried
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import LogError
 from canshaper.recording.history import History
 
-ABOUT, HISTORY, LOG = "about.json", "history.txt", "recording.log"
-FOLDER = "deployment"
-OUTSIDE = "outside"
+HISTORY, LOG = "history.txt", "recording.log"
 # A bundle that somebody sends may be made to fill the disk. A log of candump packs 5 to 30 times,
 # and an hour of a full bus at 1 Mbit/s has 2 GB.
 MOST_MEMBERS = 100
 MOST_LOG_BYTES = 4_000_000_000
 MOST_FILE_BYTES = 10_000_000
 MOST_RATIO, RATIO_FROM_BYTES = 100, 1_000_000
-PACKAGES = ("python-can", "cantools", "bitstruct", "pydantic", "PyYAML", "msgpack", "crccheck")
 
 
 def pack(
@@ -43,33 +37,13 @@ def pack(
     Raises:
         OSError: a file cannot be read or written.
     """
-    file = deployment.path.resolve()
-    text = file.read_text(encoding="utf-8")
-    sources = [(name, Path(os.path.normpath(file.parent / name))) for name in deployment.config.dbc]
-    inside = [source for name, source in sources if not Path(name).is_absolute()]
-    root = Path(os.path.commonpath([file.parent, *(source.parent for source in inside)]))
-    here = file.parent.relative_to(root)
-    about = {
-        "deployment": str(Path(FOLDER) / here / file.name),
-        "log": LOG,
-        "made": datetime.now(UTC).isoformat(timespec="seconds"),
-        "buses": {n: f"{b.interface} {b.channel}" for n, b in deployment.config.buses.items()},
-        "versions": versions(),
-        "identity": deployment.identity.lines(),
-        **facts,
-    }
+    inside, files = carried(deployment)
+    about = about_of(deployment, inside, LOG) | facts
     part = path.with_name(path.name + ".part")
     with zipfile.ZipFile(part, "w", zipfile.ZIP_DEFLATED) as bundle:
         bundle.write(log, LOG)
-        for name, source in sources:
-            if Path(name).is_absolute():
-                bundle.write(source, str(Path(FOLDER) / OUTSIDE / source.name))
-                text = text.replace(
-                    name, os.path.relpath(root / OUTSIDE / source.name, file.parent)
-                )
-            else:
-                bundle.write(source, str(Path(FOLDER) / source.relative_to(root)))
-        bundle.writestr(str(Path(FOLDER) / here / file.name), text)
+        for name, content in files.items():
+            bundle.writestr(name, content)
         bundle.writestr(ABOUT, json.dumps(about, indent=2) + "\n")
         bundle.writestr(HISTORY, "".join(f"{line}\n" for line in history_lines(history)))
     part.replace(path)
@@ -122,7 +96,7 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
         raise ValueError("a name that leads out of it")
     if kind not in (0, stat.S_IFREG):
         raise ValueError("a link or another special file")
-    most = MOST_LOG_BYTES if member.filename == LOG else MOST_FILE_BYTES
+    most = MOST_LOG_BYTES if member.filename in (LOG, BOX) else MOST_FILE_BYTES
     if member.file_size > most:
         raise ValueError(f"{member.file_size} bytes, allowed are {most} at most")
     if member.file_size > max(RATIO_FROM_BYTES, MOST_RATIO * member.compress_size):
@@ -133,19 +107,6 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
     # zipfile hands out no more than file_size, whatever is packed.
     with bundle.open(member) as source, target.open("xb") as file:
         shutil.copyfileobj(source, file)
-
-
-def versions() -> dict[str, str]:
-    """What ran here: program, interpreter, packages, kernel."""
-    found = {"canshaper": __version__, "python": platform.python_version()}
-    for name in PACKAGES:
-        try:
-            found[name] = version(name)
-        except PackageNotFoundError:
-            found[name] = "not installed"
-    found["kernel"] = f"{platform.system()} {platform.release()} {platform.version()}"
-    found["machine"] = platform.machine()
-    return found
 
 
 def history_lines(history: History) -> list[str]:

@@ -6,8 +6,8 @@ from typing import Any
 from canshaper.codec.codecs import ACTIVE_SET, ServiceStatusCodec
 from canshaper.codec.frame import FrameFault
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.channels import Key
 from canshaper.recording.listen import Heard
-from canshaper.recording.sorting import Key
 from canshaper.shaping.states import Reason, State
 
 COUNTED = [name for name in ServiceStatusCodec.SIGNALS if name not in ServiceStatusCodec.CODES]

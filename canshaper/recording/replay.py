@@ -1,69 +1,47 @@
 """What canshaper would have done with a recorded drive, or what it did."""
 
-import statistics
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import partial
-from itertools import islice, pairwise
+from itertools import islice
 from pathlib import Path
 
+from canshaper.blackbox.file import SUFFIX, Box, BoxError, read_box
+from canshaper.blackbox.state import StateError
 from canshaper.codec.frame import Frame, new_frame
 from canshaper.codec.j1939 import group_of
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.channels import Key, Kind, Sorter, bus_of_channel
 from canshaper.recording.frames import CutOffError, LogError, TimedFrame
 from canshaper.recording.log import LogFile
-from canshaper.recording.sorting import Key, Kind, Sorter, bus_of_channel
-from canshaper.recording.stepper import Difference, Result, Stepper, count_of
-from canshaper.recording.ticks import Recovery, Sorted, Tick, clocked
-from canshaper.recording.verify import Verifier
+from canshaper.recording.play import Player, frames_of, of_same_files
+from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked
 
-# What is looked at before a replay, to know the channels and whether a daemon sent there.
+# What is looked at before a replay, to know the channels.
 LOOKED_AT = 20_000
-# Frames of a daemon come at its ticks, those of another controller at times of its own; but on a
-# PC that is too busy many ticks are missing.
-MUCH_FASTER, MUCH_SLOWER = 0.7, 1.5
 EXAMPLES = 5
 MOST_NAMED = 8
 
 
 @dataclass
 class Verdict:
-    """A replay beside what the log says was sent.
+    """A replay of a black box beside what the daemon sent.
 
     Attributes:
-        compared: frames of valves and axes that were compared, and of the service.
+        compared: frames that were compared.
         different: how many of them are not the same.
-        service_compared, service_different: the same of the status of the service.
-        examples: the first differences, with the time in the log.
-        settled: ticks in which only what was sent told what had been read.
-        starts: daemons that start in the log.
-        ran_before: whether one ran already when the log begins.
-        last_ns: time of the last difference; None where there is none.
+        examples: the first differences, with their times.
     """
 
     compared: int = 0
     different: int = 0
-    service_compared: int = 0
-    service_different: int = 0
     examples: list[tuple[int, Difference]] = field(default_factory=list)
-    settled: int = 0
-    starts: int = 0
-    ran_before: bool = False
-    last_ns: int | None = None
 
-    def add(self, tick: Tick, result: Result, service: Key | None) -> None:
-        """Take the result of a tick; ``service`` is the message of the service's status."""
-        self.starts += tick.starts
-        self.ran_before |= bool(tick.says)
-        of_service = sum(frame[:3] == service for _, frame in tick.sent)
+    def add(self, tick: Tick, result: Result) -> None:
+        """Take the result of a tick."""
         self.different += len(result.differences)
-        self.compared += result.compared - of_service
-        self.service_different += len(result.service)
-        self.service_compared += of_service
-        if result.differences:
-            self.last_ns = tick.now_ns
+        self.compared += result.compared
         for difference in result.differences[: EXAMPLES - len(self.examples)]:
             self.examples.append((tick.now_ns, difference))
 
@@ -75,112 +53,68 @@ class Drive:
     Attributes:
         path: the log.
         channels: bus by channel.
-        daemon: whether canshaper's own frames are in it.
-        why_not: why its ticks are not taken from there.
-        recovery: makes what finds its ticks.
+        box: the log, where it is a black box.
+        exact: whether it is one of this deployment: every call is played, every frame compared.
     """
 
     path: Path
     channels: dict[str, str]
-    daemon: bool
-    why_not: str
-    recovery: Callable[[], Recovery]
+    box: Box | None
+    exact: bool
 
 
-def look(deployment: Deployment, path: Path, given: Mapping[str, str]) -> Drive:
-    """Look at the beginning of a log: which channel is which bus, and did a daemon send there?
+def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: bool) -> Drive:
+    """Look at the beginning of a log: which channel is which bus, and is it a black box?
+
+    Args:
+        deployment: the machine.
+        path: the log.
+        given: channels by bus, as the command line says.
+        own: whether the deployment came with the log.
 
     Raises:
         LogError: the log cannot be used, or its channels are not those of the deployment.
     """
+    if path.suffix == SUFFIX:
+        try:
+            box = read_box(path)
+        except BoxError as error:
+            raise LogError(str(error)) from None
+        if own or of_same_files(box, deployment):
+            return Drive(path, {bus: bus for bus in box.header["buses"]}, box, True)
+        return Drive(path, bus_of_channel(deployment, box.header["buses"], given), box, False)
     head: list[TimedFrame] = []
     try:
         head += islice(LogFile(path), LOOKED_AT)
     except CutOffError:
         if not head:
             raise
-    channels = bus_of_channel(deployment, {frame.channel for frame in head}, given)
-    marker, period = marker_of(deployment)
-    times: dict[Key, list[int]] = {}
-    for time_ns, channel, can_id, extended, _ in head:
-        if bus := channels.get(channel):
-            times.setdefault((bus, can_id, extended), []).append(time_ns)
-    why = ""
-    gaps = [after - before for before, after in pairwise(times.get(marker, []))]
-    status = [a.status.sender.key for a in deployment.axes.values() if a.status]
-    wanted_ns = deployment.config.tick_ms * period * 1_000_000
-    if not gaps:
-        why = "no valve frames of this deployment"
-    elif (
-        statistics.median(gaps) < MUCH_FASTER * wanted_ns or _often(gaps) > MUCH_SLOWER * wanted_ns
-    ):
-        found = f"every {_often(gaps) / 1e6:.1f} ms, not {wanted_ns / 1e6:g} ms"
-        why = f"valve frames {marker[1]:#x} {found}: those of another controller"
-    elif status and not any(key in times for key in status):
-        why = "valve frames without status of an axis: those of another controller"
-    return Drive(path, channels, not why, why, _recovery(deployment))
-
-
-def _recovery(deployment: Deployment) -> Callable[[], Recovery]:
-    """What finds the ticks of a daemon; of a deployment that has not sent anything yet."""
-    marker, period = marker_of(deployment)
-    periods = {
-        axis.status.sender.key: axis.status_ticks
-        for axis in deployment.axes.values()
-        if axis.status
-    }
-    if deployment.status:
-        periods[deployment.status.sender.key] = deployment.status_ticks
-    neutral = Controller(deployment).neutral_frames()
-    sender = next(one for one in deployment.senders() if one.key == marker)
-    return partial(
-        Recovery,
-        deployment.config.tick_ms * 1_000_000,
-        (marker, period),
-        next((frame.data for frame in neutral if frame[:3] == marker), b""),
-        count=partial(count_of, sender) if sender.protection.counts else None,
-        periods=periods,
-    )
-
-
-def _often(gaps: list[int]) -> int:
-    """Of the gaps between frames the one that a tenth of them does not exceed."""
-    return sorted(gaps)[len(gaps) // 10]
-
-
-def marker_of(deployment: Deployment) -> tuple[Key, int]:
-    """The valve message that goes out first in a tick, most often; and its period in ticks."""
-    # As in the controller: an axis that asks something of another goes first, and a message goes
-    # out when the last of its axes has moved.
-    axes = sorted(deployment.axes.values(), key=lambda axis: axis.radial is None)
-    last = {axis.valve.message.sender.key: axis.period_ticks for axis in reversed(axes)}
-    key = min(reversed(last), key=lambda one: last[one])
-    return key, last[key]
+    found = {frame.channel for frame in head}
+    return Drive(path, bus_of_channel(deployment, found, given), None, False)
 
 
 class Replay:
     """One deployment through one log.
 
     Args:
-        load: reads the deployment.
+        deployment: the machine; nothing was sent with it yet.
         drive: the log.
-        by_daemon: take the ticks of the daemon that sent the valve frames of the log, and compare;
-            else those of a clock.
 
     Attributes:
+        exact: whether every call of the daemon is played, and every frame compared.
         log: for what it has left out.
-        heard: frames of each message that is taken.
-        verdict: beside the log, where its ticks are taken.
-        cut_off: the log is cut off, and why.
+        received: frames of each message that is received.
+        verdict: beside a black box.
+        cut_off: the log is cut off, and why; else empty.
     """
 
-    def __init__(self, load: Callable[[], Deployment], drive: Drive, *, by_daemon: bool) -> None:
-        self.stepper = Stepper(load, compare=by_daemon)
-        self.heard: Counter[Key] = Counter()
+    def __init__(self, deployment: Deployment, drive: Drive) -> None:
+        self.exact = drive.exact
+        self.received: Counter[Key] = Counter()
         self.verdict = Verdict()
-        self.cut_off: CutOffError | None = None
+        self.cut_off = drive.box.cut_off if drive.box else ""
+        self._deployment = deployment
         self._drive = drive
-        self._by_daemon = by_daemon
         self.log = LogFile(drive.path)
 
     def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
@@ -189,28 +123,25 @@ class Replay:
         Raises:
             LogError: the log cannot be used; one that is cut off is used up to there.
         """
-        self.log = LogFile(self._drive.path, progress)
-        deployment = self.stepper.deployment
-        sorter = Sorter(deployment)
-        if not self._by_daemon:
-            tick_ns = deployment.config.tick_ms * 1_000_000
-            for tick in clocked(self._frames(sorter), tick_ns):
-                if tick.number == 0:
-                    self.stepper.begin(tick)
-                self._count(tick)
-                yield tick, self.stepper.step(tick)
-            return
-        verifier = Verifier(self.stepper)
-        service = deployment.status.sender.key if deployment.status else None
-        for tick, result in verifier.run(self._drive.recovery().ticks(self._frames(sorter))):
-            self._count(tick)
-            self.verdict.add(tick, result, service)
+        for tick, result in self._played(progress) if self.exact else self._clocked(progress):
+            for _, frame in tick.received:
+                self.received[frame[:3]] += 1
+            self.verdict.add(tick, result)
             yield tick, result
-        self.verdict.settled = verifier.settled
 
-    def _count(self, tick: Tick) -> None:
-        for _, frame in tick.taken:
-            self.heard[frame[:3]] += 1
+    def _played(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
+        assert self._drive.box is not None  # only one is exact
+        try:
+            yield from Player(self._drive.box, self._deployment).run(progress)
+        except (BoxError, StateError) as error:
+            raise LogError(str(error)) from None
+
+    def _clocked(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
+        self.log = LogFile(self._drive.path, progress)
+        stepper = Stepper(Controller(self._deployment))
+        tick_ns = self._deployment.config.tick_ms * 1_000_000
+        for tick in clocked(self._frames(Sorter(self._deployment)), tick_ns):
+            yield tick, stepper.step(tick)
 
     def check_joysticks(self) -> None:
         """Look whether there was anything to replay.
@@ -218,13 +149,13 @@ class Replay:
         Raises:
             LogError: the log has no frame of any joystick.
         """
-        deployment = self.stepper.deployment
-        missing = self._missing()
-        if len(missing) == len(deployment.joysticks):
-            named = "; ".join(missing)
-            found = ", ".join(f"{k[0]} {k[1]:#x}" for k in sorted(self.heard)[:MOST_NAMED])
+        deployment = self._deployment
+        missed = self._missing()
+        if len(missed) == len(deployment.joysticks) and not self.exact:
+            named = "; ".join(missed)
+            found = ", ".join(f"{k[0]} {k[1]:#x}" for k in sorted(self.received)[:MOST_NAMED])
             text = f"found none of its joystick messages ({named})"
-            text += f", of what it takes only {found}" if found else ""
+            text += f", of what it receives only {found}" if found else ""
             raise LogError(
                 f"{self._drive.path}: {text}; allowed is a log of the buses of"
                 f" {deployment.path.name}: see --channel and the ids in the DBC files"
@@ -232,22 +163,27 @@ class Replay:
 
     def _missing(self) -> list[str]:
         """Joysticks without frames in the log."""
-        heard = {(bus, group_of(i) if extended else i) for bus, i, extended in self.heard}
+        there = {(bus, group_of(i) if extended else i) for bus, i, extended in self.received}
         return [
             f"{joystick.message.name}, id {joystick.key[1]:#x} on {joystick.key[0]}"
-            for joystick in self.stepper.deployment.joysticks.values()
-            if self.heard.keys().isdisjoint(joystick.keys)
-            and not (joystick.by_group and (joystick.key[0], group_of(joystick.key[1])) in heard)
+            for joystick in self._deployment.joysticks.values()
+            if self.received.keys().isdisjoint(joystick.keys)
+            and not (joystick.by_group and (joystick.key[0], group_of(joystick.key[1])) in there)
         ]
 
     def ticks_of(self) -> str:
         """Whose ticks these are, for people."""
-        if self._by_daemon:
-            return "the ticks are those of the daemon that the log is of"
-        return f"the ticks are those of a clock ({self._drive.why_not or 'as asked'})"
+        box = self._drive.box
+        if self.exact:
+            return "the ticks are those of the daemon that the black box is of"
+        why = "the black box is of other files" if box else "the log has none"
+        return f"the ticks are those of a clock: {why}"
 
     def warnings(self) -> Iterator[str]:
         """What is to be known of the log before its replay is believed."""
+        box, program = self._drive.box, self._deployment.identity.lines()[1]
+        if self.exact and box and program not in box.header["identity"]:
+            yield "the black box is of another program than this one; what is different may be that"
         if self.cut_off:
             yield f"{self.cut_off}; replayed up to there"
         for name in self._missing():
@@ -260,11 +196,11 @@ class Replay:
 
     def _frames(self, sorter: Sorter) -> Iterator[Sorted]:
         """Frames of the log on the buses of the deployment, but those that no daemon sees."""
-        channels = self._drive.channels
+        channels, box = self._drive.channels, self._drive.box
         known: dict[tuple[str, int, bool], tuple[str, Kind]] = {}
         new, ignored = new_frame, Kind.IGNORED
         try:
-            for time_ns, channel, can_id, extended, data in self.log:
+            for time_ns, channel, can_id, extended, data in frames_of(box) if box else self.log:
                 source = (channel, can_id, extended)
                 if (found := known.get(source)) is None:
                     bus = channels.get(channel, "")
@@ -274,4 +210,4 @@ class Replay:
                 if kind is not ignored:
                     yield time_ns, new(Frame, (bus, can_id, extended, data)), kind
         except CutOffError as error:
-            self.cut_off = error
+            self.cut_off = str(error)

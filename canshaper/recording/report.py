@@ -11,7 +11,7 @@ from rich.text import Text
 
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.replay import Replay
-from canshaper.recording.stepper import Difference
+from canshaper.recording.ticks import Difference
 from canshaper.recording.trace import Trace
 from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper.report.table import NOTHING, axis_title
@@ -76,7 +76,10 @@ class Replayed:
             "ticks": self.ticks,
             "missed_deadlines": self.missed,
             "seconds": (self.trace.end_ns - start_ns) / 1e9,
-            "heard": {f"{k[0]} {k[1]:#x}": count for k, count in sorted(replay.heard.items())},
+            "received": {
+                f"{bus} {can_id:#x}": count
+                for (bus, can_id, _), count in sorted(replay.received.items())
+            },
             "axes": {
                 axis: {
                     "straight": asdict(self.straight[axis]),
@@ -86,16 +89,7 @@ class Replayed:
                 }
                 for axis in self.measures
             },
-            "compared": {
-                "frames": verdict.compared,
-                "different": verdict.different,
-                "service_frames": verdict.service_compared,
-                "service_different": verdict.service_different,
-                "settled_ticks": verdict.settled,
-                "starts": verdict.starts,
-                "ran_before": verdict.ran_before,
-                "last_different_s": verdict.last_ns and (verdict.last_ns - start_ns) / 1e9,
-            }
+            "compared": {"frames": verdict.compared, "different": verdict.different}
             if verdict.compared
             else None,
         }
@@ -127,33 +121,16 @@ def verdict_lines(one: Replayed, *, examples: bool) -> Iterator[str]:
     verdict = one.replay.verdict
     if not verdict.compared:
         return
-    yield (
-        f"{one.name}: {verdict.compared} frames of valves and axes in the log,"
-        f" {_same(verdict.different, verdict.compared)}"
-    )
-    if verdict.service_compared:
-        counters = f"{verdict.service_compared} of the service's counters"
-        yield f"  {counters}, {_same(verdict.service_different, verdict.service_compared)}"
-        if verdict.service_different:
-            yield "  (faults of the bus are counted there, and are not in a log)"
-    if verdict.settled:
-        yield (
-            f"  in {verdict.settled} ticks the order on the bus left open what the daemon had read;"
-            " what it sent decided"
-        )
-    if verdict.ran_before:
-        yield "  the log begins while the daemon runs: what its models knew before is not in it"
+    yield f"{one.name}: {verdict.compared} frames sent, {_same(verdict.different)}"
     start_ns = one.trace.start_ns or 0
     for time_ns, difference in verdict.examples if examples else ():
         yield f"  {(time_ns - start_ns) / 1e9:.3f} s: {_told(one.deployment, difference)}"
-    if verdict.last_ns is not None:
-        yield f"  the last difference is at {(verdict.last_ns - start_ns) / 1e9:.3f} s"
 
 
-def _same(different: int, compared: int) -> str:
+def _same(different: int) -> str:
     if not different:
         return "every one the same to the last bit"
-    return f"{min(different, compared)} not the same"
+    return f"{different} not the same"
 
 
 def _told(deployment: Deployment, difference: Difference) -> str:
@@ -175,7 +152,7 @@ def _told(deployment: Deployment, difference: Difference) -> str:
         assert isinstance(values, Mapping)
         return " ".join(f"{k}={v:g}" for k, v in values.items() if isinstance(v, int | float))
 
-    return f"{bus} {name}: log {shown(difference.logged)}; replay {shown(difference.ours)}"
+    return f"{bus} {name}: black box {shown(difference.recorded)}; replay {shown(difference.ours)}"
 
 
 def _axes(replays: Sequence[Replayed]) -> list[str]:

@@ -4,8 +4,7 @@ import math
 from array import array
 
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.stepper import Result
-from canshaper.recording.ticks import Tick
+from canshaper.recording.ticks import Result, Tick
 from canshaper.shaping.sway import SwayModel
 from canshaper_sim.recording import AxisTrace, Recording
 
@@ -60,7 +59,7 @@ class Trace:
             straight = 0.0
             if name in self._models:
                 model, full_speed = self._models[name]
-                model.step(row.stick)
+                model.step(row.command)
                 straight = math.degrees(model.sway_rad(full_speed))
             if kept:
                 for column, value in zip(self._rows[name], (*row, straight), strict=True):

@@ -4,8 +4,7 @@ from collections.abc import Mapping
 from typing import TextIO
 
 from canshaper.codec.frame import Frame
-from canshaper.recording.stepper import Result
-from canshaper.recording.ticks import Tick
+from canshaper.recording.ticks import Result, Tick
 
 
 class LogWriter:
@@ -24,7 +23,7 @@ class LogWriter:
 
     def write(self, tick: Tick, result: Result) -> None:
         """Write one tick; its others are without a time of their own."""
-        for time_ns, frame in tick.taken:
+        for time_ns, frame in tick.received:
             self._line(time_ns, frame)
         for frame in tick.others:
             self._line(self._last_ns, frame)

@@ -6,12 +6,13 @@ from typing import Any
 
 import pytest
 
+from canshaper.codec.codecs import Sender
+from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.inputs.feedback import Following
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.stepper import count_of
 from canshaper.shaping.states import State
 from tests.machine.protected_machine import load
 from tests.rigs.canopen import (
@@ -72,6 +73,14 @@ def j1939(tmp_path: Path) -> J1939Rig:
 
 def last_of(frames: list[Frame]) -> Sent:
     return {frame[:3]: frame.data for frame in frames}
+
+
+def count_of(sender: Sender, data: bytes) -> int:
+    """Alive counter of a frame of a message that has one."""
+    protection = sender.protection
+    if isinstance(protection.check, E2e):
+        return data[1] & COUNTER
+    return int(sender.fields.layout.decode(data)[protection.counter or ""])
 
 
 def counts(deployment: Deployment, sent: Sent) -> dict[tuple[str, int, bool], int]:

@@ -6,9 +6,9 @@ from dataclasses import dataclass, field
 from canshaper.codec.frame import Frame
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.channels import Key
 from canshaper.recording.history import History, Told
 from canshaper.recording.listen import Heard
-from canshaper.recording.sorting import Key
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000

@@ -13,7 +13,7 @@ Key = tuple[str, int, bool]
 class Kind(Enum):
     """What a frame is to the daemon of a deployment."""
 
-    TAKEN = "taken"
+    RECEIVED = "received"
     """It waits in the first socket, and is read before the valves are told."""
     OTHER = "other"
     """It is seen too, after the valves were told."""
@@ -81,7 +81,7 @@ class Sorter:
             return Kind.SENT
         group = group_of(message[0]) if message[1] else -1
         if message in ids.received or group in ids.received_groups:
-            return Kind.TAKEN
+            return Kind.RECEIVED
         if group not in ids.sent_groups and (message in ids.known or (message[1] and ids.j1939)):
             return Kind.IGNORED
-        return Kind.OTHER if self._raw[bus] else Kind.TAKEN
+        return Kind.OTHER if self._raw[bus] else Kind.RECEIVED

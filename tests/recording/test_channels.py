@@ -8,8 +8,8 @@ import pytest
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.channels import Kind, Sorter, bus_of_channel
 from canshaper.recording.frames import LogError
-from canshaper.recording.sorting import Kind, Sorter, bus_of_channel
 from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked
 
 
@@ -55,7 +55,7 @@ def test_a_bus_without_a_channel_is_told_with_what_there_is(
 def test_what_a_frame_is_to_the_daemon(one: Deployment) -> None:
     sorter = Sorter(one)
     kinds = {
-        0x110: Kind.TAKEN,  # a joystick
+        0x110: Kind.RECEIVED,  # a joystick
         0x200: Kind.SENT,  # a valve
         0x300: Kind.SENT,  # a status
         0x310: Kind.SENT,
@@ -69,7 +69,7 @@ def test_what_a_frame_is_to_the_daemon(one: Deployment) -> None:
 def test_other_interfaces_than_socketcan_have_one_queue(one: Deployment) -> None:
     bus = one.config.buses["crane"].model_copy(update={"interface": "udp_multicast"})
     config = one.config.model_copy(update={"buses": {"crane": bus}})
-    assert Sorter(replace(one, config=config)).kind(("crane", 0x123, False)) is Kind.TAKEN
+    assert Sorter(replace(one, config=config)).kind(("crane", 0x123, False)) is Kind.RECEIVED
 
 
 def test_a_pause_costs_no_tick_for_each_of_its_deadlines() -> None:
@@ -77,13 +77,13 @@ def test_a_pause_costs_no_tick_for_each_of_its_deadlines() -> None:
     tick_ns, day_ns = 20_000_000, 24 * 3600 * 10**9
     frame = Frame("crane", 0x110, False, b"\0" * 8)
     times = [0, 5_000_000, day_ns, day_ns + 100_000_000, 400 * day_ns]
-    ticks = list(clocked([(at, frame, Kind.TAKEN) for at in times], tick_ns))
+    ticks = list(clocked([(at, frame, Kind.RECEIVED) for at in times], tick_ns))
     assert [tick.number for tick in ticks] == list(range(len(ticks)))
     assert len(ticks) < 3 * (PAUSE_NS + LEAD_NS) // tick_ns
     assert {(tick.now_ns - ticks[0].now_ns) % tick_ns for tick in ticks} == {0}
-    taken = [(at, tick.now_ns) for tick in ticks for at, _ in tick.taken]
-    assert [at for at, _ in taken] == times
-    assert all(0 <= now_ns - at < tick_ns for at, now_ns in taken)
+    received = [(at, tick.now_ns) for tick in ticks for at, _ in tick.received]
+    assert [at for at, _ in received] == times
+    assert all(0 <= now_ns - at < tick_ns for at, now_ns in received)
     steps = [after.now_ns - before.now_ns for before, after in pairwise(ticks)]
     assert sum(step > tick_ns for step in steps) == 2
     before = [tick.now_ns for tick in ticks if tick.now_ns < day_ns - 2 * LEAD_NS]

@@ -1,0 +1,130 @@
+"""The file of a black box: one line that says what it is, one of JSON, then the segments."""
+
+import json
+import struct
+import zlib
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from canshaper.blackbox.records import SIZE
+from canshaper.blackbox.ring import BLOCK, MOST_BLOCKS, Segment
+
+SUFFIX = ".blackbox"
+MAGIC = b"canshaper black box 1\n"
+# begin in ns, follows on the one before, bytes of the state, bytes of the records, CRC-32 of both
+HEAD = struct.Struct("<q?III")
+MOST_HEADER = 100_000
+MOST_STATE = 10_000_000
+MOST_RECORDS = MOST_BLOCKS * BLOCK
+MOST_SEGMENTS = 1000
+
+
+class BoxError(ValueError):
+    """A black box that cannot be used: says where, what was found and what is allowed."""
+
+
+class BoxSegment(NamedTuple):
+    """A part of a black box without gaps.
+
+    Attributes:
+        begin_ns: by the clock of the daemon, which counts from the start of its PC.
+        follows: whether nothing is missing between the one before and this one.
+        state: of the controller at its begin.
+        records: what happened then, see ``canshaper.blackbox.records``.
+    """
+
+    begin_ns: int
+    follows: bool
+    state: bytes
+    records: bytes
+
+
+@dataclass
+class Box:
+    """What a black box has.
+
+    Attributes:
+        path: the file.
+        header: what is said of it, see ``canshaper.blackbox.keeper.header_of``.
+        segments: the oldest first; at least one.
+        cut_off: where and why the file ends in the middle; empty where it does not.
+    """
+
+    path: Path
+    header: dict[str, Any]
+    segments: list[BoxSegment]
+    cut_off: str = ""
+
+
+def chunks(header: dict[str, Any], segments: Iterable[Segment]) -> Iterator[bytes]:
+    """A black box as bytes, piece by piece."""
+    yield MAGIC + json.dumps(header).encode() + b"\n"
+    for one in segments:
+        data = one.data()
+        crc = zlib.crc32(data, zlib.crc32(one.state))
+        yield HEAD.pack(one.begin_ns, one.follows, len(one.state), len(data), crc)
+        yield one.state
+        yield data
+
+
+def read_box(path: Path) -> Box:
+    """Read a black box.
+
+    Raises:
+        BoxError: it is none, or has not even one segment that is whole.
+        OSError: it cannot be read.
+    """
+    with path.open("rb") as file:
+        if file.readline(len(MAGIC)) != MAGIC:
+            raise BoxError(f"{path}: found no black box, allowed is one of canshaper")
+        try:
+            header = json.loads(file.readline(MOST_HEADER))
+            box = Box(path, _checked(header), [])
+        except (ValueError, KeyError, TypeError, RecursionError) as error:
+            text = f"found {type(error).__name__} {error}, allowed is what canshaper writes"
+            raise BoxError(f"{path}: header: {text}") from None
+        while head := file.read(HEAD.size):
+            number = len(box.segments) + 1
+            try:
+                box.segments.append(_segment(file.read, head))
+            except ValueError as error:
+                box.cut_off = f"{path}: segment {number}: {error}"
+                break
+            if number == MOST_SEGMENTS:
+                break
+    if not box.segments:
+        raise BoxError(box.cut_off or f"{path}: found no segment, allowed is one or more")
+    return box
+
+
+def _checked(header: dict[str, Any]) -> dict[str, Any]:
+    """The header with what a reader needs, each of its kind.
+
+    Raises:
+        ValueError, KeyError, TypeError: it is not.
+    """
+    names = {key: [str(one) for one in header[key]] for key in ("buses", "identity")}
+    numbers = {key: int(header[key]) for key in ("time_ns", "clock_ns")}
+    listens = bool(header["listen_only"])
+    return {**names, **numbers, "listen_only": listens, "why": str(header["why"])}
+
+
+def _segment(read: Any, head: bytes) -> BoxSegment:
+    """The next segment.
+
+    Raises:
+        ValueError: what is wrong with it.
+    """
+    if len(head) < HEAD.size:
+        raise ValueError("the file is cut off")
+    begin_ns, follows, state_size, size, crc = HEAD.unpack(head)
+    if state_size > MOST_STATE or size > MOST_RECORDS or size % SIZE:
+        raise ValueError(f"found a length of {state_size} and {size} bytes, which none has")
+    state, data = read(state_size), read(size)
+    if len(state) < state_size or len(data) < size:
+        raise ValueError("the file is cut off")
+    if zlib.crc32(data, zlib.crc32(state)) != crc:
+        raise ValueError("found another check sum than that of its content")
+    return BoxSegment(begin_ns, follows, state, data)

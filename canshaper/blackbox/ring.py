@@ -1,0 +1,131 @@
+"""A bounded ring in memory: segments of records, each with the controller's state at its begin.
+
+Nothing is allocated in a steady tick: records are packed into blocks that are used again.
+"""
+
+from collections import deque
+
+from canshaper.blackbox.records import RECORD, SIZE
+
+BLOCK = 2048 * SIZE
+# 8 MB: a minute of 5000 records a second, which is two full buses at 500 kbit/s. With more the ring
+# reaches less far back. Memory is taken when it is needed first.
+MOST_BLOCKS = 170
+KEPT_NS = 60_000_000_000
+
+
+class Segment:
+    """What happened from one state of the controller on.
+
+    Attributes:
+        state: of the controller when it begins, see ``canshaper.blackbox.state``.
+        begin_ns: when that is, by ``boottime_ns``.
+        follows: whether nothing is missing between the segment before and this one.
+        blocks: its records.
+        used: bytes of the last block.
+        held: whether somebody still reads it: its blocks must not be used again.
+        cut_off: whether there was no room for its last records.
+    """
+
+    __slots__ = ("begin_ns", "blocks", "cut_off", "follows", "held", "state", "used")
+
+    def __init__(self, state: bytes, begin_ns: int, *, follows: bool) -> None:
+        self.state = state
+        self.begin_ns = begin_ns
+        self.follows = follows
+        self.blocks: list[bytearray] = []
+        self.used = 0
+        self.held = self.cut_off = False
+
+    def data(self) -> bytes:
+        """All its records."""
+        return b"".join([*self.blocks[:-1], *(block[: self.used] for block in self.blocks[-1:])])
+
+
+class Ring:
+    """The last minute, in segments.
+
+    Args:
+        most_blocks: memory that it may take.
+    """
+
+    def __init__(self, most_blocks: int = MOST_BLOCKS) -> None:
+        self._free: list[bytearray] = []
+        self._left = most_blocks
+        self._segments: deque[Segment] = deque()
+        self._open: Segment | None = None
+        self._block = self._nowhere = bytearray(BLOCK)  # what is put there is lost
+        self._at = 0
+
+    @property
+    def segments(self) -> tuple[Segment, ...]:
+        """The oldest first; the last one may still be written to."""
+        if self._open is not None and self._open.blocks:
+            self._open.used = self._at
+        return tuple(self._segments)
+
+    def put(  # noqa: PLR0917  (names would cost as much as the rest of it)
+        self,
+        kind: int,
+        bus: int,
+        length: int,
+        extended: bool,
+        number: int,
+        time_ns: int,
+        data: bytes,
+    ) -> None:
+        """Write one record, see ``canshaper.blackbox.records``."""
+        at = self._at
+        if at == BLOCK:
+            at = self._next_block()
+        RECORD.pack_into(self._block, at, kind, bus, length, extended, number, time_ns, data)
+        self._at = at + SIZE
+
+    def begin(self, state: bytes, now_ns: int, *, follows: bool) -> None:
+        """Begin a segment; what is older than it has to be is dropped."""
+        self.pause()
+        segments = self._segments
+        follows = follows and bool(segments) and not segments[-1].cut_off
+        while len(segments) > 1 and segments[1].begin_ns <= now_ns - KEPT_NS:
+            self._drop()
+        self._open = Segment(state, now_ns, follows=follows)
+        segments.append(self._open)
+        self._at = BLOCK
+
+    def pause(self) -> None:
+        """End the segment; nothing is kept until the next one begins."""
+        _ = self.segments
+        self._open = None
+        self._block, self._at = self._nowhere, 0
+
+    def clear(self) -> None:
+        """Drop everything."""
+        self.pause()
+        while self._segments:
+            self._drop()
+
+    def _drop(self) -> None:
+        segment = self._segments.popleft()
+        if segment.held:
+            self._left += len(segment.blocks)
+        else:
+            self._free += segment.blocks
+
+    def _next_block(self) -> int:
+        """Find a block for what follows; where in it that is put."""
+        segment = self._open
+        if segment is None:
+            return 0  # nowhere, again
+        if not self._free and not self._left and len(self._segments) > 1:
+            self._drop()
+        if self._free:
+            self._block = self._free.pop()
+        elif self._left:
+            self._left -= 1
+            self._block = bytearray(BLOCK)
+        else:
+            self.pause()
+            segment.used, segment.cut_off = BLOCK, True
+            return 0
+        segment.blocks.append(self._block)
+        return 0

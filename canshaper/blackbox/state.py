@@ -1,0 +1,180 @@
+"""The state of a controller as bytes, and back: what a replay has to begin with.
+
+Everything that the controller refers to is kept by value, with ``pickle``, but for what never
+changes: configuration, messages of the DBC files and their layouts, functions. Those are kept by
+number, and are those of the deployment that the replay has loaded.
+
+A black box may come from anybody, and a pickle can call whatever it names. Here it can name only
+classes of the packages that a controller is made of, none of which touches a file or a process, and
+only the opcodes are allowed that are needed.
+"""
+
+import io
+import pickle
+import pickletools
+import sys
+from collections.abc import Callable
+from pathlib import PurePath
+from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
+from typing import Any
+
+from cantools.database.can import Message
+from pydantic import BaseModel
+
+import canshaper
+from canshaper.codec.flags import FlaggedVelocity
+from canshaper.codec.layout import Layout
+from canshaper.codec.signals import FieldSet
+from canshaper.config.filters import restored_filter
+from canshaper.config.source import Source
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.database import Messages
+
+# What a deployment and its DBC files say.
+FIXED = (
+    BaseModel,
+    Message,
+    Messages,
+    Layout,
+    FieldSet,
+    FlaggedVelocity,
+    Source,
+    PurePath,
+    FunctionType,
+    BuiltinFunctionType,
+)
+PROTOCOL = 5
+OPCODES = frozenset(
+    "PROTO FRAME STOP MARK POP POP_MARK MEMOIZE BINGET LONG_BINGET NONE NEWTRUE NEWFALSE BININT"  # noqa: SIM905
+    " BININT1 BININT2 LONG1 BINFLOAT SHORT_BINUNICODE BINUNICODE SHORT_BINBYTES BINBYTES"
+    " EMPTY_TUPLE TUPLE TUPLE1 TUPLE2 TUPLE3 EMPTY_LIST APPEND APPENDS EMPTY_DICT SETITEM SETITEMS"
+    " EMPTY_SET ADDITEMS FROZENSET STACK_GLOBAL NEWOBJ REDUCE BUILD".split()
+)
+Root = tuple[Guarded, Controller]
+
+
+class StateError(ValueError):
+    """The state cannot be kept, or is not that of such a controller."""
+
+
+def _fixed(number: int) -> Any:
+    """In a pickle: what never changes, by its number."""
+    raise NotImplementedError  # its name only is used
+
+
+def _method(one: Any, name: str) -> Any:
+    """In a pickle: a method of an object of ours."""
+    if type(one).__module__ == "builtins" or name.startswith("__"):
+        raise StateError(f"found a method {name} of {type(one).__name__}")
+    return MethodType(getattr(type(one), name), one)
+
+
+class States:
+    """Keeps the state of a controller, and makes controllers from it.
+
+    Args:
+        guarded: a controller behind its output guard, as it is made.
+        controller: that controller.
+
+    Raises:
+        StateError: something in it cannot be kept.
+    """
+
+    def __init__(self, guarded: Guarded, controller: Controller) -> None:
+        self._root: Root = (guarded, controller)
+        self._numbers: dict[int, int] = {}
+        self._fixed: list[Any] = []  # alive, so that no other object gets their ids
+        self._classes: set[type] = set()
+        self._numbering = True
+        self.save()
+        self._numbering = False
+        packages = {kind.__module__.rpartition(".")[0] for kind in self._classes}
+        self._packages = {name for name in packages if name.startswith(f"{canshaper.__name__}.")}
+
+    def save(self) -> bytes:
+        """What the controller knows now.
+
+        Raises:
+            StateError: something in it cannot be kept.
+        """
+        file = io.BytesIO()
+        try:
+            _Pickler(file, self._number, self._classes.add).dump(self._root)
+        except (pickle.PicklingError, TypeError, AttributeError, RecursionError) as error:
+            raise StateError(str(error)) from None
+        return file.getvalue()
+
+    def load(self, state: bytes) -> Root:
+        """A controller that knows what another one knew.
+
+        Raises:
+            StateError: that was not one of this deployment and program, or this is no state.
+        """
+        try:
+            for opcode, _, _ in pickletools.genops(state):
+                if opcode.name not in OPCODES:
+                    raise StateError(f"found the opcode {opcode.name}")
+            guarded, controller = _Unpickler(io.BytesIO(state), self._find).load()
+        except StateError:
+            raise
+        except Exception as error:  # of many kinds, where it is damaged or of another version
+            raise StateError(f"{type(error).__name__}: {error}") from None
+        if type(guarded) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
+            raise StateError("found no controller")
+        return guarded, controller
+
+    def _number(self, one: Any) -> int | None:
+        """Number of what never changes; None for what is kept by value."""
+        number = self._numbers.get(id(one))
+        if number is None and self._numbering:
+            number = self._numbers[id(one)] = len(self._fixed)
+            self._fixed.append(one)
+            self._classes.add(type(one))  # changed numbers of a configuration are kept by value
+        return number
+
+    def _find(self, module: str, name: str) -> Any:
+        """What a state may name."""
+        if name == _fixed.__name__ and module == __name__:
+            return self._fixed.__getitem__
+        found = getattr(sys.modules.get(module), name, None)
+        if found in (_method, restored_filter) or found in self._classes:
+            return found
+        # A filter or an event of another kind than at the start.
+        package = module.rpartition(".")[0]
+        ours = isinstance(found, type) and found.__module__ == module
+        if ours and package in self._packages:
+            return found
+        raise StateError(f"found the name {module}.{name}")
+
+
+class _Pickler(pickle.Pickler):
+    def __init__(
+        self, file: io.BytesIO, number: Callable[[Any], int | None], note: Callable[[type], None]
+    ) -> None:
+        super().__init__(file, PROTOCOL)
+        self._number, self._note = number, note
+
+    def reducer_override(self, one: Any) -> Any:
+        kind = type(one)
+        if one is _fixed or one is _method:
+            return NotImplemented
+        if isinstance(one, type):
+            self._note(one)
+            return NotImplemented
+        if kind is MethodType:
+            return _method, (one.__self__, one.__func__.__name__)
+        if kind is BuiltinFunctionType and not isinstance(one.__self__, ModuleType):
+            raise pickle.PicklingError(f"found a method of {type(one.__self__).__name__}")
+        if isinstance(one, FIXED) and (number := self._number(one)) is not None:
+            return _fixed, (number,)
+        return NotImplemented
+
+
+class _Unpickler(pickle.Unpickler):
+    def __init__(self, file: io.BytesIO, find: Callable[[str, str], Any]) -> None:
+        super().__init__(file)
+        self._find = find
+
+    def find_class(self, module: str, name: str) -> Any:
+        return self._find(module, name)

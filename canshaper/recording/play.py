@@ -1,0 +1,188 @@
+"""A black box, played: every call that the daemon made, in its order, and every frame compared."""
+
+import json
+from collections.abc import Callable, Iterator
+
+from canshaper.blackbox.file import Box, BoxError
+from canshaper.blackbox.records import Kind, Record, records
+from canshaper.blackbox.state import States
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.adjust import Adjuster
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.machine.deployment import Deployment
+from canshaper.recording.frames import TimedFrame
+from canshaper.recording.ticks import Difference, Result, Rows, Tick, Timed
+
+# What the daemon may call between two frames of one tick.
+WITHIN = frozenset((Kind.FAILED, Kind.WITHHELD, Kind.FAULT))
+SENT = frozenset((Kind.TX,))
+OF_A_FRAME = frozenset((Kind.RX, Kind.TX, Kind.FAILED, Kind.WITHHELD))
+
+
+def of_same_files(box: Box, deployment: Deployment) -> bool:
+    """Whether a black box is of this deployment, by the hashes of its files."""
+    return bool(box.header["identity"][2:] == deployment.identity.lines()[2:])
+
+
+def frames_of(box: Box) -> Iterator[TimedFrame]:
+    """The frames that the daemon received, as a log has them."""
+    buses = box.header["buses"]
+    since_1970_ns = box.header["time_ns"] - box.header["clock_ns"]
+    for segment in box.segments:
+        for record in records(segment.records):
+            if record.kind == Kind.RX:
+                data = record.data[: record.length]
+                at_ns = record.time_ns + since_1970_ns
+                yield TimedFrame(at_ns, buses[record.bus], record.number, record.extended, data)
+
+
+class Player:
+    """Plays a black box.
+
+    Args:
+        box: the black box.
+        deployment: that of the daemon; nothing was sent with it yet.
+
+    Raises:
+        StateError: a controller of this deployment cannot be played.
+    """
+
+    def __init__(self, box: Box, deployment: Deployment) -> None:
+        self._box = box
+        if box.header.get("listen_only"):
+            deployment = deployment.listening()
+        controller = Controller(deployment)
+        self._states = States(Guarded(controller), controller)
+
+    def run(self, progress: Callable[[float], None]) -> Iterator[tuple[Tick, Result]]:
+        """Every tick, with all that was received and sent since the one before it.
+
+        Raises:
+            BoxError: what is recorded cannot be.
+        """
+        number, box = -1, self._box
+        since_1970_ns = box.header["time_ns"] - box.header["clock_ns"]
+        played: _Played | None = None
+        for index, segment in enumerate(box.segments):
+            try:
+                if played is None or not segment.follows:
+                    played = _Played(*self._states.load(segment.state), box.header["buses"])
+                for missed, tick, result in played.run(segment.records):
+                    number += 1 + missed
+                    tick.number = number
+                    tick.now_ns += since_1970_ns
+                    tick.received = [(at + since_1970_ns, frame) for at, frame in tick.received]
+                    yield tick, result
+            except (ValueError, LookupError) as error:
+                raise BoxError(f"{box.path}: segment {index + 1}: {error}") from None
+            progress((index + 1) / len(box.segments))
+
+
+class _Played:
+    """A controller that is called as the daemon has called its own."""
+
+    def __init__(self, guarded: Guarded, controller: Controller, buses: list[str]) -> None:
+        self._guarded, self._controller, self._buses = guarded, controller, buses
+        self._adjuster = Adjuster(controller)
+        self._rows = Rows(controller)
+        controller.events.clear()  # told before
+        self._records: list[Record] = []
+        self._at = 0
+        self._text = b""
+        self._begin_tick()
+
+    def _begin_tick(self) -> None:
+        self._received: list[Timed] = []
+        self._result = Result([], {}, [])
+
+    def run(self, data: bytes) -> Iterator[tuple[int, Tick, Result]]:
+        """Every tick, with how many deadlines were missed before it."""
+        self._records, self._at = list(records(data)), 0
+        while (record := self._next()) is not None:
+            if record.kind != Kind.TICK:
+                self._call(record)
+                continue
+            self._tick(record)
+            controller, result = self._controller, self._result
+            result.rows = self._rows()
+            result.events = [event.text for event in controller.events]
+            controller.events.clear()
+            tick = Tick(0, record.time_ns, self._received)
+            self._begin_tick()
+            yield record.number, tick, result
+
+    def _next(self) -> Record | None:
+        if self._at == len(self._records):
+            return None
+        self._at += 1
+        return self._records[self._at - 1]
+
+    def _next_of(self, kinds: frozenset[Kind]) -> Record | None:
+        """The next record, where it is one of these."""
+        if self._at < len(self._records) and self._records[self._at].kind in kinds:
+            return self._next()
+        return None
+
+    def _compare(self, ours: Frame) -> None:
+        """Compare a frame that was computed now with the one that was then."""
+        result = self._result
+        result.sent.append(ours)
+        record = self._next_of(SENT)
+        if record is None:
+            if self._at < len(self._records):  # no recording that ends in the middle of a tick
+                self._differs(Difference(ours[:3], ours.data, None))
+            return
+        result.compared += 1
+        then = self._frame(record)
+        if then != ours:
+            same = then[:3] == ours[:3]
+            self._differs(Difference(then[:3], ours.data if same else None, then.data))
+
+    def _differs(self, difference: Difference) -> None:
+        self._result.differences.append(difference)
+
+    def _frame(self, record: Record) -> Frame:
+        bus = self._buses[record.bus]
+        return Frame(bus, record.number, record.extended, record.data[: record.length])
+
+    def _tick(self, record: Record) -> None:
+        for frame in self._guarded.tick(record.time_ns, record.number):
+            while (call := self._next_of(WITHIN)) is not None:
+                self._call(call)
+            self._compare(frame)
+
+    def _call(self, record: Record) -> None:
+        if record.kind in OF_A_FRAME:
+            self._call_with(self._frame(record), record)
+            return
+        guarded, controller, kind = self._guarded, self._controller, record.kind
+        if kind == Kind.STALLED:
+            guarded.stalled()
+        elif kind == Kind.NEUTRAL:
+            for frame in guarded.neutral_frames():
+                self._compare(frame)
+        elif kind == Kind.OFF_BUS:
+            controller.on_bus_off(self._buses[record.bus])
+        elif kind == Kind.FAULT:
+            controller.counters.add(FrameFault(record.number))
+        elif kind == Kind.SET:
+            self._text += record.data[: record.length]
+            if record.number == record.length:  # that was the last part
+                values, self._text = json.loads(self._text), b""
+                self._adjuster.change(values)
+        else:
+            raise ValueError(f"found a record of kind {kind}")
+
+    def _call_with(self, frame: Frame, record: Record) -> None:
+        guarded, kind = self._guarded, record.kind
+        if kind == Kind.RX:
+            self._received.append((record.time_ns, frame))
+            if (passed := guarded.receive(frame, record.time_ns)) is not None:
+                self._compare(passed)
+        elif kind == Kind.TX:
+            self._differs(Difference(frame[:3], None, frame.data))
+        elif kind == Kind.FAILED:
+            guarded.send_failed(frame)
+        else:
+            guarded.withhold(frame)

@@ -1,0 +1,329 @@
+"""The black box of a daemon: what a trip leaves behind, and what replay makes of it."""
+
+import json
+import logging
+import pickle
+import tracemalloc
+import zipfile
+import zlib
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.blackbox import keeper, ring, write
+from canshaper.blackbox.file import HEAD, MAGIC, read_box
+from canshaper.blackbox.records import RECORD, Kind, records
+from canshaper.blackbox.ring import BLOCK, Ring
+from canshaper.blackbox.state import StateError, States
+from canshaper.cli.app import app
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
+from canshaper.daemon.daemon import Daemon
+from canshaper.machine.binding import load_deployment
+from tests.daemon.test_reload import Bench
+from tests.rigs.forwarder import ROOT
+
+SECOND = 50  # ticks
+TRIP = 3 * SECOND
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(tmp_path, monkeypatch)
+
+
+@pytest.fixture
+def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
+    caplog.set_level(logging.INFO, "canshaper")
+    return lambda: [r.getMessage() for r in caplog.records if "black-box" in r.getMessage()]
+
+
+def drive(bench: Bench, folder: Path | None, ticks: int, trips: tuple[int, ...] = (TRIP,)) -> None:
+    """A drive in which the driver lets go of the enable switch, for a tenth of a second each."""
+
+    def script(number: int) -> None:
+        held = all(not trip <= number < trip + 5 for trip in trips)
+        reset = any(trip + 20 <= number < trip + 25 for trip in trips)
+        centred = any(trip <= number < trip + 40 for trip in trips) or number < 10
+        bench.joysticks(
+            Slew=0 if centred else 500 + number % 300, Enable=int(held), Reset=int(reset)
+        )
+        if number == ticks:
+            bench.stop()
+
+    bench.script = script
+    Daemon(lambda: load_deployment(bench.file), folder).run()
+
+
+def replayed(*arguments: object, code: int = 0) -> str:
+    result = CliRunner().invoke(app, ["replay", *map(str, arguments)])
+    assert result.exit_code == code, result.output
+    return result.output
+
+
+@pytest.fixture
+def box(bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A black box, written after a trip."""
+    monkeypatch.setattr(keeper, "STATE_NS", 10**9)
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    drive(bench, folder, TRIP + 8 * SECOND)
+    (path,) = folder.iterdir()
+    return path
+
+
+def test_a_trip_leaves_a_file_that_is_played_the_same(box: Path, tmp_path: Path) -> None:
+    assert box.name == "machine-0001.zip"
+    out = tmp_path / "out"
+    text = replayed(box, "--verify", "--out", out)
+    assert "the ticks are those of the daemon that the black box is of" in text
+    assert "frames sent, every one the same to the last bit" in text
+    assert "state=TRIPPED from=ACTIVE reason=ENABLE_LOST" in text
+    data = json.loads((out / "replay.json").read_text())["machine"]
+    # From the first tick until five seconds after the trip.
+    assert data["ticks"] == TRIP + 5 * SECOND + 1
+    assert data["compared"]["frames"] > 3 * data["ticks"]
+    about = json.loads(zipfile.ZipFile(box).read("about.json"))
+    assert about["why"].startswith("axis=slew state=TRIPPED")
+    assert about["identity"] == load_deployment(tmp_path / "machine.yaml").identity.lines()
+
+
+def test_with_other_files_its_joysticks_drive_them(box: Path, tmp_path: Path) -> None:
+    text = replayed(box, "--config", "forwarder-robust.yaml", "--out", tmp_path / "out")
+    assert "those of a clock: the black box is of other files" in text
+    assert "reason=ENABLE_LOST" in text
+    verified = ("--config", "forwarder-robust.yaml", "--verify", "--out", tmp_path / "out")
+    assert "is no black box of these files" in replayed(box, *verified, code=2)
+    same = replayed(box, "--config", tmp_path / "machine.yaml", "--out", tmp_path / "out")
+    assert "every one the same to the last bit" in same
+
+
+@pytest.mark.parametrize("ticks", [TRIP + 10, TRIP + 6 * SECOND])
+def test_a_daemon_that_ends_writes_first(bench: Bench, tmp_path: Path, ticks: int) -> None:
+    drive(bench, tmp_path / ".", ticks)
+    assert (tmp_path / "machine-0001.zip").exists()
+
+
+def test_without_a_trip_or_a_folder_nothing_is_written(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    drive(bench, folder, TRIP, trips=())
+    drive(bench, None, TRIP + 6 * SECOND)
+    assert list(folder.iterdir()) == []
+    assert log() == []
+
+
+def test_a_folder_that_cannot_be_written_costs_one_line(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    folder = tmp_path / "none"
+    drive(bench, folder, TRIP + 20 * SECOND)
+    assert log() == [f"black-box=not-written folder={folder} No such file or directory"]
+
+
+def test_many_trips_make_a_file_a_minute_and_the_oldest_go(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    monkeypatch.setattr(write, "MOST_FILES", 2)
+    monkeypatch.setattr(keeper, "BETWEEN_NS", 20 * 10**9)
+    monkeypatch.setattr(keeper.os, "WNOHANG", 0)  # time passes quicker here than a file is written
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    (folder / "another-0007.zip").touch()
+    drive(bench, folder, 70 * SECOND, trips=tuple(range(TRIP, 69 * SECOND, 2 * SECOND)))
+    assert len(log()) == 4  # at 8, 28, 48 and 68 s
+    names = sorted(path.name for path in folder.iterdir())
+    assert names == ["another-0007.zip", "machine-0003.zip", "machine-0004.zip"]
+    for name in names[1:]:
+        replayed(folder / name, "--verify", "--out", tmp_path / "out")
+
+
+def test_it_reaches_a_minute_back_and_not_much_further(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    trip = 95 * SECOND
+    drive(bench, folder, trip + 6 * SECOND, trips=(trip,))
+    out = tmp_path / "out"
+    replayed(folder / "machine-0001.zip", "--verify", "--out", out)
+    data = json.loads((out / "replay.json").read_text())["machine"]
+    assert 60 * SECOND <= data["ticks"] <= 75 * SECOND + 1
+    assert data["axes"]["slew"]["trips"] == 1
+
+
+def test_a_reload_of_the_same_files_is_played_through(bench: Bench, tmp_path: Path) -> None:
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    acts = {10: bench.reload, TRIP + 30: bench.reload}
+
+    def before(number: int) -> None:
+        if number in acts:
+            acts[number]()
+
+    joysticks = bench.joysticks
+    numbers = iter(range(10_000))
+    bench.joysticks = lambda **raw: (before(next(numbers)), joysticks(**raw))  # type: ignore[method-assign]
+    drive(bench, folder, TRIP + 6 * SECOND)
+    box = read_box(inside(folder / "machine-0001.zip", tmp_path))
+    assert [segment.follows for segment in box.segments].count(False) == 3
+    replayed(folder / "machine-0001.zip", "--verify", "--out", tmp_path / "out")
+
+
+def inside(box: Path, folder: Path) -> Path:
+    """The black box in a bundle, by itself."""
+    path = folder / write.BOX
+    path.write_bytes(zipfile.ZipFile(box).read(write.BOX))
+    return path
+
+
+# -- files that are not as they were written ---------------------------------------------------
+
+
+def test_one_bit_that_is_not_the_same_is_found_with_its_time(box: Path, tmp_path: Path) -> None:
+    path = inside(box, tmp_path)
+    data = bytearray(path.read_bytes())
+    at = data.index(b"\n", len(MAGIC)) + 1
+    _, _, state, size, _ = HEAD.unpack_from(data, at)
+    begin = at + HEAD.size + state
+    valves = [
+        begin + i * RECORD.size
+        for i, record in enumerate(records(bytes(data[begin : begin + size])))
+        if record.kind == Kind.TX and record.number == 0x200
+    ]
+    data[valves[30] + RECORD.size - 8] ^= 1
+    checked(data, at, begin, size)
+    path.write_bytes(data)
+    text = replayed(path, *options(tmp_path), "--verify", code=1)
+    assert "1 not the same" in text
+    assert "0.600 s: crane SlewCommand: black box" in text
+
+
+def options(folder: Path) -> list[str]:
+    return ["--config", str(folder / "machine.yaml"), "--out", str(folder / "out")]
+
+
+def checked(data: bytearray, at: int, begin: int, size: int) -> None:
+    """Give a segment the check sum of what it has now."""
+    data[at + HEAD.size - 4 : at + HEAD.size] = zlib.crc32(
+        bytes(data[at + HEAD.size : begin + size])
+    ).to_bytes(4, "little")
+
+
+@pytest.mark.parametrize("part", [0.0, 0.001, 0.02, 0.5, 0.9, 0.999])
+def test_one_that_is_cut_off_is_played_up_to_there_or_told(
+    box: Path, tmp_path: Path, part: float
+) -> None:
+    path = inside(box, tmp_path)
+    whole = path.read_bytes()
+    path.write_bytes(whole[: round(part * len(whole))])
+    result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
+    assert result.exit_code == (0 if part > 0.1 else 2), result.output
+    assert "Traceback" not in result.output
+    text = result.output.replace("\n", "")
+    assert "the file is cut off" in text if part > 0.01 else "found" in text
+
+
+def test_a_byte_that_is_another_is_told(box: Path, tmp_path: Path) -> None:
+    path = inside(box, tmp_path)
+    whole = path.read_bytes()
+    for at in range(3, len(whole), len(whole) // 40):
+        path.write_bytes(whole[:at] + bytes([whole[at] ^ 0x55]) + whole[at + 1 :])
+        result = CliRunner().invoke(app, ["replay", str(path), *options(tmp_path)])
+        assert result.exit_code in (0, 2), result.output
+        assert result.exception is None or isinstance(result.exception, SystemExit)
+
+
+class Hostile:
+    def __reduce__(self) -> tuple[object, ...]:
+        return (open, ("/tmp/canshaper-hostile", "w"))
+
+
+def test_a_state_can_call_nothing_of_its_own(tmp_path: Path) -> None:
+    deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
+    controller = Controller(deployment)
+    states = States(Guarded(controller), controller)
+    good = states.save()
+    assert type(states.load(good)[1]) is Controller
+    for bad in (
+        pickle.dumps(Hostile(), 5),
+        b"cos\nsystem\n(S'true'\ntR.",
+        pickle.dumps(Daemon, 5),
+        pickle.dumps(7, 5),
+        good[:-20],
+        b"",
+    ):
+        with pytest.raises(StateError):
+            states.load(bad)
+
+
+# -- the ring ----------------------------------------------------------------------------------
+
+
+def filled(ring_: Ring, count: int, first: int = 0) -> None:
+    for number in range(first, first + count):
+        ring_.put(Kind.RX, 0, 8, False, number, 10 * number, b"12345678")
+
+
+def test_the_ring_takes_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+    a_block = BLOCK // RECORD.size
+    one = Ring(most_blocks=4)
+    filled(one, 3)  # nowhere: nothing has begun
+    assert one.segments == ()
+    for number in range(20):
+        one.begin(b"%d" % number, number * 10**9, follows=True)
+        filled(one, a_block * 3 // 2, number)
+        blocks = {id(block) for segment in one.segments for block in segment.blocks}
+        assert len(blocks) <= 4
+    last, newest = one.segments[-2:]
+    assert [last.state, newest.state] == [b"18", b"19"]
+    read = [record.number for record in records(newest.data())]
+    assert read == list(range(19, 19 + a_block * 3 // 2))
+
+
+def test_what_is_more_than_all_of_it_is_cut_off() -> None:
+    a_block = BLOCK // RECORD.size
+    one = Ring(most_blocks=2)
+    one.begin(b"", 0, follows=True)
+    filled(one, 5 * a_block)
+    (segment,) = one.segments
+    assert segment.cut_off
+    assert len(segment.data()) == 2 * BLOCK
+    one.begin(b"", 10**9, follows=True)
+    filled(one, 3)
+    assert not one.segments[-1].follows
+    assert [r.number for r in records(one.segments[-1].data())] == [0, 1, 2]
+
+
+def test_what_is_held_is_not_written_over() -> None:
+    a_block = BLOCK // RECORD.size
+    one = Ring(most_blocks=2)
+    one.begin(b"", 0, follows=True)
+    filled(one, a_block)
+    (held,) = one.segments
+    held.held = True
+    before = held.data()
+    for number in range(4):
+        one.begin(b"", (100 + number) * 10**9, follows=True)
+        filled(one, a_block, 10**6)
+    assert held.data() == before
+    assert held not in one.segments
+
+
+def test_a_steady_ring_takes_no_more_memory() -> None:
+    one = Ring(most_blocks=3)
+    one.begin(b"", 0, follows=True)
+    filled(one, 3 * BLOCK // RECORD.size)
+    one.begin(b"", 100 * 10**9, follows=True)
+    tracemalloc.start()
+    try:
+        before = tracemalloc.get_traced_memory()[0]
+        filled(one, 2000)
+        assert tracemalloc.get_traced_memory()[0] - before < 2000
+    finally:
+        tracemalloc.stop()
+    assert ring.KEPT_NS == 60 * 10**9
