@@ -1,34 +1,50 @@
 """mutmut with more operators, and what its result says; for tools/mutation.py.
 
-mutants.py run SURVIVORS|- [PATTERN ...]     in the working directory, where mutmut finds its
-mutants.py judge SURVIVORS [PATTERN ...]     settings as soon as it is imported
+    mutants.py run PROCESSES SURVIVORS|- [PATTERN ...]
+    mutants.py judge SURVIVORS [PATTERN ...]
+
+In the working directory, where mutmut finds its settings as soon as it is imported.
 """
 
 import fnmatch
 import re
 import signal
 import sys
-from collections import Counter
+from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator
+from difflib import unified_diff
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import libcst as cst
+from mutant_names import numbered
 from mutmut import __main__ as mutmut
 from mutmut.mutation.data import SourceFileMutationData
-from mutmut.mutation.diff_apply import get_diff_for_mutant
+from mutmut.mutation.diff_apply import read_functions_from_index
 from mutmut.mutation.mutators import mutation_operators
 from mutmut.runners.harness import PytestRunner
 from mutmut.state import state
 from mutmut.utils.file_utils import change_cwd, walk_mutatable_files
 from mutmut.workers import isolation
 
-PROCESSES = 2
 # Exit codes of mutmut's workers: a test failed, or its time was up (a loop that never ends).
 KILLED, TIMED_OUT, SURVIVED, TYPES = (1, 3), (-27, -24, 24, 36, 152, 255), 0, 37
 UNREACHED = 33  # none of the chosen tests calls the function
 
-Change = tuple[str, tuple[str, ...]]  # function, and the lines of the difference
+
+class Mutant(NamedTuple):
+    """One change: where its exit code is, mutmut's name for it, ours, and the source with it."""
+
+    data: SourceFileMutationData
+    key: str
+    name: str  # function: operator #number
+    before: str
+    after: str
+
+    def difference(self) -> str:
+        """Lines that changed."""
+        lines = unified_diff(self.before.splitlines(), self.after.splitlines(), n=0)
+        return "\n".join(line.rstrip() for line in list(lines)[3:])
 
 
 # -- more operators than mutmut has ----------------------------------------------------------------
@@ -87,10 +103,11 @@ def run_tests(runner: PytestRunner, *, mutant_name: str | None, tests: Iterable[
         return int(runner.execute_pytest(runner._pytest_args_regular_run(tests), plugins=plugins))
 
 
-def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None:
+def run(processes: int, patterns: list[str], survivors: dict[str, str] | None = None) -> None:
     """Run mutmut.
 
     Args:
+        processes: how many at a time.
         patterns: names of mutants; none for all.
         survivors: where time is short, what is known to survive; it is not run again, and neither
             is what puts None into the code, which the type checker refuses.
@@ -101,24 +118,36 @@ def run(patterns: list[str], survivors: dict[Change, str] | None = None) -> None
     if survivors is not None:
         Path("mutants").mkdir()
         mutmut.copy_src_dir()
-        mutmut.create_mutants(PROCESSES)
-        for data, name, change in mutants():
-            nones = Counter(line[0] for line in change[1] for _ in re.findall(r"\bNone\b", line))
-            if change in survivors or nones["+"] > nones["-"]:
-                data.exit_code_by_key[name] = SURVIVED if change in survivors else TYPES
-                data.save()
-    mutmut._run(patterns, PROCESSES)
+        mutmut.create_mutants(processes)
+        for mutant in mutants():
+            of_types = re.search(r"-> None #\d+$", mutant.name)
+            if mutant.name in survivors or of_types:
+                code = SURVIVED if mutant.name in survivors else TYPES
+                mutant.data.exit_code_by_key[mutant.key] = code
+                mutant.data.save()
+    mutmut._run(patterns, processes)
 
 
-def mutants() -> Iterator[tuple[SourceFileMutationData, str, Change]]:
-    """Every mutant: where its exit code is, its name, and what it changed."""
+def mutants() -> Iterator[Mutant]:
+    """Every mutant."""
     for path in walk_mutatable_files():
         data = SourceFileMutationData(path=path)
         data.load()
-        for name in data.exit_code_by_key:
-            lines = get_diff_for_mutant(name, path=path).splitlines()[2:]
-            changed = tuple(line.rstrip() for line in lines if line[:1] in "+-")
-            yield data, name, (function_of(name), changed)
+        of_function: defaultdict[str, list[str]] = defaultdict(list)
+        for key in data.exit_code_by_key:
+            of_function[function_of(key)].append(key)
+        for function, keys in of_function.items():
+            sources = [source_of(key, path) for key in keys]
+            for key, name, source in zip(keys, numbered(sources), sources, strict=True):
+                yield Mutant(data, key, f"{function}: {name}", *source)
+
+
+def source_of(key: str, path: Path) -> tuple[str, str]:
+    """Source of a function before and after a mutant."""
+    functions = read_functions_from_index(key, path)
+    assert functions, f"mutmut has no lines of {key}"
+    before, after = (cst.Module([function]).code.strip() + "\n" for function in functions)
+    return before, after
 
 
 def function_of(mutant: str) -> str:
@@ -127,61 +156,62 @@ def function_of(mutant: str) -> str:
     return re.sub(r"xǁ(\w+)ǁ", r"\1.", name).replace(".x_", ".")
 
 
-def explained(survivors: Path) -> dict[Change, str]:
-    """Survivors with their reasons: `function`, lines of the difference, `= reason`, blank line."""
-    entries: dict[Change, str] = {}
+def explained(survivors: Path) -> dict[str, str]:
+    """Survivors with their reasons: names, a line each, and under them, indented, the reason."""
+    entries: dict[str, str] = {}
     for block in survivors.read_text().split("\n\n"):
-        lines = [line.rstrip() for line in block.splitlines() if not line.startswith("#")]
-        if lines:
-            changed = tuple(line for line in lines[1:] if line[0] in "+-")
-            reason = " ".join(line[1:].strip() for line in lines[1:] if line[0] == "=")
-            if not (changed and reason):
-                raise SystemExit(f"{survivors.name}: no difference or no reason:\n{block}")
-            entries[lines[0], changed] = reason
+        lines = [line for line in block.splitlines() if not line.startswith("#")]
+        names = [line for line in lines if not line[:1].isspace()]
+        reason = " ".join(line.strip() for line in lines[len(names) :])
+        if lines and not (names and reason):
+            raise SystemExit(f"{survivors.name}: no name or no reason:\n{block}")
+        for name in names:
+            if name in entries:
+                raise SystemExit(f"{survivors.name}: stands there twice: {name}")
+            entries[name] = reason
     return entries
 
 
-def judge(known: dict[Change, str], patterns: list[str]) -> int:
+def judge(known: dict[str, str], patterns: list[str]) -> int:
     """Print the result; 0 when every survivor has its reason, and every reason its survivor."""
     counts: Counter[str] = Counter()
-    seen: set[Change] = set()
-    alive: set[Change] = set()
+    seen: set[str] = set()
     failures = 0
-    for data, name, change in mutants():
-        if patterns and not any(fnmatch.fnmatch(name, pattern) for pattern in patterns):
+    for mutant in mutants():
+        if patterns and not any(fnmatch.fnmatch(mutant.key, pattern) for pattern in patterns):
             continue
-        code = data.exit_code_by_key[name]
-        seen.add(change)
+        code = mutant.data.exit_code_by_key[mutant.key]
+        seen.add(mutant.name)
         if code in (*KILLED, *TIMED_OUT):
             counts["killed" if code in KILLED else "killed by the time limit"] += 1
+            if mutant.name in known:
+                failures += 1
+                print(f"\n# killed, though explained\n{mutant.name}\n{mutant.difference()}")
         elif code == TYPES:
             counts["left to the type checker"] += 1
-        elif code == SURVIVED and change in known:
+        elif code == SURVIVED and mutant.name in known:
             counts["survived for a reason"] += 1
-            alive.add(change)
         else:
             failures += 1
             words = {SURVIVED: "survived", UNREACHED: "reached by no test"}
             what = words.get(code, f"came to nothing ({code})")
             counts[what] += 1
-            print(f"\n# {what}: {name}", change[0], *change[1], sep="\n")
-    for change in (known.keys() & seen) - alive:  # a function may have the same line twice
-        print("\n# killed, though explained", change[0], *change[1], sep="\n")
-    mutated = {function.rpartition(".")[0] for function, _ in seen}
-    for function, changed in known:
-        module = function.rpartition(".")[0]
-        if not patterns and module in mutated and (function, changed) not in seen:
+            print(f"\n# {what}: {mutant.key}\n{mutant.name}\n{mutant.difference()}")
+    mutated = {name.partition(":")[0].rpartition(".")[0] for name in seen}
+    for name in known:
+        of = name.partition(":")[0].rpartition(".")[0]
+        if not patterns and of in mutated and name not in seen:
             failures += 1
-            print("\n# explained, but no such mutant", function, *changed, sep="\n")
+            print(f"\n# explained, but no such mutant\n{name}")
     print(f"\n{counts.total()} mutants:", ", ".join(f"{n} {what}" for what, n in counts.items()))
     return 1 if failures or not counts else 0
 
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["run", "-", *patterns]:
-            run(patterns)
-        case ["run", survivors, *patterns]:
-            run(patterns, explained(Path(survivors)))
+        case ["run", processes, "-", *patterns]:
+            run(int(processes), patterns)
+        case ["run", processes, survivors, *patterns]:
+            run(int(processes), patterns, explained(Path(survivors)))
         case ["judge", survivors, *patterns]:
             sys.exit(judge(explained(Path(survivors)), patterns))

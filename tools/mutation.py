@@ -3,6 +3,7 @@
     tools/mutation.py                     every module of the coverage gate, group by group
     tools/mutation.py core                what runs in `make test`: state machine and output limits
     tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
+    tools/mutation.py -j1 daemon          so many at a time, here one; two without it
 
 Each mutant gets the quick tests that reach its function. Survivors have to stand, with a reason, in
 tests/mutation/survivors.txt; the run fails for one that does not, and for an entry that fits no
@@ -20,15 +21,12 @@ from pathlib import Path
 ROOT = Path(__file__).parents[1]
 SURVIVORS = ROOT / "tests/mutation/survivors.txt"
 DAEMON = [f"tests/{room}" for room in ("inputs", "guard", "protocols", "controller", "daemon")]
-# Groups: the rooms of the modules, and the tests that reach them.
-ROOMS = {
-    "shaping": ("shaping",),
-    "controller": ("inputs", "guard", "protocols", "controller"),
-    "daemon": ("daemon",),
-    "bus": ("bus",),
-}
+# The groups: rooms, each with the tests that reach it.
 TESTS = {
     "shaping": ["tests/shaping"],
+    "inputs": DAEMON,
+    "guard": DAEMON,
+    "protocols": DAEMON,
     "controller": DAEMON,
     "daemon": DAEMON,
     "bus": ["tests/bus"],
@@ -45,10 +43,10 @@ COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
 
 
 def modules(group: str) -> list[str]:
-    """Modules of the coverage gate in the rooms of a group."""
+    """Modules of the coverage gate in a room."""
     config = tomllib.loads((ROOT / "pyproject.toml").read_text())
     gate: list[str] = config["tool"]["coverage"]["run"]["source_pkgs"]
-    return [name for name in gate if name.split(".")[1] in ROOMS[group]]
+    return [name for name in gate if name.split(".")[1] == group]
 
 
 def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
@@ -77,7 +75,7 @@ use_git_change_detection = false
     )
 
 
-def run(group: str, patterns: list[str]) -> int:
+def run(group: str, patterns: list[str], processes: str) -> int:
     """Prepare, run and judge one group."""
     work = ROOT / "out/mutation" / group
     start = time.monotonic()
@@ -89,7 +87,8 @@ def run(group: str, patterns: list[str]) -> int:
     mutants = [sys.executable, str(ROOT / "tools/mutants.py")]
     log = work / "mutmut.log"
     with log.open("w") as out:
-        command = [*mutants, "run", str(SURVIVORS) if group == "core" else "-", *patterns]
+        known = str(SURVIVORS) if group == "core" else "-"
+        command = [*mutants, "run", processes, known, *patterns]
         ran = subprocess.run(command, cwd=work, stdout=out, stderr=subprocess.STDOUT, check=False)
     if ran.returncode:
         print(log.read_text()[-5000:])
@@ -105,7 +104,9 @@ def run(group: str, patterns: list[str]) -> int:
 
 
 if __name__ == "__main__":
-    groups, chosen = sys.argv[1:2] or list(TESTS), sys.argv[2:]
-    if not set(groups) <= {*TESTS, "core"}:
+    arguments = sys.argv[1:]
+    at_a_time = arguments.pop(0)[2:] if arguments[:1] and arguments[0].startswith("-j") else "2"
+    groups, chosen = arguments[:1] or list(TESTS), arguments[1:]
+    if not set(groups) <= {*TESTS, "core"} or not at_a_time.isdecimal():
         sys.exit(__doc__)
-    sys.exit(max([run(group, chosen) for group in groups]))
+    sys.exit(max([run(group, chosen, at_a_time) for group in groups]))
