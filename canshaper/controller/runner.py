@@ -59,6 +59,7 @@ class AxisRunner:
         self._joystick = joystick
         self._releases = self._presses = 0  # as this axis knows them
         self._signal = config.command.signal
+        self._put = bound.valve.put
         self._neutral_band = config.command.neutral_pct / 100.0
         self.period_ticks = bound.period_ticks
         self.period_s = period_s = tick_s * bound.period_ticks
@@ -195,22 +196,22 @@ class AxisRunner:
         fault = None
         if emergency or self._interlocks or self._invalid or self._foreign_ns is not None:
             fault = self._objections(now_ns, emergency)
+        axis, joystick = self.axis, self._joystick
         trip, self._trip = self._trip, None
-        stick = self._joystick.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
-        self._releases = self._joystick.releases
+        stick = joystick.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
+        self._releases = joystick.releases
         # A release is more than a fault.
-        if fault is not None and (stick.enabled or self.axis.neutral):
+        if fault is not None and (stick.enabled or axis.neutral):
             stick = StickInput(fault=fault, reset=stick.reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
-        overrun = overrun and self.axis.state is not State.BYPASS_ON
-        if overrun and stick.enabled and stick.fault is None:
+        if overrun and axis.state is not State.BYPASS_ON and stick.enabled and stick.fault is None:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, reset=stick.reset, trip=stick.trip)
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self.compensator is not None:
             self.added = self.compensator.before_slew()
-        transition = self.axis.act(stick, self.added)
-        self.bound.valve.put(self.axis.raw)
+        transition = axis.act(stick, self.added)
+        self._put(axis.raw)
         return transition
 
     def post_step(self, now_ns: int) -> None:

@@ -96,3 +96,23 @@ class AddedBounds:
         self._way_s += self._now * ticks * self._tick_s
         if abs(self._now) >= self._least:
             self._left -= ticks
+
+
+def without_opposing(added: float, command: float, target: float) -> float:
+    """What is left of an added velocity without what goes against a joystick that is held.
+
+    Args:
+        added: the velocity that another axis adds.
+        command: the operator's command.
+        target: what is asked for on its account.
+
+    Raises:
+        ValueError: the added one is no velocity.
+    """
+    if not abs(added) <= 1.0:
+        raise ValueError(f"added velocity is {added}")
+    if command > 0.0:
+        return max(added, min(0.0, target) - target)
+    if command < 0.0:
+        return min(added, max(0.0, target) - target)
+    return added

@@ -63,7 +63,7 @@ def period_s(rig: Rig) -> float:
 
 
 def poles(rig: Rig) -> tuple[float, float]:
-    shaper = rig.controller.axes["slew"].axis._shaper
+    shaper = rig.controller.axes["slew"].axis._transfer._shaper
     assert isinstance(shaper, Gff)
     return shaper.poles_rad_s
 

@@ -8,13 +8,14 @@ from typing import Any
 
 import pytest
 
-from canshaper.shaping.axis import BLEND_S, Axis
+from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State, StickInput
 from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.transfer import BLEND_S
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]
@@ -347,7 +348,7 @@ def test_a_filter_that_breaks_in_a_missed_tick_trips(drive: Drive, error: type[E
             raise error
 
     drive.moving()
-    drive.axis._shaper = Broken()
+    drive.axis._transfer._shaper = Broken()
     drive.axis.hold(2)
     assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
     assert drive.axis.raw == 0
@@ -361,7 +362,7 @@ def test_of_a_long_standstill_not_every_tick_is_gone_through(drive: Drive) -> No
             self.times += 1
             return 0.0
 
-    drive.axis._shaper = counted = Counted()
+    drive.axis._transfer._shaper = counted = Counted()
     drive.axis.hold(50 * 86_400)
     assert counted.times <= 2000
 
@@ -376,7 +377,7 @@ def test_in_missed_ticks_the_filter_sees_the_last_command(drive_with: DriveWith)
 
     drive = drive_with(limits=OutputLimits(maximum=0.5))
     drive.moving()
-    drive.axis._shaper = Seen()
+    drive.axis._transfer._shaper = Seen()
     for stick in (0.3, -0.8):
         drive.tick(StickInput(stick))
         drive.axis.hold(2)
