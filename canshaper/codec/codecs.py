@@ -1,20 +1,17 @@
-"""Codecs of a joystick and of the status messages."""
+"""Codec of a joystick, and the messages that we send."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 from cantools.database.can import Message
 
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.protection import UNPROTECTED, Protection, Protector
 from canshaper.codec.signals import FieldSet, VelocitySignal
-from canshaper.shaping.states import Reason, State
-
-DIGEST_BITS = 16
+from canshaper.shaping.states import Reason
 
 
 class WrongLengthError(Exception):
@@ -86,81 +83,3 @@ class Sender:
         """The next frame, protected, with these raw values."""
         data = self.protector.protect({**self.fields.start, **raw})
         return Frame(self._bus, self._id, self._extended, data)
-
-
-ACTIVE_SET = "ActiveSet"
-
-
-@dataclass(frozen=True, slots=True)
-class AxisStatusCodec:
-    """Status message of an axis."""
-
-    sender: Sender
-    SIGNALS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway")
-    CODES: ClassVar[dict[str, int]] = {"State": max(State), "Reason": max(Reason)}
-
-    def frame(
-        self,
-        state: State,
-        reason: Reason,
-        command: float,
-        sent: float,
-        sway_deg: float,
-        *,
-        active_set: int = 0,
-    ) -> Frame:
-        """Status frame; command and sent in [-1, 1].
-
-        The signal ActiveSet need not be there.
-        """
-        fields = self.sender.fields
-        raw = {
-            "State": int(state),
-            "Reason": int(reason),
-            "RawCommand": fields.raw("RawCommand", 100.0 * command),
-            "ShapedCommand": fields.raw("ShapedCommand", 100.0 * sent),
-            "PredictedSway": fields.raw("PredictedSway", sway_deg),
-        }
-        if ACTIVE_SET in fields.start:
-            raw[ACTIVE_SET] = fields.raw(ACTIVE_SET, active_set)
-        return self.sender.frame(raw)
-
-
-@dataclass(frozen=True, slots=True)
-class IdentityCodec:
-    """Message with the digest of what runs."""
-
-    sender: Sender
-    SIGNALS = ("Digest",)
-    CODES: ClassVar[dict[str, int]] = {"Digest": (1 << DIGEST_BITS) - 1}
-
-    def frame(self, digest: int) -> Frame:
-        """The frame with this digest."""
-        return self.sender.frame({"Digest": digest})
-
-    def digest(self, data: bytes) -> int | None:
-        """The digest in a frame; None where its length is wrong."""
-        layout = self.sender.fields.layout
-        return int(layout.decode(data)["Digest"]) if len(data) == layout.length else None
-
-
-@dataclass(frozen=True, slots=True)
-class ServiceStatusCodec:
-    """Status message of the whole service: counters that stop at their largest value."""
-
-    sender: Sender
-    SIGNALS = (
-        "LastFault",
-        "MissedDeadlines",
-        "WrongLength",
-        "UnknownId",
-        "ErrorFrames",
-        "InvalidSignals",
-        "SendFailures",
-    )
-    CODES: ClassVar[dict[str, int]] = {"LastFault": max(FrameFault)}
-
-    def frame(self, values: dict[str, int]) -> Frame:
-        """Status frame from the counters by signal name."""
-        fields = self.sender.fields
-        return self.sender.frame({name: fields.raw(name, values[name]) for name in self.SIGNALS})

@@ -6,7 +6,6 @@ everything here is decoded raw (``Layout``) and judged raw.
 
 import math
 import re
-from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -106,26 +105,6 @@ def set_point_fault(signal: Signal) -> str | None:
         text = f"{signal.name} has {steps} steps to full command; a set point of CiA 408 has"
         return f"{text} {FULL_SET_POINT}, and float at {raw_limits(signal)[1]}"
     return None
-
-
-def status_faults(message: Message, names: Iterable[str], codes: dict[str, int]) -> list[str]:
-    """Why a message cannot carry a status.
-
-    Args:
-        message: the message.
-        names: signals of the status.
-        codes: largest number that a signal has to carry, where that is fixed.
-    """
-    signals = {s.name: s for s in message.signals if s.name in names}
-    missing = [n for n in names if n not in signals]
-    faults = [f"lacks the signals {', '.join(missing)}"] if missing else []
-    for name, signal in signals.items():
-        if signal.is_float or not signal.scale:
-            found = "is a float" if signal.is_float else "has a scale of 0"
-            faults.append(f"{name} {found}; allowed is an integer signal with a scale")
-        elif raw_limits(signal)[1] < codes.get(name, 0):
-            faults.append(f"{name} cannot carry {codes[name]} with {signal.length} bits")
-    return faults
 
 
 def special_codes(signal: Signal) -> dict[Any, Reason]:
@@ -231,3 +210,8 @@ class FieldSet:
         """
         scale, offset, low, high = self._fields[name]
         return min(max(round((value - offset) / scale), low), high)
+
+    def value(self, name: str, raw: float) -> float:
+        """Physical value of a raw one."""
+        scale, offset, _, _ = self._fields[name]
+        return raw * scale + offset

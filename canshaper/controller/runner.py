@@ -250,12 +250,15 @@ class AxisRunner:
 
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""
-        if self.bound.status is None:
-            return None
-        axis = self.axis
-        sway_rad = axis.sway.sway_rad(self._full_speed_m_s) if axis.sway else 0.0
-        sway_deg = math.degrees(sway_rad)
-        number = self.chooser.number if self.chooser else 0
-        return self.bound.status.frame(
-            axis.state, axis.reason, axis.command, axis.sent, sway_deg, active_set=number
-        )
+        return self.bound.status.frame(self) if self.bound.status else None
+
+    @property
+    def sway_deg(self) -> float:
+        """Predicted swing of the load."""
+        sway = self.axis.sway
+        return math.degrees(sway.sway_rad(self._full_speed_m_s)) if sway else 0.0
+
+    @property
+    def active_set(self) -> int:
+        """Number of the parameter set that is chosen; 0 where there is no choice."""
+        return self.chooser.number if self.chooser else 0

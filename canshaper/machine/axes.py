@@ -1,6 +1,6 @@
 """Axes of a deployment, bound to the DBC: valve, filters, status, and what they ask of others."""
 
-from canshaper.codec.codecs import AxisStatusCodec
+from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
 from canshaper.machine.bound_axis import BoundAxis, BoundRadial
@@ -36,7 +36,7 @@ def _bind_axis(
             f"found {axis.command.joystick!r}, joysticks are {names}",
         )
     valve = bind_valve(lookup, shared_valves, (*place, "valve"), axis.valve, axis.command)
-    status = bind_status(lookup, (*place, "status"), axis.status, AxisStatusCodec)
+    status = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)
     if valve is None or len(problems) > before:
         return None
     codec, ticks = valve

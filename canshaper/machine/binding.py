@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from pathlib import Path
 
 from canshaper.checksums import package_line
-from canshaper.codec.codecs import IdentityCodec, ServiceStatusCodec
 from canshaper.codec.signals import find_signal, special_name
+from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
 from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig, DeploymentConfig
@@ -51,8 +51,8 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         _check_values(lookup, profile, {("profile", "codes", name): code for name, code in codes})
     if load_state:
         _check_values(lookup, load_state, _values_of_schedules(config))
-    service = bind_status(lookup, ("status",), config.status, ServiceStatusCodec)
-    identity, _ = bind_status(lookup, ("identity",), config.identity, IdentityCodec)
+    service = bind_status(lookup, ("status",), config.status, SERVICE_STATUS)
+    identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
     check_control(diagnostics, config)

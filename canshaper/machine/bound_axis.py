@@ -4,8 +4,8 @@ from dataclasses import dataclass
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import AxisStatusCodec
 from canshaper.codec.rewrite import RewrittenMessage
+from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import ValveCodec
 from canshaper.config.schema import AxisConfig, RadialConfig
 from canshaper.machine.inputs import BoundFeedback, BoundRadius, BoundStatusWord
@@ -33,7 +33,7 @@ class BoundAxis:
     valve_message: Message
     valve: ValveCodec
     period_ticks: int
-    status: AxisStatusCodec | None
+    status: StatusCodec[ReportedAxis] | None
     status_ticks: int
     radial: BoundRadial | None = None
     feedback: BoundFeedback | None = None

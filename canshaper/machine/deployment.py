@@ -3,11 +3,13 @@
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
+from typing import Any
 
 from cantools.database.can import Message
 
-from canshaper.codec.codecs import AxisStatusCodec, IdentityCodec, Sender, ServiceStatusCodec
+from canshaper.codec.codecs import Sender
 from canshaper.codec.layout import is_j1939
+from canshaper.codec.status import StatusCodec
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.source import Source
 from canshaper.machine.bound_axis import BoundAxis
@@ -28,10 +30,10 @@ class Deployment:
     joysticks: dict[str, BoundJoystick]
     axes: dict[str, BoundAxis]
     emergency_stop: BoundStop | None
-    status: ServiceStatusCodec | None
+    status: StatusCodec[dict[str, int]] | None
     status_ticks: int
     identity: Identity
-    identity_status: IdentityCodec | None
+    identity_status: StatusCodec[int] | None
     load_state: BoundSwitch | None
     profile: BoundSwitch | None
     on_bus: dict[str, list[Message]]
@@ -89,7 +91,7 @@ class Deployment:
         config = self.config.model_copy(update={"buses": buses})
         return replace(self, config=config, axes=axes, listen_only=True)
 
-    def _statuses(self) -> list[AxisStatusCodec | IdentityCodec | ServiceStatusCodec]:
+    def _statuses(self) -> list[StatusCodec[Any]]:
         """Every status message that is sent."""
         of_axes = [axis.status for axis in self.axes.values()]
         return [s for s in (self.status, self.identity_status, *of_axes) if s]

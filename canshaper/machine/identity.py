@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path
 
 import canshaper
-from canshaper.codec.codecs import DIGEST_BITS
+from canshaper.codec.status import DIGEST_BITS
 from canshaper.shaping.registry import ADDED
 
 

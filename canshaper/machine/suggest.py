@@ -6,8 +6,8 @@ from difflib import SequenceMatcher
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.codecs import AxisStatusCodec, IdentityCodec, ServiceStatusCodec
 from canshaper.codec.signals import command_fault, raw_limits, symmetrical_range
+from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
@@ -60,7 +60,7 @@ def valves(messages: Sequence[Message], stick: str) -> list[Message]:
 
 def is_status(message: Message) -> bool:
     """Whether a message carries the status of an axis."""
-    return {s.name for s in message.signals} >= set(AxisStatusCodec.SIGNALS)
+    return {s.name for s in message.signals} >= required_names(AXIS_STATUS)
 
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:
@@ -72,17 +72,17 @@ def status_of(messages: Sequence[Message], axis: str) -> Message | None:
 
 def service_status(messages: Sequence[Message]) -> Message | None:
     """The message with the counters of the service."""
-    return _with(ServiceStatusCodec.SIGNALS, messages)
+    return _with(required_names(SERVICE_STATUS), messages)
 
 
 def identity(messages: Sequence[Message]) -> Message | None:
     """The message with the digest of what runs."""
-    return _with(IdentityCodec.SIGNALS, messages)
+    return _with(required_names(IDENTITY), messages)
 
 
-def _with(signals: Sequence[str], messages: Sequence[Message]) -> Message | None:
+def _with(signals: set[str], messages: Sequence[Message]) -> Message | None:
     """The first message that has all these signals."""
-    return next((m for m in messages if {s.name for s in m.signals} >= set(signals)), None)
+    return next((m for m in messages if {s.name for s in m.signals} >= signals), None)
 
 
 def axis_name(signal: str) -> str:

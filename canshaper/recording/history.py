@@ -3,37 +3,35 @@
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.codec.codecs import ACTIVE_SET, ServiceStatusCodec
-from canshaper.codec.frame import FrameFault
+from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key
 from canshaper.recording.listen import Heard
-from canshaper.shaping.states import Reason, State
-
-COUNTED = [name for name in ServiceStatusCodec.SIGNALS if name not in ServiceStatusCodec.CODES]
 
 
 @dataclass(frozen=True, slots=True)
 class AxisStatus:
-    """Status of one axis, as it was told.
+    """Status of one axis, as it was received.
 
     Attributes:
         time_ns: when.
-        state: name of the state, or its number where it is unknown.
-        reason: the same of the reason.
-        command: stick, percent of full speed.
-        sent: command that was sent, percent.
-        sway_deg: predicted swing.
-        active_set: number of the parameter set; 0 where that is not told.
+        values: those of its fields, by their names, decoded.
+        shown: the same for people.
     """
 
     time_ns: int
-    state: str
-    reason: str
-    command: float
-    sent: float
-    sway_deg: float
-    active_set: int
+    values: dict[str, Any]
+    shown: dict[str, str]
+
+    @property
+    def state(self) -> str:
+        """Name of the state, or its number where it is unknown."""
+        return self.shown["State"]
+
+    @property
+    def reason(self) -> str:
+        """The same of the reason."""
+        return self.shown["Reason"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -62,59 +60,36 @@ class History:
         self.last_fault = ""
         self.counted_ns: int | None = None
         self.changes: list[Told] = []
-        self._axis_of: dict[Key, str] = {
-            axis.status.sender.key: name for name, axis in deployment.axes.items() if axis.status
+        self._axes = {a.status.sender.key: n for n, a in deployment.axes.items() if a.status}
+        self._codecs: dict[Key, StatusCodec[Any]] = {
+            axis.status.sender.key: axis.status for axis in deployment.axes.values() if axis.status
         }
-        self._senders = {
-            axis.status.sender.key: axis.status.sender
-            for axis in deployment.axes.values()
-            if axis.status
-        }
-        self._service = deployment.status.sender if deployment.status else None
+        if deployment.status:
+            self._codecs[deployment.status.sender.key] = deployment.status
 
     def take(self, frame: Heard) -> None:
         """Take a data frame; one that is no status is passed over."""
         key = (frame.bus, frame.can_id, frame.extended)
-        if name := self._axis_of.get(key):
-            raw = self._decoded(self._senders[key], frame.data)
-            if raw is not None:
-                self._axis(name, self._senders[key], raw, frame.time_ns)
-        elif self._service is not None and key == self._service.key:
-            raw = self._decoded(self._service, frame.data)
-            if raw is not None:
-                self._counters(raw, frame.time_ns)
+        codec = self._codecs.get(key)
+        if codec is None or (values := codec.decode(frame.data)) is None:
+            return
+        shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
+        if name := self._axes.get(key):
+            self._axis(name, AxisStatus(frame.time_ns, values, shown))
+        else:
+            self._counters(values, shown[LAST_FAULT.name], frame.time_ns)
 
-    @staticmethod
-    def _decoded(sender: Any, data: bytes) -> dict[str, Any] | None:
-        if len(data) != sender.fields.message.length:
-            return None
-        raw: dict[str, Any] = sender.fields.layout.decode(data)
-        return raw
-
-    def _axis(self, name: str, sender: Any, raw: dict[str, Any], time_ns: int) -> None:
-        def value(signal: str) -> float:
-            found = next(s for s in sender.fields.message.signals if s.name == signal)
-            return float(raw[signal] * found.scale + found.offset)
-
-        status = AxisStatus(
-            time_ns,
-            named(State, raw["State"]),
-            named(Reason, raw["Reason"]),
-            value("RawCommand"),
-            value("ShapedCommand"),
-            value("PredictedSway"),
-            int(raw.get(ACTIVE_SET, 0)),
-        )
+    def _axis(self, name: str, status: AxisStatus) -> None:
         last = self.axes.get(name)
         self.axes[name] = status
         if last is None or (last.state, last.reason) != (status.state, status.reason):
             was = f" from={last.state}" if last else ""
-            self._note(time_ns, f"axis={name} state={status.state}{was} reason={status.reason}")
+            text = f"axis={name} state={status.state}{was} reason={status.reason}"
+            self._note(status.time_ns, text)
 
-    def _counters(self, raw: dict[str, Any], time_ns: int) -> None:
+    def _counters(self, values: dict[str, int], fault: str, time_ns: int) -> None:
         self.counted_ns = time_ns
-        fault = named(FrameFault, raw["LastFault"])
-        counters = {name: int(raw[name]) for name in COUNTED}
+        counters = {name: count for name, count in values.items() if name != LAST_FAULT.name}
         for name, count in counters.items():
             last = self.counters.get(name)
             if last is not None and count != last:
@@ -124,11 +99,3 @@ class History:
     def _note(self, time_ns: int, text: str) -> None:
         if len(self.changes) < self.MOST_CHANGES:
             self.changes.append(Told(time_ns, text))
-
-
-def named(kind: Any, number: int) -> str:
-    """Name of a number of an enumeration; the number itself where it has none."""
-    try:
-        return str(kind(number).name)
-    except ValueError:
-        return f"unknown ({number})"

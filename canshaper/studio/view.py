@@ -10,6 +10,7 @@ from cantools.database.can import Message
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.j1939 import NULL, with_source
+from canshaper.codec.status import StatusCodec
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
@@ -80,12 +81,10 @@ class CraneView:
         deployment = self._deployment
         for name, axis in deployment.axes.items():
             self._on(axis.valve.message.sender.key, self._valve, name)
-            if axis.status and axis.config.status:
-                message = self._message(axis.config.status.message)
-                self._on(axis.status.sender.key, self._axis_status, (name, message))
-        if deployment.status and deployment.config.status:
-            message = self._message(deployment.config.status.message)
-            self._on(deployment.status.sender.key, self._service_status, message)
+            if axis.status:
+                self._on(axis.status.sender.key, self._axis_status, (name, axis.status))
+        if deployment.status:
+            self._on(deployment.status.sender.key, self._service_status, deployment.status)
         for message_name, handler in (
             ("GrappleSway", self._sway),
             ("TipPosition", self._position),
@@ -210,13 +209,14 @@ class CraneView:
         )
         self._daemon_s = now_s
 
-    def _axis_status(self, what: tuple[str, Message], data: bytes, now_s: float) -> None:
-        name, message = what
-        values: Any = message.decode(data, decode_choices=False)
+    def _axis_status(self, what: tuple[str, StatusCodec[Any]], data: bytes, now_s: float) -> None:
+        name, codec = what
+        if (values := codec.decode(data)) is None:
+            return
         view, state, reason = self.axes[name], int(values["State"]), int(values["Reason"])
         # The model lags behind the tip; across the boom that is the negative direction.
         sign = -1.0 if SWAY_OF.get(name) == ACROSS else 1.0
-        view.predicted_deg = sign * float(values["PredictedSway"])
+        view.predicted_deg = sign * values["PredictedSway"]
         if self.sway_deg is None and (predicted := self._predicted()):
             self._swings.append((now_s, math.hypot(*predicted)))
         if view.state is not None and (state, reason) != (view.state, view.reason):
@@ -225,8 +225,9 @@ class CraneView:
         view.state, view.reason = state, reason
         self._daemon_s = now_s
 
-    def _service_status(self, message: Message, data: bytes, now_s: float) -> None:
-        values = _raw(message, data)
+    def _service_status(self, codec: StatusCodec[Any], data: bytes, now_s: float) -> None:
+        if (values := codec.decode(data)) is None:
+            return
         fault = int(values["LastFault"])
         if fault not in (self.fault, 0):
             self._tell(f"fault: {fault_words(fault)}", "warn")

@@ -11,17 +11,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.codec.codecs import (
-    AxisStatusCodec,
     JoystickCodec,
     Sender,
-    ServiceStatusCodec,
     WrongLengthError,
 )
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.signals import VelocitySignal
+from canshaper.codec.status import AXIS_STATUS, SERVICE_STATUS, StatusCodec
 from canshaper.codec.valve import ValveCodec, ValveMessage
 from canshaper.shaping.states import Reason, State
+from tests.rigs.reports import report
 
 SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
 shipped: Any = cantools.database.load_file(SHIPPED)
@@ -300,7 +300,7 @@ def test_start_values_beyond_the_bits_are_held_within() -> None:
 
 def axis_status(*values: Any) -> dict[str, Any]:
     message = shipped.get_message_by_name("SlewStatus")
-    frame = AxisStatusCodec(Sender("b", message)).frame(*values)
+    frame = StatusCodec(Sender("b", message), AXIS_STATUS).frame(report(*values))
     decoded = message.decode(frame.data, decode_choices=False)
     assert isinstance(decoded, dict)
     return decoded
@@ -327,14 +327,38 @@ def test_status_beyond_its_bits_stays_at_the_end(sway: float, shown: float) -> N
 
 def test_counters_stop_at_their_largest_value() -> None:
     message = shipped.get_message_by_name("ShaperStatus")
-    codec = ServiceStatusCodec(Sender("b", message))
-    decoded = message.decode(
-        codec.frame({**dict.fromkeys(codec.SIGNALS, 10**6), "LastFault": 7}).data
-    )
+    codec = StatusCodec(Sender("b", message), SERVICE_STATUS)
+    names = [one.name for one in SERVICE_STATUS]
+    decoded = message.decode(codec.frame({**dict.fromkeys(names, 10**6), "LastFault": 7}).data)
     assert isinstance(decoded, dict)
     assert decoded.pop("MissedDeadlines") == 65535
     assert str(decoded.pop("LastFault")) == "BUS_ERROR"
     assert set(decoded.values()) == {255}
+
+
+def test_a_status_is_decoded_as_it_was_encoded() -> None:
+    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
+    values = codec.decode(
+        codec.frame(report(State.ACTIVE, Reason.STICK_MOVED, 0.5, 0.25, 1.5, active_set=3)).data
+    )
+    assert values == {
+        "State": State.ACTIVE,
+        "Reason": Reason.STICK_MOVED,
+        "RawCommand": 50.0,
+        "ShapedCommand": 25.0,
+        "PredictedSway": 1.5,
+        "ActiveSet": 3,
+    }
+    assert codec.decode(b"") is None
+
+
+def test_a_code_of_another_version_is_shown_by_its_number() -> None:
+    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
+    values = codec.decode(codec.frame(report(State.READY, 254)).data)
+    assert values is not None
+    assert values["Reason"] == 254
+    shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
+    assert (shown["State"], shown["Reason"]) == ("READY", "unknown (254)")
 
 
 def test_tables_of_the_dbc_are_the_numbers_of_the_program() -> None:

@@ -82,9 +82,9 @@ def test_every_shipped_deployment_sends_it(name: str) -> None:
     status = deployment.identity_status
     assert status is not None
     frame = status.frame(deployment.identity.digest)
-    assert status.digest(frame.data) == deployment.identity.digest
+    assert status.decode(frame.data) == {"Digest": deployment.identity.digest}
     assert frame[1:3] in deployment.routing.buses[frame.bus].sent
-    assert status.digest(frame.data[:1]) is None
+    assert status.decode(frame.data[:1]) is None
 
 
 def test_check_prints_it() -> None:

@@ -17,6 +17,7 @@ from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.plant import PlantNode
 from tests.rigs.j1939 import bjm
+from tests.rigs.reports import report
 
 CONFIG = Path(__file__).parents[2] / "config"
 FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
@@ -40,7 +41,7 @@ class Watched:
     ) -> Frame:
         codec = self.deployment.axes[axis].status
         assert codec
-        return codec.frame(state, reason, 0.0, 0.0, sway_deg)
+        return codec.frame(report(state, reason, sway_deg=sway_deg))
 
     def valve(self, axis: str, steps: int) -> Frame:
         bound = self.deployment.axes[axis]

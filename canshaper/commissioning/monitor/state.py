@@ -114,15 +114,15 @@ class Monitor:
             rate.take(frame.time_ns)
         self.history.take(frame)
         identity = self.deployment.identity_status
-        if identity and key == identity.sender.key:
-            self._compare_identity(identity.digest(frame.data), frame.time_ns)
+        if identity and key == identity.sender.key and (values := identity.decode(frame.data)):
+            self._compare_identity(values["Digest"], frame.time_ns)
         changes = self.history.changes
         self.events.extend(changes)
         changes.clear()  # for a day there are many
 
-    def _compare_identity(self, digest: int | None, time_ns: int) -> None:
+    def _compare_identity(self, digest: int, time_ns: int) -> None:
         """Whether the daemon runs the files and the program that we have here."""
-        if digest is None or digest == self.digest:
+        if digest == self.digest:
             return
         self.digest, ours = digest, self.deployment.identity.digest
         differs = "" if digest == ours else f", not {ours:#06x} of the files and program here"

@@ -79,8 +79,9 @@ def status_line(monitor: Monitor, now_ns: int) -> str:
         stale_s = monitor.stale_s(name, now_ns)
         stale = f" STALE {stale_s:.1f}s" if stale_s is not None else ""
         parts.append(
-            f"{name}={status.state}({status.reason}) raw={status.command:+.0f}%"
-            f" sent={status.sent:+.0f}% sway={status.sway_deg:+.1f}deg{stale}"
+            f"{name}={status.state}({status.reason}) raw={status.values['RawCommand']:+.0f}%"
+            f" sent={status.values['ShapedCommand']:+.0f}%"
+            f" sway={status.values['PredictedSway']:+.1f}deg{stale}"
         )
     missed = monitor.history.counters.get("MissedDeadlines")
     parts.append(f"missed={'unknown' if missed is None else missed}")
@@ -115,6 +116,10 @@ def _head(monitor: Monitor, now_ns: int) -> Text:
     return text.append(f"  {clock(now_ns)[:8]}", DIM)
 
 
+# Fields of an axis that have a place of their own.
+IN_ROWS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway", "ActiveSet")
+
+
 def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[Text]:
     """Two lines: state and stick, reason and what is sent."""
     status = monitor.history.axes.get(name)
@@ -126,14 +131,17 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
         return
     stale_s = monitor.stale_s(name, now_ns)
     style = DIM if stale_s is not None else ""
-    first = _row(name, status.state, "stick", status.command, style, plain=plain)
-    yield first.append(f"  set {status.active_set}" if status.active_set else "", style)
+    first = _row(name, status.state, "stick", status.values["RawCommand"], style, plain=plain)
+    number = status.values.get("ActiveSet")
+    yield first.append(f"  set {number}" if number else "", style)
     reason = status.reason if stale_s is None else f"STALE {stale_s:.1f} s"
-    second = _row("", reason, "valve", status.sent, style, plain=plain)
+    second = _row("", reason, "valve", status.values["ShapedCommand"], style, plain=plain)
     if stale_s is not None:
         second.stylize(STALE, NAME + 1, NAME + 1 + len(reason))
     swings = monitor.deployment.axes[name].config.sway is not None
-    yield second.append(f"  sway {status.sway_deg:+.1f}" if swings else "", style)
+    second.append(f"  sway {status.values['PredictedSway']:+.1f}" if swings else "", style)
+    others = (f"  {one} {text}" for one, text in status.shown.items() if one not in IN_ROWS)
+    yield second.append("".join(others), style)
 
 
 def _row(name: str, word: str, of: str, percent: float, style: str, *, plain: bool) -> Text:

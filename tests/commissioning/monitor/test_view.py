@@ -15,6 +15,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Heard
 from canshaper.shaping.states import Reason, State
 from tests.rigs.j1939 import bjm
+from tests.rigs.reports import report
 
 NOW = 1_763_750_000_000_000_000
 MS = 1_000_000
@@ -47,7 +48,7 @@ def told(
 ) -> list[Heard]:
     """Status of all axes and of the service."""
     frames = [
-        heard(axis.status.frame(state, reason, 0.5, -0.25, 3.4), time_ns)
+        heard(axis.status.frame(report(state, reason, 0.5, -0.25, 3.4)), time_ns)
         for axis in deployment.axes.values()
         if axis.status
     ]

@@ -1,0 +1,169 @@
+"""Status messages: which fields they have, and how each is encoded and decoded.
+
+A field is declared once, in a table below; a message carries those that it has in its DBC. Who
+wants to send another one adds a line to the table: it is sent where a DBC has the signal, decoded
+by all who read status messages, and required by no one.
+"""
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from enum import IntEnum
+from operator import itemgetter
+from typing import Any, Generic, Protocol, TypeVar
+
+from cantools.database.can import Message
+
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.signals import raw_limits
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.states import Reason, State
+
+DIGEST_BITS = 16
+
+Source = TypeVar("Source")
+
+
+@dataclass(frozen=True, slots=True)
+class StatusField(Generic[Source]):
+    """One field of a status message.
+
+    Attributes:
+        name: of its signal in the DBC.
+        encode: its value from what is reported: in the unit of the DBC, or a code.
+        decode: what is shown, from that value.
+        required: whether a message without it is refused.
+        largest: largest code of a field that is sent as its raw value; None for a measurement.
+    """
+
+    name: str
+    encode: Callable[[Source], float]
+    decode: Callable[[Any], Any] = float
+    required: bool = False
+    largest: int | None = None
+
+    def shown(self, value: object) -> str:
+        """A decoded value for people: codes by their name, where they have one."""
+        if isinstance(value, IntEnum):
+            return value.name
+        return f"unknown ({value})" if isinstance(self.decode, _Code) else f"{value:g}"
+
+
+class _Code:
+    """Decodes a code to a member; one that this program does not know stays a number."""
+
+    def __init__(self, kind: type[IntEnum]) -> None:
+        self._kind = kind
+
+    def __call__(self, value: int) -> int:
+        try:
+            return self._kind(value)
+        except ValueError:
+            return int(value)
+
+
+class ReportedAxis(Protocol):
+    """An axis, as its status sees it."""
+
+    @property
+    def axis(self) -> Axis:
+        """State, reason, commands."""
+
+    @property
+    def sway_deg(self) -> float:
+        """Predicted swing of the load."""
+
+    @property
+    def active_set(self) -> int:
+        """Number of the parameter set that is chosen; 0 where there is no choice."""
+
+
+AXIS_STATUS: list[StatusField[ReportedAxis]] = [
+    StatusField("State", lambda one: one.axis.state, _Code(State), True, max(State)),
+    StatusField("Reason", lambda one: one.axis.reason, _Code(Reason), True, max(Reason)),
+    StatusField("RawCommand", lambda one: 100.0 * one.axis.command, required=True),
+    StatusField("ShapedCommand", lambda one: 100.0 * one.axis.sent, required=True),
+    StatusField("PredictedSway", lambda one: one.sway_deg, required=True),
+    StatusField("ActiveSet", lambda one: one.active_set, int),
+]
+LAST_FAULT: StatusField[dict[str, int]] = StatusField(
+    "LastFault", itemgetter("LastFault"), _Code(FrameFault), True, max(FrameFault)
+)
+COUNTERS: list[StatusField[dict[str, int]]] = [
+    StatusField(name, itemgetter(name), int, required=True)
+    for name in (
+        "MissedDeadlines",
+        "WrongLength",
+        "UnknownId",
+        "ErrorFrames",
+        "InvalidSignals",
+        "SendFailures",
+    )
+]
+"""Those of the service; each stops at its largest value."""
+SERVICE_STATUS = [LAST_FAULT, *COUNTERS]
+IDENTITY: list[StatusField[int]] = [
+    StatusField("Digest", int, int, required=True, largest=(1 << DIGEST_BITS) - 1)
+]
+"""Digest of what runs."""
+
+
+class StatusCodec(Generic[Source]):
+    """A status message.
+
+    Args:
+        sender: its place on the bus.
+        fields: those that such a message may have.
+
+    Attributes:
+        sender: its place on the bus.
+        fields: those that it has in its DBC.
+    """
+
+    def __init__(self, sender: Sender, fields: Iterable[StatusField[Source]]) -> None:
+        self.sender = sender
+        self.fields = [one for one in fields if one.name in sender.fields.start]
+
+    def frame(self, source: Source) -> Frame:
+        """The next frame; values beyond the bits of their signal are held at its end."""
+        raw: dict[str, int] = {}
+        for one in self.fields:
+            value = one.encode(source)
+            coded = one.largest is not None
+            raw[one.name] = int(value) if coded else self.sender.fields.raw(one.name, value)
+        return self.sender.frame(raw)
+
+    def decode(self, data: bytes) -> dict[str, Any] | None:
+        """Values of a frame by the names of its fields; None where its length is wrong."""
+        fields = self.sender.fields
+        if len(data) != fields.layout.length:
+            return None
+        raw = fields.layout.decode(data)
+        return {
+            one.name: one.decode(
+                raw[one.name] if one.largest is not None else fields.value(one.name, raw[one.name])
+            )
+            for one in self.fields
+        }
+
+
+def status_faults(message: Message, fields: Iterable[StatusField[Source]]) -> list[str]:
+    """Why a message cannot carry a status."""
+    signals = {signal.name: signal for signal in message.signals}
+    missing = [one.name for one in fields if one.required and one.name not in signals]
+    faults = [f"lacks the signals {', '.join(missing)}"] if missing else []
+    for one in fields:
+        signal = signals.get(one.name)
+        if signal is None:
+            continue
+        if signal.is_float or not signal.scale:
+            fault = "is a float" if signal.is_float else "has a scale of 0"
+            faults.append(f"{one.name} {fault}; allowed is an integer signal with a scale")
+        elif raw_limits(signal)[1] < (one.largest or 0):
+            faults.append(f"{one.name} cannot carry {one.largest} with {signal.length} bits")
+    return faults
+
+
+def required_names(fields: Iterable[StatusField[Source]]) -> set[str]:
+    """Names of the signals that a message needs to carry a status."""
+    return {one.name for one in fields if one.required}

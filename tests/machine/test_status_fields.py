@@ -1,0 +1,73 @@
+"""Fields of status messages: one declaration is enough, and no machine needs a new one."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.codec import status
+from canshaper.codec.status import StatusField
+from canshaper.commissioning.monitor.state import Monitor
+from canshaper.commissioning.monitor.view import screen
+from canshaper.config.source import DeploymentError
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.recording.listen import Heard
+
+ROOT = Path(__file__).parents[2]
+ACTIVE_SET = "SG_ ActiveSet : 4|4@1+ (1,0) [0|15]"
+AT_REST = "SG_ AtRest : 4|1@1+ (1,0) [0|1]"
+FIELD: StatusField[status.ReportedAxis] = StatusField("AtRest", lambda one: one.axis.neutral, int)
+
+
+def machine(path: Path, old: str, new: str) -> Deployment:
+    """The shipped machine with a text of its DBC replaced in the status of its first axis."""
+    text = (ROOT / "dbc" / "forwarder.dbc").read_text()
+    assert old in text
+    (path / "forwarder.dbc").write_text(text.replace(old, new, 1))
+    file = path / "forwarder.yaml"
+    file.write_text((ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc/", ""))
+    return load_deployment(file)
+
+
+def shown(deployment: Deployment) -> tuple[dict[str, object], str]:
+    """Status of the first axis as a monitor decodes and shows it."""
+    monitor = Monitor(deployment)
+    for frame in Controller(deployment).tick(0):
+        monitor.take(Heard(0, frame.bus, "can0", *frame[1:], ""))
+    return monitor.history.axes["slew"].values, screen(monitor, 0, 120, 40, plain=True).plain
+
+
+def test_a_field_added_from_outside_is_sent_decoded_and_shown(tmp_path: Path) -> None:
+    status.AXIS_STATUS.append(FIELD)
+    try:
+        values, text = shown(machine(tmp_path, ACTIVE_SET, AT_REST))
+    finally:
+        status.AXIS_STATUS.remove(FIELD)
+    assert values["AtRest"] == 1
+    assert "ActiveSet" not in values
+    assert "AtRest 1" in text
+
+
+@pytest.mark.parametrize(
+    "name",
+    [path.name for path in sorted((ROOT / "config").glob("*.yaml")) if "axes:" in path.read_text()],
+)
+def test_its_absence_in_a_dbc_refuses_no_machine(name: str) -> None:
+    status.AXIS_STATUS.append(FIELD)
+    try:
+        deployment = load_deployment(ROOT / "config" / name)
+    finally:
+        status.AXIS_STATUS.remove(FIELD)
+    for axis in deployment.axes.values():
+        assert axis.status is None or "AtRest" not in [one.name for one in axis.status.fields]
+
+
+def test_a_required_field_that_is_missing_is_named(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError, match="SlewStatus: lacks the signals PredictedSway"):
+        machine(tmp_path, "SG_ PredictedSway", "SG_ Prediction")
+
+
+def test_an_optional_field_that_cannot_carry_a_number_is_refused(tmp_path: Path) -> None:
+    with pytest.raises(DeploymentError, match="ActiveSet has a scale of 0"):
+        machine(tmp_path, ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))

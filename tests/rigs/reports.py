@@ -1,0 +1,20 @@
+"""What the status message of an axis reports."""
+
+from types import SimpleNamespace
+from typing import Any
+
+from canshaper.shaping.states import State
+
+
+def report(
+    state: State,
+    reason: int,
+    command: float = 0.0,
+    sent: float = 0.0,
+    sway_deg: float = 0.0,
+    *,
+    active_set: int = 0,
+) -> Any:
+    """An axis with these values."""
+    axis = SimpleNamespace(state=state, reason=reason, command=command, sent=sent)
+    return SimpleNamespace(axis=axis, sway_deg=sway_deg, active_set=active_set)
