@@ -38,6 +38,7 @@ def config_schema(
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
     from canshaper.config.source import DeploymentError
+    from canshaper.config.version import VERSION
     from canshaper.shaping.registry import KINDS
 
     try:
@@ -52,6 +53,7 @@ def config_schema(
         return
     schema = DeploymentConfig.model_json_schema()
     schema["$schema"] = "https://json-schema.org/draft/2020-12/schema"
+    schema["$id"] = f"urn:canshaper:deployment:{VERSION}"
     schema["title"] = "canshaper deployment"
     echo(json.dumps(schema, indent=2))
 

@@ -64,7 +64,7 @@ class Match(Section):
         None, min_length=1, description="where the device is plugged in, as ID_PATH of udev"
     )
     port: Annotated[int, number(0, 63, "", "channel of an adapter with several")] | None = None
-    """As the kernel counts, from 0: dev_port of the interface, in older drivers dev_id."""
+    """Channel of an adapter with several, from 0: dev_port of the interface, or dev_id."""
     driver: str | None = Field(
         None, min_length=1, description="driver of the kernel, such as peak_usb; vcan"
     )
@@ -91,7 +91,7 @@ class Bus(Section):
     interface: str = Field(description="python-can interface, such as socketcan")
     channel: str = Field(description="channel of the interface, such as can0")
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
-    """What the load of the bus is reckoned with; SocketCAN is set by the system, not by us."""
+    """Bit rate (bit/s), with which the load is computed; SocketCAN itself is set by the system."""
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )
@@ -99,4 +99,6 @@ class Bus(Section):
         False, description="share a bus of udp_multicast over the network; else it stays local"
     )
     j1939: J1939 | None = None
+    """Our node, on a bus of J1939 or ISO 11783."""
     canopen: Canopen | None = None
+    """Our node, on a bus of CANopen."""

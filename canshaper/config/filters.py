@@ -2,7 +2,7 @@
 
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
-from pydantic import Field, create_model, model_validator
+from pydantic import ConfigDict, Field, create_model, model_validator
 
 from canshaper.config.section import Section, number
 from canshaper.shaping.registry import KINDS
@@ -11,6 +11,9 @@ from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 
 class FilterSection(Section):
     """A filter: its ``kind`` and its parameters by the names the registry takes."""
+
+    # Made from the rows of the registry, each with its description: there is no source to read.
+    model_config = ConfigDict(use_attribute_docstrings=False)
 
     kind: str
 
@@ -31,7 +34,7 @@ class FilterSection(Section):
 
 def _section(kind: ShaperKind) -> type[FilterSection]:
     """The section of a kind, such as ``TwoModeFilter``."""
-    fields: dict[str, Any] = {"kind": (Literal[kind.name], ...)}
+    fields: dict[str, Any] = {"kind": (Literal[kind.name], Field(description=kind.summary))}
     fields |= {p.name: _field(p) for p in kind.parameters}
     return create_model(
         f"{kind.name.title().replace('_', '')}Filter",
@@ -47,7 +50,8 @@ def _field(parameter: Parameter) -> tuple[Any, Any]:
     one: Any = Annotated[int if parameter.whole else float, limits]
     if parameter.entries:
         least, most = parameter.entries
-        one = Annotated[list[one], Field(min_length=least, max_length=most)]
+        text = parameter.description
+        one = Annotated[list[one], Field(min_length=least, max_length=most, description=text)]
     if parameter.optional:
         return Optional[one], None  # noqa: UP045  (made while the program runs)
     return one, ... if parameter.default is None else parameter.default

@@ -12,7 +12,7 @@ class Input(Protected):
     source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
         None
     )
-    """By default that of the DBC, where 254 means any: then the first that is heard."""
+    """Source address of the sender, in J1939; by default that of the DBC, where 254 is any."""
     timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
     alive_max_step: (
         Annotated[
@@ -20,7 +20,7 @@ class Input(Protected):
         ]
         | None
     ) = None
-    """3, or half of the counter's range where that is less."""
+    """Largest step of the counter that is still the next one; by default 3, or half its range."""
     qualify: Annotated[
         int, number(1, 20, "messages", "good ones in a row that are needed after a wrong one")
     ] = 1

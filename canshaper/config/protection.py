@@ -58,5 +58,6 @@ class Protected(Section):
     message: str = Field(description="message in the DBC files")
     alive_counter: str | None = Field(None, description="signal counted up with every message")
     checksum: Checksum | None = None
+    """Checksum of the message."""
     e2e: E2e | None = None
-    """Instead of both."""
+    """Instead of both a profile of AUTOSAR E2E."""

@@ -65,7 +65,7 @@ class Command(Section):
     joystick: str = Field(description="name of a joystick")
     signal: str = Field(description="signal with the velocity; its DBC range is full stick")
     flags: DirectionFlags | None = None
-    """Only where the velocity has no sign of its own."""
+    """Signals of the direction, only where the velocity has no sign of its own."""
     negative: str | None = Field(
         None, description="rocker of two signals: that of the negative direction"
     )
@@ -102,12 +102,13 @@ class Valve(Protected):
 
     signal: str = Field(description="signal with the command; its DBC range is full command")
     direction: DirectionCodes | None = None
-    """Only where the command has no sign of its own."""
+    """Codes of the direction, only where the command has no sign of its own."""
     also: list[str] = Field([], description="signals that tell the same in another resolution")
     timeout_ms: Annotated[
         int, number(10, 5000, "ms", "silence after which the valve closes by itself")
     ]
     cia408: Cia408 | None = None
+    """State machine of a valve of CANopen."""
 
 
 class Feedback(Input):
@@ -118,7 +119,7 @@ class Feedback(Input):
     )
     timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
     full: Annotated[float, number(1e-3, 1e6, "", "its value at full command")] | None = None
-    """By default the end of its DBC range."""
+    """Value of the signal at full command; by default the end of its DBC range."""
     tolerance_pct: Annotated[
         float, number(1, 100, "% of full", "how far it may be from what was commanded")
     ] = 20.0
@@ -149,6 +150,7 @@ class RadialConfig(Section):
         Annotated[float, number(0.5, 30, "m", "radius of the tip, where it is fixed")] | None
     ) = None
     radius: Radius | None = None
+    """Radius of the tip, where it is measured."""
     max_pct: Annotated[float, number(1, 50, "% of full near-far speed", "fastest compensation")] = (
         25.0
     )
@@ -195,10 +197,11 @@ class Limits(Section):
     curve_command_pct: (
         list[Annotated[float, number(-100, 100, "% of full command", "command")]] | None
     ) = None
-    """Instead of ``deadband_pct`` the measured valve: commands, and the speed at each."""
+    """Of the measured valve, instead of ``deadband_pct``: its commands (% of full command)."""
     curve_speed_pct: (
         list[Annotated[float, number(-100, 100, "% of full speed", "speed at a command")]] | None
     ) = None
+    """Of the measured valve: the speed at each of these commands (% of full speed)."""
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
@@ -257,16 +260,22 @@ class AxisConfig(Section):
     command: Command = Field(description="the joystick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")
     feedback: Feedback | None = None
+    """What the valve says of itself: it is compared with what was commanded."""
     status: Status | None = None
+    """Message with the status of the axis."""
     sway: Sway | None = None
+    """Swing of the tool on this axis."""
     slewing: Slewing | None = None
+    """Of an axis that turns: what its full speed is in angle."""
     filter: Filter = Field(discriminator="kind", description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
     profiles: dict[str, Profile] = Field(
         {}, description="other filters that the operator may choose"
     )
     limits: Limits = Limits()
+    """Output limits of the axis."""
     radial_compensation: RadialConfig | None = None
+    """Of a slew axis: what the near-far axis does meanwhile against the centrifugal force."""
 
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
@@ -299,11 +308,17 @@ class DeploymentConfig(Section):
     joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
     gateway: Gateway | None = None
+    """The two buses between which we stand, where the machine's own ECU moves the valves."""
     emergency_stop: EmergencyStop | None = None
+    """An emergency stop that is told on the bus."""
     load_state: LoadState | None = None
+    """What hangs on the crane; it chooses in the gain schedules of the axes."""
     profile: ProfileSwitch | None = None
+    """The operator's choice among the profiles of the axes."""
     status: Status | None = None
+    """Message with the state and the counters of the service."""
     identity: Status | None = Field(
         None, description="message, once a second, with the digest of what runs"
     )
     control: Control | None = None
+    """What may be changed while the machine works."""

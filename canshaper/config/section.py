@@ -2,7 +2,9 @@
 
 from typing import Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema
 
 
 def number(low: float, high: float, unit: str, text: str) -> Any:
@@ -19,4 +21,18 @@ def number(low: float, high: float, unit: str, text: str) -> Any:
 class Section(BaseModel):
     """A part of the file: frozen, no unknown keys, no silent conversion of types."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True)
+    model_config = ConfigDict(
+        extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True
+    )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        """JSON schema; an optional key without a description has that of what may stand there."""
+        found = handler(schema)
+        for key in handler.resolve_ref_schema(found).get("properties", {}).values():
+            texts = [one["description"] for one in key.get("anyOf", ()) if "description" in one]
+            if texts:
+                key.setdefault("description", texts[0])
+        return found

@@ -42,6 +42,7 @@ def test_it_is_a_json_schema_with_a_title(schema: dict[str, Any]) -> None:
     Draft202012Validator.check_schema(schema)
     assert schema["$schema"] == "https://json-schema.org/draft/2020-12/schema"
     assert schema["title"] == "canshaper deployment"
+    assert schema["$id"] == "urn:canshaper:deployment:1"
 
 
 def test_it_accepts_the_shipped_deployment(schema: dict[str, Any], machine: dict[str, Any]) -> None:
@@ -119,3 +120,11 @@ def test_every_number_has_a_range_and_a_unit(schema: dict[str, Any]) -> None:
     assert len(found) > 20
     for path, node in found:
         assert {"minimum", "maximum", "unit", "description"} <= node.keys(), path
+
+
+def test_every_key_is_described(schema: dict[str, Any]) -> None:
+    sections = {"": schema, **schema["$defs"]}
+    keys = {(n, k): v for n, s in sections.items() for k, v in s.get("properties", {}).items()}
+    assert len(keys) > 150
+    assert [place for place, key in keys.items() if len(key.get("description", "")) < 8] == []
+    assert [name for name, section in sections.items() if not section.get("description")] == []
