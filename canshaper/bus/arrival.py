@@ -1,7 +1,7 @@
 """When a frame arrived: the kernel's stamp of it, on the clock of the control loop.
 
-A frame is as old as its arrival, whenever it is read. The kernel stamps by the wall clock, which
-somebody may set between the stamp and the read.
+The kernel stamps by the wall clock, which somebody may set between the stamp and the read:
+docs/decisions/0007-age-and-standstill.md.
 """
 
 import socket

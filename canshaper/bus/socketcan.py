@@ -1,7 +1,6 @@
 """SocketCAN sockets: ids to filters, and the options that a control loop needs.
 
-python-can opens them too, but keeps from us what decides here: whether a frame is our own one, seen
-back from the bus, how many the kernel has dropped, and a filter for the ids that do not matter.
+Why not python-can: docs/decisions/0006-raw-sockets.md.
 """
 
 import socket

@@ -1,7 +1,6 @@
 """Raw values of a message from and to bytes, compiled once for the control loop.
 
-cantools reads the DBC files. Its own decode and encode reach the compiled part of bitstruct through
-several layers of Python for every frame; here bitstruct is called directly.
+bitstruct is called directly: docs/decisions/0009-cantools-at-the-desk.md.
 """
 
 import math

@@ -1,9 +1,6 @@
 """Reads a deployment in a process of its own, so that the control loop never waits for it.
 
-YAML and DBC files take tens of milliseconds, a large DBC file seconds. A thread would share the
-interpreter with the loop and, without the loop's priority, keep it from the loop for as long as
-other processes like. Files that others made may take the memory or the time of the whole PC: the
-other process may take only so much of both, and is ended when it takes longer.
+The process may take only so much memory and time: docs/decisions/0008-the-loop-waits-for-no-one.md.
 """
 
 import os

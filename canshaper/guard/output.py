@@ -1,8 +1,7 @@
 """The output guard: the last look at a valve frame before the socket, by its bytes alone.
 
-It knows the limits of the deployment file, the bytes that came from joysticks and emergency stop,
-and the bytes that are about to leave; nothing of how the one was made from the other. A frame that
-moves a valve passes only if
+It knows nothing of how the frame was made (docs/decisions/0005-output-guard.md). A frame that moves
+a valve passes only if
 
 - no emergency stop is pressed or missing, and the joystick's enable was not seen released,
 - the joystick is not silent for longer than its timeout and the longest stop,
@@ -11,8 +10,7 @@ moves a valve passes only if
   that direction, but for what falls at the valve's rate since then,
 - the valve's rates lead from the last frame to this one.
 
-Neutral always passes. All bounds err on the side of the controller by what it is entitled to: the
-age of an input, the standstill that a loop may have, the rounding of the frame.
+Neutral always passes.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,6 @@
 """Which text of a DBC file belongs to which message: one pass over its statements, no parser.
 
-cantools takes a millisecond and 30 kB for each message. So it gets the text of those messages only
-that are used; what else is in the file is looked at here, as far as it takes to say what is wrong.
+cantools gets the text of the messages that are used (docs/decisions/0009-cantools-at-the-desk.md).
 Strings and comments end where they end for cantools: nothing within one is taken for a statement.
 """
 

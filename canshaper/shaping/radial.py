@@ -1,9 +1,7 @@
 """Radial compensation while slewing: the tip moves in a little, so the grapple does not fly out.
 
-On a circle of radius rho at angular speed w the hanging grapple needs the accelerations rho w^2
-towards the pillar and rho w' along the circle. Gravity gives them, with no swing in the boom's
-plane, when the tip stands ahead of the grapple by the angle psi and at the radius rho h (small
-swing angles; w5, w6: sway modes of slew and near-far, which pull along the boom's own directions)
+The tip stands ahead of the grapple by the angle psi and at the radius rho h (small swing angles;
+w5, w6: sway modes of slew and near-far; docs/decisions/0004-radial-compensation.md)
 
     tan psi = L / s5        h = (s5 s6 + L^2 w5^2 / w6^2) / sqrt(s5^2 + L^2) + (2 zeta6 / w6) D'
     s5 = 1 - w^2 / w5^2     s6 = 1 - w^2 / w6^2       D' = 2 (w w' - w5^2 L L') / w6^2

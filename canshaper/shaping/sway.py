@@ -118,10 +118,7 @@ class SwayModel:
         angle = theta / (k V)            s
         rate  = theta' / (k V) - v       1        v: velocity in [-1, 1], held over the tick
 
-    Taking v out of the rate removes the derivative of the input from the equations. The discrete
-    equations are kept as increments, F = Ad - I, because at a tick of 1 ms Ad is so close to I
-    that half of the digits would be lost. The equilibrium under constant v, (0, -v), has to be
-    kept exactly; hence Bd = F (0, 1), and one step is  x += F (angle, rate + v).
+    One step is x += F (angle, rate + v) with F = Ad - I: docs/decisions/0002-sway-in-increments.md.
 
     Raises:
         ValueError: the tick is outside 0.1 to 200 ms, or too long for the mode.

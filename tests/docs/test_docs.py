@@ -12,14 +12,16 @@ from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason, State
 
 ROOT = Path(__file__).parents[2]
-PAGES = sorted([ROOT / "README.md", *(ROOT / "docs").glob("*.md")])
+EVERY_PAGE = {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")}
+# What was once may be named in it.
+PAGES = sorted(EVERY_PAGE - {ROOT / "CHANGELOG.md"})
 COMMANDS: Any = typer.main.get_command(app)
 CODE = re.compile(r"`([^`\n]+)`|^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"\bcanshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")
 NAMES = {member.name for kind in (State, Reason, FrameFault) for member in kind}
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_links_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     found = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
@@ -27,7 +29,7 @@ def test_links_lead_somewhere(page: Path) -> None:
     assert [link for link in local if not (page.parent / link).exists()] == []
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_commands_and_options_are_there(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     wrong = []
@@ -50,7 +52,7 @@ def test_troubleshooting_names_real_states_and_reasons() -> None:
     assert found <= NAMES
 
 
-@pytest.mark.parametrize("page", PAGES, ids=[page.name for page in PAGES])
+@pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_tests_are_where_a_page_says(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     named = set(re.findall(r"(?<![\w/])(?:tests/)?((?:[a-z0-9_]+/)+test_[a-z0-9_]+)", text))

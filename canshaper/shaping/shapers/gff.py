@@ -2,15 +2,10 @@
 
     G_FF(s) = (s^2/w^2 + 2 zeta s/w + 1) / (a2 s^2 + a1 s + 1)
 
-Realised as state feedback on the model of the sway that is driven by what is really sent:
-
-    wanted output    v* = u - K1 angle - K2 (rate + u)       u: operator's command
+    output           v* = u - K1 angle - K2 (rate + u)       u: operator's command
     model update     x += F (angle, rate + v)                v: v* after all limits and rounding
 
-While v = v*, the map u -> v has the zeros of the sampled sway, exp(sway pole T), the poles
-exp(p_i T), and gain one: it is Eq. 13 with matched poles and zeros. When a limit acts, the model
-still knows the true sway, and the filter goes on damping it. (rate + u vanishes in the steady
-state, so the gain is one for every K, not only for an exactly computed one.)
+Why: docs/decisions/0001-feedback-from-what-was-sent.md.
 """
 
 import math

@@ -1,13 +1,9 @@
 """A linear shaper made aware of the limits that cut its output.
 
-While nothing cuts it, a shaper leaves the swing that it was designed to leave. What a limit changes
-is a second input, (sent - asked), and the swing it makes is the difference between the axis' sway
-model, driven by what was sent, and a twin driven by what the shaper asked for. That difference is
-damped by the same state feedback as in G_FF, with command zero:
-
     v* = y - K1 (angle - angle_twin) - K2 (rate - rate_twin)
 
-With no limit acting the difference is zero, and the shaper is itself.
+The axis' sway model is driven by what was sent, its twin by what the shaper asked for. Why:
+docs/decisions/0003-limit-aware-by-a-twin.md.
 """
 
 import math
