@@ -6,32 +6,22 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.valve import ValveMessage
 from canshaper.controller.compensator import Compensator
 from canshaper.controller.counters import Counters
 from canshaper.controller.events import FeedbackEvent, StateEvent
+from canshaper.controller.inputs import MachineInputs, received_by
+from canshaper.controller.outputs import ValveOutputs
+from canshaper.controller.overrun import OverrunDetector
 from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
+from canshaper.controller.status import status_frames
 from canshaper.inputs.carry_over import Key, Part, carry_over
-from canshaper.inputs.feedback import Feedback, Following
-from canshaper.inputs.input import EmergencyStopInput, Input, MessageInput
-from canshaper.inputs.joystick import JoystickInput
-from canshaper.inputs.radius import RadiusInput
-from canshaper.inputs.value import ValueInput
+from canshaper.inputs.feedback import Feedback
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.inputs import BoundInput
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
 from canshaper.shaping.states import Reason
 
-# A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
-# than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
-LATE_WEIGHT = 5
-LATE_LIMIT = 50
-FAULT_OF = {
-    Following.NO: FrameFault.NOT_FOLLOWING,
-    Following.LOST: FrameFault.FEEDBACK_LOST,
-}
 NOWHERE: frozenset[str] = frozenset()
 
 
@@ -50,57 +40,36 @@ class Controller:
         self.deployment = deployment
         self.counters = Counters()
         self.events: list[Event] = []
-        joysticks = {
-            name: JoystickInput(joystick) for name, joystick in deployment.joysticks.items()
-        }
-        self.joysticks = joysticks
-        taken: list[tuple[BoundInput, MessageInput]] = [
-            (joystick, joysticks[name]) for name, joystick in deployment.joysticks.items()
-        ]
-        self._stop: EmergencyStopInput | None = None
-        if stop := deployment.emergency_stop:
-            self._stop = EmergencyStopInput(stop, stop.config.signal)
-            taken.append((stop, self._stop))
+        inputs = MachineInputs(deployment)
+        self.joysticks, self._stop = inputs.joysticks, inputs.stop
         tick_s = deployment.config.tick_ms / 1000.0
         self.axes = {
-            name: AxisRunner(bound, tick_s, joysticks[bound.config.command.joystick])
+            name: AxisRunner(bound, tick_s, inputs.joysticks[bound.config.command.joystick])
             for name, bound in deployment.axes.items()
         }
-        taken += self._choose()
-        taken += [
+        self._connect(inputs)
+        bound = inputs.bound + [
             (runner.bound.feedback, runner.feedback)
             for runner in self.axes.values()
             if runner.bound.feedback and runner.feedback
         ]
-        for runner in self.axes.values():
-            if (radial := runner.bound.radial) is not None:
-                radius = RadiusInput(radial)
-                if (measured := radial.radius) is not None:
-                    taken.append((measured, radius))
-                target = self.axes[radial.config.axis]
-                runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
         routing = deployment.routing
-        handlers = {id(bound): one for bound, one in taken}
-        self.inputs: dict[MessageKey, MessageInput] = {
-            key: handlers[id(route.input)]
-            for key, route in routing.routes.items()
-            if id(route.input) in handlers
-        }
+        self.inputs = received_by(routing, bound)
         self._sent, self._others = routing.sent, routing.others
-        self._by_message: dict[MessageKey, list[AxisRunner]] = {
-            key: [self.axes[name] for name in names] for key, names in routing.valves.items()
-        }
         # An axis that asks something of another one goes first.
         order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
-        self._protocols = protocols(deployment, self.axes, joysticks, taken)
+        self._protocols = protocols(deployment, self.axes, inputs.joysticks, bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
         for protocol in self._protocols:
             self.inputs |= protocol.inputs
             self._forwarding |= protocol.forwarding
-        self._turns = [self._turn(name, runner) for name, runner in order]
+        by_message = {
+            key: [self.axes[name] for name in names] for key, names in routing.valves.items()
+        }
+        self._outputs = ValveOutputs(by_message, self._forwarding)
+        self._turns = self._outputs.turns(order)
         self._last = -1  # number of the last deadline
-        self._late = 0
-        self._overrun = False
+        self._overrun = OverrunDetector()
         self._stood_still = False
         self.moves = False
 
@@ -110,7 +79,7 @@ class Controller:
         What is latched, what other nodes reported and every alive counter stay as they are. A bus
         that was opened again was not listened to: nothing good that is known of it counts.
         """
-        self._late, self._overrun = before._late, before._overrun
+        self._overrun.copy_state(before._overrun)
         if before._stop is not None:
             for runner in before.axes.values():
                 runner.see(before._stop)
@@ -151,8 +120,7 @@ class Controller:
             fault = entry.receive(frame.data, arrived_ns)
         elif key in self._sent:  # a bus never hands back what was sent by us
             fault = FrameFault.SECOND_SENDER
-            for runner in self._by_message.get(key, ()):
-                runner.foreign_sender(arrived_ns)
+            self._outputs.foreign_sender(key, arrived_ns)
         elif (handler := self._handler(frame)) is not None:
             fault = handler.receive(frame, arrived_ns)
         elif key[1:] in self._others or any(one.usual(frame) for one in self._protocols):
@@ -202,7 +170,7 @@ class Controller:
         if self._stood_still:
             self._stood_still = False
             self._forget()
-        overrun = self._overruns(missed) if missed or self._late else False
+        overrun = self._overruns(missed) if missed or self._overrun.late else False
         changed = []
         silent = self.silent_buses if self._protocols else NOWHERE
         for name, runner, message, rule in self._turns:
@@ -213,8 +181,8 @@ class Controller:
                 transition = runner.tick(now_ns, self._stop, overrun)
                 self.moves |= runner.axis.raw != 0
                 if rule is not None:
-                    if (frame := rule.own(now_ns)) is not None:
-                        yield frame
+                    if (own := rule.own(now_ns)) is not None:
+                        yield own
                 elif message is not None and message.bus not in silent:
                     yield message.frame()
                 runner.post_step(now_ns)
@@ -224,68 +192,45 @@ class Controller:
                     self.events.append(StateEvent(name, transition))
                     changed.append(runner)
         self.moves = False
-        yield from self._statuses(changed, last, now, silent)
+        axes = self.axes.values()
+        for frame in status_frames(self.deployment, axes, changed, self.counters, (last, now)):
+            if frame.bus not in silent:
+                yield frame
+        if self._protocols:
+            yield from self._of_protocols(now_ns)
+
+    def _of_protocols(self, now_ns: int) -> Iterator[Frame]:
+        """What protocols send besides commands and status, and what they report."""
         for protocol in self._protocols:
             if fault := protocol.silence(now_ns):
                 self.counters.add(fault)
             yield from protocol.frames(now_ns)
             self.events += protocol.changes()
 
-    def _turn(
-        self, name: str, runner: AxisRunner
-    ) -> tuple[str, AxisRunner, ValveMessage | None, ForwardingRule | None]:
-        """An axis, and the message that goes out when it has moved: the last one of the message."""
-        message = runner.bound.valve.message
-        if self._by_message[message.sender.key][-1] is not runner:
-            return name, runner, None, None
-        return name, runner, message, self._forwarding.get(message.sender.key)
-
-    def _choose(self) -> list[tuple[BoundInput, Input]]:
-        """Let load state and operator choose sway data and filter of axes that have a choice."""
-        bound = self.deployment.load_state, self.deployment.profile
-        load_state, profile = (ValueInput(one, one.config.signal) if one else None for one in bound)
-        codes = self.deployment.config.profile.codes if self.deployment.config.profile else {}
-        for runner in self.axes.values():
+    def _connect(self, inputs: MachineInputs) -> None:
+        """Let load state and operator choose filters, and axes ask something of each other."""
+        profile = self.deployment.config.profile
+        for name, runner in self.axes.items():
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
-                runner.add_chooser(load_state, profile, codes)
-        return [(b, one) for b, one in zip(bound, (load_state, profile), strict=True) if b and one]
+                codes = profile.codes if profile else {}
+                runner.add_chooser(inputs.load_state, inputs.profile, codes)
+            if (radial := runner.bound.radial) is not None:
+                target, radius = self.axes[radial.config.axis], inputs.radii[name]
+                runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
-        """Tell when the valve no longer does what it is told, and when it does again."""
+        """Report when the valve no longer follows its command, and when it does again."""
         sent = runner.axis.sent
         if feedback.check(sent, now_ns):
-            self.events.append(FeedbackEvent(name, feedback.following, feedback.part, sent))
-            if fault := FAULT_OF.get(feedback.following):
-                self.counters.add(fault)
-
-    def _statuses(
-        self, changed: list[AxisRunner], last: int, now: int, silent: frozenset[str]
-    ) -> Iterator[Frame]:
-        """Status of the axes that changed and of all that are due, and of the service."""
-        for runner in self.axes.values():
-            if runner in changed or _passed(last, now, runner.bound.status_ticks):
-                frame = runner.status_frame()
-                if frame and frame.bus not in silent:
-                    yield frame
-        service = self.deployment.status
-        if service and _passed(last, now, self.deployment.status_ticks):
-            frame = service.frame(self.counters.status())
-            if frame.bus not in silent:
-                yield frame
+            event = FeedbackEvent(name, feedback.following, feedback.part, sent)
+            self.events.append(event)
+            if event.fault:
+                self.counters.add(event.fault)
 
     def _overruns(self, missed: int) -> bool:
-        """Whether so many ticks came late that the filter no longer does what it was tuned for.
-
-        Asked while that is not paid back, and when a tick was late.
-        """
         if missed:
             self.counters.add(FrameFault.MISSED_DEADLINE, missed)
-            self._late = min(self._late + LATE_WEIGHT, LATE_LIMIT)
-            self._overrun |= self._late == LATE_LIMIT
-        else:
-            self._late -= 1
-            self._overrun &= self._late > 0
-        return self._overrun
+        return self._overrun.tick(late=missed > 0)
 
     def stalled(self) -> None:
         """The loop stood still for longer than any input may be old: nothing good still holds.
@@ -318,48 +263,19 @@ class Controller:
         self.counters.add(FrameFault.SEND_FAILED)
         for protocol in self._protocols:
             protocol.send_failed(frame)
-        for runner in self._by_message.get((frame.bus, frame.can_id, frame.extended), ()):
-            runner.trip_in_motion(Reason.SEND_FAILED)
+        self._outputs.send_failed(frame[:3])
 
     def withhold(self, frame: Frame) -> bool:
-        """A valve frame comes too late: whether it moves one, and so must not leave.
-
-        Its receiver will see no gap in the counter.
-        """
-        runners = self._by_message[frame[:3]]
-        if not any(runner.axis.raw for runner in runners):
-            return False
-        runners[-1].bound.valve.message.sender.protector.take_back()
-        return True
+        """A valve frame comes too late: whether it moves one, and so must not leave."""
+        return self._outputs.withhold(frame)
 
     def refused(self, frame: Frame) -> Frame:
-        """The output guard has refused a valve frame: its axes trip.
-
-        Returns:
-            The same frame with neutral commands, to be sent in its place.
-        """
+        """The output guard has refused a valve frame: its axes trip; see ``ValveOutputs``."""
         self.counters.add(FrameFault.OUTPUT_REFUSED)
-        runners = self._by_message[frame[:3]]
-        for runner in runners:
-            runner.trip(Reason.OUTPUT_REFUSED)
-            runner.bound.valve.put(0)
-        return runners[0].bound.valve.message.instead(frame)
+        return self._outputs.refused(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve: the last thing sent."""
-        for runner in self.axes.values():
-            runner.bound.valve.put(0)
         for protocol in self._protocols:
             protocol.leave()
-        frames, silent = [], self.silent_buses
-        for key, runners in self._by_message.items():
-            if (rule := self._forwarding.get(key)) is not None:
-                frames += rule.last()
-            elif key[0] not in silent:
-                frames.append(runners[-1].bound.valve.message.frame())
-        return frames
-
-
-def _passed(last: int, now: int, period: int) -> int:
-    """How many multiples of the period lie after deadline ``last``, up to ``now``."""
-    return now // period - last // period if period else 0
+        return self._outputs.neutral_frames(self.silent_buses)

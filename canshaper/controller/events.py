@@ -2,9 +2,14 @@
 
 from dataclasses import dataclass
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Transition
+
+FAULT_OF = {
+    Following.NO: FrameFault.NOT_FOLLOWING,
+    Following.LOST: FrameFault.FEEDBACK_LOST,
+}
 
 
 @dataclass(frozen=True, slots=True)
@@ -33,8 +38,13 @@ class FeedbackEvent:
     @property
     def text(self) -> str:
         """For the log."""
-        found = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
-        return f"axis={self.axis} valve={self.following.value} {found}"
+        values = f"feedback_pct={100 * self.value:.0f} command_pct={100 * self.sent:.0f}"
+        return f"axis={self.axis} valve={self.following.value} {values}"
+
+    @property
+    def fault(self) -> FrameFault:
+        """As what it counts; none where the valve follows."""
+        return FAULT_OF.get(self.following, FrameFault.NONE)
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,0 +1,62 @@
+"""The inputs of a deployment: what receives each of its messages."""
+
+from collections.abc import Iterable, Mapping
+
+from canshaper.inputs.input import EmergencyStopInput, MessageInput
+from canshaper.inputs.joystick import JoystickInput
+from canshaper.inputs.radius import RadiusInput
+from canshaper.inputs.value import ValueInput
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.inputs import BoundInput, BoundSwitch
+from canshaper.machine.routing import Routing
+from canshaper.protocols.interface import MessageKey
+
+BoundHandler = tuple[BoundInput, MessageInput]
+
+
+class MachineInputs:
+    """Inputs that are not part of an axis.
+
+    Attributes:
+        joysticks: the joysticks by name.
+        stop: the emergency stop, where there is one.
+        load_state: tells what hangs on the crane, where there is a signal for it.
+        profile: the operator's choice, where there is one.
+        radii: radius of the tip for each axis with a radial compensation, by its name.
+        bound: all of them that receive frames, with their messages.
+    """
+
+    def __init__(self, deployment: Deployment) -> None:
+        self.joysticks = {name: JoystickInput(one) for name, one in deployment.joysticks.items()}
+        self.bound: list[BoundHandler] = [
+            (bound, self.joysticks[name]) for name, bound in deployment.joysticks.items()
+        ]
+        self.stop: EmergencyStopInput | None = None
+        if stop := deployment.emergency_stop:
+            self.stop = EmergencyStopInput(stop, stop.config.signal)
+            self.bound.append((stop, self.stop))
+        self.load_state = self._switch(deployment.load_state)
+        self.profile = self._switch(deployment.profile)
+        self.radii: dict[str, RadiusInput] = {}
+        for name, axis in deployment.axes.items():
+            if axis.radial is not None:
+                self.radii[name] = RadiusInput(axis.radial)
+                if axis.radial.radius is not None:
+                    self.bound.append((axis.radial.radius, self.radii[name]))
+
+    def _switch(self, bound: BoundSwitch | None) -> ValueInput | None:
+        if bound is None:
+            return None
+        one = ValueInput(bound, bound.config.signal)
+        self.bound.append((bound, one))
+        return one
+
+
+def received_by(routing: Routing, bound: Iterable[BoundHandler]) -> dict[MessageKey, MessageInput]:
+    """What receives each message that is known by its identifier."""
+    handlers: Mapping[int, MessageInput] = {id(one): handler for one, handler in bound}
+    return {
+        key: handlers[id(route.input)]
+        for key, route in routing.routes.items()
+        if id(route.input) in handlers
+    }

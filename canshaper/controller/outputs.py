@@ -1,0 +1,86 @@
+"""The valve messages: which axes command each, and what becomes of a frame that does not leave."""
+
+from collections.abc import Iterable, Mapping, Sequence
+
+from canshaper.codec.frame import Frame
+from canshaper.codec.valve import ValveMessage
+from canshaper.controller.runner import AxisRunner
+from canshaper.protocols.interface import ForwardingRule, MessageKey
+from canshaper.shaping.states import Reason
+
+Turn = tuple[str, AxisRunner, ValveMessage | None, ForwardingRule | None]
+"""An axis with its name, and what goes out when it has moved: a message, or by a rule."""
+
+
+class ValveOutputs:
+    """All valve messages.
+
+    Args:
+        axes: the axes that command each message, by its identifier.
+        forwarding: what leaves in the place of a message, by the same.
+    """
+
+    def __init__(
+        self,
+        axes: Mapping[MessageKey, Sequence[AxisRunner]],
+        forwarding: Mapping[MessageKey, ForwardingRule],
+    ) -> None:
+        self._axes = axes
+        self._forwarding = forwarding
+
+    def turns(self, order: Iterable[tuple[str, AxisRunner]]) -> list[Turn]:
+        """The axes in their order; a message goes out with the last one of its axes."""
+        turns: list[Turn] = []
+        for name, runner in order:
+            message = runner.bound.valve.message
+            key = message.sender.key
+            if self._axes[key][-1] is runner:
+                turns.append((name, runner, message, self._forwarding.get(key)))
+            else:
+                turns.append((name, runner, None, None))
+        return turns
+
+    def foreign_sender(self, key: MessageKey, arrived_ns: int) -> None:
+        """A frame with this identifier came from another sender."""
+        for runner in self._axes.get(key, ()):
+            runner.foreign_sender(arrived_ns)
+
+    def send_failed(self, key: MessageKey) -> None:
+        """A frame with this identifier did not reach its bus: axes in motion trip."""
+        for runner in self._axes.get(key, ()):
+            runner.trip_in_motion(Reason.SEND_FAILED)
+
+    def withhold(self, frame: Frame) -> bool:
+        """A frame comes too late: whether it moves a valve, and so must not leave.
+
+        Its receiver will see no gap in the counter.
+        """
+        runners = self._axes[frame[:3]]
+        if not any(runner.axis.raw for runner in runners):
+            return False
+        runners[-1].bound.valve.message.sender.protector.take_back()
+        return True
+
+    def refused(self, frame: Frame) -> Frame:
+        """The output guard has refused a frame: its axes trip.
+
+        Returns:
+            The same frame with neutral commands, to be sent in its place.
+        """
+        runners = self._axes[frame[:3]]
+        for runner in runners:
+            runner.trip(Reason.OUTPUT_REFUSED)
+            runner.bound.valve.put(0)
+        return runners[0].bound.valve.message.instead(frame)
+
+    def neutral_frames(self, silent: frozenset[str]) -> list[Frame]:
+        """A neutral frame for every valve whose bus is not silent: the last thing sent."""
+        frames: list[Frame] = []
+        for key, runners in self._axes.items():
+            for runner in runners:
+                runner.bound.valve.put(0)
+            if (rule := self._forwarding.get(key)) is not None:
+                frames += rule.last()
+            elif key[0] not in silent:
+                frames.append(runners[-1].bound.valve.message.frame())
+        return frames
