@@ -42,6 +42,10 @@ class StatusField(Generic[Source]):
     required: bool = False
     largest: int | None = None
 
+    def __reduce__(self) -> tuple[Callable[[str], Any], tuple[str]]:
+        """Pickled by its name: a reload reads the deployment in a process of its own."""
+        return _field, (self.name,)
+
     def shown(self, value: object) -> str:
         """A decoded value for people: codes by their name, where they have one."""
         if isinstance(value, IntEnum):
@@ -106,6 +110,12 @@ IDENTITY: list[StatusField[int]] = [
     StatusField("Digest", int, int, required=True, largest=(1 << DIGEST_BITS) - 1)
 ]
 """Digest of what runs."""
+
+
+def _field(name: str) -> StatusField[Any]:
+    """The field of that name, of the tables of this process."""
+    fields: list[StatusField[Any]] = [*AXIS_STATUS, *SERVICE_STATUS, *IDENTITY]
+    return next(field for field in fields if field.name == name)
 
 
 class StatusCodec(Generic[Source]):

@@ -1,5 +1,6 @@
 """Fields of status messages: one declaration is enough, and no machine needs a new one."""
 
+import pickle
 from pathlib import Path
 
 import pytest
@@ -71,3 +72,9 @@ def test_a_required_field_that_is_missing_is_named(tmp_path: Path) -> None:
 def test_an_optional_field_that_cannot_carry_a_number_is_refused(tmp_path: Path) -> None:
     with pytest.raises(DeploymentError, match="ActiveSet has a scale of 0"):
         machine(tmp_path, ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))
+
+
+def test_every_field_is_itself_in_a_reload() -> None:
+    """The deployment is read in a process of its own, and comes back as bytes."""
+    for field in (*status.AXIS_STATUS, *status.SERVICE_STATUS, *status.IDENTITY):
+        assert pickle.loads(pickle.dumps(field)) is field
