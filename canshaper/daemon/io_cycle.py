@@ -24,7 +24,7 @@ class FrameProcessor(Protocol):
     def stalled(self) -> None:
         """The loop stood still for too long: what comes before the next tick has waited."""
 
-    def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
+    def tick(self, now_ns: int, missed: int) -> Iterator[Frame]:
         """One tick: the frames to send now."""
 
     def send_failed(self, frame: Frame) -> None:

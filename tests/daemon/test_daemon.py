@@ -4,7 +4,7 @@ import json
 import logging
 import signal
 import socket
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -15,9 +15,11 @@ from canshaper.bus.port import BusError, WrongBusError
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
+from canshaper.daemon.standstill import Standstill
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.daemon.test_reload import Bench, FakePort, Read
+from tests.daemon.test_reload import BUS, Bench, FakePort, Read
 from tests.rigs.forwarder import ROOT
 
 RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
@@ -60,9 +62,23 @@ def test_the_state_of_a_bus_is_logged_when_it_changes(
     ]
 
 
-@pytest.mark.parametrize(
-    "state", [BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.GONE]
-)
+# Nobody hears us there, or we nobody; and where a bus only has trouble.
+OFF = [
+    BusState.BUS_OFF,
+    BusState.NOT_CONFIRMED,
+    BusState.DOWN,
+    BusState.GONE,
+    BusState.WRONG_DEVICE,
+]
+ON = [BusState.UP, BusState.PASSIVE, BusState.FAILED]
+
+
+def test_we_are_on_a_bus_or_not_whatever_its_state() -> None:
+    """A state that is new has to be put to one of them."""
+    assert {*OFF, *ON} == {*BusState}
+
+
+@pytest.mark.parametrize("state", OFF)
 def test_of_a_bus_that_we_are_not_on_the_controller_knows(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
 ) -> None:
@@ -72,7 +88,7 @@ def test_of_a_bus_that_we_are_not_on_the_controller_knows(
     assert set(off) == {"crane"}
 
 
-@pytest.mark.parametrize("state", [BusState.UP, BusState.PASSIVE, BusState.FAILED])
+@pytest.mark.parametrize("state", ON)
 def test_a_bus_that_only_has_trouble_is_one_that_we_are_on(
     bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
 ) -> None:
@@ -206,7 +222,8 @@ def test_a_number_that_is_refused_is_in_the_log(
     assert "0.5 to 1" in answer["error"]
     refused = [line for line in log() if "set=refused" in line]
     assert len(refused) == 1
-    assert refused[0].startswith("WARNING ")
+    assert refused[0].startswith("WARNING set=refused uid=")
+    assert refused[0].endswith(answer["error"])
 
 
 @pytest.mark.parametrize("request_", [{"get": 1}, {"set": 1}, {"set": {}, "more": 1}])
@@ -319,46 +336,115 @@ def test_a_reload_in_motion_waits_and_the_log_says_so_once(
 
 
 class Beside:
-    """What a gateway does between its ticks, counted."""
+    """What a gateway does between its ticks, counted; it has taken joystick frames by then."""
 
-    def __init__(self, bench: Bench) -> None:
+    def __init__(
+        self, bench: Bench, deployment: Deployment, on_fault: Callable[[FrameFault], None]
+    ) -> None:
+        assert deployment.config.gateway
         self.waits = self.passes = self.checks = 0
         self.closed = 0
+        self.on_fault = on_fault
         self._bench = bench
 
-    def wait(self, seconds: float, *_: object) -> None:
+    def wait(
+        self,
+        seconds: float,
+        processor: FrameProcessor,
+        ports: Mapping[str, FramePort],
+        standstill: Standstill,
+    ) -> None:
         self.waits += 1
-        self._bench.sleep(seconds)
+        self._bench.sleep(seconds / 2)
+        assert not standstill.over(self._bench.now_ns)
+        receive_waiting(processor, ports, self._bench.now_ns, standstill)
+        self._bench.sleep(seconds / 2)
 
     def pass_others(self) -> int:
         self.passes += 1
         return 0
 
-    def check(self, _now_ns: int, *, neutral: bool) -> None:
-        assert neutral
+    def check(self, now_ns: int, *, neutral: bool) -> None:
+        assert (now_ns, neutral) == (self._bench.now_ns, True)
         self.checks += 1
 
     def close(self) -> None:
         self.closed += 1
 
 
-def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
+@pytest.fixture
+def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Beside]:
+    """The bench's machine has a gateway; what stands in its line, one after the other."""
     text = (ROOT / "config" / "gateway-forwarder.yaml").read_text(encoding="utf-8")
     bench.text = text.replace("../dbc", str(ROOT / "dbc"))
     bench.file.write_text(bench.text, encoding="utf-8")
     lines: list[Beside] = []
 
-    def in_line(*_: object) -> Beside:
-        lines.append(Beside(bench))
+    def in_line(*arguments: Any) -> Beside:
+        lines.append(Beside(bench, *arguments))
         return lines[-1]
 
     monkeypatch.setattr(module, "InlineGateway", in_line)
+    return lines
+
+
+def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
+    bench: Bench, lines: list[Beside]
+) -> None:
     at(bench, {5: bench.reload})
     assert [one.closed for one in lines] == [1, 1]  # the old one, and the last one at the end
     assert sum(one.passes for one in lines) == sum(one.checks for one in lines) == 21
     assert sum(one.waits for one in lines) == 19  # a reload begins with a tick
+
+
+def test_a_joystick_frame_leaves_a_gateway_before_the_next_tick(
+    bench: Bench, lines: list[Beside]
+) -> None:
+    """Half a tick after the one before; it has waited on the first bus until then."""
+    left: list[int] = []
+
+    def comes_later() -> None:
+        frame = bench.rig.joystick("JoystickLeft")
+        before = len(bench.sent)
+        bench.ports[0].waiting.append((bench.now_ns + 9_000_000, frame))
+        left.append(before)
+
+    def counts() -> None:
+        left.append(sum(f.can_id == frame_id for f in bench.sent[left[0] :]))
+
+    frame_id = bench.rig.messages["JoystickLeft"].frame_id
+    bench.script = lambda number: None
+    acts = {5: comes_later, 6: counts, 8: bench.stop}
+    bench.run(lambda number: acts.get(number, lambda: None)())
+    assert len(lines) == 1
+    assert left[1] == 1
+
+
+def test_a_fault_of_a_gateway_is_counted(
+    bench: Bench, lines: list[Beside], log: Callable[[], list[str]]
+) -> None:
+    at(bench, {5: lambda: lines[0].on_fault(FrameFault.SEND_FAILED)})
+    assert any("fault=SEND_FAILED" in line for line in log())
+
+
+def test_a_line_that_cannot_be_opened_leaves_the_one_before(
+    bench: Bench, lines: list[Beside], monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+) -> None:
+    """A port that was opened for it is closed again; those from before are not."""
+
+    def cannot(*_: object) -> None:
+        raise BusError("gateway: cannot open vcan0 and vcan9: no such device")
+
+    def reloads() -> None:
+        monkeypatch.setattr(module, "InlineGateway", cannot)
+        bench.reload("channel: vcan1", "channel: vcan9")
+
+    closed: list[tuple[str, bool]] = []
+    ends = lambda: closed.extend((p.channel, p.closed) for p in bench.ports)  # noqa: E731
+    at(bench, {5: reloads, 19: ends})
+    assert [line for line in log() if "refused" in line]
+    assert closed == [("vcan0", False), ("vcan1", False), ("vcan9", True)]
+    assert [one.closed for one in lines] == [1]
 
 
 def test_signals_are_those_of_a_service(bench: Bench) -> None:
@@ -399,12 +485,18 @@ def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
 def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
+    bench.text = bench.text.replace(
+        BUS, "crane:\n    interface: socketcan\n    channel: vcan0\n    match: { serial: '1' }"
+    )
+    bench.file.write_text(bench.text, encoding="utf-8")
+
     def wrong(*_: object) -> None:
         raise WrongBusError("crane", "expected serial number 1, found 2")
 
     monkeypatch.setattr("canshaper.daemon.ports.open_port", wrong)
     with pytest.raises(BusError) as error:
         Daemon(lambda: load_deployment(bench.file))
-    assert str(error.value).startswith(f"{bench.file}:")
-    assert "buses.crane" in str(error.value)
+    lines = bench.text.splitlines()
+    number = 1 + next(i for i, line in enumerate(lines) if "match:" in line)
+    assert str(error.value).startswith(f"{bench.file}:{number}: buses.crane.match:")
     assert str(error.value).endswith("expected serial number 1, found 2")
