@@ -1,8 +1,8 @@
 """How many times faster than real time a log is replayed, beside python-can only reading it.
 
 The log is a drive of the closed loop as a daemon's own bus carries it: joysticks, valves, status
-and what the simulated crane tells, some 410 frames a second. Replayed once with the ticks of that
-daemon, every frame compared, and once with those of a clock; table and picture are not in it.
+and what the simulated crane tells, some 410 frames a second. Replayed as the black box of that
+daemon, every frame compared, and as a log at the ticks of a clock; without table and picture.
 
     python benchmarks/replay.py [--minutes 10] [--runs 3] [--config forwarder.yaml]
 """
@@ -18,10 +18,16 @@ from pathlib import Path
 
 import can
 
+from canshaper.blackbox.file import SUFFIX, chunks
+from canshaper.blackbox.recorder import Recorder
+from canshaper.blackbox.ring import Ring
+from canshaper.blackbox.state import States
+from canshaper.blackbox.write import header_of
 from canshaper.cli.common import loader
 from canshaper.cli.replay import _without_collector
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
 from canshaper.recording.log import read_log
 from canshaper.recording.replay import Replay, look
 from canshaper_sim.joysticks import JoystickNode
@@ -32,11 +38,15 @@ TICK_NS = 20_000_000
 START_NS = 1_763_750_000_000_000_000
 
 
-def write_drive(path: Path, seconds: float, config: str) -> int:
-    """The log of a drive of so many seconds; how many lines it has."""
+def write_drive(path: Path, box: Path, seconds: float, config: str) -> int:
+    """Log and black box of a drive of so many seconds; how many lines the log has."""
     load = loader(config)
     deployment = load()
-    controller = Controller(deployment)
+    controller, ring = Controller(deployment), Ring(most_blocks=10_000)
+    guarded = Guarded(controller)
+    state = States(guarded, controller).save()
+    recorder = Recorder(guarded, controller, ring)
+    ring.begin(state, 0, follows=False)
     plant = PlantNode(load())
     lines = 0
     with path.open("w", encoding="ascii") as file:
@@ -48,7 +58,7 @@ def write_drive(path: Path, seconds: float, config: str) -> int:
             text = f"({second}.{ns // 1000:06d}) vcan0 {frame.can_id:03X}#"
             file.write(f"{text}{frame.data.hex().upper()}\n")
 
-        for frame in controller.neutral_frames():
+        for frame in recorder.neutral_frames():
             log(0, frame)
         joysticks: JoystickNode | None = None
         ends_ms, seed = 0, count(1)
@@ -61,14 +71,16 @@ def write_drive(path: Path, seconds: float, config: str) -> int:
             assert joysticks is not None
             for frame in joysticks.frames(number * 20 - begin_ms):
                 log(now_ns + 1_000, frame)
-                controller.receive(frame, now_ns)
-            for i, frame in enumerate(controller.tick(now_ns)):
+                recorder.receive(frame, now_ns)
+            for i, frame in enumerate(recorder.tick(now_ns)):
                 log(now_ns + 100_000 + 30_000 * i, frame)
                 plant.receive(frame)
+            recorder.flush()
             plant.advance(0.02)
             for i, frame in enumerate(plant.feedback()):
                 log(now_ns + 10_000_000 + 100_000 * i, frame)
-                controller.receive(frame, now_ns)
+                recorder.receive(frame, now_ns)
+    box.write_bytes(b"".join(chunks(header_of(deployment, "benchmark"), ring.segments)))
     return lines
 
 
@@ -82,14 +94,15 @@ def taken(run: Callable[[], object], runs: int) -> float:
     return statistics.median(times)
 
 
-def replay(path: Path, config: str, *, by_daemon: bool) -> None:
-    """Replay all of it; with the daemon's ticks every frame has to be the same."""
-    load = loader(config)
-    one = Replay(load, look(load(), path, {}), by_daemon=by_daemon)
+def replay(path: Path, config: str) -> None:
+    """Replay all of it; of a black box every frame has to be the same."""
+    deployment = loader(config)()
+    one = Replay(deployment, look(deployment, path, {}, own=path.suffix == SUFFIX))
     with _without_collector():
         for _ in one.run(lambda _part: None):
             pass
     assert not one.verdict.different, one.verdict
+    assert one.exact == bool(one.verdict.compared)
 
 
 def main() -> None:
@@ -102,15 +115,15 @@ def main() -> None:
     config = arguments.config
     seconds = 60.0 * arguments.minutes
     with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / "drive.log"
-        lines = write_drive(path, seconds, config)
+        path, box = Path(folder) / "drive.log", Path(folder) / f"drive{SUFFIX}"
+        lines = write_drive(path, box, seconds, config)
         print(f"{arguments.minutes:g} minutes, {lines} frames, {path.stat().st_size / 1e6:.1f} MB")
         before_kb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
         for title, run in (
             ("python-can reads it", lambda: sum(1 for _ in can.LogReader(path))),
             ("canshaper reads it", lambda: sum(1 for _ in read_log(path))),
-            ("replay, daemon's ticks, compared", lambda: replay(path, config, by_daemon=True)),
-            ("replay, ticks of a clock", lambda: replay(path, config, by_daemon=False)),
+            ("replay of the black box", lambda: replay(box, config)),
+            ("replay, ticks of a clock", lambda: replay(path, config)),
         ):
             time_s = taken(run, arguments.runs)
             print(f"{title:33} {time_s:6.2f} s, {seconds / time_s:6.0f} x real time")

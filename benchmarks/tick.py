@@ -3,13 +3,15 @@
 Both take the same two joystick frames from a bus and send four valve frames to it; the bus is
 python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,
 decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status; it
-is timed with the output guard in front of the bus, and without.
+is timed with the output guard in front of the bus, and without. What the black box adds is timed
+without a bus: in the tick, behind it, and for the state that it keeps every ten seconds.
 Each is timed tick by tick, in turn, in one run; the ratio is the figure that counts.
 
     python benchmarks/tick.py [--ticks 5000]
 """
 
 import argparse
+import gc
 import statistics
 import tempfile
 import time
@@ -18,6 +20,9 @@ from pathlib import Path
 
 import can
 
+from canshaper.blackbox.recorder import Recorder
+from canshaper.blackbox.ring import Ring
+from canshaper.blackbox.state import States
 from canshaper.bus.port import Port, open_port
 from canshaper.cli.common import data_directory
 from canshaper.codec.frame import Frame
@@ -99,13 +104,55 @@ def daemon(controller: Controller, port: Port, *, guard: bool) -> Callable[[int]
     return body
 
 
+def black_box(one: Deployment, other: Deployment, ticks: int) -> None:
+    """Measure and print what the black box costs."""
+    controllers = Controller(one), Controller(other)
+    guarded, inner = (Guarded(controller) for controller in controllers)
+    ring, states = Ring(), States(inner, controllers[1])
+    ring.begin(states.save(), 0, follows=False)
+    recorder = Recorder(inner, controllers[1], ring)
+    joysticks = JoystickNode(one, random_script(1, ticks * 0.02 + 1.0))
+    without: list[int] = []
+    recorded: list[int] = []
+    behind: list[int] = []
+    kept: list[int] = []
+    both = (guarded, without), (recorder, recorded)
+    gc.collect()
+    gc.disable()  # as in the daemon
+    for i in range(ticks):
+        frames, now_ns = joysticks.frames(i * 20), i * 20_000_000
+        for driven, spent in both[:: 1 if i % 2 else -1]:
+            start = time.perf_counter_ns()
+            for frame in frames:
+                driven.receive(frame, now_ns)
+            for _ in driven.tick(now_ns):
+                pass
+            spent.append(time.perf_counter_ns() - start)
+        start = time.perf_counter_ns()
+        recorder.flush()
+        behind.append(time.perf_counter_ns() - start)
+        for controller in controllers:
+            controller.events.clear()
+        if i % 50 == 0:
+            start = time.perf_counter_ns()
+            states.save()
+            kept.append(time.perf_counter_ns() - start)
+    bare, whole, after, state = (
+        statistics.median(row) / 1e3 for row in (without, recorded, behind, kept)
+    )
+    print(
+        f"black box: {whole - bare:.1f} us more in a tick of {bare:.0f} us without a bus,"
+        f" {after:.1f} us behind it, {state:.0f} us for a state every 10 s"
+    )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--ticks", type=int, default=5000)
     ticks = parser.parse_args().ticks
     with tempfile.TemporaryDirectory() as directory:
-        deployment, other = (four_axes(Path(directory)) for _ in range(2))
+        deployment, other, *boxed = (four_axes(Path(directory)) for _ in range(4))
     controller = Controller(deployment)
     joysticks = JoystickNode(deployment, random_script(1, ticks * 0.02 + 1.0))
     hands = {n: can.Bus(interface="virtual", channel=n) for n in ("ours", "open", "bare")}
@@ -164,6 +211,7 @@ def main() -> None:
     print(
         f"with / without the output guard: {guard:.2f}, {more / 1e3:.1f} us more in the same tick"
     )
+    black_box(*boxed, ticks)
 
 
 if __name__ == "__main__":

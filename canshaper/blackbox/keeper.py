@@ -44,6 +44,7 @@ class BlackBox:
     def __init__(self, folder: Path | None) -> None:
         self._folder = folder
         self._ring = Ring()
+        self._recorder: Recorder | None = None
         self._deployment: Deployment | None = None
         self._states: States | None = None
         self._next_ns = 0  # when the next state is due
@@ -58,6 +59,7 @@ class BlackBox:
     def around(self, guarded: Guarded, controller: Controller) -> Recorder:
         """What records all that goes into a controller and comes out; ``begin`` starts it."""
         deployment = controller.deployment
+        self._flush()
         self._ring.pause()
         if self._deployment and self._deployment.identity != deployment.identity:
             self._freeze()
@@ -67,10 +69,12 @@ class BlackBox:
             self._states = States(guarded, controller)
         except StateError as error:  # of a filter of another package
             log.warning("black-box=none %s", error)
-        return Recorder(guarded, controller, self._ring)
+        self._recorder = Recorder(guarded, controller, self._ring)
+        return self._recorder
 
     def begin(self, now_ns: int) -> None:
-        """From here on everything is recorded, but what is received and sent behind our back."""
+        """From here on everything is recorded."""
+        self._flush()  # what was before is not
         self._keep_state(now_ns, follows=False)
 
     def after_tick(self, now_ns: int, events: Iterable[object], *, neutral: bool) -> None:
@@ -81,6 +85,7 @@ class BlackBox:
             events: what changed in it.
             neutral: whether every axis is.
         """
+        self._flush()
         for event in events:
             if isinstance(event, StateEvent) and event.transition.new in STOPPED and not self._why:
                 self._why = event.text
@@ -115,11 +120,16 @@ class BlackBox:
 
     def close(self) -> None:
         """The daemon ends, with every valve neutral: what is to be written is written now."""
+        self._flush()
         if self._writer:
             self._ended(os.waitpid(self._writer, 0)[1])
         self._freeze()
         if self._frozen:
             self._ended(_exit_status(self._write()))
+
+    def _flush(self) -> None:
+        if self._recorder is not None:
+            self._recorder.flush()
 
     def _keep_state(self, now_ns: int, *, follows: bool) -> None:
         self._next_ns = now_ns + STATE_NS

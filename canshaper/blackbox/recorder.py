@@ -12,11 +12,14 @@ from canshaper.controller.guarded import Guarded
 # Members of an enumeration cost a look-up each.
 TICK, RX, TX = int(Kind.TICK), int(Kind.RX), int(Kind.TX)
 
+# kind, frame, number, time in ns; see canshaper.blackbox.records
+Call = tuple[int, Frame | None, int, int]
+
 
 class Recorder:
     """A controller behind its output guard, every call of which is recorded.
 
-    What the valves wait for comes first: a frame is recorded when it has been sent.
+    While the valves wait a call is only noted; ``flush`` packs the notes, behind the tick.
 
     Args:
         guarded: who does the work.
@@ -27,15 +30,16 @@ class Recorder:
     def __init__(self, guarded: Guarded, controller: Controller, ring: Ring) -> None:
         self._guarded, self._controller = guarded, controller
         self._put = ring.put
+        self._calls: list[Call] = []
+        self._note = self._calls.append
         self._bus = {name: i for i, name in enumerate(controller.deployment.config.buses)}
 
     def receive(self, frame: Frame, now_ns: int) -> Frame | None:
         """Take a frame from a bus, see ``Guarded``."""
-        bus, can_id, extended, data = frame
-        self._put(RX, self._bus[bus], len(data), extended, can_id, now_ns, data)
+        self._note((RX, frame, 0, now_ns))
         passed = self._guarded.receive(frame, now_ns)
         if passed is not None:
-            self._frame(TX, passed)
+            self._note((TX, passed, 0, 0))
         return passed
 
     @property
@@ -45,56 +49,60 @@ class Recorder:
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send now."""
-        put, buses = self._put, self._bus
-        put(TICK, 0, 0, False, missed, now_ns, b"")
+        note = self._note
+        note((TICK, None, missed, now_ns))
         for frame in self._guarded.tick(now_ns, missed):
             yield frame
-            bus, can_id, extended, data = frame
-            put(TX, buses[bus], len(data), extended, can_id, 0, data)
+            note((TX, frame, 0, 0))
 
     def stalled(self) -> None:
         """The loop stood still for too long."""
-        self._note(Kind.STALLED)
+        self._note((Kind.STALLED, None, 0, 0))
         self._guarded.stalled()
 
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus."""
-        self._frame(Kind.FAILED, frame)
+        self._note((Kind.FAILED, frame, 0, 0))
         self._guarded.send_failed(frame)
 
     def withhold(self, frame: Frame) -> bool:
         """A valve frame comes too late: whether it moves one, and so must not leave."""
-        self._frame(Kind.WITHHELD, frame)
+        self._note((Kind.WITHHELD, frame, 0, 0))
         return self._guarded.withhold(frame)
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve."""
-        self._note(Kind.NEUTRAL)
+        self._note((Kind.NEUTRAL, None, 0, 0))
         frames = self._guarded.neutral_frames()
         for frame in frames:
-            self._frame(TX, frame)
+            self._note((TX, frame, 0, 0))
         return frames
 
     def on_bus_off(self, bus: str) -> None:
         """We are not on a bus now."""
-        self._note(Kind.OFF_BUS, bus=self._bus[bus])
+        self._note((Kind.OFF_BUS, None, self._bus[bus], 0))
         self._controller.on_bus_off(bus)
 
     def fault(self, fault: FrameFault) -> None:
         """A bus has a fault."""
-        self._note(Kind.FAULT, number=fault)
+        self._note((Kind.FAULT, None, fault, 0))
         self._controller.counters.add(fault)
 
     def set(self, values: Mapping[str, object]) -> None:
         """Numbers have been changed by hand."""
+        self.flush()
         text = json.dumps(values).encode()
         for at in range(0, len(text), CHUNK):
             part = text[at : at + CHUNK]
             self._put(Kind.SET, 0, len(part), False, len(text) - at, 0, part)
 
-    def _note(self, kind: int, *, bus: int = 0, number: int = 0) -> None:
-        self._put(kind, bus, 0, False, number, 0, b"")
-
-    def _frame(self, kind: int, frame: Frame) -> None:
-        bus, can_id, extended, data = frame
-        self._put(kind, self._bus[bus], len(data), extended, can_id, 0, data)
+    def flush(self) -> None:
+        """Write down what was noted."""
+        put, buses = self._put, self._bus
+        for kind, frame, number, time_ns in self._calls:
+            if frame is None:
+                put(kind, 0, 0, False, number, time_ns, b"")
+            else:
+                bus, can_id, extended, data = frame
+                put(kind, buses[bus], len(data), extended, can_id, time_ns, data)
+        self._calls.clear()

@@ -29,7 +29,7 @@ class Kind(IntEnum):
     NEUTRAL = 7
     """Neutral frames were computed outside of a tick."""
     OFF_BUS = 8
-    """We are not on a bus now."""
+    """We are not on bus ``number`` now."""
     FAULT = 9
     """A bus has a fault: ``number`` is that of the fault."""
     SET = 10

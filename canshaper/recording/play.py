@@ -163,7 +163,7 @@ class _Played:
             for frame in guarded.neutral_frames():
                 self._compare(frame)
         elif kind == Kind.OFF_BUS:
-            controller.on_bus_off(self._buses[record.bus])
+            controller.on_bus_off(self._buses[record.number])
         elif kind == Kind.FAULT:
             controller.counters.add(FrameFault(record.number))
         elif kind == Kind.SET:

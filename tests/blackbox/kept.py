@@ -36,6 +36,7 @@ class Kept(keeper.BlackBox):
 
     def _keep(self) -> None:
         assert self._deployment is not None
+        self._flush()
         header: dict[str, Any] = header_of(self._deployment, self._why)
         self.boxes.append((self._fresh, b"".join(chunks(header, self._ring.segments))))
 
