@@ -8,7 +8,7 @@ by all who read status messages, and required by no one.
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from enum import IntEnum
-from operator import itemgetter
+from operator import attrgetter, itemgetter
 from typing import Any, Generic, Protocol, TypeVar
 
 from cantools.database.can import Message
@@ -82,13 +82,22 @@ class ReportedAxis(Protocol):
         """Number of the parameter set that is chosen; 0 where there is no choice."""
 
 
+def _command_pct(one: ReportedAxis) -> float:
+    return 100.0 * one.axis.command
+
+
+def _applied_pct(one: ReportedAxis) -> float:
+    return 100.0 * one.axis.sent
+
+
+# Nothing here may be a lambda: a deployment is handed over by the process that has read it.
 AXIS_STATUS: list[StatusField[ReportedAxis]] = [
-    StatusField("State", lambda one: one.axis.state, _Code(State), True, max(State)),
-    StatusField("Reason", lambda one: one.axis.reason, _Code(Reason), True, max(Reason)),
-    StatusField("RawCommand", lambda one: 100.0 * one.axis.command, required=True),
-    StatusField("ShapedCommand", lambda one: 100.0 * one.axis.sent, required=True),
-    StatusField("PredictedSway", lambda one: one.sway_deg, required=True),
-    StatusField("ActiveSet", lambda one: one.active_set, int),
+    StatusField("State", attrgetter("axis.state"), _Code(State), True, max(State)),
+    StatusField("Reason", attrgetter("axis.reason"), _Code(Reason), True, max(Reason)),
+    StatusField("RawCommand", _command_pct, required=True),
+    StatusField("ShapedCommand", _applied_pct, required=True),
+    StatusField("PredictedSway", attrgetter("sway_deg"), required=True),
+    StatusField("ActiveSet", attrgetter("active_set"), int),
 ]
 LAST_FAULT: StatusField[dict[str, int]] = StatusField(
     "LastFault", itemgetter("LastFault"), _Code(FrameFault), True, max(FrameFault)
