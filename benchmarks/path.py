@@ -24,6 +24,7 @@ from rig import Row, print_table, slew_only
 from canshaper.bus.raw import CAN_FRAME, RawPort
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
 from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.binding import load_deployment
@@ -39,6 +40,7 @@ class Counted:
     def __init__(self) -> None:
         self.bytecodes: Counter[str] = Counter()
         self.calls: Counter[str] = Counter()
+        self.files: set[str] = set()
 
     def trace(self, frame: FrameType, event: str, _argument: Any) -> Any:
         """As ``sys.settrace`` wants it."""
@@ -51,6 +53,7 @@ class Counted:
             self.bytecodes[name] += 1
         elif event == "call":
             self.calls[name] += 1
+            self.files.add(code.co_filename)
         return self.trace
 
 
@@ -63,13 +66,14 @@ class Traced(RawPort):
         return sent
 
 
-def count() -> Counted:
-    """Drive the axis; count the last tick."""
+def count(*, guarded: bool = False) -> Counted:
+    """Drive the axis; count the last tick, without the output guard or with it."""
     near, far = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK)
     with tempfile.TemporaryDirectory() as name:
         deployment = load_deployment(slew_only(Path(name), "vcan0", 1))
     controller, hand, counted = Controller(deployment), Hand(deployment), Counted()
     port = Traced("crane", lambda _ids: [near], None, lambda _fault: None, confirms=False)
+    processor = Guarded(controller) if guarded else controller
     standstill = Standstill(deployment)
     standstill.clock = lambda: 0
     for tick in range(TICKS):
@@ -78,7 +82,7 @@ def count() -> Counted:
             far.send(CAN_FRAME.pack(frame.can_id, len(frame.data), frame.data))
         if tick == TICKS - 1:
             sys.settrace(counted.trace)
-        io_cycle(controller, {"crane": port}, tick * TICK_NS, 0, standstill)
+        io_cycle(processor, {"crane": port}, tick * TICK_NS, 0, standstill)
         with suppress(BlockingIOError):
             while True:
                 far.recv(CAN_FRAME.size)
@@ -105,6 +109,16 @@ def main() -> None:
     rows.append(Row("all", [str(sum(counted.calls.values())), str(whole), "100"]))
     print(f"one tick, {platform.python_implementation()} {platform.python_version()}")
     print_table(["calls", "bytecodes", "%"], rows)
+    with_guard = count(guarded=True)
+    print(f"without the output guard: {_size(counted)}")
+    print(f"with it:                  {_size(with_guard)}")
+
+
+def _size(counted: Counted) -> str:
+    rooms = {Path(name).parent for name in counted.files}
+    whole = sum(counted.bytecodes.values())
+    where = f"{len(counted.files)} files of {len(rooms)} packages"
+    return f"{whole} bytecodes in {len(counted.calls)} functions, {where}"
 
 
 if __name__ == "__main__":
