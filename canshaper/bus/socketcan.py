@@ -8,8 +8,7 @@ import struct
 from collections.abc import Iterable
 
 from canshaper.bus.device import WrongDeviceError, check_device
-from canshaper.codec.canopen import SERVICES
-from canshaper.codec.j1939 import group_mask
+from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
 from canshaper.machine.routing import BusRoutes
 

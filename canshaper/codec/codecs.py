@@ -7,7 +7,7 @@ from cantools.database.can import Message
 
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import with_source
+from canshaper.codec.identifier import with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.protection import UNPROTECTED, Protection, Protector
 from canshaper.codec.signals import FieldSet, VelocitySignal

@@ -1,16 +1,7 @@
-"""Identifiers of J1939: parameter groups, source addresses, and the NAME of a node.
+"""Groups of J1939 that a node sends about itself, and its NAME."""
 
-An identifier is priority (3 bits), data page and extended data page (2), PDU format PF (8), PDU
-specific PS (8), source address SA (8). Below PF 240 PS is the destination, from 240 on a part of
-the group (SAE J1939-21). Here a *group* is an identifier without priority and source, and without
-destination where there is one.
-"""
-
+from canshaper.codec.identifier import LOWEST_PRIORITY, NULL, identifier
 from canshaper.config.bus import J1939Name
-
-GLOBAL = 0xFF  # as destination: everybody
-NULL = 0xFE  # as source: a node without an address; in DBC files: any
-DEFAULT_PRIORITY, LOWEST_PRIORITY = 6, 7
 
 REQUEST = 0xEA00  # PGN 59904
 CLAIMED = 0xEE00  # PGN 60928, address claimed or cannot claim
@@ -18,55 +9,6 @@ ACKNOWLEDGE = 0xE800  # PGN 59392
 TRANSPORT = 0xEC00  # PGN 60416, connection management
 TRANSPORT_DATA = 0xEB00  # PGN 60160
 DM1 = 0xFECA  # PGN 65226, active diagnostic trouble codes
-
-WITHOUT_PRIORITY = 0x03FFFFFF
-_PAGES_AND_FORMAT = 0x03FF0000
-_GROUP_OF_PDU2 = 0x03FFFF00
-
-
-def has_destination(can_id: int) -> bool:
-    """Whether messages of its group are sent to one node, or to all where that says so."""
-    return (can_id >> 16) & 0xFF < 240
-
-
-def group_mask(can_id: int) -> int:
-    """Bits of an identifier that tell its group."""
-    return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
-
-
-def group_of(can_id: int) -> int:
-    """Group of an identifier of 29 bits."""
-    return can_id & group_mask(can_id)
-
-
-def identifier(
-    pgn: int, source: int, destination: int = GLOBAL, priority: int = DEFAULT_PRIORITY
-) -> int:
-    """Identifier of a message.
-
-    Args:
-        pgn: parameter group number.
-        source: source address.
-        destination: only for groups that have one.
-        priority: 0 to 7, the lower the sooner.
-    """
-    specific = 0 if (pgn >> 8) & 0xFF >= 240 else destination << 8
-    return priority << 26 | pgn << 8 | specific | source
-
-
-def pgn_of(can_id: int) -> int:
-    """Parameter group number of an identifier."""
-    return group_of(can_id) >> 8
-
-
-def with_source(can_id: int, source: int) -> int:
-    """The same message from another address."""
-    return can_id & ~0xFF | source
-
-
-def at_every_priority(can_id: int) -> list[int]:
-    """The identifiers that a message may come with: its priority says nothing of what it is."""
-    return [priority << 26 | can_id & WITHOUT_PRIORITY for priority in range(8)]
 
 
 def claims_of(address: int) -> list[int]:

@@ -11,9 +11,11 @@ from typing import Any
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.canopen import FULL_SET_POINT
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
+
+FULL_SET_POINT = 0x4000
+"""Of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
 
 # Names that the tables of a DBC give to raw values that are no measurement, as words in small
 # letters: SensorError is "sensor error". In a name without any gap, such as sensorerror, they are

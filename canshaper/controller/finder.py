@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Generic, TypeVar
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.j1939 import group_of
+from canshaper.codec.identifier import group_of
 from canshaper.config.bus import Bus
 from canshaper.machine.inputs import BoundInput
 from canshaper.protocols.j1939.groups import AnySource, TakenGroup

@@ -16,7 +16,7 @@ Neutral always passes.
 from collections.abc import Sequence
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import group_of
+from canshaper.codec.identifier import group_of
 from canshaper.guard.axis import At, GuardedAxis
 from canshaper.guard.inputs import GuardedInput, GuardedJoystick, GuardedStop
 from canshaper.machine.deployment import Deployment

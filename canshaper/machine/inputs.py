@@ -6,7 +6,7 @@ from typing import TypeVar
 from cantools.database.can import Message
 
 from canshaper.codec.codecs import JoystickCodec
-from canshaper.codec.j1939 import NULL, at_every_priority, has_destination, with_source
+from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Guard, Protection
 from canshaper.codec.signals import find_signal, radius_range

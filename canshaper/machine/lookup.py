@@ -7,9 +7,14 @@ from pathlib import Path
 from cantools.database.can import Message
 from pydantic import BaseModel
 
-from canshaper.codec.canopen import service_of
 from canshaper.codec.codecs import Sender
-from canshaper.codec.j1939 import NULL, WITHOUT_PRIORITY, has_destination, with_source
+from canshaper.codec.identifier import (
+    NULL,
+    WITHOUT_PRIORITY,
+    has_destination,
+    service_of,
+    with_source,
+)
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Protection
 from canshaper.config.protection import Protected

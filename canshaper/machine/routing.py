@@ -7,8 +7,8 @@ from collections.abc import Container, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
-from canshaper.codec.canopen import EMERGENCY, HEARTBEAT, NMT
-from canshaper.codec.j1939 import CLAIMED, NULL, REQUEST, claims_of, group_of, identifier, sent_by
+from canshaper.codec.identifier import EMERGENCY, HEARTBEAT, NMT, NULL, group_of, identifier
+from canshaper.codec.j1939 import CLAIMED, REQUEST, claims_of, sent_by
 from canshaper.codec.layout import is_j1939
 from canshaper.config.bus import Bus
 from canshaper.config.schema import DeploymentConfig

@@ -3,7 +3,7 @@
 from collections.abc import Collection, Mapping
 from enum import Enum
 
-from canshaper.codec.j1939 import group_of
+from canshaper.codec.identifier import group_of
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import LogError
 

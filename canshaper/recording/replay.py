@@ -9,7 +9,7 @@ from pathlib import Path
 from canshaper.blackbox.file import SUFFIX, Box, BoxError, read_box
 from canshaper.blackbox.state import StateError
 from canshaper.codec.frame import Frame, new_frame
-from canshaper.codec.j1939 import group_of
+from canshaper.codec.identifier import group_of
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key, Kind, Sorter, bus_of_channel

@@ -9,7 +9,7 @@ from typing import Any
 from cantools.database.can import Message
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import NULL, with_source
+from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import Deployment

@@ -3,9 +3,10 @@
 from collections.abc import Iterator
 from typing import Any
 
-from canshaper.codec.canopen import HEARTBEAT, NMT, START, NodeState, ValveState
+from canshaper.codec.canopen import START, NodeState, ValveState
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.identifier import HEARTBEAT, NMT
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 

@@ -8,7 +8,7 @@ none. With joint commands the three boom joints thus show the same sway, each wi
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import NULL, with_source
+from canshaper.codec.identifier import NULL, with_source
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband

@@ -13,10 +13,7 @@ from hypothesis import strategies as st
 from canshaper.bus.socketcan import MOST_FILTERS, set_filters
 from canshaper.checksums import Checksum
 from canshaper.codec.frame import BusState, Frame
-from canshaper.codec.j1939 import (
-    CLAIMED,
-    DM1,
-    claims_of,
+from canshaper.codec.identifier import (
     group_mask,
     group_of,
     has_destination,
@@ -24,6 +21,7 @@ from canshaper.codec.j1939 import (
     pgn_of,
     with_source,
 )
+from canshaper.codec.j1939 import CLAIMED, DM1, claims_of
 from canshaper.config.source import DeploymentError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment

@@ -4,7 +4,7 @@ from cantools.database.can import Message, Signal
 
 from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import NULL, group_of
+from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input

@@ -2,8 +2,8 @@
 
 from collections.abc import Iterator, Mapping
 
-from canshaper.codec.canopen import service_of
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.identifier import service_of
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.input import MessageInput
 from canshaper.machine.deployment import Deployment

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator
 
-from canshaper.codec.j1939 import NULL, WITHOUT_PRIORITY, group_mask, group_of
+from canshaper.codec.identifier import NULL, WITHOUT_PRIORITY, group_mask, group_of
 from canshaper.codec.kernel_check import kernel_check
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.rewrite import RewrittenMessage

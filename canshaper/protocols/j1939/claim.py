@@ -9,16 +9,8 @@ from enum import Enum
 from typing import Self
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import (
-    ACKNOWLEDGE,
-    CLAIMED,
-    GLOBAL,
-    NULL,
-    REQUEST,
-    group_of,
-    identifier,
-    name_bytes,
-)
+from canshaper.codec.identifier import GLOBAL, NULL, group_of, identifier
+from canshaper.codec.j1939 import ACKNOWLEDGE, CLAIMED, REQUEST, name_bytes
 from canshaper.config.bus import J1939
 
 # Time for others to object before anything else is sent.

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from typing import Self
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.codec.j1939 import GLOBAL
+from canshaper.codec.identifier import GLOBAL
 from canshaper.inputs.input import Receiver
 from canshaper.protocols.interface import DrivenAxis
 

@@ -4,7 +4,8 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from canshaper.codec.frame import Frame
-from canshaper.codec.j1939 import CLAIMED, group_of, name_bytes, pgn_of
+from canshaper.codec.identifier import group_of, pgn_of
+from canshaper.codec.j1939 import CLAIMED, name_bytes
 from canshaper.config.bus import J1939
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Following
