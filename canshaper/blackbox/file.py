@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from canshaper.blackbox.records import SIZE
 from canshaper.blackbox.ring import BLOCK, MOST_BLOCKS, Segment
+from canshaper.errors import BoxError
 
 SUFFIX = ".blackbox"
 MAGIC = b"canshaper black box 1\n"
@@ -19,10 +20,6 @@ MOST_HEADER = 100_000
 MOST_STATE = 10_000_000
 MOST_RECORDS = MOST_BLOCKS * BLOCK
 MOST_SEGMENTS = 1000
-
-
-class BoxError(ValueError):
-    """A black box that cannot be used: says where, what was found and what is allowed."""
 
 
 class BoxSegment(NamedTuple):

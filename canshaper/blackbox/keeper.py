@@ -13,11 +13,12 @@ from typing import NoReturn
 
 from canshaper.blackbox.recorder import Recorder
 from canshaper.blackbox.ring import Ring, Segment
-from canshaper.blackbox.state import StateError, States
+from canshaper.blackbox.state import States
 from canshaper.blackbox.write import write_box
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
+from canshaper.errors import StateError
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.states import State
 

@@ -29,6 +29,7 @@ from canshaper.config.filters import restored_filter
 from canshaper.config.source import Source
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
+from canshaper.errors import StateError
 from canshaper.machine.database import Messages
 
 # What a deployment and its DBC files say.
@@ -52,10 +53,6 @@ OPCODES = frozenset(
     " EMPTY_SET ADDITEMS FROZENSET STACK_GLOBAL NEWOBJ REDUCE BUILD".split()
 )
 Root = tuple[Guarded, Controller]
-
-
-class StateError(ValueError):
-    """The state cannot be kept, or is not that of such a controller."""
 
 
 def _fixed(number: int) -> Any:

@@ -16,6 +16,7 @@ from pathlib import Path
 
 from canshaper.bus.netlink import ACKNOWLEDGE, ask, attributes
 from canshaper.config.bus import Bus
+from canshaper.errors import WrongDeviceError
 
 ROOT = Path("/")
 # linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
@@ -31,10 +32,6 @@ _CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
 
 KindAndBitrate = tuple[str | None, int | None]
 Ask = Callable[[int], KindAndBitrate]
-
-
-class WrongDeviceError(Exception):
-    """An interface is not the device of the deployment; the message says what differs."""
 
 
 @dataclass(frozen=True)

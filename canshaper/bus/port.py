@@ -14,12 +14,13 @@ from typing import Any, Protocol
 import can
 
 from canshaper.bus.arrival import Arrivals
-from canshaper.bus.device import WrongDeviceError, whereabouts
+from canshaper.bus.device import whereabouts
 from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
 from canshaper.bus.raw import MOST_FRAMES, RawPort
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.errors import BusError, WrongBusError, WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 # Frames sent and not yet seen again: a few ticks of a machine with many axes.
@@ -27,23 +28,6 @@ MOST_ECHOES = 256
 # Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
 # behind it must not grow old; a bus that is gone fails at every call.
 MOST_FAILURES = 20
-
-
-class BusError(Exception):
-    """A bus could not be opened."""
-
-
-class WrongBusError(BusError):
-    """A bus is another device than the deployment names.
-
-    Attributes:
-        bus: its name in the deployment file.
-        why: what differs, and which interface is the device.
-    """
-
-    def __init__(self, bus: str, why: str) -> None:
-        super().__init__(f"bus {bus}: {why}")
-        self.bus, self.why = bus, why
 
 
 class Port(Protocol):

@@ -14,9 +14,9 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
-from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.socketcan import dropped_frames, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
+from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 CAN_FRAME = struct.Struct("=IB3x8s")  # linux/can.h, struct can_frame

@@ -7,9 +7,10 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from canshaper.bus.device import WrongDeviceError, check_device
+from canshaper.bus.device import check_device
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
+from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 # linux/can/raw.h, linux/can.h, asm/socket.h; Python has no names for these.

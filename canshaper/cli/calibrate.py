@@ -69,12 +69,10 @@ def calibrate(
 
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """
-    from canshaper.bus.port import BusError
     from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.fit import CalibrationError
     from canshaper.commissioning.calibration.ramp import Ramp
     from canshaper.commissioning.calibration.run import run_live
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, CalibrationError, ConfigError
 
     try:
         deployment = loader(file, interface, channel, network=network)()
@@ -106,7 +104,7 @@ def calibrate(
         result = drive.result()
     except BusError as error:
         raise fail(error, EXIT_NO_BUS) from None
-    except (DeploymentError, ValueError) as error:
+    except (ConfigError, ValueError) as error:
         raise fail(error) from None
     except CalibrationError as error:
         raise fail(error, EXIT_NOT_MEASURED) from None
@@ -163,7 +161,7 @@ def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: f
 
 def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
     from canshaper.config.edit import set_values
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
 
     commands, speeds = result.curve()
     values = {
@@ -173,5 +171,5 @@ def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
     }
     try:
         set_values(deployment.path, ("axes", axis, "limits"), values)
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None

@@ -37,12 +37,13 @@ def check(file: str = FILE) -> None:
     """
 
     from canshaper.cli.stopping import print_stopping
-    from canshaper.config.source import DeploymentError, Source
+    from canshaper.config.source import Source
+    from canshaper.errors import ConfigError
     from canshaper.machine.stopping import unstated
 
     try:
         deployment = loader(file)()
-    except DeploymentError as error:
+    except ConfigError as error:
         echo(str(error), err=True)
         count = len(error.problems)
         echo(f"{count} problem{'s' if count > 1 else ''}", err=True)

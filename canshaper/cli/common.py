@@ -7,7 +7,7 @@ from pathlib import Path
 import typer
 
 from canshaper.cli.console import echo
-from canshaper.config.source import DeploymentError, Problem
+from canshaper.errors import ConfigError, Problem
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
@@ -53,11 +53,11 @@ def refuse_shipped(file: str) -> None:
     """Refuse to write into a deployment that is only found among the shipped ones.
 
     Raises:
-        DeploymentError: it is one of them.
+        ConfigError: it is one of them.
     """
     if deployment_path(file) != Path(file):
         text = "shipped with the package; copy it, then write to the copy"
-        raise DeploymentError([Problem(file, None, "--write", text)])
+        raise ConfigError([Problem(file, None, "--write", text)])
 
 
 def loader(
@@ -85,7 +85,7 @@ def loader(
                 name = next(iter(buses))
             if name not in buses:
                 text = f"found {item!r}, allowed is NAME=CHANNEL with a bus of {', '.join(buses)}"
-                raise DeploymentError([Problem("command line", None, "--channel", text)])
+                raise ConfigError([Problem("command line", None, "--channel", text)])
             buses[name] = buses[name].model_copy(update={"channel": channel})
         if interface:  # what the file says of sharing was said of its own interface
             update = {"interface": interface, "network": False}
@@ -93,11 +93,11 @@ def loader(
         if network:
             if others := {b.interface for b in buses.values()} - {"udp_multicast"}:
                 text = f"found the interface {', '.join(others)}, allowed is udp_multicast only"
-                raise DeploymentError([Problem("command line", None, "--network", text)])
+                raise ConfigError([Problem("command line", None, "--network", text)])
             buses = {n: b.model_copy(update={"network": True}) for n, b in buses.items()}
         if len({(b.interface, b.channel) for b in buses.values()}) < len(buses):
             text = f"two of the buses {', '.join(buses)} have one channel; allowed is one for each"
-            raise DeploymentError([Problem("command line", None, "--channel", text)])
+            raise ConfigError([Problem("command line", None, "--channel", text)])
         return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
 
     return load

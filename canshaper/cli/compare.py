@@ -44,11 +44,11 @@ def compare(
 
       canshaper compare --json --processes 1
     """
-    from canshaper.config.source import DeploymentError
     from canshaper.design.comparison.candidates import candidates, nominal_mode
     from canshaper.design.comparison.manoeuvres import manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
+    from canshaper.errors import ConfigError
 
     console = SafeConsole(stderr=as_json)
     try:
@@ -56,7 +56,7 @@ def compare(
         deployment = load()
         found = candidates(deployment, axis)
         tasks = manoeuvres(axis)
-    except (DeploymentError, ValueError) as error:
+    except (ConfigError, ValueError) as error:
         raise fail(error) from None
     try:
         with Progress(

@@ -37,14 +37,14 @@ def config_schema(
     from canshaper.checksums import checksum_table
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
-    from canshaper.config.source import DeploymentError
     from canshaper.config.version import VERSION
+    from canshaper.errors import ConfigError
     from canshaper.shaping.registry import KINDS
 
     try:
         check_packages()
         table = [*checksum_table()] if checksums else []
-    except (DeploymentError, ValueError) as error:  # of a package
+    except (ConfigError, ValueError) as error:  # of a package
         raise fail(error) from None
     if filters:
         table += filter_table(KINDS.values())

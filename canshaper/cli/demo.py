@@ -45,9 +45,9 @@ def demo(
 
       canshaper demo --set grapple.l2_m=1.5
     """
-    from canshaper.config.source import DeploymentError
     from canshaper.design.lockstep import drive
-    from canshaper.design.processes import DriveError, choose_transport, drive_on_bus
+    from canshaper.design.processes import choose_transport, drive_on_bus
+    from canshaper.errors import ConfigError, DriveError
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
     from canshaper_sim.operator import script_named
@@ -60,7 +60,7 @@ def demo(
         load = loader(file)
         deployment = load()
         way = None if lockstep else choose_transport(transport, deployment)
-    except (DeploymentError, DriveError, ValueError) as error:
+    except (ConfigError, DriveError, ValueError) as error:
         raise fail(error) from None
     console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     console.print(f"Transport: {way.description if way else LOCKSTEP}", highlight=False)

@@ -62,9 +62,8 @@ def doctor(
     from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
     from canshaper.commissioning.doctor.machine import machine_findings
     from canshaper.commissioning.doctor.measure import measure
-    from canshaper.commissioning.doctor.processes import MeasureError
     from canshaper.commissioning.doctor.report import as_dict, print_report
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError, MeasurementError
 
     try:
         deployment = loader(file, interface, channel)()
@@ -80,7 +79,7 @@ def doctor(
         if as_json:
             data = as_dict(deployment, seconds, runs, findings)
             as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
-    except (DeploymentError, MeasureError, OSError) as error:
+    except (ConfigError, MeasurementError, OSError) as error:
         raise fail(error) from None
     except KeyboardInterrupt:
         echo("interrupted", err=True)
@@ -91,9 +90,9 @@ def doctor(
 
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
-    from canshaper.bus.device import WrongDeviceError
     from canshaper.commissioning.doctor.finding import Finding, Level
     from canshaper.commissioning.doctor.listen import heard_findings, listen
+    from canshaper.errors import WrongDeviceError
 
     try:
         with _progress(f"listening, {seconds:g} s", seconds) as tell:

@@ -37,14 +37,13 @@ def gateway(
 
       sudo canshaper gateway config/gateway-forwarder.yaml running
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
-    from canshaper.protocols.gateway.cangw import GatewayError, between, load_module, make, rules
+    from canshaper.errors import BusError, ConfigError, GatewayError
+    from canshaper.protocols.gateway.cangw import between, load_module, make, rules
     from canshaper.protocols.gateway.rules import channels, fallback_rules, passing_rules
 
     try:
         deployment = loader(file, interface, channel)()
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     if deployment.config.gateway is None:
         raise fail(ValueError(f"{deployment.path}: found no gateway; allowed is a file with one"))
@@ -81,7 +80,7 @@ def _look_at_devices(deployment: "Deployment") -> None:
         BusError: it is another one than the deployment names, or cannot be looked at.
     """
     from canshaper.bus.device import match_fault
-    from canshaper.bus.port import BusError
+    from canshaper.errors import BusError
 
     assert deployment.config.gateway is not None  # only such deployments have rules
     for name in deployment.config.gateway.between:

@@ -83,7 +83,7 @@ def identify(
         timed_by_hand,
     )
     from canshaper.commissioning.identification.recommend import advise
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
 
     try:
         deployment = loader(file)() if file else None
@@ -116,7 +116,7 @@ def identify(
         ]
         picture = _draw(findings, advice, out)
         written = _write(deployment, findings, advice) if write and deployment else []
-    except (DeploymentError, OSError, ValueError) as error:
+    except (ConfigError, OSError, ValueError) as error:
         raise fail(error) from None
     _tell(findings, advice, deployment, picture, written, as_json=as_json)
     if not all(f.usable for f in findings):

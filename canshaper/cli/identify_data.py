@@ -63,7 +63,7 @@ def signals_named(pairs: Sequence[str], deployment: "Deployment | None") -> dict
 
 def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
     """Messages that name the signals."""
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
     from canshaper.machine.database import Messages, load_dbc
 
     if not files and deployment:
@@ -74,7 +74,7 @@ def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Mess
         problems += faults
         loaded += [one] if one else []
     if problems:
-        raise DeploymentError(problems)
+        raise ConfigError(problems)
     return Messages(loaded)
 
 

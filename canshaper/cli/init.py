@@ -45,7 +45,7 @@ def init(
       canshaper init     (tries it with the shipped forwarder.dbc)
     """
     from canshaper.config.first import first_deployment
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
     for path in (file, draft):
@@ -55,7 +55,7 @@ def init(
         messages = _messages(files := dbc or [data_directory() / "dbc" / "forwarder.dbc"])
         machine = _machine(messages, files, file.resolve().parent)
         _write(file, draft, first_deployment(machine))
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except OSError as error:
         raise fail(ValueError(f"{error.filename or file}: {error.strerror}")) from None
@@ -68,7 +68,7 @@ def init(
 
 
 def _messages(files: Sequence[Path]) -> "list[Message]":
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
     from canshaper.machine.database import load_dbc
 
     found, problems = [], []
@@ -79,7 +79,7 @@ def _messages(files: Sequence[Path]) -> "list[Message]":
             found += file.messages
             print_warnings(file.count, file.warnings, "left out")
     if problems:
-        raise DeploymentError(problems)
+        raise ConfigError(problems)
     return found
 
 
@@ -249,13 +249,13 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 def _write(file: Path, draft: Path, text: str) -> None:
     """Write it when it is a good deployment: read like every other first. Else it stays a draft."""
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
     from canshaper.machine.binding import load_deployment
 
     draft.write_text(text, encoding="utf-8")
     try:
         load_deployment(draft)
-    except DeploymentError as error:
+    except ConfigError as error:
         kept = f"{draft}: kept with all answers; mend it there and rename it to {file}"
         raise fail(ValueError(f"{error}\n{kept}")) from None
     draft.replace(file)

@@ -39,9 +39,8 @@ def monitor(
 
       canshaper monitor machine.yaml --plain | tee monitor.txt
     """
-    from canshaper.bus.port import BusError
     from canshaper.commissioning.monitor.run import run_live, run_plain
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, ConfigError
 
     stop = _Stop()
     console = SafeConsole()
@@ -51,7 +50,7 @@ def monitor(
             run_plain(deployment, _write, stop.going)
         else:
             run_live(deployment, console, refresh_hz, stop.going)
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except BusError as error:
         raise fail(error, EXIT_NO_BUS) from None

@@ -71,8 +71,7 @@ def record(
 
       canshaper record machine.yaml --last
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, ConfigError
     from canshaper.recording.record import Recording
 
     if last:
@@ -83,7 +82,7 @@ def record(
         raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
     try:
         deployment = loader(file, interface, channel, network=network)()
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     console = SafeConsole(stderr=True)
     recording = Recording(deployment)
@@ -119,13 +118,13 @@ def record(
 
 def _last(file: str, control: Path | None) -> None:
     """Let the daemon write what it has."""
-    from canshaper.config.source import DeploymentError
-    from canshaper.daemon.control_client import ControlError, write_black_box
+    from canshaper.daemon.control_client import write_black_box
+    from canshaper.errors import ConfigError, ControlError
 
     try:
         path = control or control_socket(loader(file)())
         folder = write_black_box(path, lambda: time.sleep(ASK_AGAIN_S))
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except ControlError as error:
         raise fail(error, EXIT_NOT_WRITTEN) from None

@@ -63,9 +63,8 @@ def replay(
 
       canshaper replay recording.zip --verify
     """
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError, LogError
     from canshaper.recording.bundle import unpack
-    from canshaper.recording.frames import LogError
 
     console = SafeConsole()
     with tempfile.TemporaryDirectory() as folder:
@@ -80,7 +79,7 @@ def replay(
             replays = _run(log, configs, _channels(channel or []), (begin_s, end_s), out, inside)
             for one in replays:
                 one.measure()
-        except (LogError, DeploymentError) as error:
+        except (LogError, ConfigError) as error:
             raise fail(error) from None
         except OSError as error:
             text = f"{error.filename or out}: {error.strerror or error}"
@@ -105,7 +104,7 @@ def _run(
     inside: Path | None,
 ) -> "list[Replayed]":
     """Replay every deployment, one after the other."""
-    from canshaper.recording.frames import LogError
+    from canshaper.errors import LogError
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
 

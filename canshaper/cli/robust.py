@@ -46,9 +46,9 @@ def robust(
     """
     from canshaper.config.edit import Value, set_values
     from canshaper.config.filters import filter_of
-    from canshaper.config.source import DeploymentError
     from canshaper.design.tuning.evaluate import Machine, evaluate
     from canshaper.design.tuning.robust import least_residual, shortest
+    from canshaper.errors import ConfigError
     from canshaper.shaping.registry import build_shaper
 
     console = SafeConsole()
@@ -98,7 +98,7 @@ def robust(
             values: dict[str, Value] = {"kind": "robust", **dict.fromkeys(gone - {"kind"})}
             values |= {"tick_ms": tick_ms, "taps": taps}
             set_values(deployment.path, ("axes", axis, "filter"), values)
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except ValueError as error:
         raise fail(ValueError(f"axis {axis}: {error}")) from None

@@ -55,17 +55,16 @@ def run(
 
       canshaper run machine.yaml --listen-only
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
     from canshaper.daemon import journal
     from canshaper.daemon.daemon import Daemon
+    from canshaper.errors import BusError, ConfigError
 
     journal.set_up()
     try:
         load = loader(file, interface, channel, network=network)
         changed = _changed(load, listen_only=listen_only, control=control)
         daemon = Daemon(changed, black_box or _log_folder())
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except BusError as error:
         raise fail(error, EXIT_NO_BUS) from None
@@ -82,7 +81,8 @@ def _changed(
     load: "Callable[[], Deployment]", *, listen_only: bool, control: str | None
 ) -> "Callable[[], Deployment]":
     """The same with these options put in."""
-    from canshaper.config.source import DeploymentError, Problem, Source
+    from canshaper.config.source import Source
+    from canshaper.errors import ConfigError, Problem
     from canshaper.machine.stopping import unstated
 
     def changed() -> "Deployment":
@@ -91,13 +91,13 @@ def _changed(
             deployment = deployment.listening()
         elif faults := list(unstated(deployment)):
             source = Source(deployment.path)
-            raise DeploymentError([source.problem(place, text) for place, text in faults])
+            raise ConfigError([source.problem(place, text) for place, text in faults])
         if control is None:
             return deployment
         section = deployment.config.control
         if section is None:
             text = "the deployment file has no control section, so nothing may be changed"
-            raise DeploymentError([Problem("command line", None, "--control", text)])
+            raise ConfigError([Problem("command line", None, "--control", text)])
         section = section.model_copy(update={"socket": control})
         config = deployment.config.model_copy(update={"control": section})
         return replace(deployment, config=config)

@@ -46,8 +46,8 @@ def set_(
 
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
-    from canshaper.config.source import DeploymentError
     from canshaper.daemon import control_client as client
+    from canshaper.errors import ConfigError, ControlError
 
     try:
         deployment = loader(file)()
@@ -61,9 +61,9 @@ def set_(
         table = client.table(path)
         if values and write:
             _write(deployment.path, values)
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
-    except client.ControlError as error:
+    except ControlError as error:
         raise fail(error, EXIT_REFUSED) from None
     if as_json:
         echo(json.dumps(table, indent=2))

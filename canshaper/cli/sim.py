@@ -48,8 +48,7 @@ def sim(
 
       canshaper sim config/forwarder.yaml --show
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, ConfigError
     from canshaper_sim.cranes import one_crane
     from canshaper_sim.parameters import changed_parameters, parameter_names
     from canshaper_sim.realtime import run_plant
@@ -63,7 +62,7 @@ def sim(
         deployment = loader(file, interface, channel, network=network)()
         driven = one_crane(deployment, crane) if crane else deployment
         run_plant(driven, parameters, machine)
-    except (DeploymentError, BusError, ValueError) as error:
+    except (ConfigError, BusError, ValueError) as error:
         raise fail(error) from None
 
 
@@ -89,8 +88,7 @@ def operator(
 
       canshaper operator config/forwarder.yaml --list
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, ConfigError
     from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import one_crane
     from canshaper_sim.operator import SCRIPTS, script_named
@@ -107,5 +105,5 @@ def operator(
             deployment = one_crane(deployment, crane)
         axes = [axis for axis in ALL_AXES if axis in deployment.axes]
         run_operator(deployment, script_named(script, axes), bypass=bypass)
-    except (DeploymentError, BusError, ValueError) as error:
+    except (ConfigError, BusError, ValueError) as error:
         raise fail(error) from None

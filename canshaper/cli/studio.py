@@ -55,8 +55,7 @@ def studio(
 
       canshaper studio machine.yaml --shadow --host 0.0.0.0
     """
-    from canshaper.bus.port import BusError
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import BusError, ConfigError
     from canshaper.studio.access import Access
     from canshaper.studio.crane import copied
     from canshaper.studio.events import Events
@@ -80,7 +79,7 @@ def studio(
                     raise ValueError("this deployment has several buses; only --shadow shows it")
                 stage = Stage(deployment, Events())
                 stage.drive(transports, directory, changes or [])
-        except (DeploymentError, BusError, ValueError) as error:
+        except (ConfigError, BusError, ValueError) as error:
             raise fail(error) from None
         try:
             one = stack.enter_context(listening(host, port))

@@ -84,7 +84,7 @@ def tune(
 
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
 
     console = SafeConsole()
     try:
@@ -112,7 +112,7 @@ def tune(
         with _progress(axis) as tell:
             tuning = _solve(task, method, starts, tell, beyond=beyond)
         _report(deployment, bound, task, tuning, out, console, write=write, as_json=as_json)
-    except DeploymentError as error:
+    except ConfigError as error:
         raise fail(error) from None
     except (OSError, ValueError) as error:
         raise fail(ValueError(f"axis {axis}: {error}")) from None

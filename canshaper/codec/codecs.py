@@ -11,11 +11,8 @@ from canshaper.codec.identifier import with_source
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.protection import UNPROTECTED, Protection, Protector
 from canshaper.codec.signals import FieldSet, VelocitySignal
+from canshaper.errors import WrongLengthError
 from canshaper.shaping.states import Reason
-
-
-class WrongLengthError(Exception):
-    """A frame is shorter or longer than its message in the DBC."""
 
 
 class JoystickCodec:

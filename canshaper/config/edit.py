@@ -17,7 +17,8 @@ import yaml
 
 from canshaper.config.bounded import read_bounded
 from canshaper.config.load import load_config
-from canshaper.config.source import MOST_BYTES, DeploymentError, Place, Problem, Source
+from canshaper.config.source import MOST_BYTES, Place, Source
+from canshaper.errors import ConfigError, Problem
 
 Value = float | str | Sequence[float] | None
 """A value to write, a number, a plain word or a list of numbers; None takes the key away."""
@@ -35,7 +36,7 @@ def set_values(path: Path, place: Place, values: Mapping[str, Value]) -> None:
         values: values by key.
 
     Raises:
-        DeploymentError: the section is not there or cannot be changed without touching anything
+        ConfigError: the section is not there or cannot be changed without touching anything
             else, the result is no valid deployment, or the file cannot be written. The file is as
             it was.
     """
@@ -49,7 +50,7 @@ def edited(text: str, place: Place, values: Mapping[str, Value], name: str = "")
     """Return the text of a YAML file with values of one section changed; see ``set_values``.
 
     Raises:
-        DeploymentError: the section cannot be changed; ``name`` is the file it names.
+        ConfigError: the section cannot be changed; ``name`` is the file it names.
     """
     edit = _Edit(text, place, name)
     absent = []
@@ -187,10 +188,10 @@ class _Edit:
             text = "shared with another place by an anchor; change it by hand"
             raise self._error(node, text)
 
-    def _error(self, node: yaml.Node | None, message: str) -> DeploymentError:
+    def _error(self, node: yaml.Node | None, message: str) -> ConfigError:
         line = node.start_mark.line + 1 if node is not None else None
         where = ".".join(str(key) for key in self._place)
-        return DeploymentError([Problem(self._name, line, where, message)])
+        return ConfigError([Problem(self._name, line, where, message)])
 
 
 def _written(value: float | str | Sequence[float]) -> str:
@@ -231,7 +232,7 @@ def _read(path: Path) -> str:
     except OSError as error:
         raise _failed(path, error) from None
     except UnicodeDecodeError:
-        raise DeploymentError([Problem(str(path), None, "", "not YAML: not UTF-8")]) from None
+        raise ConfigError([Problem(str(path), None, "", "not YAML: not UTF-8")]) from None
 
 
 def _replace(path: Path, before: str, text: str, expected: Any) -> None:
@@ -251,7 +252,7 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
         _check(path, temporary, expected)
         if _read(path) != before:
             text = "changed by someone else meanwhile; nothing was written"
-            raise DeploymentError([Problem(str(path), None, "", text)])
+            raise ConfigError([Problem(str(path), None, "", text)])
         temporary.replace(path)
         temporary = None
     except OSError as error:
@@ -265,14 +266,14 @@ def _check(path: Path, temporary: Path, expected: Any) -> None:
     """The new file is a valid deployment and differs in nothing but what was asked."""
     try:
         _, source = load_config(temporary)
-    except DeploymentError as error:
+    except ConfigError as error:
         problems = [Problem(str(path), p.line, p.where, p.message) for p in error.problems]
-        raise DeploymentError(problems) from None
+        raise ConfigError(problems) from None
     if source.data != expected:
         text = "cannot be changed without changing something else; change it by hand"
-        raise DeploymentError([Problem(str(path), None, "", text)])
+        raise ConfigError([Problem(str(path), None, "", text)])
 
 
-def _failed(path: Path, error: OSError) -> DeploymentError:
+def _failed(path: Path, error: OSError) -> ConfigError:
     text = f"not written, the file is as it was: {error.strerror or error}"
-    return DeploymentError([Problem(str(path), None, "", text)])
+    return ConfigError([Problem(str(path), None, "", text)])

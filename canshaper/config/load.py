@@ -11,8 +11,9 @@ from pydantic_core import ErrorDetails
 
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
-from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.config.source import Place, Source
 from canshaper.config.version import moved_keys
+from canshaper.errors import ConfigError, Problem
 from canshaper.shaping.registry import FAULTS
 
 _S = TypeVar("_S", bound=Section)
@@ -31,7 +32,7 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
     """Read and validate a deployment file.
 
     Raises:
-        DeploymentError: with every problem of the file, each with its line; or a package that adds
+        ConfigError: with every problem of the file, each with its line; or a package that adds
             filters has a fault, and which filters there are is not sure.
     """
     check_packages()
@@ -39,7 +40,7 @@ def load_config(path: Path) -> tuple[DeploymentConfig, Source]:
     moved = moved_keys(source)
     config, problems = _validated(source, DeploymentConfig)
     if config is None or moved:
-        raise DeploymentError(_sorted(moved + problems))
+        raise ConfigError(_sorted(moved + problems))
     return config, source
 
 
@@ -47,22 +48,22 @@ def check_packages() -> None:
     """Refuse to go on where a package that adds filters has a fault.
 
     Raises:
-        DeploymentError: one problem for each fault, with the name of the package.
+        ConfigError: one problem for each fault, with the name of the package.
     """
     if FAULTS:
-        raise DeploymentError([Problem(package, None, "", text) for package, text in FAULTS])
+        raise ConfigError([Problem(package, None, "", text) for package, text in FAULTS])
 
 
 def load_section(path: Path, schema: type[_S]) -> tuple[_S, Source]:
     """Read and validate a file whose whole content is one section.
 
     Raises:
-        DeploymentError: with every problem of the file, each with its line.
+        ConfigError: with every problem of the file, each with its line.
     """
     source = Source(path)
     config, problems = _validated(source, schema)
     if config is None:
-        raise DeploymentError(_sorted(problems))
+        raise ConfigError(_sorted(problems))
     return config, source
 
 

@@ -2,7 +2,6 @@
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import yaml
 
 from canshaper.config.bounded import read_bounded
+from canshaper.errors import ConfigError, Problem
 
 Place = tuple[str | int, ...]
 
@@ -18,9 +18,6 @@ Place = tuple[str | int, ...]
 MOST_BYTES = 262_144
 MOST_NODES = 10_000  # anchors within anchors can make a few lines grow without end
 MOST_NESTED = 50
-# Of one file, and of one problem: a person reads no more.
-MOST_PROBLEMS = 100
-MOST_LETTERS = 2000
 
 _TAG = "tag:yaml.org,2002:"
 _SCALARS = frozenset(_TAG + t for t in ("str", "int", "float", "bool", "null", "timestamp"))
@@ -30,32 +27,6 @@ _DECIMAL = re.compile(r"[-+]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][-+]?[0-9]+)?")
 _NOT_FINITE = re.compile(r"[-+]?\.(inf|Inf|INF)|\.(nan|NaN|NAN)")
 # Escapes can put them into text. No name has any, and no path with a NUL can be opened.
 _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
-
-
-@dataclass(frozen=True)
-class Problem:
-    """One fault of a file, as a person reads it."""
-
-    file: str
-    line: int | None
-    where: str
-    message: str
-
-    def __str__(self) -> str:
-        place = self.file if self.line is None else f"{self.file}:{self.line}"
-        text = ": ".join(part for part in (place, self.where, self.message) if part)
-        return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."
-
-
-class DeploymentError(Exception):
-    """A deployment that must not start; carries every problem found."""
-
-    def __init__(self, problems: list[Problem]) -> None:
-        lines = [str(problem) for problem in problems[:MOST_PROBLEMS]]
-        if more := len(problems) - len(lines):
-            lines.append(f"and {more} more problems")
-        super().__init__("\n".join(lines))
-        self.problems = problems
 
 
 class _Loader(yaml.SafeLoader):
@@ -84,7 +55,7 @@ class Source:
         sha256: of its bytes, in hexadecimal digits.
 
     Raises:
-        DeploymentError: the file cannot be read or is not YAML, or a key stands twice.
+        ConfigError: the file cannot be read or is not YAML, or a key stands twice.
     """
 
     def __init__(self, path: Path) -> None:
@@ -100,17 +71,17 @@ class Source:
             node = yaml.compose(content, Loader=_Loader)
             self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:
-            raise DeploymentError([self.problem((), error.strerror or str(error))]) from None
+            raise ConfigError([self.problem((), error.strerror or str(error))]) from None
         except RecursionError:
             text = "nested too deeply, or an anchor that contains itself"
-            raise DeploymentError([self.problem((), text)]) from None
+            raise ConfigError([self.problem((), text)]) from None
         # ValueError: not UTF-8; ValueError and OverflowError: an escape that is no character
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             text = getattr(error, "problem", None) or str(error).splitlines()[0]
             problem = Problem(str(path), _line(error, content), "", f"not YAML: {text}")
-            raise DeploymentError([problem]) from None
+            raise ConfigError([problem]) from None
         if self._problems:
-            raise DeploymentError(self._problems)
+            raise ConfigError(self._problems)
 
     def problem(self, path: Place, message: str) -> Problem:
         """A problem at a place of this file, such as ("axes", "slew", "filter")."""

@@ -2,7 +2,8 @@
 
 from collections.abc import Mapping
 
-from canshaper.config.source import DeploymentError, Problem, Source
+from canshaper.config.source import Source
+from canshaper.errors import ConfigError, Problem
 
 VERSION = 1
 
@@ -30,12 +31,12 @@ def moved_keys(source: Source) -> list[Problem]:
     All else in the file can then be checked as if it had the new names.
 
     Raises:
-        DeploymentError: the file is of a later version; nothing else can be said of it.
+        ConfigError: the file is of a later version; nothing else can be said of it.
     """
     version = source.data.get("version") if isinstance(source.data, dict) else None
     if type(version) is int and version > VERSION:
         text = f"expected {VERSION}, got {version}: the file is for a later release of canshaper"
-        raise DeploymentError([source.problem(("version",), text)])
+        raise ConfigError([source.problem(("version",), text)])
     problems = []
     for pattern, name in MOVED.items():
         for place in [*source.places(pattern.split("."))]:

@@ -13,7 +13,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO, NoReturn
 
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.deployment import Deployment
 
 # Ten times what the largest deployment takes that is allowed (canshaper.config.source and
@@ -97,7 +97,7 @@ def _bound() -> None:
 def _result(load: Callable[[], Deployment]) -> Deployment | str:
     try:
         return load()
-    except DeploymentError as error:
+    except ConfigError as error:
         return str(error)
     except MemoryError:
         return f"its reader took more than {MOST_BYTES >> 20} MB"

@@ -7,13 +7,10 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.daemon.control_server import MOST_BYTES
+from canshaper.errors import ControlError
 
 # The daemon answers within a tick or two.
 ANSWER_S = 5.0
-
-
-class ControlError(Exception):
-    """The daemon cannot be asked, or refuses; the message says why."""
 
 
 def table(path: Path) -> dict[str, dict[str, float]]:

@@ -10,7 +10,7 @@ from typing import Any
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.clock import boottime_ns
-from canshaper.bus.port import BusError, Port
+from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
@@ -30,6 +30,7 @@ from canshaper.daemon.ports import (
 )
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.standstill import Standstill
+from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.identity import program_sha256
 
@@ -59,7 +60,7 @@ class Daemon:
         folder: where black boxes are written; None for nowhere.
 
     Raises:
-        DeploymentError: the deployment is not valid.
+        ConfigError: the deployment is not valid.
         BusError: a bus cannot be opened.
     """
 

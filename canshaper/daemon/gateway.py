@@ -8,16 +8,17 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
-from canshaper.bus.device import WrongDeviceError, check_device
-from canshaper.bus.port import BusError, Port
+from canshaper.bus.device import check_device
+from canshaper.bus.port import Port
 from canshaper.bus.raw import GONE, REOPEN_NS, SIZE
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
 from canshaper.daemon.io_cycle import FrameProcessor, receive_waiting
 from canshaper.daemon.standstill import Standstill
+from canshaper.errors import BusError, GatewayError, WrongDeviceError
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.gateway.cangw import GatewayError, Rule, between, difference, rules
+from canshaper.protocols.gateway.cangw import Rule, between, difference, rules
 from canshaper.protocols.gateway.passing import Pattern
 from canshaper.protocols.gateway.rules import excluded, passing_rules
 

@@ -3,9 +3,10 @@
 import time
 from collections.abc import Callable, Iterable, Mapping
 
-from canshaper.bus.port import BusError, ListeningPort, Port, WrongBusError, open_port
+from canshaper.bus.port import ListeningPort, Port, open_port
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.deployment import Deployment
 
 # Until what was sent last has left a queue of some frames, also on a bus with other traffic.

@@ -10,6 +10,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.io_cycle import FrameProcessor, io_cycle
 from canshaper.daemon.standstill import Standstill
+from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
@@ -19,10 +20,6 @@ from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import Recording
-
-
-class DriveError(ValueError):
-    """The drive could not be made; the message says why."""
 
 
 class PlantPort:
@@ -144,7 +141,7 @@ def drive(
         The recorded drive, one row a tick.
 
     Raises:
-        DeploymentError: the deployment does not fit the machine.
+        ConfigError: the deployment does not fit the machine.
         DriveError: nor does the script, or there is no such machine or start pose.
     """
     controller = Controller(deployment)

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from canshaper.bus.port import BusError, Port
-from canshaper.design.lockstep import DriveError
+from canshaper.bus.port import Port
+from canshaper.errors import BusError, DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import Script
 from canshaper_sim.parameters import changed_parameters

@@ -3,8 +3,8 @@
 from abc import ABC, abstractmethod
 from typing import Any, Protocol, Self
 
-from canshaper.codec.codecs import WrongLengthError
 from canshaper.codec.frame import FrameFault
+from canshaper.errors import WrongLengthError
 from canshaper.inputs.carry_over import Part
 from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason

@@ -9,7 +9,8 @@ from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config
 from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig, DeploymentConfig
-from canshaper.config.source import DeploymentError, Place
+from canshaper.config.source import Place
+from canshaper.errors import ConfigError
 from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
@@ -30,14 +31,14 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         inside: read no DBC file outside of this directory, where somebody else made the file.
 
     Raises:
-        DeploymentError: with every problem of all files.
+        ConfigError: with every problem of all files.
     """
     config, source = load_config(path)
     diagnostics = Diagnostics(source)
     check_buses(diagnostics, config)
     messages = load_messages(diagnostics, config, path.parent, inside)
     if messages is None:
-        raise DeploymentError(diagnostics.problems)
+        raise ConfigError(diagnostics.problems)
     lookup = Lookup(diagnostics, config, messages)
     joysticks = {name: bind_joystick(lookup, name, one) for name, one in config.joysticks.items()}
     axes = bind_axes(lookup)

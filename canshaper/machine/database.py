@@ -10,7 +10,7 @@ from cantools.database.can import Message
 
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.bounded import read_bounded
-from canshaper.config.source import MOST_LETTERS, MOST_PROBLEMS, Problem
+from canshaper.errors import MOST_LETTERS, MOST_PROBLEMS, Problem
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
     EXTENDED,

@@ -7,7 +7,7 @@ from pathlib import Path
 import cantools
 from cantools.database.can import Database, Message
 
-from canshaper.config.source import Problem
+from canshaper.errors import Problem
 from canshaper.machine.dbc_text import WIDE_ID
 
 # What cantools gets of the files of a deployment: messages that are used, and what is of none.

@@ -1,6 +1,7 @@
 """The problems of a deployment's files: all of them are collected, each with its place."""
 
-from canshaper.config.source import DeploymentError, Place, Problem, Source
+from canshaper.config.source import Place, Source
+from canshaper.errors import ConfigError, Problem
 
 
 class Diagnostics:
@@ -25,7 +26,7 @@ class Diagnostics:
         """End here if there is any problem.
 
         Raises:
-            DeploymentError: with all of them.
+            ConfigError: with all of them.
         """
         if self.problems:
-            raise DeploymentError(self.problems)
+            raise ConfigError(self.problems)

@@ -8,8 +8,8 @@ from datetime import UTC, datetime
 from pathlib import Path, PurePosixPath
 
 from canshaper.blackbox.write import ABOUT, BOX, about_of, carried
+from canshaper.errors import LogError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.frames import LogError
 from canshaper.recording.history import History
 
 HISTORY, LOG = "history.txt", "recording.log"

@@ -4,8 +4,8 @@ from collections.abc import Collection, Mapping
 from enum import Enum
 
 from canshaper.codec.identifier import group_of
+from canshaper.errors import LogError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.frames import LogError
 
 Key = tuple[str, int, bool]
 

@@ -5,6 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import NamedTuple
 
+from canshaper.errors import CutOffError, LogError
+
 # No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
 LATEST_S = 10_000_000_000
 
@@ -30,14 +32,6 @@ class TimedFrame(NamedTuple):
 def fits(can_id: int, *, extended: bool) -> bool:
     """Whether an id has room in its 11 or 29 bits."""
     return can_id < 1 << (29 if extended else 11)
-
-
-class LogError(ValueError):
-    """A log that cannot be used: says where, what was found and what is allowed."""
-
-
-class CutOffError(LogError):
-    """A log that ends in the middle; every frame before that has been handed out."""
 
 
 @dataclass

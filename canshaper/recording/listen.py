@@ -10,10 +10,11 @@ from typing import Any, NamedTuple
 import can
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.bus.port import BusError, open_python_can
+from canshaper.bus.port import open_python_can
 from canshaper.bus.raw import CAN_FRAME
 from canshaper.bus.socketcan import dropped_frames, open_sockets
 from canshaper.config.bus import Bus
+from canshaper.errors import BusError
 from canshaper.recording.text import ERROR_FLAG
 
 # Frames taken from one bus before the next one has its turn.

@@ -11,8 +11,9 @@ from io import BufferedReader, RawIOBase
 from pathlib import Path
 from typing import Any, BinaryIO
 
+from canshaper.errors import CutOffError, LogError
 from canshaper.recording import binary, text
-from canshaper.recording.frames import LATEST_S, CutOffError, LogError, Place, TimedFrame
+from canshaper.recording.frames import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 

@@ -3,13 +3,14 @@
 import json
 from collections.abc import Callable, Iterator
 
-from canshaper.blackbox.file import Box, BoxError
+from canshaper.blackbox.file import Box
 from canshaper.blackbox.records import Kind, Record, records
 from canshaper.blackbox.state import States
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
+from canshaper.errors import BoxError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import TimedFrame
 from canshaper.recording.ticks import Difference, Result, Rows, Tick, Timed

@@ -6,14 +6,14 @@ from dataclasses import dataclass, field
 from itertools import islice
 from pathlib import Path
 
-from canshaper.blackbox.file import SUFFIX, Box, BoxError, read_box
-from canshaper.blackbox.state import StateError
+from canshaper.blackbox.file import SUFFIX, Box, read_box
 from canshaper.codec.frame import Frame, new_frame
 from canshaper.codec.identifier import group_of
 from canshaper.controller.controller import Controller
+from canshaper.errors import BoxError, CutOffError, LogError, StateError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key, Kind, Sorter, bus_of_channel
-from canshaper.recording.frames import CutOffError, LogError, TimedFrame
+from canshaper.recording.frames import TimedFrame
 from canshaper.recording.log import LogFile
 from canshaper.recording.play import Player, frames_of, of_same_files
 from canshaper.recording.ticks import Difference, Result, Sorted, Stepper, Tick, clocked

@@ -10,6 +10,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeGuard
 
+from canshaper.errors import PageMessageError
 from canshaper_sim.hand import Held
 
 SILENT_S = 0.2
@@ -22,10 +23,6 @@ NEUTRAL = 0.02
 """Below it a stick of the page counts as neutral."""
 
 Tell = Callable[[str], None]
-
-
-class NonsenseError(ValueError):
-    """What a page sent is no message; says what was found and what is allowed."""
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -76,15 +73,15 @@ class Cab:
         """Take the positions of all sticks; those of a page that does not drive count for nothing.
 
         Raises:
-            NonsenseError: they are no positions.
+            PageMessageError: they are no positions.
         """
         for name, value in sticks.items():
             if name not in self._axes:
                 allowed = ", ".join(sorted(self._axes))
-                raise NonsenseError(f"found the stick {name[:20]!r}, there are {allowed}")
+                raise PageMessageError(f"found the stick {name[:20]!r}, there are {allowed}")
             if not (is_number(value) and -1.0 <= value <= 1.0):  # false of NaN, too
                 found = repr(value)[:20]
-                raise NonsenseError(f"found {found} for the stick {name}, allowed is -1 to 1")
+                raise PageMessageError(f"found {found} for the stick {name}, allowed is -1 to 1")
         if page != self.driver:
             return
         self._watch(now_s)

@@ -8,8 +8,8 @@ from typing import Any
 
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
-from canshaper.daemon.control_client import ControlError
-from canshaper.studio.cab import Cab, NonsenseError, is_number
+from canshaper.errors import ControlError, PageMessageError
+from canshaper.studio.cab import Cab, is_number
 from canshaper.studio.stage import Stage
 
 SHOW_S = 1.0 / 30.0
@@ -81,7 +81,7 @@ class Client:
                 return
             try:
                 self._take(message.get("text"))
-            except NonsenseError as error:
+            except PageMessageError as error:
                 self._stage.with_cab(lambda cab, now_s: cab.nonsense(self._number, now_s))
                 self._refusals.append(str(error))
                 self._nonsense += 1
@@ -103,13 +103,13 @@ class Client:
         """Do what a message asks for.
 
         Raises:
-            NonsenseError: it is none.
+            PageMessageError: it is none.
         """
         message = parsed(text)
         number = self._number
         if (sticks := message.get("sticks")) is not None:
             if not isinstance(sticks, dict):
-                raise NonsenseError("found sticks that are no object")
+                raise PageMessageError("found sticks that are no object")
             self._stage.with_cab(lambda cab, now_s: cab.sticks(number, sticks, now_s))
         elif (word := message.get("do")) is not None:
             self._stage.with_cab(_action(word, number))
@@ -119,7 +119,7 @@ class Client:
             name, factor = message.get("slide"), message.get("to")
             known = isinstance(name, str) and name in self._stage.sliders
             if not known or not is_number(factor):
-                raise NonsenseError("found no message that is known")
+                raise PageMessageError("found no message that is known")
             self._wanted[str(name)] = factor
             self._slid.set()
 
@@ -171,16 +171,16 @@ def parsed(text: str | None) -> dict[str, Any]:
     """A message of a page.
 
     Raises:
-        NonsenseError: it is no JSON object.
+        PageMessageError: it is no JSON object.
     """
     if text is None:
-        raise NonsenseError("found bytes, allowed is JSON")
+        raise PageMessageError("found bytes, allowed is JSON")
     try:
         message = json.loads(text)
     except (ValueError, RecursionError):
-        raise NonsenseError(f"found {text[:40]!r}, allowed is JSON") from None
+        raise PageMessageError(f"found {text[:40]!r}, allowed is JSON") from None
     if not isinstance(message, dict):
-        raise NonsenseError(f"found {text[:40]!r}, allowed is an object")
+        raise PageMessageError(f"found {text[:40]!r}, allowed is an object")
     return message
 
 
@@ -193,5 +193,7 @@ def _action(word: object, number: int) -> Action:
         "reset": lambda cab, now_s: cab.press_reset(number, now_s),
     }
     if not isinstance(word, str) or word not in actions:
-        raise NonsenseError(f"found {str(word)[:20]!r}, allowed are {', '.join(map(str, actions))}")
+        raise PageMessageError(
+            f"found {str(word)[:20]!r}, allowed are {', '.join(map(str, actions))}"
+        )
     return actions[word]

@@ -41,7 +41,7 @@ def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:
         directory: where the copy is written.
 
     Raises:
-        DeploymentError: the file is not valid.
+        ConfigError: the file is not valid.
     """
     load_deployment(path)  # its own problems, with its own lines
     config, source = load_config(path)

@@ -9,7 +9,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, Guard
 from canshaper.codec.signals import find_signal
 from canshaper.codec.valve import ValveCodec
-from canshaper.config.source import DeploymentError, Problem
+from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import USUAL_MAX_STEP, BoundFeedback
 from canshaper_sim.axes import ROTATOR
@@ -101,7 +101,7 @@ class PlantNode:
         sway: swing of the grapple at the start; by default it hangs still.
 
     Raises:
-        DeploymentError: an axis that this machine does not have, or no feedback messages in the
+        ConfigError: an axis that this machine does not have, or no feedback messages in the
             DBC files.
         ValueError: no such machine, or the joints do not reach the start pose.
     """
@@ -131,7 +131,7 @@ class PlantNode:
                 protection = radii.get(message, UNPROTECTED)
                 self._senders[message] = Sender(bus, found[1], protection=protection)
         if problems:
-            raise DeploymentError(problems)
+            raise ConfigError(problems)
         self._machine = build_machine(name, parameters, sway)
         self._valve_feedback = [
             _ValveFeedback(axis, bound.feedback)

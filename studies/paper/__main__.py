@@ -57,7 +57,7 @@ def reproduce(
 
 
 def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
-    from canshaper.config.source import DeploymentError
+    from canshaper.errors import ConfigError
     from studies.paper.study import FIGURES, Study, steps
     from studies.paper.table import print_paper_table
 
@@ -82,7 +82,7 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
             # Every number comes before the first file: an interruption leaves no half of a set.
             numbers = {n: study.figure_numbers(n) for n in figures}
             table = None if wanted else study.table()
-        except (DeploymentError, ValueError) as error:
+        except (ConfigError, ValueError) as error:
             raise fail(error) from None
         drawn: list[tuple[str, Path]] = []
         for n in figures:

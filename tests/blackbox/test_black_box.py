@@ -16,11 +16,12 @@ from canshaper.blackbox import keeper, ring, write
 from canshaper.blackbox.file import HEAD, MAGIC, read_box
 from canshaper.blackbox.records import RECORD, Kind, records
 from canshaper.blackbox.ring import BLOCK, Ring
-from canshaper.blackbox.state import StateError, States
+from canshaper.blackbox.state import States
 from canshaper.cli.app import app
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.daemon import Daemon
+from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.test_reload import Bench
 from tests.rigs.forwarder import ROOT

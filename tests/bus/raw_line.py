@@ -11,9 +11,9 @@ from typing import Any
 import can
 from can.interfaces.socketcan.socketcan import build_can_frame
 
-from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.raw import SIZE, RawPort
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 TICK_NS = 20_000_000

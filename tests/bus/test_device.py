@@ -13,7 +13,6 @@ from canshaper.bus import device as module
 from canshaper.bus import netlink
 from canshaper.bus.device import (
     Device,
-    WrongDeviceError,
     check_device,
     device_fault,
     kind_and_bitrate,
@@ -21,9 +20,10 @@ from canshaper.bus.device import (
     read_device,
     whereabouts,
 )
-from canshaper.bus.port import BusError, WrongBusError, open_port
+from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets
 from canshaper.config.bus import Bus, Match
+from canshaper.errors import BusError, WrongBusError, WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 from tests.bus.fake_devices import HUB, PCI, SPI, USB, FakeDevices
 from tests.bus.raw_line import IDS

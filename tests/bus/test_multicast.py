@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from canshaper.bus import multicast
-from canshaper.bus.port import BusError, Port, open_port
+from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
+from canshaper.errors import BusError
 from tests.bus.neighbour import CANNOT
 
 WAIT_S = 10.0

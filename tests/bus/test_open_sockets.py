@@ -10,11 +10,11 @@ import pytest
 
 from canshaper.bus import port as bus_module
 from canshaper.bus import socketcan
-from canshaper.bus.device import WrongDeviceError
-from canshaper.bus.port import BusError, ListeningPort, WrongBusError, open_port
+from canshaper.bus.port import ListeningPort, open_port
 from canshaper.bus.socketcan import open_sockets, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
+from canshaper.errors import BusError, WrongBusError, WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 BUS = Bus(interface="socketcan", channel="can0", bitrate=250000)

@@ -8,9 +8,9 @@ from typing import Any
 import pytest
 
 from canshaper.bus import raw
-from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
 from canshaper.codec.frame import BusState, FrameFault
+from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import (
     IDS,

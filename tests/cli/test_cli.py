@@ -14,7 +14,7 @@ from typer.testing import CliRunner
 from canshaper import __version__
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
@@ -237,7 +237,7 @@ def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path
     assert loader(*multicast, network=True)().config.buses["crane"].network
     assert not loader(str(SHIPPED), "udp_multicast", ["239.1.2.3"])().config.buses["crane"].network
     says = "--network: found the interface socketcan, allowed is udp_multicast only"
-    with pytest.raises(DeploymentError, match=says):
+    with pytest.raises(ConfigError, match=says):
         loader(str(SHIPPED), network=True)()
 
 
@@ -251,7 +251,7 @@ def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path
     ],
 )
 def test_bus_options_that_do_not_fit(two_buses: Path, channels: list[str], says: str) -> None:
-    with pytest.raises(DeploymentError, match=re.escape(f"command line: --channel: {says}")):
+    with pytest.raises(ConfigError, match=re.escape(f"command line: --channel: {says}")):
         loader(str(two_buses), None, channels)()
 
 

@@ -7,8 +7,9 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.errors import GatewayError
 from canshaper.protocols.gateway import cangw
-from canshaper.protocols.gateway.cangw import GatewayError, Rule, difference
+from canshaper.protocols.gateway.cangw import Rule, difference
 from canshaper.protocols.gateway.passing import Pattern
 
 ROOT = Path(__file__).parents[2]

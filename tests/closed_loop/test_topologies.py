@@ -5,7 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.design.lockstep import DriveError, drive
+from canshaper.design.lockstep import drive
+from canshaper.errors import DriveError
 from canshaper.machine.binding import load_deployment
 from canshaper.report.metrics import compare
 from canshaper_sim.cranes import cranes, one_crane

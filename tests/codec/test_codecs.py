@@ -10,16 +10,13 @@ from cantools.database.can import Message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.codecs import (
-    JoystickCodec,
-    Sender,
-    WrongLengthError,
-)
+from canshaper.codec.codecs import JoystickCodec, Sender
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.signals import VelocitySignal
 from canshaper.codec.status import AXIS_STATUS, SERVICE_STATUS, StatusCodec
 from canshaper.codec.valve import ValveCodec, ValveMessage
+from canshaper.errors import WrongLengthError
 from canshaper.shaping.states import Reason, State
 from tests.rigs.reports import report
 

@@ -22,7 +22,7 @@ from canshaper.codec.identifier import (
     with_source,
 )
 from canshaper.codec.j1939 import CLAIMED, DM1, claims_of
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import BusRoutes
@@ -63,7 +63,7 @@ class Machine:
         return load_deployment(self.directory / "machine.yaml")
 
     def problems(self) -> list[str]:
-        with pytest.raises(DeploymentError) as caught:
+        with pytest.raises(ConfigError) as caught:
             self.load()
         return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
 

@@ -12,7 +12,7 @@ from canshaper.codec.codecs import Sender
 from canshaper.codec.flags import RockerVelocity
 from canshaper.codec.signals import VelocitySignal
 from canshaper.codec.valve import FlagsCodec, ValveCodec, ValveMessage
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import Reason
 
@@ -100,7 +100,7 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
         text = text.replace(old, new, 1)
     file = folder / "machine.yaml"
     file.write_text(text)
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     return "\n".join(map(str, caught.value.problems))
 

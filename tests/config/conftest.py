@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = ROOT / "config" / "forwarder.yaml"
@@ -43,7 +43,7 @@ def problems(load: Load, file: Path) -> Problems:
     """Every problem of a text as lines, the path of the file cut down to its name."""
 
     def find(text: str | bytes) -> list[str]:
-        with pytest.raises(DeploymentError) as caught:
+        with pytest.raises(ConfigError) as caught:
             load(text)
         assert str(caught.value).splitlines() == [str(p) for p in caught.value.problems]
         assert all(p.file == str(file) for p in caught.value.problems)

@@ -12,7 +12,7 @@ from pydantic import ValidationError
 
 from canshaper.config.load import load_config
 from canshaper.config.schema import DeploymentConfig
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.shaping.limits import OutputLimits
 
 Load = Callable[[str | bytes], DeploymentConfig]
@@ -114,7 +114,7 @@ def loads_or_says_why(file: Path, content: bytes) -> None:
     file.write_bytes(content)
     try:
         config, _ = load_config(file)
-    except DeploymentError as error:
+    except ConfigError as error:
         assert error.problems
         assert all(p.message and p.file == str(file) for p in error.problems)
     else:

@@ -17,8 +17,9 @@ from pydantic.fields import FieldInfo
 from canshaper.config.load import load_section
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
-from canshaper.config.source import DeploymentError, Place, Problem
+from canshaper.config.source import Place
 from canshaper.design.crane.config import CraneConfig
+from canshaper.errors import ConfigError, Problem
 from canshaper.shaping.registry import KINDS
 
 FILES = [(DeploymentConfig, kind) for kind in KINDS] + [(CraneConfig, "")]
@@ -83,7 +84,7 @@ def problems(directory: Path, schema: type[Section], data: Any) -> dict[str, Pro
     file = directory / "file.yaml"
     text = yaml.safe_dump(data, sort_keys=False)
     file.write_text(text, encoding="utf-8")
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_section(file, schema)
     lines = text.splitlines()
     for problem in caught.value.problems:

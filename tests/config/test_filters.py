@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.config.schema import DeploymentConfig
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir, residual_left
@@ -184,7 +184,7 @@ def checked(directory: Path, text: str, *, sway: str = "") -> list[str]:
         load_deployment(file)
         return []
     assert result.exit_code == 2
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     return [str(p).removeprefix(f"{directory}/") for p in caught.value.problems]
 

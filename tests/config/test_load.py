@@ -8,7 +8,7 @@ import pytest
 
 from canshaper.config.load import load_config
 from canshaper.config.schema import AxisConfig, DeploymentConfig
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 
 Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
@@ -209,7 +209,7 @@ def test_long_findings_are_cut(shipped: str, problems: Problems) -> None:
 
 
 def test_missing_file(tmp_path: Path) -> None:
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_config(tmp_path / "none.yaml")
     assert str(caught.value) == f"{tmp_path / 'none.yaml'}: No such file or directory"
 

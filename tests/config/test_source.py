@@ -6,7 +6,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.config import bounded
-from canshaper.config.source import DeploymentError, Source
+from canshaper.config.source import Source
+from canshaper.errors import ConfigError
 
 Problems = Callable[[str | bytes], list[str]]
 
@@ -23,7 +24,7 @@ def fault(file: Path, text: str | bytes) -> str:
 
 
 def unreadable(path: Path) -> str:
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         Source(path)
     (problem,) = caught.value.problems
     return str(problem).removeprefix(str(path))

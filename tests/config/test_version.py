@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.config.load import load_config
-from canshaper.config.source import DeploymentError
 from canshaper.config.version import MOVED
+from canshaper.errors import ConfigError
 from tests.config.conftest import Load, Problems
 
 # As machines were described before there was a version, with every key that moved since then.
@@ -121,5 +121,5 @@ def test_what_is_no_version(problems: Problems, shipped: str, value: str) -> Non
 def test_a_file_that_is_something_else(tmp_path: Path, text: str) -> None:
     file = tmp_path / "machine.yaml"
     file.write_text(text)
-    with pytest.raises(DeploymentError):
+    with pytest.raises(ConfigError):
         load_config(file)

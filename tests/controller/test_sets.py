@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.codec.frame import Frame
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.shaping.shapers.gff import Gff
 from tests.rigs.forwarder import Rig
 
@@ -194,7 +194,7 @@ def test_what_cannot_run_between_two_sets_is_told(changed_rig: Make) -> None:
     slew = SLEW.replace("kind: gff, a1: 0.708, a2: 0.12", one)
     sets = SETS.partition("    profiles:")[0].replace("kind: gff, a1: 0.7, a2: 0.12", one)
     changed = {**YAML, SLEW: slew + sets.replace("kind: gff, a1: 0.9, a2: 0.2", two)}
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         changed_rig(yaml=changed, dbc=DBC)
     (problem,) = caught.value.problems
     text = "at 31.25, between two breakpoints: sum of the taps is 1.001, allowed is 1"
@@ -247,7 +247,7 @@ def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
 def test_what_does_not_fit_is_told(changed_rig: Make, old: str, new: str, says: str) -> None:
     changed = {key: value.replace(old, new) for key, value in YAML.items()}
     assert changed != YAML
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         changed_rig(yaml=changed, dbc=DBC)
     assert any(says in str(problem) for problem in caught.value.problems), caught.value.problems
 
@@ -280,7 +280,7 @@ def test_a_value_that_the_dbc_names_default_is_a_choice(changed_rig: Make) -> No
 def test_a_value_that_the_dbc_names_an_error_is_no_choice(
     changed_rig: Make, names: str, says: str
 ) -> None:
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         changed_rig(yaml=YAML, dbc=DBC | {"VAL_ 272 Enable": f"{names}\nVAL_ 272 Enable"})
     (problem,) = caught.value.problems
     assert says in str(problem)

@@ -13,10 +13,10 @@ import pytest
 
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
-from canshaper.config.source import DeploymentError, Problem
 from canshaper.controller.controller import Controller
 from canshaper.daemon import config_reload as reading_module
 from canshaper.daemon.config_reload import ConfigReload
+from canshaper.errors import ConfigError, Problem
 from canshaper.machine.deployment import Deployment
 from tests.rigs.forwarder import ROOT, TICK_NS
 
@@ -76,7 +76,7 @@ def test_a_wrong_file_is_refused_with_every_line(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("tick_ms: 0\nnonsense: 1\n")
     found = read(loader(str(path)))
-    with pytest.raises(DeploymentError) as here:
+    with pytest.raises(ConfigError) as here:
         loader(str(path))()
     assert found == str(here.value)
     assert {f"{path}:1:", f"{path}:2:"} <= {line.split(" ")[0] for line in found.splitlines()}
@@ -102,9 +102,9 @@ def test_a_long_answer_comes_whole() -> None:
     problems = [Problem("machine.yaml", line, "axes", "x" * 1900) for line in range(100)]
 
     def load() -> Deployment:
-        raise DeploymentError(problems)
+        raise ConfigError(problems)
 
-    answer_text = str(DeploymentError(problems))
+    answer_text = str(ConfigError(problems))
     assert read(load) == answer_text
     assert len(answer_text) > 65_536
 

@@ -20,6 +20,7 @@ from canshaper.daemon.control_server import (
     SILENT_NS,
     ControlServer,
 )
+from canshaper.errors import ControlError
 
 
 class Rig:
@@ -214,5 +215,5 @@ def test_a_file_that_is_no_socket_is_left_alone(tmp_path: Path) -> None:
 
 
 def test_a_client_without_a_daemon_says_where_it_looked(tmp_path: Path) -> None:
-    with pytest.raises(client.ControlError, match=r"none\.sock: No such file"):
+    with pytest.raises(ControlError, match=r"none\.sock: No such file"):
         client.table(tmp_path / "none.sock")

@@ -11,12 +11,12 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus.port import BusError, WrongBusError
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
 from canshaper.daemon.standstill import Standstill
+from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.daemon.test_reload import BUS, Bench, FakePort, Read

@@ -8,14 +8,13 @@ from typing import Any
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.bus.device import WrongDeviceError
-from canshaper.bus.port import BusError
 from canshaper.bus.raw import REOPEN_NS
 from canshaper.cli.app import app
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus, Match
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import Bridge
+from canshaper.errors import BusError, WrongDeviceError
 from canshaper.protocols.gateway import cangw
 from tests.rigs.gateway import ROOT
 

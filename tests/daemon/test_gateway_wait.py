@@ -14,7 +14,8 @@ from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway
 from canshaper.daemon.standstill import Standstill
-from canshaper.protocols.gateway.cangw import GatewayError, Rule
+from canshaper.errors import GatewayError
+from canshaper.protocols.gateway.cangw import Rule
 from tests.rigs.gateway import GatewayRig
 
 WAIT_S = 0.1

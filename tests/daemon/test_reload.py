@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus.port import BusError, Port
+from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.controller.adjust import Adjuster
@@ -18,6 +18,7 @@ from canshaper.daemon import daemon as module
 from canshaper.daemon import loop, standstill
 from canshaper.daemon import ports as service_ports
 from canshaper.daemon.daemon import Daemon
+from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.routing import BusRoutes

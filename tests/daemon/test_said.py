@@ -9,10 +9,10 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus.port import BusError
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
+from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.test_daemon import answered, control
 from tests.daemon.test_reload import BUS, SECOND, Bench, FakePort

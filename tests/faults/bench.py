@@ -15,15 +15,14 @@ from unittest.mock import patch
 
 from canshaper.codec.frame import BusState, Frame
 from canshaper.config.bus import Bus
-from canshaper.config.source import DeploymentError
 from canshaper.daemon import daemon as module
 from canshaper.daemon import gateway as gateway_module
 from canshaper.daemon import loop as loop_module
 from canshaper.daemon import ports as ports_module
 from canshaper.daemon import standstill as standstill_module
+from canshaper.errors import ConfigError, GatewayError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.protocols.gateway.cangw import GatewayError
 from tests.faults.guarded import Unrefused
 from tests.faults.machine import Key
 from tests.faults.rules import Rules
@@ -89,7 +88,7 @@ class Loader:
 
     def __call__(self) -> Deployment:
         if self.file is None:
-            raise DeploymentError("machine.yaml:1: this is no deployment")
+            raise ConfigError("machine.yaml:1: this is no deployment")
         if self.file not in self._read:
             self._read[self.file] = pickle.dumps(load_deployment(self.file))
         found = pickle.loads(self._read[self.file])
@@ -258,7 +257,7 @@ class Read:
     def __init__(self, load: Callable[[], Deployment], polls: int) -> None:
         try:
             self._found: Deployment | str = load()
-        except DeploymentError as error:
+        except ConfigError as error:
             self._found = str(error)
         self._polls = polls
 

@@ -4,8 +4,8 @@ import re
 from pathlib import Path
 
 from canshaper.codec.frame import Frame
-from canshaper.config.source import DeploymentError
 from canshaper.controller.controller import Controller
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
@@ -30,19 +30,19 @@ class Files:
         """Load and, where that goes well, run; None where there are problems, well told.
 
         Raises:
-            Exception: anything but a ``DeploymentError`` with proper problems is a fault.
+            Exception: anything but a ``ConfigError`` with proper problems is a fault.
         """
         self.yaml.write_bytes(yaml)
         self.dbc.write_bytes(dbc)
         try:
             deployment = load_deployment(self.yaml)
-        except DeploymentError as error:
+        except ConfigError as error:
             self._check(error)
             return None
         runs(deployment)
         return deployment
 
-    def _check(self, error: DeploymentError) -> None:
+    def _check(self, error: ConfigError) -> None:
         """Every problem has words, a file that is there, and the line where there is one."""
         assert error.problems
         assert str(error).splitlines()

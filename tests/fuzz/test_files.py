@@ -50,10 +50,10 @@ from pathlib import Path
 resource.setrlimit(resource.RLIMIT_AS, ({0}, {0}))
 resource.setrlimit(resource.RLIMIT_CPU, ({1}, {1}))
 from canshaper.machine.binding import load_deployment
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 try:
     load_deployment(Path(sys.argv[1]))
-except DeploymentError as error:
+except ConfigError as error:
     print(error)
 """
 

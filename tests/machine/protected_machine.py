@@ -2,7 +2,7 @@
 
 from pathlib import Path
 
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
@@ -155,7 +155,7 @@ def problems(directory: Path, *changes: tuple[str, str]) -> list[str]:
     """What is wrong with the changed machine, without the directory."""
     try:
         load(directory, *changes)
-    except DeploymentError as error:
+    except ConfigError as error:
         return [str(p).replace(f"{directory}/", "") for p in error.problems]
     return []
 

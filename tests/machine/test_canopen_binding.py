@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from tests.rigs.canopen import DBC_FILE, ROOT, write_variant
 
@@ -71,6 +71,6 @@ def test_problems_of_the_dbc(tmp_path: Path, old: str, new: str, says: str) -> N
 
 
 def problems(file: Path) -> list[str]:
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     return [str(problem) for problem in caught.value.problems]

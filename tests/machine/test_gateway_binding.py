@@ -9,7 +9,7 @@ from canshaper.checksums import Checksum
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
@@ -35,7 +35,7 @@ def load(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", ""
 
 
 def problems(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> list[str]:
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load(folder, *changes, dbc=dbc)
     return [str(p).rpartition(f"{folder}/")[2] for p in caught.value.problems]
 
@@ -79,7 +79,7 @@ def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
     )  # fmt: skip
     file = tmp_path / "machine.yaml"
     file.write_text(text)
-    with pytest.raises(DeploymentError, match="no valve has the message of a joystick"):
+    with pytest.raises(ConfigError, match="no valve has the message of a joystick"):
         load_deployment(file)
 
 

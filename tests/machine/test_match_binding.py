@@ -7,12 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.bus import port as module
-from canshaper.bus.device import WrongDeviceError, read_device, whereabouts
-from canshaper.bus.port import BusError
+from canshaper.bus.device import read_device, whereabouts
 from canshaper.cli.app import app
 from canshaper.config.bus import Match
-from canshaper.config.source import DeploymentError
 from canshaper.daemon.ports import open_ports
+from canshaper.errors import BusError, ConfigError, WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.bus.fake_devices import FakeDevices
 
@@ -70,7 +69,7 @@ def test_two_devices(tmp_path: Path, first: str, second: str) -> None:
 def test_two_channels_that_nothing_tells_apart(tmp_path: Path, first: str, second: str) -> None:
     """Their names could change hands, and both would match."""
     file = machine(tmp_path, first, second)
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     text = "buses.rear.match: may be the device of bus front too; allowed is another serial, path"
     assert str(caught.value) == f"{file}:{line_of(file, TWO)}: {text} or port"
@@ -95,7 +94,7 @@ def test_two_channels_that_nothing_tells_apart(tmp_path: Path, first: str, secon
 )
 def test_a_match_that_cannot_be(tmp_path: Path, match: str, where: str, text: str) -> None:
     file = machine(tmp_path, match)
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     (problem,) = caught.value.problems
     assert str(problem).startswith(f"{file}:{line_of(file, ONE)}: buses.front.{where}: {text}")
@@ -105,7 +104,7 @@ def test_only_socketcan_has_devices(tmp_path: Path) -> None:
     file = machine(tmp_path, "{ driver: vcan }")
     front = "front: { interface: "
     file.write_text(file.read_text().replace(f"{front}socketcan", f"{front}virtual"))
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
     text = "buses.front.match: found it with the interface virtual, allowed is socketcan"
     assert str(caught.value) == f"{file}:{line_of(file, ONE)}: {text}"

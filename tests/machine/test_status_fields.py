@@ -9,8 +9,8 @@ from canshaper.codec import status
 from canshaper.codec.status import StatusField
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import screen
-from canshaper.config.source import DeploymentError
 from canshaper.controller.controller import Controller
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Heard
@@ -65,12 +65,12 @@ def test_its_absence_in_a_dbc_refuses_no_machine(name: str) -> None:
 
 
 def test_a_required_field_that_is_missing_is_named(tmp_path: Path) -> None:
-    with pytest.raises(DeploymentError, match="SlewStatus: lacks the signals PredictedSway"):
+    with pytest.raises(ConfigError, match="SlewStatus: lacks the signals PredictedSway"):
         machine(tmp_path, "SG_ PredictedSway", "SG_ Prediction")
 
 
 def test_an_optional_field_that_cannot_carry_a_number_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(DeploymentError, match="ActiveSet has a scale of 0"):
+    with pytest.raises(ConfigError, match="ActiveSet has a scale of 0"):
         machine(tmp_path, ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))
 
 

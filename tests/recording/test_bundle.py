@@ -8,9 +8,9 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.errors import LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.recording.bundle import history_lines, pack, unpack
-from canshaper.recording.frames import LogError
 from canshaper.recording.history import History, Told
 
 ROOT = Path(__file__).parents[2]

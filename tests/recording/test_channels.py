@@ -7,9 +7,9 @@ import pytest
 
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
+from canshaper.errors import LogError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Kind, Sorter, bus_of_channel
-from canshaper.recording.frames import LogError
 from canshaper.recording.ticks import LEAD_NS, PAUSE_NS, clocked
 
 

@@ -8,7 +8,8 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.recording.log import CutOffError, LogError, LogFile, TimedFrame, read_log
+from canshaper.errors import CutOffError, LogError
+from canshaper.recording.log import LogFile, TimedFrame, read_log
 from tests.recording.writing import messages, written
 
 FRAMES = [

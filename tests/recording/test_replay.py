@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from canshaper.cli.common import loader
+from canshaper.errors import LogError
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.frames import LogError
 from canshaper.recording.replay import Replay, look
 from tests.golden.replay import DRIVE
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 
@@ -45,7 +45,7 @@ class Machine:
 
     def problems(self) -> list[str]:
         """Every problem, without the directory."""
-        with pytest.raises(DeploymentError) as caught:
+        with pytest.raises(ConfigError) as caught:
             self.load()
         return [str(p).replace(f"{self.directory}/", "") for p in caught.value.problems]
 

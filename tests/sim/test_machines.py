@@ -9,8 +9,8 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
-from canshaper.config.source import DeploymentError
-from canshaper.design.lockstep import DriveError, drive
+from canshaper.design.lockstep import drive
+from canshaper.errors import ConfigError, DriveError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import JOINT_AXES, TIP_AXES
@@ -70,12 +70,12 @@ def test_axes_that_the_machine_lacks_are_told(tmp_path: Path) -> None:
         r"axes.boom: the crane has slew, near_far, lift, or joint by joint"
         r" slew, lift_cylinder, knuckle, extension"
     )
-    with pytest.raises(DeploymentError, match=expected):
+    with pytest.raises(ConfigError, match=expected):
         PlantNode(deployment)
     mixed = renamed(tmp_path, TIP_FILE, ("\n  near_far:", "\n  knuckle:"))
-    with pytest.raises(DeploymentError, match=r"axes.lift: the crane has slew, lift_cylinder"):
+    with pytest.raises(ConfigError, match=r"axes.lift: the crane has slew, lift_cylinder"):
         PlantNode(mixed)
-    with pytest.raises(DeploymentError, match=r"axes.knuckle: machine tip-controller has slew"):
+    with pytest.raises(ConfigError, match=r"axes.knuckle: machine tip-controller has slew"):
         PlantNode(load_deployment(JOINT_FILE), machine="tip-controller")
 
 
@@ -85,7 +85,7 @@ def test_joints_need_their_feedback_messages(tmp_path: Path) -> None:
     dbc.write_text(text.replace("1027 JointPosition", "1027 Other"))
     deployment = renamed(tmp_path, TIP_FILE, (str(ROOT / "dbc" / "forwarder.dbc"), str(dbc)))
     PlantNode(deployment)
-    with pytest.raises(DeploymentError, match="'JointPosition', messages of the DBC files are"):
+    with pytest.raises(ConfigError, match="'JointPosition', messages of the DBC files are"):
         PlantNode(deployment, machine="tip-controller")
 
 

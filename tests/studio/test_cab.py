@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.studio.cab import RELEASE_S, RESET_S, SILENT_S, Cab, NonsenseError
+from canshaper.errors import PageMessageError
+from canshaper.studio.cab import RELEASE_S, RESET_S, SILENT_S, Cab
 from canshaper_sim.hand import Held
 
 AXES = ("slew", "near_far", "lift")
@@ -171,7 +172,7 @@ def test_anti_sway_is_switched_and_told_once(seat: Seat) -> None:
 def test_what_is_no_position_is_refused_and_moves_nothing(
     seat: Seat, sticks: dict[str, Any]
 ) -> None:
-    with pytest.raises(NonsenseError, match=r"allowed is -1 to 1|there are"):
+    with pytest.raises(PageMessageError, match=r"allowed is -1 to 1|there are"):
         seat.cab.sticks(1, sticks, 1.02)
     assert deflected(seat.cab.held(1.03)) == {}
 

@@ -8,10 +8,11 @@ import statistics
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.calibration.fit import Calibration, CalibrationError, Sample, fit
+from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.speed import SpeedFeedback
 from canshaper.controller.controller import Controller
+from canshaper.errors import CalibrationError
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
@@ -71,7 +72,7 @@ class CalibrationDrive:
         progress: how much of the ramp is done, 0 to 1.
 
     Raises:
-        DeploymentError: no such message or signal.
+        ConfigError: no such message or signal.
     """
 
     def __init__(

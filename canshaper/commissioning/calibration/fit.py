@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
+from canshaper.errors import CalibrationError
+
 
 class Sample(NamedTuple):
     """One moment of a measurement.
@@ -21,10 +23,6 @@ class Sample(NamedTuple):
 
     command: float
     speed: float
-
-
-class CalibrationError(Exception):
-    """The measurement makes no curve; the message says why and what to do."""
 
 
 @dataclass(frozen=True, slots=True)

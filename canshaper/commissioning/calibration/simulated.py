@@ -23,7 +23,7 @@ def run_simulated(
     """Drive the axis of the simulated crane, with the enable switch held, to the end.
 
     Raises:
-        DeploymentError: the deployment does not fit the machine.
+        ConfigError: the deployment does not fit the machine.
     """
     plant = PlantNode(deployment, parameters)
     joysticks = JoystickNode(deployment, Script("held", (), 1e9))

@@ -8,7 +8,7 @@ from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input
-from canshaper.config.source import DeploymentError, Problem
+from canshaper.errors import ConfigError, Problem
 from canshaper.inputs.value import ValueInput, measurable
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -31,7 +31,7 @@ class SpeedFeedback:
         signal: its signal.
 
     Raises:
-        DeploymentError: no such message or signal, or one that cannot be measured with.
+        ConfigError: no such message or signal, or one that cannot be measured with.
     """
 
     def __init__(self, deployment: Deployment, axis: str, message: str, signal: str) -> None:
@@ -72,7 +72,7 @@ class SpeedFeedback:
 def _find(deployment: Deployment, message: str, signal: str) -> tuple[Message, Signal]:
     found = deployment.messages.find(message)
     if isinstance(found, str):
-        raise DeploymentError([Problem("command line", None, "--speed", found)])
+        raise ConfigError([Problem("command line", None, "--speed", found)])
     definition = find_signal(found[1], signal)
     if definition is None:
         names = ", ".join(s.name for s in found[1].signals)
@@ -96,5 +96,5 @@ def _bound(
     return BoundInput(config, message, JoystickCodec(message, []), UNPROTECTED)
 
 
-def _problem(deployment: Deployment, text: str) -> DeploymentError:
-    return DeploymentError([Problem(str(deployment.path), None, "--speed", text)])
+def _problem(deployment: Deployment, text: str) -> ConfigError:
+    return ConfigError([Problem(str(deployment.path), None, "--speed", text)])

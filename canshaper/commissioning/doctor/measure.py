@@ -11,7 +11,8 @@ from typing import Any
 
 from canshaper.bus.raw import CAN_FRAME
 from canshaper.commissioning.doctor.load import load_kinds
-from canshaper.commissioning.doctor.processes import Children, MeasureError, output, ready
+from canshaper.commissioning.doctor.processes import Children, output, ready
+from canshaper.errors import MeasurementError
 from canshaper.machine.deployment import Deployment
 
 # How often the run is looked after, and how much longer than asked it may take.
@@ -61,7 +62,7 @@ def measure(
         load: keep the PC busy meanwhile.
 
     Raises:
-        MeasureError: a process failed.
+        MeasurementError: a process failed.
     """
     with Children() as children, ExitStack() as ends:
         loops, joysticks = {}, {}
@@ -102,7 +103,7 @@ def _result(
         with suppress(subprocess.TimeoutExpired):
             found: dict[str, Any] = json.loads(output(loop, LOOK_S))
             return found
-    raise MeasureError(f"the loop did not end within {seconds + PATIENCE_S:.0f} s")
+    raise MeasurementError(f"the loop did not end within {seconds + PATIENCE_S:.0f} s")
 
 
 def run_of(

@@ -12,6 +12,8 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from canshaper.errors import MeasurementError
+
 # linux/prctl.h
 PR_SET_PDEATHSIG = 1
 # The loop has the priority that the service's unit gives it; the joysticks come after it, so that
@@ -23,10 +25,6 @@ _CODE = f"import sys; sys.path[:] = {{path!r}}; from {__name__} import be; be()"
 
 
 READY = "ready"
-
-
-class MeasureError(Exception):
-    """A process of the measurement failed."""
 
 
 class Children:
@@ -82,24 +80,24 @@ def ready(process: "subprocess.Popen[str]") -> None:
     """Wait until a child says that it is ready; nothing else is printed before its end.
 
     Raises:
-        MeasureError: it ended instead.
+        MeasurementError: it ended instead.
     """
     assert process.stdout is not None
     if process.stdout.readline().strip() != READY:
         output(process, None)
-        raise MeasureError(f"the measurement failed: {process.args!r} ended")
+        raise MeasurementError(f"the measurement failed: {process.args!r} ended")
 
 
 def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
     """What a child printed until its end.
 
     Raises:
-        MeasureError: it failed.
+        MeasurementError: it failed.
         TimeoutExpired: it has not ended yet.
     """
     out, err = process.communicate(timeout=limit_s)
     if process.returncode:
-        raise MeasureError(f"the measurement failed: {err.strip() or process.returncode}")
+        raise MeasurementError(f"the measurement failed: {err.strip() or process.returncode}")
     return out
 
 

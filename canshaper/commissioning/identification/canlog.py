@@ -12,17 +12,11 @@ from canshaper.codec.identifier import NULL, group_of
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples
-from canshaper.commissioning.identification.series import (
-    IdentificationError,
-    Kind,
-    Series,
-    Unit,
-    ordered,
-    unit_of,
-)
+from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
+from canshaper.errors import CutOffError, IdentificationError, LogError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.log import CutOffError, LogError, LogFile
+from canshaper.recording.log import LogFile
 
 
 @dataclass

@@ -6,12 +6,12 @@ from typing import Any
 
 import numpy as np
 
-from canshaper.codec.codecs import WrongLengthError
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
 from canshaper.commissioning.identification.driven import STANDS
 from canshaper.commissioning.identification.series import Array, Command
 from canshaper.controller.finder import InputFinder
+from canshaper.errors import WrongLengthError
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick

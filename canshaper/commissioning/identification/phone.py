@@ -6,13 +6,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from canshaper.commissioning.identification.segments import Found, find_free
-from canshaper.commissioning.identification.series import (
-    Array,
-    IdentificationError,
-    Series,
-    ordered,
-)
+from canshaper.commissioning.identification.series import Array, Series, ordered
 from canshaper.commissioning.identification.table import Table
+from canshaper.errors import IdentificationError
 
 # Width of the ellipse that is swung, part of its length, from which on it is told.
 ROUND = 0.3

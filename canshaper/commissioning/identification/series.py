@@ -10,14 +10,12 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from canshaper.errors import IdentificationError
+
 Array = NDArray[np.float64]
 
 # Bins that a fast signal is averaged into; the shortest period that is looked for has 15 of them.
 BIN_S = 0.02
-
-
-class IdentificationError(ValueError):
-    """The data cannot be used; the message says why and what to do."""
 
 
 class Kind(Enum):

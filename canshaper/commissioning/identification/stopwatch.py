@@ -3,7 +3,7 @@
 import math
 
 from canshaper.commissioning.identification.decay import Value
-from canshaper.commissioning.identification.series import IdentificationError
+from canshaper.errors import IdentificationError
 
 # What a hand adds at either end, and an eye to an angle, as standard deviations.
 _HAND_S = 0.15

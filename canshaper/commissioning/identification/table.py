@@ -16,7 +16,8 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from canshaper.commissioning.identification.series import Array, IdentificationError, Unit, unit_of
+from canshaper.commissioning.identification.series import Array, Unit, unit_of
+from canshaper.errors import IdentificationError
 
 _HEADER = re.compile(r"^(.*?)\s*[(\[]\s*([^)\]]*?)\s*[)\]]\s*$")
 _TIME = re.compile(r"time|zeit|seconds|timestamp|^t$|uptime", re.IGNORECASE)

@@ -6,9 +6,9 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.live import Live
 
-from canshaper.bus.port import BusError
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import clock, screen, status_line
+from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import Listener
 

@@ -109,6 +109,6 @@ def load_crane(path: Path) -> tuple[CraneConfig, Source]:
     """Read and validate a crane file.
 
     Raises:
-        DeploymentError: with every problem of the file, each with its line.
+        ConfigError: with every problem of the file, each with its line.
     """
     return load_section(path, CraneConfig)

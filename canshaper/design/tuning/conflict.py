@@ -12,25 +12,22 @@ import numpy as np
 
 from canshaper.design.tuning.formulation import OVER_COMMAND, SETTLED, Task
 from canshaper.design.tuning.program import Program, Vector
+from canshaper.errors import InfeasibleError
 
 _ROUNDS = 4
 _TOLERANCE = 1e-6
 
 
-class Infeasible(ValueError):
-    """No poles keep all requirements."""
-
-
 def box_conflict(task: Task) -> None:
-    """Raise Infeasible where the bounds on single poles leave no room."""
+    """Raise InfeasibleError where the bounds on single poles leave no room."""
     (low, why_low), (high, why_high) = task.slowest(), task.fastest()
     if high <= 0.0:
-        raise Infeasible(
+        raise InfeasibleError(
             "the printed sense of 14e allows no pole: the sway is undamped; use the sense of"
             " the text, or off"
         )
     if low > high:
-        raise Infeasible(
+        raise InfeasibleError(
             f"{why_low} asks for poles of {low:.3g} rad/s or faster,"
             f" {why_high} allows {high:.3g} rad/s or slower; attainable is one of them"
         )

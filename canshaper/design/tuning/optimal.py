@@ -8,9 +8,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from canshaper.design.tuning.conflict import Infeasible, box_conflict, explain, feasible_point
+from canshaper.design.tuning.conflict import box_conflict, explain, feasible_point
 from canshaper.design.tuning.formulation import Task
 from canshaper.design.tuning.program import Program, Solution, Vector
+from canshaper.errors import InfeasibleError
 from canshaper.shaping.shapers.gff import denominator_from_poles
 
 # "As good": what the poles may do within so much of the optimal cost.
@@ -66,7 +67,7 @@ def tune(
         progress: called with what is being done and the part done, 0 to 1.
 
     Raises:
-        Infeasible: no poles keep all requirements; says which conflict and what is attainable.
+        InfeasibleError: no poles keep all requirements; says which conflict and what is attainable.
         ValueError: a value is out of range, or no start converged.
     """
     tell = progress or (lambda _what, _done: None)
@@ -143,7 +144,7 @@ def _second_try(program: Program) -> Solution:
     """From a point that a search over all poles found feasible, or say why there is none."""
     point = feasible_point(program)
     if point is None:
-        raise Infeasible(explain(program))
+        raise InfeasibleError(explain(program))
     solution = program.solve(point)
     if not solution.success:
         raise ValueError("the solver did not converge from any start; try more starts")

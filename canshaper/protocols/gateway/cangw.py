@@ -16,6 +16,7 @@ from pathlib import Path
 
 from canshaper.bus.netlink import ACKNOWLEDGE, DUMP, ask, attribute, attributes
 from canshaper.codec.kernel_check import CS_CRC8, CS_XOR
+from canshaper.errors import GatewayError
 from canshaper.protocols.gateway.passing import Pattern
 
 # linux/can/gw.h, linux/rtnetlink.h; Python has no names for most of these.
@@ -28,10 +29,6 @@ _RULE = struct.Struct("=BBH")  # rtcanmsg
 _MODIFICATION = struct.Struct("=IB3x8sB")  # cgw_frame_mod
 _WORDS = struct.Struct("=II")
 MODIFYING = frozenset((AND, OR, XOR, SET, CS_XOR, CS_CRC8, UID, *FD_MODIFICATIONS))
-
-
-class GatewayError(Exception):
-    """The kernel's gateway cannot do what it is asked; the message says why."""
 
 
 @dataclass(frozen=True, order=True)

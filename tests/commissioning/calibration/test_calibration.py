@@ -8,10 +8,10 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
-from canshaper.commissioning.calibration.fit import Calibration, CalibrationError, Sample, fit
+from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.simulated import run_simulated
-from canshaper.config.source import DeploymentError
+from canshaper.errors import CalibrationError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.joysticks import JoystickNode
@@ -208,7 +208,7 @@ def test_a_signal_that_is_none_of_the_axis_is_told(deployment: Deployment) -> No
 
 
 def test_no_signal_at_all_is_refused(deployment: Deployment) -> None:
-    with pytest.raises(DeploymentError, match="found 'Nothing'"):
+    with pytest.raises(ConfigError, match="found 'Nothing'"):
         CalibrationDrive(deployment, "slew", ("TipVelocity", "Nothing"), RAMP)
 
 

@@ -11,7 +11,7 @@ from canshaper.codec.frame import Frame
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.simulated import run_simulated
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
@@ -104,7 +104,7 @@ def test_what_is_no_speed_counts_as_silence(tmp_path: Path, message: str, data: 
     ("message", "why"), [("Chosen", "is multiplexed"), ("Long", "has 20 bytes, allowed are 8")]
 )
 def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why: str) -> None:
-    with pytest.raises(DeploymentError, match=f"--speed: {message} {why}"):
+    with pytest.raises(ConfigError, match=f"--speed: {message} {why}"):
         CalibrationDrive(with_messages(tmp_path), "slew", (message, "Speed"), RAMP)
 
 

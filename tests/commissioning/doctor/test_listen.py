@@ -12,13 +12,13 @@ from typing import Any
 import pytest
 
 from canshaper.bus.arrival import SO_TIMESTAMPNS
-from canshaper.bus.device import WrongDeviceError
 from canshaper.bus.raw import CAN_FRAME
 from canshaper.cli.doctor import _listened
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.listen import heard_findings
+from canshaper.errors import WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import ROOT, SHIPPED
 from tests.rigs.j1939 import bjm

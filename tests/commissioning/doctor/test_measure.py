@@ -13,8 +13,9 @@ import pytest
 
 from canshaper.commissioning.doctor.joysticks import LARGEST, NEUTRAL_S, STROKE_S, Waving
 from canshaper.commissioning.doctor.measure import measure, run_of
-from canshaper.commissioning.doctor.processes import Children, MeasureError, ready
+from canshaper.commissioning.doctor.processes import Children, ready
 from canshaper.controller.controller import Controller
+from canshaper.errors import MeasurementError
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.joysticks import JoystickNode
 from tests.commissioning.doctor.conftest import ROOT, SHIPPED
@@ -125,7 +126,7 @@ def test_no_process_outlives_its_block() -> None:
 def test_a_process_that_fails_says_why_and_leaves_no_other() -> None:
     before = children()
     gone = replace(load_deployment(SHIPPED), path=Path("gone.yaml"))
-    with pytest.raises(MeasureError, match=r"gone\.yaml: No such file"):
+    with pytest.raises(MeasurementError, match=r"gone\.yaml: No such file"):
         measure(gone, 0.5, lambda _: None, load=True)
     assert children() == before
 

@@ -9,12 +9,11 @@ import numpy as np
 import pytest
 
 from canshaper.commissioning.identification.canlog import bind, read_can
-from canshaper.commissioning.identification.series import IdentificationError, Kind
-from canshaper.config.source import DeploymentError
+from canshaper.commissioning.identification.series import Kind
+from canshaper.errors import ConfigError, IdentificationError, LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.database import Messages, load_dbc
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.log import LogError
 from tests.commissioning.identification.machine import FILE, ROOT, Push, candump, driven
 
 PUSHES = [Push("slew", 2.0, 1.0, 0.5), Push("near_far", 6.0, 1.0, -0.4)]
@@ -158,7 +157,7 @@ def test_no_values_are_left_out_and_told(tmp_path: Path) -> None:
 def messages_of(path: Path) -> Messages:
     file, problems = load_dbc(path)
     if file is None:
-        raise DeploymentError(problems)
+        raise ConfigError(problems)
     return Messages([file])
 
 

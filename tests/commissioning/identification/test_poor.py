@@ -9,7 +9,6 @@ from canshaper.commissioning.identification.decay import Value
 from canshaper.commissioning.identification.judge import Finding, identify
 from canshaper.commissioning.identification.series import (
     Array,
-    IdentificationError,
     Kind,
     Series,
     Unit,
@@ -17,6 +16,7 @@ from canshaper.commissioning.identification.series import (
     unit_of,
 )
 from canshaper.commissioning.identification.stopwatch import stopwatch
+from canshaper.errors import IdentificationError
 from tests.commissioning.identification.machine import Coloured
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")

@@ -7,14 +7,14 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.source import DeploymentError
 from canshaper.design.crane.config import CraneConfig, load_crane
+from canshaper.errors import ConfigError
 from canshaper_sim.grapple import Grapple
 
 
 def problems(path: Path, text: str) -> list[str]:
     path.write_text(text, encoding="utf-8")
-    with pytest.raises(DeploymentError) as caught:
+    with pytest.raises(ConfigError) as caught:
         load_crane(path)
     return [str(p).replace(str(path), path.name) for p in caught.value.problems]
 

@@ -5,18 +5,19 @@ import re
 import numpy as np
 import pytest
 
-from canshaper.design.tuning.conflict import Infeasible, explain, feasible_point
+from canshaper.design.tuning.conflict import explain, feasible_point
 from canshaper.design.tuning.evaluate import gff, step_response
 from canshaper.design.tuning.formulation import Requirements, Task
 from canshaper.design.tuning.optimal import tune
 from canshaper.design.tuning.program import Program
+from canshaper.errors import InfeasibleError
 from canshaper.shaping.sway import SwayMode
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 
 
 def test_run_on_against_output_within_the_command() -> None:
-    with pytest.raises(Infeasible) as caught:
+    with pytest.raises(InfeasibleError) as caught:
         tune(Task(MODE, require=Requirements(max_run_on_s=1.2)))
     text = str(caught.value)
     assert "run-on at most 1.2 s" in text
@@ -39,11 +40,13 @@ def test_run_on_against_output_within_the_command() -> None:
 
 def test_bounds_on_single_poles() -> None:
     heavy = SwayMode(2.86, 0.5)
-    with pytest.raises(Infeasible, match=r"pole distance \(14e\) asks for poles of 7.15 rad/s"):
+    with pytest.raises(
+        InfeasibleError, match=r"pole distance \(14e\) asks for poles of 7.15 rad/s"
+    ):
         tune(Task(heavy, require=Requirements(max_rate_per_s=2.0)))
-    with pytest.raises(Infeasible, match="undamped"):
+    with pytest.raises(InfeasibleError, match="undamped"):
         tune(Task(SwayMode(2.86, 0.0), require=Requirements(pole_distance="printed")))
-    with pytest.raises(Infeasible, match=r"14e, printed"):
+    with pytest.raises(InfeasibleError, match=r"14e, printed"):
         tune(Task(SwayMode(2.86, 0.001), require=Requirements(pole_distance="printed")))
 
 

@@ -11,7 +11,7 @@ import yaml
 
 from canshaper.config.edit import Value, edited, set_values
 from canshaper.config.load import load_config
-from canshaper.config.source import DeploymentError
+from canshaper.errors import ConfigError
 
 FILE = Path(__file__).resolve().parents[3] / "config" / "forwarder.yaml"
 SLEW = ("axes", "slew", "filter")
@@ -165,13 +165,13 @@ REFUSED = {
 @pytest.mark.parametrize("name", REFUSED)
 def test_what_cannot_be_changed_alone_is_refused(name: str) -> None:
     text, message = REFUSED[name]
-    with pytest.raises(DeploymentError, match=message):
+    with pytest.raises(ConfigError, match=message):
         edited(text, ("filter",), NEW, "machine.yaml")
 
 
 def test_a_result_that_is_no_deployment_is_not_written(file: Path) -> None:
     before = file.read_bytes()
-    with pytest.raises(DeploymentError, match=r"machine.yaml:\d+: axes.slew.filter: a1 is 0.1"):
+    with pytest.raises(ConfigError, match=r"machine.yaml:\d+: axes.slew.filter: a1 is 0.1"):
         set_values(file, SLEW, {"a1": 0.1, "a2": 0.12})
     assert file.read_bytes() == before
     assert list(file.parent.iterdir()) == [file]
@@ -198,7 +198,7 @@ def test_a_directory_that_cannot_be_written(file: Path, monkeypatch: pytest.Monk
 
         monkeypatch.setattr("canshaper.config.edit.tempfile.mkstemp", refuse)
     try:
-        with pytest.raises(DeploymentError, match="not written, the file is as it was: Permission"):
+        with pytest.raises(ConfigError, match="not written, the file is as it was: Permission"):
             set_values(file, SLEW, NEW)
     finally:
         file.parent.chmod(0o755)
@@ -215,7 +215,7 @@ def test_a_disk_that_fails_on_the_way(
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr(f"canshaper.config.edit.{step}", fail)
-    with pytest.raises(DeploymentError, match="No space left on device"):
+    with pytest.raises(ConfigError, match="No space left on device"):
         set_values(file, SLEW, NEW)
     assert file.read_bytes() == before
     assert list(file.parent.iterdir()) == [file]
@@ -231,13 +231,13 @@ def test_a_file_changed_meanwhile_is_left_alone(
         file.write_text("tick_ms: 10\n")
 
     monkeypatch.setattr("canshaper.config.edit.os.fsync", someone_else)
-    with pytest.raises(DeploymentError, match="changed by someone else"):
+    with pytest.raises(ConfigError, match="changed by someone else"):
         set_values(file, SLEW, NEW)
     assert file.read_text() == "tick_ms: 10\n"
 
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    with pytest.raises(DeploymentError, match="No such file"):
+    with pytest.raises(ConfigError, match="No such file"):
         set_values(tmp_path / "none.yaml", SLEW, NEW)
 
 

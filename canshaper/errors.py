@@ -1,0 +1,152 @@
+"""Every exception that canshaper raises for a person to read. The message says what to do.
+
+::
+
+    CanshaperError
+     +-- ConfigError            a deployment that must not start; carries every problem
+     +-- BusError               a bus cannot be opened
+     |    +-- WrongBusError         it is another device than the deployment names
+     |    +-- WrongDeviceError      so is an interface
+     |    +-- GatewayError          the kernel's gateway refuses
+     +-- ControlError           a running daemon cannot be reached, or refuses
+     +-- WrongLengthError       a frame is shorter or longer than its message
+     +-- PageMessageError       what a page sent is no message
+     +-- LogError               a log cannot be used
+     |    +-- CutOffError           it ends in the middle
+     |    +-- BoxError              a black box cannot be used
+     |    +-- StateError            nor can the state that is kept in it
+     +-- DesignError            nothing fits
+     |    +-- InfeasibleError       no poles keep all requirements
+     |    +-- DriveError            a simulated drive could not be made
+     +-- MeasurementError       a measurement failed, or says nothing
+          +-- IdentificationError   of the swing
+          +-- CalibrationError      of a valve
+
+Those about data (``LogError``, ``DesignError``, ``IdentificationError``, ``PageMessageError``) are
+``ValueError`` too.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+# Of one file, and of one problem: a person reads no more.
+MOST_PROBLEMS = 100
+MOST_LETTERS = 2000
+
+
+@dataclass(frozen=True)
+class Problem:
+    """One fault of a file, as a person reads it.
+
+    Attributes:
+        file: its name.
+        line: in it; None where no line can be told.
+        where: key, message or option.
+        message: what was found and what is allowed.
+    """
+
+    file: str
+    line: int | None
+    where: str
+    message: str
+
+    def __str__(self) -> str:
+        place = self.file if self.line is None else f"{self.file}:{self.line}"
+        text = ": ".join(part for part in (place, self.where, self.message) if part)
+        return text if len(text) <= MOST_LETTERS else f"{text[:MOST_LETTERS]} ..."
+
+
+class CanshaperError(Exception):
+    """The root of all."""
+
+
+class ConfigError(CanshaperError):
+    """A deployment that must not start.
+
+    Attributes:
+        problems: every one that was found, in the order of the file.
+    """
+
+    def __init__(self, problems: Sequence[Problem]) -> None:
+        lines = [str(problem) for problem in problems[:MOST_PROBLEMS]]
+        if more := len(problems) - len(lines):
+            lines.append(f"and {more} more problems")
+        super().__init__("\n".join(lines))
+        self.problems = list(problems)
+
+
+class BusError(CanshaperError):
+    """A bus cannot be opened."""
+
+
+class WrongBusError(BusError):
+    """A bus is another device than the deployment names.
+
+    Attributes:
+        bus: its name in the deployment file.
+        why: what differs, and which interface is the device.
+    """
+
+    def __init__(self, bus: str, why: str) -> None:
+        super().__init__(f"bus {bus}: {why}")
+        self.bus, self.why = bus, why
+
+
+class WrongDeviceError(BusError):
+    """An interface is not the device of the deployment; the message says what differs."""
+
+
+class GatewayError(BusError):
+    """The kernel's gateway cannot do what it is to do."""
+
+
+class ControlError(CanshaperError):
+    """A running daemon cannot be reached, or refuses."""
+
+
+class WrongLengthError(CanshaperError):
+    """A frame is shorter or longer than its message in the DBC file."""
+
+
+class PageMessageError(CanshaperError, ValueError):
+    """What a page sent is no message; says what was found and what is allowed."""
+
+
+class LogError(CanshaperError, ValueError):
+    """A log that cannot be used: says where, what was found and what is allowed."""
+
+
+class CutOffError(LogError):
+    """A log that ends in the middle; every frame before that has been handed out."""
+
+
+class BoxError(LogError):
+    """A black box that cannot be used."""
+
+
+class StateError(LogError):
+    """A state that cannot be kept, or is not that of such a controller."""
+
+
+class DesignError(CanshaperError, ValueError):
+    """Nothing fits; says what conflicts."""
+
+
+class InfeasibleError(DesignError):
+    """No poles keep all requirements."""
+
+
+class DriveError(DesignError):
+    """A simulated drive could not be made."""
+
+
+class MeasurementError(CanshaperError):
+    """A measurement failed, or says nothing."""
+
+
+class IdentificationError(MeasurementError, ValueError):
+    """Data from which no swing can be told; says why and what to do."""
+
+
+class CalibrationError(MeasurementError):
+    """The measurement makes no curve of a valve; says why and what to do."""
