@@ -1,6 +1,8 @@
 # make demo   the crane, driven with anti-sway off and on
 # make test   lint, format, types and all tests, those on real SocketCAN included
 
+# make quick   the tests that a change needs first
+# make versions   lowest versions of every dependency; newest Python
 # make coverage   every line and branch of what decides whether a valve moves (within make test)
 # make mutation   does a test notice every small change of it? (mutation-core: within make test)
 # make paper   the paper's figures and numbers beside ours, in out/paper
@@ -8,14 +10,14 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
+.PHONY: demo test quick versions test-others test-long test-socketcan test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
 	@touch $@
 
 .venv/test-ready: pyproject.toml tools/venv.sh
-	tools/venv.sh tools,studio,dev
+	tools/venv.sh tools,studio,dev,lint
 	@touch $@
 
 .venv/fuzz-ready: pyproject.toml tools/venv.sh
@@ -25,11 +27,40 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo
 
+# The parts of `make test`, the longest first: so many side by side, each printed when it ends.
+JOBS ?= 2
+PARTS = test-others coverage test-socketcan mutation-core test-long test-studio
 test: lint
-	.venv/bin/python -m pytest
-	$(MAKE) test-studio coverage mutation-core
+	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
+
+# Where time counts runs before what only computes.
+NICE = nice -n 10
+# Rooms of what decides whether a valve moves.
+GATE = tests/shaping tests/inputs tests/guard tests/bus tests/protocols tests/controller tests/daemon
+
+# Every line and branch; `long` tests add none.
+coverage: .venv/test-ready
+	@mkdir -p out
+	$(NICE) .venv/bin/python -m coverage run -m pytest -q -m "not long" $(GATE)
+	.venv/bin/python -m coverage report
+
+test-long: .venv/test-ready
+	$(NICE) .venv/bin/python -m pytest -q -m long $(GATE)
+
+test-others: .venv/test-ready
+	$(NICE) .venv/bin/python -m pytest -q $(GATE:%=--ignore=%)
+
+test-socketcan: .venv/test-ready
 	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
 		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
+
+# What a change needs first: the rooms that differ from main, and the golden drives.
+quick: .venv/test-ready
+	.venv/bin/python tools/quick.py
+
+# The daemon's rooms with the lowest versions of every dependency, and with the newest Python.
+versions:
+	tools/versions.sh
 
 # J1939, CANopen, a valve being measured, a gateway: foreign counterparts on real SocketCAN.
 test-machines: .venv/test-ready
@@ -54,20 +85,11 @@ lint: .venv/test-ready
 	.venv/bin/mypy
 	.venv/bin/lint-imports
 
-# Tests that take seconds of pure reckoning add no line, nor do those that start processes and
-# threads; few examples will do.
-GATE = tests/shaping tests/inputs tests/guard tests/bus tests/protocols tests/controller tests/daemon
-coverage: .venv/test-ready
-	@mkdir -p out
-	.venv/bin/python -m coverage run -m pytest -q -m "not long and not processes" \
-		--hypothesis-profile=few $(GATE)
-	.venv/bin/python -m coverage report
-
 mutation: .venv/test-ready
 	.venv/bin/python tools/mutation.py
 
 mutation-core: .venv/test-ready
-	.venv/bin/python tools/mutation.py core
+	$(NICE) .venv/bin/python tools/mutation.py core
 
 FUZZ_S ?= 60
 fuzz: .venv/fuzz-ready

@@ -39,9 +39,8 @@ install_missing $missing
 minor=$("$python" -c 'import sys; print(sys.version_info.minor)')
 "$python" -c 'import ensurepip' 2>/dev/null || install_missing "python3.$minor-venv"
 
-version=${1:-$("$python" -c '
-import tomllib
-print(tomllib.load(open("pyproject.toml", "rb"))["project"]["version"])')}
+# What comes before a release is less than it: 0.2.0~dev5+gabcdef0 for dpkg.
+version=${1:-$("$python" tools/version.py | sed 's/\.dev/~dev/')}
 architecture=$(dpkg --print-architecture)
 SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || date +%s)}
 export SOURCE_DATE_EPOCH PYTHONHASHSEED=0

@@ -94,3 +94,41 @@ def test_the_bill_is_valid_and_names_everything(tmp_path: Path) -> None:
     packed = sha256((VENDOR / "three.js").read_bytes()).hexdigest()
     assert parts["three"]["hashes"] == [{"alg": "SHA-256", "content": packed}]
     assert parts["some-package"]["licenses"] == [{"license": {"id": "MIT"}}]
+
+
+@pytest.fixture
+def tree(tmp_path: Path) -> Path:
+    """A tree of its own with the module that knows the version."""
+    (tmp_path / "tools").mkdir()
+    shutil.copy(ROOT / "tools" / "version.py", tmp_path / "tools")
+    (tmp_path / "CHANGELOG.md").write_text("## [Unreleased]\n\n## [0.3.0] - 2026-01-01\n")
+    return tmp_path
+
+
+def git(tree: Path, *words: str) -> None:
+    who = ["-c", "user.name=a", "-c", "user.email=a@b"]
+    subprocess.run(["git", *who, *words], cwd=tree, check=True, capture_output=True)
+
+
+def version_of(tree: Path) -> str:
+    command = [sys.executable, "tools/version.py"]
+    done = subprocess.run(command, cwd=tree, capture_output=True, text=True, check=False)
+    return done.stdout.strip() or done.stderr.splitlines()[-1]
+
+
+def test_the_version_comes_from_the_tags(tree: Path) -> None:
+    git(tree, "init")
+    for _ in range(2):
+        git(tree, "commit", "--allow-empty", "-m", "one")
+    assert re.fullmatch(r"0\.3\.1\.dev2\+g[0-9a-f]+", version_of(tree))
+    git(tree, "tag", "v1.2.9")
+    assert version_of(tree) == "1.2.9"
+    git(tree, "commit", "--allow-empty", "-m", "later")
+    git(tree, "tag", "another")
+    assert re.fullmatch(r"1\.2\.10\.dev1\+g[0-9a-f]+", version_of(tree))
+
+
+def test_a_source_distribution_carries_its_version(tree: Path) -> None:
+    assert "expected a clone or a source distribution" in version_of(tree)
+    (tree / "PKG-INFO").write_text("Metadata-Version: 2.4\nName: canshaper\nVersion: 3.4.5\n")
+    assert version_of(tree) == "3.4.5"
