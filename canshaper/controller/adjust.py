@@ -56,13 +56,15 @@ class Adjuster:
         configs = {
             name: self._config(name, self._axes[name], axis) for name, axis in by_axis.items()
         }
-        told = [f"{key}={number:g} was={self._now(str(key)):g}" for key, number in numbers.items()]
+        changes = [
+            f"{key}={number:g} was={self._now(str(key)):g}" for key, number in numbers.items()
+        ]
         for name, config in configs.items():
             self._axes[name].adjust(config)
         for runner in self._axes.values():
             if runner.compensator is not None:
                 runner.compensator.adjust()
-        return told
+        return changes
 
     def _now(self, text: str) -> float:
         key = _key(text)

@@ -59,23 +59,23 @@ class Compensator:
 
     def before_slew(self) -> float:
         """What the slew axis is to add in this tick."""
-        sway, told = self._sway(), self._slew.told
-        self._share = self._radial.tip_share(sway, told)
-        return self._radial.slew(sway, told) if self._moving() else 0.0
+        sway, applied = self._sway(), self._slew.applied
+        self._share = self._radial.tip_share(sway, applied)
+        return self._radial.slew(sway, applied) if self._moving() else 0.0
 
     def after_slew(self, now_ns: int) -> None:
         """Tell the near-far axis what to add in this tick, in which the slew axis has moved."""
         added = 0.0
         if self._moving():
             sway = self._sway()
-            share = self._radial.tip_share(sway, self._slew.told)
+            share = self._radial.tip_share(sway, self._slew.applied)
             circle_m = self._radius.circle_m(now_ns, share)
             if circle_m is not None:
                 added = self._radial.near_far(self._share, share, circle_m, sway.tick_s)
         elif self._slew.state is State.TRIPPED:
             self._near_far.axis.drop_added()
         self._near_far.add(added)
-        if not self._slew.asked:
+        if not self._slew.commanded:
             self._bounds.begin()
 
     def _sway(self) -> SwayModel:
@@ -89,4 +89,4 @@ class Compensator:
 
         Not for ever after a swing that nobody damps: nothing may move without an operator.
         """
-        return self._slew.asked and self._slew.state is State.ACTIVE
+        return self._slew.commanded and self._slew.state is State.ACTIVE

@@ -87,7 +87,7 @@ class Controller:
         open_before = before.deployment.config.buses.values()
         for name, bus in self.deployment.config.buses.items():
             if bus not in open_before:
-                self._forget(name)
+                self._invalidate(name)
                 self.on_bus_off(name)
 
     def _parts(self) -> dict[Key, Part]:
@@ -161,7 +161,7 @@ class Controller:
             missed: deadlines missed since the last tick; the last output was held meanwhile.
 
         Yields:
-            The frames to send now. One that could not be sent is to be told to ``send_failed``,
+            The frames to send now. One that could not be sent is reported by ``send_failed``,
             and never sent later.
         """
         last, now = self._last, self._last + 1 + missed
@@ -169,7 +169,7 @@ class Controller:
         self.moves = False
         if self._stood_still:
             self._stood_still = False
-            self._forget()
+            self._invalidate()
         overrun = self._overruns(missed) if missed or self._overrun.late else False
         changed = []
         silent = self.silent_buses if self._protocols else NOWHERE
@@ -245,13 +245,13 @@ class Controller:
             runner.invalidate()
             runner.trip_in_motion(Reason.LOOP_STALLED)
 
-    def _forget(self, bus: str | None = None) -> None:
+    def _invalidate(self, bus: str | None = None) -> None:
         """Every input has to come again before it counts: those of one bus, or all."""
         for (where, _, _), entry in self.inputs.items():
             if bus in (None, where):
-                entry.forget()
+                entry.invalidate()
         for protocol in self._protocols:
-            protocol.forget(bus)
+            protocol.invalidate(bus)
 
     def on_bus_off(self, bus: str) -> None:
         """We are not on a bus now: frames are missed there."""

@@ -7,7 +7,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.identifier import group_of
 from canshaper.config.bus import Bus
 from canshaper.machine.inputs import BoundInput
-from canshaper.protocols.j1939.groups import AnySource, TakenGroup
+from canshaper.protocols.j1939.groups import AnySource, ReceivedGroup
 
 _Input = TypeVar("_Input", bound=BoundInput)
 
@@ -15,7 +15,7 @@ _Input = TypeVar("_Input", bound=BoundInput)
 class InputFinder(Generic[_Input]):
     """Finds inputs by identifier, those of J1939 by group and source, whatever their priority.
 
-    Of a message that may come from any address the first one that is heard counts, until it is
+    Of a message that may come from any address the first one that sends is used, until it is
     silent for ``timeout_ms``.
 
     Args:
@@ -25,7 +25,7 @@ class InputFinder(Generic[_Input]):
 
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
         self._by_key: dict[tuple[str, int, bool], _Input] = {}
-        self._by_group: dict[tuple[str, int], TakenGroup] = {}
+        self._by_group: dict[tuple[str, int], ReceivedGroup] = {}
         self._found: _Input | None = None
         for bound in inputs:
             if not bound.by_group:
@@ -34,7 +34,7 @@ class InputFinder(Generic[_Input]):
             bus, can_id, _ = bound.key
             node = buses[bus].j1939
             own = node.address if node else None
-            group = self._by_group.setdefault((bus, group_of(can_id)), TakenGroup(own))
+            group = self._by_group.setdefault((bus, group_of(can_id)), ReceivedGroup(own))
             noted = _Noted(self, bound)
             if bound.any_source:
                 timeout_ns = bound.config.timeout_ms * 1_000_000
@@ -68,5 +68,5 @@ class _Noted(Generic[_Input]):
         self._finder.note(self._bound)
         return FrameFault.NONE
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing is kept."""

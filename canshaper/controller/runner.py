@@ -215,7 +215,7 @@ class AxisRunner:
         return transition
 
     def post_step(self, now_ns: int) -> None:
-        """What can wait until the valve was told: the model, and what is asked of another axis."""
+        """What can wait until the frame is out: the model, and what another axis is to add."""
         self.axis.advance()
         if self.compensator is not None:
             self.compensator.after_slew(now_ns)
@@ -240,7 +240,7 @@ class AxisRunner:
             self._presses = emergency.presses
             if stop is Reason.EMERGENCY_STOP or (stop and not neutral):
                 trip = trip or stop
-            else:  # not heard of yet: nothing to trip, but nothing may begin
+            else:  # nothing received yet: nothing to trip, but nothing may begin
                 fault = fault or stop
         if self._invalid:
             self._invalid = False

@@ -1,4 +1,4 @@
-"""Does the valve do what it is told? Its own feedback, compared with the commands."""
+"""Does the valve follow its command? Its own feedback, compared with the commands."""
 
 import math
 from collections import deque
@@ -14,7 +14,7 @@ class Following(Enum):
     """What the feedback of a valve says."""
 
     UNKNOWN = "unknown"
-    """Nothing was heard of it yet, and it is not late."""
+    """Nothing was received of it yet, and it is not late."""
     YES = "following"
     NO = "not-following"
     """The spool is elsewhere than any command of the last moments asked for."""
@@ -60,8 +60,8 @@ class Feedback(ValueInput):
         before = self.following
         if self._waited_for_ns is None:
             self._waited_for_ns = now_ns
-        told_ns = self._waited_for_ns if self.measured_ns is None else self.measured_ns
-        if now_ns - told_ns > self._timeout_ns:
+        last_ns = self._waited_for_ns if self.measured_ns is None else self.measured_ns
+        if now_ns - last_ns > self._timeout_ns:
             self.following = Following.LOST
         elif self.measured_ns is not None:
             low = min(self._commands) - self._tolerance
@@ -74,7 +74,7 @@ class Feedback(ValueInput):
         super().copy_state(before)
         self.following = before.following
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
-        super().forget()
+        super().invalidate()
         self._waited_for_ns = None

@@ -19,7 +19,7 @@ class Receiver(Protocol):
     def receive(self, data: bytes, arrived_ns: int, /) -> FrameFault:
         """Receive one; what is wrong with it."""
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
 
 
@@ -43,7 +43,7 @@ class Input(ABC):
         self._guard = bound.guard()
         self._counter = bound.protection.counter
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
-        self._heard_ns: int | None = None
+        self._last_frame_ns: int | None = None
         self._refused_ns: int | None = None
         self._received_ns: int | None = None
         self.raw: dict[str, Any] = {}
@@ -56,28 +56,28 @@ class Input(ABC):
         except WrongLengthError:
             return FrameFault.WRONG_LENGTH
         guard = self._guard
-        if self._heard_ns is None or arrived_ns - self._heard_ns > self._timeout_ns:
+        if self._last_frame_ns is None or arrived_ns - self._last_frame_ns > self._timeout_ns:
             guard.begin_anew()
         fault = guard.judge(data, raw[self._counter] if self._counter else 0)
         if fault is CHECKSUM:
             self._refused_ns = arrived_ns
             return fault
-        self._heard_ns = arrived_ns
-        counts = guard.qualified and not fault
-        content = self.heard(raw, commands, arrived_ns, counts)
-        if not counts:
+        self._last_frame_ns = arrived_ns
+        accepted = guard.qualified and not fault
+        content = self.on_frame(raw, commands, arrived_ns, accepted)
+        if not accepted:
             self._refused_ns = arrived_ns
             return fault
         self.raw, self.commands, self._received_ns = raw, commands, arrived_ns
         return content
 
     @abstractmethod
-    def heard(
+    def on_frame(
         self,
         raw: dict[str, Any],
         commands: dict[str, float | Reason],
         arrived_ns: int,
-        counts: bool,
+        accepted: bool,
     ) -> FrameFault:
         """A frame with the right checksum came; the last one still stands in ``raw``.
 
@@ -85,20 +85,20 @@ class Input(ABC):
             raw: its raw values, by signal.
             commands: its velocities, or why there is none, by signal.
             arrived_ns: when it arrived.
-            counts: whether it may be used. A switch may tell something without that.
+            accepted: whether it may be used. A switch may tell something without that.
 
         Returns:
             What is wrong with its content.
         """
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
-        self._received_ns = self._heard_ns = None
+        self._received_ns = self._last_frame_ns = None
 
     def copy_state(self, before: Self) -> None:
         """Continue the sequence of the same message; its values have to come again to count."""
         self._guard.copy_state(before._guard)
-        self._heard_ns, self._refused_ns = before._heard_ns, before._refused_ns
+        self._last_frame_ns, self._refused_ns = before._last_frame_ns, before._refused_ns
 
     def lost(self, now_ns: int) -> Reason | None:
         """Why nothing is known now; None while the last good frame is fresh."""
@@ -122,18 +122,18 @@ class EmergencyStopInput(Input):
         self.presses = 0
         self._pressed = False
 
-    def heard(
+    def on_frame(
         self,
         raw: dict[str, Any],
         commands: dict[str, float | Reason],
         arrived_ns: int,
-        counts: bool,
+        accepted: bool,
     ) -> FrameFault:
         """A stop needs no trust, however short it is pressed; only a frame that counts frees it."""
         if raw[self._signal] != 0:
             self.presses += 1
             self._pressed = True
-        elif counts:
+        elif accepted:
             self._pressed = False
         return GOOD
 
@@ -143,7 +143,7 @@ class EmergencyStopInput(Input):
         self._pressed = before._pressed
 
     def stops(self, now_ns: int) -> bool:
-        """Whether nothing may move now: it is pressed, or not heard."""
+        """Whether nothing may move now: it is pressed, or lost."""
         return self._pressed or self.lost(now_ns) is not None
 
     def stop(self, now_ns: int, presses: int) -> Reason | None:

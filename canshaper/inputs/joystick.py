@@ -35,12 +35,12 @@ class JoystickInput(Input):
         """Whether enable is released, by the last frame that says so or says otherwise."""
         return self._released
 
-    def heard(
+    def on_frame(
         self,
         raw: dict[str, Any],
         commands: dict[str, float | Reason],
         arrived_ns: int,
-        counts: bool,
+        accepted: bool,
     ) -> FrameFault:
         """Note since when each stick is where it is; codes that are no measurement are a fault.
 
@@ -50,11 +50,11 @@ class JoystickInput(Input):
         if enable == 0:
             self.releases += 1
             self._released = True
-            if not counts:
+            if not accepted:
                 self._doubted = self.releases
-        elif counts:
+        elif accepted:
             self._released = False
-        if not counts:
+        if not accepted:
             return GOOD
         valid = enable in (0, 1)
         last = self.commands

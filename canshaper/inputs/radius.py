@@ -22,10 +22,10 @@ class RadiusInput:
             return FrameFault.WRONG_LENGTH
         return self._measured.receive(data, arrived_ns)
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
         if self._measured is not None:
-            self._measured.forget()
+            self._measured.invalidate()
 
     def copy_state(self, before: Self) -> None:
         """Continue the sequence of the same message."""

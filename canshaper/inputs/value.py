@@ -40,19 +40,19 @@ class ValueInput(Input):
         self.value = 0.0
         self.measured_ns: int | None = None
 
-    def heard(
+    def on_frame(
         self,
         raw: dict[str, Any],
         commands: dict[str, float | Reason],
         arrived_ns: int,
-        counts: bool,
+        accepted: bool,
     ) -> FrameFault:
         """An error code is no value, nor is what lies outside the range, or is no number."""
         code = raw[self._name]
         value = code * self._scale + self._offset
         if code in self._special or not self._low <= value <= self._high:
             return FrameFault.INVALID_SIGNAL
-        if counts:
+        if accepted:
             self.value, self.measured_ns = value, arrived_ns
         return GOOD
 
@@ -62,9 +62,9 @@ class ValueInput(Input):
             return None
         return self.value
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
-        super().forget()
+        super().invalidate()
         self.measured_ns = None
 
 

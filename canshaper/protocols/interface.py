@@ -125,7 +125,7 @@ class BusProtocol:
     def send_failed(self, frame: Frame) -> None:
         """A frame did not reach its bus."""
 
-    def forget(self, bus: str | None = None) -> None:
+    def invalidate(self, bus: str | None = None) -> None:
         """Nothing received so far counts any more; of one bus, or of all. Not for ``inputs``."""
 
     def leave(self) -> None:

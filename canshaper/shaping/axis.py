@@ -25,8 +25,9 @@ from canshaper.shaping.transfer import BumplessTransfer
 # Missed ticks that are gone through one by one: after more of them nothing moves any more, and the
 # first neutral frame waits.
 MOST_HELD = 2000
-# Most that may be owed of an added velocity, full speed times ticks: a few steps of a coarse grid.
-MOST_OWED = 0.1
+# Largest quantisation error of an added velocity that is carried, full speed times ticks: a few
+# steps of a coarse grid.
+MOST_CARRY = 0.1
 
 
 class Axis:
@@ -44,7 +45,7 @@ class Axis:
     Attributes:
         raw: what the valve frame carries now, in grid steps (deadband included).
         sent: the velocity that gives, [-1, 1].
-        told: what the sway model was told: ``sent`` without what another axis asked.
+        applied: what drives the sway model: ``sent`` without what another axis asked.
         command: the operator's command that was in force at the last tick, [-1, 1].
     """
 
@@ -61,7 +62,7 @@ class Axis:
     ) -> None:
         self.raw = 0
         self.sent = 0.0
-        self.told = 0.0
+        self.applied = 0.0
         self.command = 0.0
         self.sway = sway
         self._bounds: AddedBounds | None = None
@@ -77,7 +78,7 @@ class Axis:
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
         self._own = 0.0  # the same without what another axis adds
         self._added = 0.0  # what is added, as far as bounds and joystick allow
-        self._owed = 0.0  # of a velocity added by another axis, not yet sent
+        self._carry = 0.0  # of a velocity added by another axis, not yet sent
 
     @property
     def state(self) -> State:
@@ -90,7 +91,7 @@ class Axis:
         return self._states.reason
 
     @property
-    def asked(self) -> bool:
+    def commanded(self) -> bool:
         """Whether the operator asked for motion within the tail."""
         return self._recent.low != 0.0 or self._recent.high != 0.0
 
@@ -113,7 +114,7 @@ class Axis:
             added: velocity that another moving axis asks of this one, [-1, 1] of full speed. Its
                 operator answers for it; it is carried out within its bounds, while this axis is
                 enabled, its stick valid, and anti-sway on, and never against a joystick that is
-                held: what would go against it is left out at once. The sway model is not told of
+                held: what would go against it is left out at once. The sway model does not get
                 it: it is there to cause no swing. One that is no velocity trips the axis.
 
         Returns:
@@ -125,7 +126,7 @@ class Axis:
         elif bounds is not None and abs(added) <= 1.0:
             added = bounds.wanted(added, self._limits.fall_per_s)
         old = states.state
-        state = states.step(stick, added, self.raw == 0 and not self.asked)
+        state = states.step(stick, added, self.raw == 0 and not self.commanded)
         if state is not old:
             self._transfer.entered(state, old)
         if state is not ACTIVE:
@@ -149,7 +150,7 @@ class Axis:
                 self._rest()
         except Exception:  # a filter of another package may raise anything
             state = self._output_invalid()
-        self.told = self.sent - self._added
+        self.applied = self.sent - self._added
         if bounds is not None:
             bounds.applied(self.sent - self._own if self._own != self._limited else 0.0)
         return None if state is old else Transition(old, state, states.reason)
@@ -157,7 +158,7 @@ class Axis:
     def advance(self) -> None:
         """Let the model swing with what ``act`` found: work that can wait until that is sent."""
         if self.sway is not None:
-            self.sway.step(self.told)
+            self.sway.step(self.applied)
 
     def hold(self, ticks: int) -> None:
         """Tell the axis that the last output was held for ``ticks`` missed ticks.
@@ -190,7 +191,7 @@ class Axis:
         if self.sway is None:
             sway = SwayModel(mode, self._tick_s)
         else:
-            sway = self.sway.retuned(mode, self.told)
+            sway = self.sway.retuned(mode, self.applied)
         shaper = shaper_for(sway)
         maximum = self._limits.maximum
         self._transfer.replace(shaper, within(self.command, -maximum, maximum, 0.0))
@@ -207,7 +208,7 @@ class Axis:
     def drop_added(self) -> None:
         """Who added has lost the right to: nothing of it is in the next output."""
         self._limited = self._own
-        self._owed = 0.0
+        self._carry = 0.0
 
     def limit(self, limits: OutputLimits) -> None:
         """Change maximum and rates; of what the run-on remembers nothing changes.
@@ -244,8 +245,8 @@ class Axis:
         """Send the operator's part and the added one, or what is left of that.
 
         The added part is a path to be run, slow and with few steps of the grid: what rounding and
-        rates leave out is owed and paid while the axis moves anyway, never by a twitch: by one step
-        of the grid in a tick.
+        rates leave out is carried over and made up for while the axis moves anyway, never by a
+        twitch: by one step of the grid in a tick.
         """
         limits, aim = self._limits, target
         own = self._own = rate_limited(target, self._own, self._rise, self._fall)
@@ -269,25 +270,25 @@ class Axis:
             limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
         if adding:
-            owed = self._owed + own + self._added - self.sent
-            self._owed = within(owed, -MOST_OWED, MOST_OWED, 0.0)
+            carry = self._carry + own + self._added - self.sent
+            self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
 
     def _both(self, target: float) -> float:
-        """Both parts together, and as much of what is owed as one step of the grid."""
+        """Both parts together, and as much of the carry as one step of the grid."""
         maximum, step = self._limits.maximum, 1.0 / self._grid_steps
         least = max(self._limits.minimum, 0.5 * step)
         wish = within(target + self._added, -maximum, maximum, least)
-        paid = within(self._owed, -step, step, 0.0) if wish else 0.0
-        return within(wish + paid, -maximum, maximum, least)
+        step_of_carry = within(self._carry, -step, step, 0.0) if wish else 0.0
+        return within(wish + step_of_carry, -maximum, maximum, least)
 
     def _rest(self) -> None:
         self._recent.clear()
         self._transfer.rest()
-        self._limited = self._own = self._added = self._owed = self.sent = 0.0
+        self._limited = self._own = self._added = self._carry = self.sent = 0.0
         self.raw = 0
 
     def _output_invalid(self) -> State:
-        """Neutral and latched, with a model that starts anew: its state cannot be trusted."""
+        """Neutral and latched, with a model that starts again: its state cannot be trusted."""
         old = self._states.state
         self._states.trip(Reason.OUTPUT_INVALID)
         self._transfer.entered(TRIPPED, old)

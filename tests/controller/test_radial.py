@@ -78,7 +78,7 @@ def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make
         rig.run(1, Slew=1000 if tick < 125 else 0)
         added += slew.added * TICK_S * FULL_SPEED_RAD_S
         assert added == pytest.approx(missing, abs=1.2e-4)  # the sum of a rate, tick by tick
-        assert slew.axis.sent - slew.axis.told == pytest.approx(slew.added, abs=1e-12)
+        assert slew.axis.sent - slew.axis.applied == pytest.approx(slew.added, abs=1e-12)
         lead = sway.angle * FULL_SPEED_RAD_S
         speed = sway.rate * FULL_SPEED_RAD_S
         missing = math.atan2(lead, 1.0 - (speed / sway.mode.omega_rad_s) ** 2) - lead

@@ -75,13 +75,13 @@ def test_it_is_known_until_its_timeout_and_not_a_nanosecond_longer(changed_rig: 
     assert radius.circle_m(NOW_NS + TIMEOUT_NS + 1, 1.0) is None
     radius.receive(frame(message, 2000), NOW_NS + TIMEOUT_NS + 1)
     assert radius.circle_m(NOW_NS + 2 * TIMEOUT_NS, 1.0) == pytest.approx(5.0)
-    radius.forget()
+    radius.invalidate()
     assert radius.circle_m(NOW_NS + 2 * TIMEOUT_NS, 1.0) is None
 
 
 def test_a_fixed_radius_is_that_of_the_grapple_and_never_lost(changed_rig: Make) -> None:
     radius, message = bound(changed_rig, "radius_m: 3.5")
     assert radius.receive(frame(message, 1500), NOW_NS) is FrameFault.WRONG_LENGTH
-    radius.forget()
+    radius.invalidate()
     for share in (1.0, 0.8):
         assert radius.circle_m(NOW_NS, share) == 3.5

@@ -65,7 +65,7 @@ def test_a_radius_with_a_flipped_bit_is_none(tip: Tip, bit: int) -> None:
 
 def test_after_a_stall_any_counter_is_the_first_one(tip: Tip) -> None:
     tip.send(4000)
-    tip.radius.forget()
+    tip.radius.invalidate()
     assert tip.known_m is None
     assert tip.send(5000, step=9) is FrameFault.NONE
     assert tip.known_m == pytest.approx(5.0)
@@ -125,5 +125,5 @@ def test_a_radius_qualifies_too(tmp_path: Path) -> None:
 
 def test_nothing_known_holds_after_a_stall(tip: Tip) -> None:
     tip.send(4000)
-    tip.radius.forget()
+    tip.radius.invalidate()
     assert tip.known_m is None

@@ -175,7 +175,7 @@ def test_it_counts_as_long_as_it_is_fresh(machine: Machine) -> None:
     assert radius.circle_m(105 * MS + 1, 1.0) is None
     radius.receive(tip(3100), 200 * MS)
     assert radius.circle_m(200 * MS, 1.0) == pytest.approx(3.1)
-    radius.forget()
+    radius.invalidate()
     assert radius.circle_m(200 * MS, 1.0) is None
 
 

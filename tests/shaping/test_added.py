@@ -169,7 +169,7 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_in_that_tick(
     for _ in range(5):
         axis.tick(StickInput(sign * 0.5), -sign * 0.2)
     assert sign * axis.sent == pytest.approx(0.3, abs=0.02)
-    assert sign * axis.told == pytest.approx(0.5, abs=0.02)
+    assert sign * axis.applied == pytest.approx(0.5, abs=0.02)
 
 
 def test_what_is_left_out_is_no_motion_to_the_model() -> None:
@@ -177,7 +177,7 @@ def test_what_is_left_out_is_no_motion_to_the_model() -> None:
     axis.tick(StickInput())
     for _ in range(10):
         axis.tick(StickInput(0.1), -0.2)
-    assert axis.told == pytest.approx(0.1)
+    assert axis.applied == pytest.approx(0.1)
     assert axis.sent == 0.0
 
 

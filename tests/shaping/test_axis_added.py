@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, settings
 from hypothesis import strategies as st
 from hypothesis.stateful import RuleBasedStateMachine, initialize, rule
 
-from canshaper.shaping.axis import MOST_OWED, Axis
+from canshaper.shaping.axis import MOST_CARRY, Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
@@ -128,14 +128,14 @@ class AskedByAnother(RuleBasedStateMachine):
     def miss(self, ticks: int) -> None:
         self.axis.hold(ticks)
         for _ in range(ticks):
-            self.shadow.step(self.axis.told)
+            self.shadow.step(self.axis.applied)
         self.now += ticks
 
     @rule(omega=st.floats(1.0, 6.0))
     def retune(self, omega: float) -> None:
         mode = SwayMode(omega, 0.02)
         self.axis.retune(mode, lambda model: Gff(model, POLES))
-        self.shadow = self.shadow.retuned(mode, self.axis.told)
+        self.shadow = self.shadow.retuned(mode, self.axis.applied)
 
     @rule(bad=st.sampled_from([math.nan, math.inf, -math.inf, 1.1, -1e300]))
     def nonsense(self, bad: float) -> None:
@@ -162,7 +162,7 @@ class AskedByAnother(RuleBasedStateMachine):
         if other is not None:  # nothing that may be added to
             other.tick(stick, 0.0)
             assert (axis.state, axis.raw, axis.sent) == (other.state, other.raw, other.sent)
-            assert axis.told == other.told == axis.sent
+            assert axis.applied == other.applied == axis.sent
 
         # what was asked
         if self.usable and self.armed and not centred:
@@ -194,16 +194,16 @@ class AskedByAnother(RuleBasedStateMachine):
         axis = self.axis
         if axis.reason is Reason.OUTPUT_INVALID:
             self.shadow.angle, self.shadow.rate = 0.0, 0.0
-            assert axis.told == 0.0
+            assert axis.applied == 0.0
         if (carried > 0.0 > axis.command) or (
             carried < 0.0 < axis.command
         ):  # against a joystick: some of it may be left out
-            left = abs(axis.sent - axis.told)
+            left = abs(axis.sent - axis.applied)
             assert left <= abs(carried) + 1e-12
-            assert axis.sent == axis.told or (axis.sent > axis.told) is (carried > 0.0)
+            assert axis.sent == axis.applied or (axis.sent > axis.applied) is (carried > 0.0)
         else:
-            assert axis.told == axis.sent - carried
-        self.shadow.step(axis.told)
+            assert axis.applied == axis.sent - carried
+        self.shadow.step(axis.applied)
         assert axis.sway is not None
         assert (axis.sway.angle, axis.sway.rate) == (self.shadow.angle, self.shadow.rate)
         assert math.isfinite(self.shadow.angle + self.shadow.rate)
@@ -215,7 +215,7 @@ class AskedByAnother(RuleBasedStateMachine):
             if self.axis.state in DRIVEN and sign * self.axis.command < 0.0:
                 allowed = 0.0
             if carried:
-                allowed += sign * carried + MOST_OWED + self.slack
+                allowed += sign * carried + MOST_CARRY + self.slack
             falling = sign * before - (0.0 if carried else self.fall) + self.slack
             assert sign * self.axis.sent <= max(allowed, min(falling, sign * before), 0.0) + 1e-12
 
@@ -258,7 +258,7 @@ def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> No
     axis.tick(StickInput(command), bad)
     assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
     assert axis.sway is not None
-    assert (axis.sway.angle, axis.sway.rate, axis.told) == (0.0, 0.0, 0.0)
+    assert (axis.sway.angle, axis.sway.rate, axis.applied) == (0.0, 0.0, 0.0)
     axis.tick(StickInput(enabled=False))
     axis.tick(StickInput())
     axis.tick(StickInput())
@@ -279,7 +279,7 @@ def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
         travel.append(position)
     # a coarse grid leaves out the first and last part of either way, below half a step
     assert max(travel) == pytest.approx(0.13 * 200 * TICK_S / math.pi, rel=0.08)
-    assert abs(position) <= MOST_OWED * TICK_S + 0.5 / steps * TICK_S
+    assert abs(position) <= MOST_CARRY * TICK_S + 0.5 / steps * TICK_S
 
 
 def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:

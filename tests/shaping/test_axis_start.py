@@ -37,9 +37,9 @@ def test_before_the_first_tick_an_axis_carries_neutral() -> None:
     """A frame may go out before the first tick: the first one sent is that of a neutral valve."""
     axis = new_axis()
     assert (axis.state, axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
-    assert (axis.raw, axis.sent, axis.told, axis.command) == (0, 0.0, 0.0, 0.0)
+    assert (axis.raw, axis.sent, axis.applied, axis.command) == (0, 0.0, 0.0, 0.0)
     assert isinstance(axis.raw, int)
-    assert axis.asked is False
+    assert axis.commanded is False
     assert axis.neutral is True
 
 
@@ -59,7 +59,7 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
     assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
     for stick in [CENTRED, CENTRED, *[StickInput(0.7)] * 60, *[CENTRED] * 60]:
         assert axis.tick(stick) == right.tick(stick)
-        assert (axis.raw, axis.told) == (right.raw, right.told)
+        assert (axis.raw, axis.applied) == (right.raw, right.applied)
     assert axis.sway.angle == model.angle
     waiting = new_axis()
     waiting.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))

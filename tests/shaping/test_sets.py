@@ -181,7 +181,7 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
     before = last = axis.sent
     assert before == pytest.approx(0.8, abs=2e-3)
     assert axis.sway is not None
-    swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.told)
+    swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.applied)
     axis.retune(FULL, lambda sway: make(new, sway))
     for _ in range(150):
         axis.tick(StickInput(0.8))

@@ -41,7 +41,7 @@ class ValveControl(Input):
         self._control = control
         self._message = message
         self._state: int | None = None
-        self._told_ns = 0
+        self._state_ns = 0
         self._left = False  # it was in another state than ACTIVE since it was looked at
         self._step = 0
         self._since_ns: int | None = None  # when this word was first put; None: at the next tick
@@ -50,24 +50,24 @@ class ValveControl(Input):
         self._word = 0
         self._go(0, None)
 
-    def heard(
+    def on_frame(
         self,
         raw: dict[str, Any],
         commands: dict[str, float | Reason],
         arrived_ns: int,
-        counts: bool,
+        accepted: bool,
     ) -> FrameFault:
         """The low four bits tell the state; that it has left ACTIVE takes no trust."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
-        if counts:
-            self._state, self._told_ns = state, arrived_ns
+        if accepted:
+            self._state, self._state_ns = state, arrived_ns
         return GOOD
 
     def gate(self, neutral: bool, now_ns: int) -> Reason | None:
         """Why the axis may not move; the control word goes one step on where it is time."""
-        if self._state is None or now_ns - self._told_ns > self._status_timeout_ns:
-            self.begin_anew()
+        if self._state is None or now_ns - self._state_ns > self._status_timeout_ns:
+            self.resync()
         self._next(now_ns)
         works = self._state == self._word == ValveState.ACTIVE and not self._left
         self._left = False
@@ -96,7 +96,7 @@ class ValveControl(Input):
         elif self._reached or passed_ns > GIVE_UP_NS:
             self._go(0, now_ns)
 
-    def begin_anew(self) -> None:
+    def resync(self) -> None:
         """The valve is not what it was: nothing known of it, and from INIT once more."""
         self._state = None
         self._go(0, None)
@@ -110,11 +110,11 @@ class ValveControl(Input):
         self._message.raw[self._control] = word
 
     def hold(self) -> None:
-        """Let a valve that is active hold: the last thing it is told."""
+        """Let a valve that is active hold: its last command."""
         if self._word == ValveState.ACTIVE:
             self._message.raw[self._control] = int(ValveState.HOLD)
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
-        super().forget()
-        self.begin_anew()
+        super().invalidate()
+        self.resync()

@@ -22,22 +22,22 @@ class NodeEvent:
 
     bus: str
     node: str
-    told: str
+    status: str
 
     @property
     def text(self) -> str:
         """For the log."""
-        return f"bus={self.bus} node={self.node} {self.told}"
+        return f"bus={self.bus} node={self.node} {self.status}"
 
 
 class RemoteNode:
     """Another node, as its heartbeats and emergency messages show it.
 
     Attributes:
-        state: what it said last; None when nothing was heard of it, or for too long.
+        state: what it said last; None before its first frame, and after its silence.
         emergency: its error code, 0 for none.
         stops: how often it said another state than OPERATIONAL, or fell silent.
-        alarms: how often it told an error.
+        alarms: how often it reported an error.
     """
 
     def __init__(self, config: CanopenNode) -> None:
@@ -46,17 +46,17 @@ class RemoteNode:
         self.emergency = NO_EMERGENCY
         self.stops = self.alarms = 0
         self._timeout_ns = config.heartbeat_ms * 1_000_000
-        self._heard_ns = 0
+        self._last_frame_ns = 0
         self._start_ns = 0
 
     def heartbeat(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Take a heartbeat; a node that boots has no emergency any more."""
+        """Receive a heartbeat; a node that boots has no emergency any more."""
         if len(data) != 1:
             return FrameFault.WRONG_LENGTH
-        if self.state is not None and arrived_ns - self._heard_ns > self._timeout_ns:
+        if self.state is not None and arrived_ns - self._last_frame_ns > self._timeout_ns:
             self.stops += 1  # it was lost, though no tick has seen that
         self.state = data[0] & STATE_MASK
-        self._heard_ns = arrived_ns
+        self._last_frame_ns = arrived_ns
         if self.state != NodeState.OPERATIONAL:
             self.stops += 1
         if self.state == NodeState.BOOT_UP:
@@ -65,7 +65,7 @@ class RemoteNode:
         return FrameFault.NONE
 
     def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
-        """Take an emergency message.
+        """Receive an emergency message.
 
         Error code 0 tells that one error is over; only with an error register of 0 are all.
         """
@@ -83,20 +83,20 @@ class RemoteNode:
 
     def lost(self, now_ns: int) -> bool:
         """Whether it has just fallen silent; its state is not known any more then."""
-        if self.state is None or now_ns - self._heard_ns <= self._timeout_ns:
+        if self.state is None or now_ns - self._last_frame_ns <= self._timeout_ns:
             return False
         self.state = None
         self.stops += 1  # an axis with a slow valve may not be asked before it is back
         return True
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Its state counts no more; an error that it reported does until it reports its end."""
         self.state = None
 
     def copy_state(self, before: Self) -> None:
         """What the same node said last, and when."""
         self.state, self.emergency = before.state, before.emergency
-        self._heard_ns, self._start_ns = before._heard_ns, before._start_ns
+        self._last_frame_ns, self._start_ns = before._last_frame_ns, before._start_ns
 
     def to_start(self, now_ns: int) -> bool:
         """Whether it is to be started now."""
@@ -116,8 +116,8 @@ class NodeGate:
 
     Args:
         node: that node.
-        in_motion: what an axis in motion is told when it no longer works.
-        control: state machine of the valve, which begins anew with a node that does.
+        in_motion: reason for an axis in motion when it no longer works.
+        control: state machine of the valve, which begins again with a node that does.
     """
 
     def __init__(
@@ -134,22 +134,22 @@ class NodeGate:
         stopped, alarmed = node.stops != self._stops, node.alarms != self._alarms
         self._stops, self._alarms = node.stops, node.alarms
         if self._control is not None and (stopped or node.state != NodeState.OPERATIONAL):
-            self._control.begin_anew()
+            self._control.resync()
         if node.works and not (stopped or alarmed):
             return None
         return Reason.NODE_FAULT if neutral else self._in_motion
 
 
-class _Heard:
+class _NodeMessage:
     """One kind of message of another node."""
 
-    def __init__(self, node: RemoteNode, take: Callable[[bytes, int], FrameFault]) -> None:
+    def __init__(self, node: RemoteNode, receive: Callable[[bytes, int], FrameFault]) -> None:
         self._node = node
-        self.receive = take
+        self.receive = receive
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing good received so far counts any more."""
-        self._node.forget()
+        self._node.invalidate()
 
     def copy_state(self, before: Self) -> None:
         """Continue with what the same node said."""
@@ -173,11 +173,11 @@ class CanopenBus:
         self._booted = False
         self._master = config.master
         self.nodes = {name: RemoteNode(node) for name, node in config.nodes.items()}
-        self._told: dict[str, str] = {}
-        self.inputs: dict[int, _Heard] = {}
+        self._reported: dict[str, str] = {}
+        self.inputs: dict[int, _NodeMessage] = {}
         for node in self.nodes.values():
-            self.inputs[HEARTBEAT + node.id] = _Heard(node, node.heartbeat)
-            self.inputs[EMERGENCY + node.id] = _Heard(node, node.alarm)
+            self.inputs[HEARTBEAT + node.id] = _NodeMessage(node, node.heartbeat)
+            self.inputs[EMERGENCY + node.id] = _NodeMessage(node, node.alarm)
 
     def copy_state(self, before: Self) -> None:
         """Continue our heartbeat: a reload is no start of our node."""
@@ -205,10 +205,10 @@ class CanopenBus:
         """What the nodes say else than at the last call."""
         for name, node in self.nodes.items():
             state = "lost" if node.state is None else _name(node.state)
-            told = f"state={state} emergency={node.emergency:#06x}"
-            if self._told.get(name) != told:
-                self._told[name] = told
-                yield NodeEvent(self._bus, name, told)
+            status = f"state={state} emergency={node.emergency:#06x}"
+            if self._reported.get(name) != status:
+                self._reported[name] = status
+                yield NodeEvent(self._bus, name, status)
 
 
 def _name(state: int) -> str:

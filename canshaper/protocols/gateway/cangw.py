@@ -1,7 +1,7 @@
 """Rules of the kernel's CAN gateway (module can-gw): list, add and remove them over netlink.
 
 A rule hands the frames of one interface that fit a pattern to another interface, perhaps changed:
-bytes AND, then OR, then a checksum anew. Formats and their order: linux/can/gw.h, and
+bytes AND, then OR, then a new checksum. Formats and their order: linux/can/gw.h, and
 net/can/gw.c of the kernel, which compares all of a rule when one is removed. To list takes no
 right, to change CAP_NET_ADMIN.
 """

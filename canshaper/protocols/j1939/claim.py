@@ -169,10 +169,10 @@ class AddressClaim:
 
     def not_sent(self) -> None:
         """The last claim did not go out: it is tried again, and the wait begins with it."""
-        self.anew()
+        self.restart()
         self._claim_at(self._again_ns)
 
-    def anew(self) -> None:
+    def restart(self) -> None:
         """Claim and wait as at the start; a lost address stays lost."""
         if self.state is not ClaimState.LOST:
             self.state = ClaimState.WAITING

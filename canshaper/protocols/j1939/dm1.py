@@ -13,7 +13,7 @@ from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Reason
 
 CYCLE_NS = 1_000_000_000
-# A change is told at once, but not again and again.
+# A change is sent at once, but not again and again.
 LEAST_BETWEEN_NS = 200_000_000
 # SAE J1939-21: 50 to 200 ms between the packets of a broadcast.
 PACKET_NS = 50_000_000
@@ -82,7 +82,7 @@ class ActiveFaults:
         self._bus = bus
         self._address = address
         self._active: set[tuple[int, int]] = set()
-        self._told: set[tuple[int, int]] = set()
+        self._sent: set[tuple[int, int]] = set()
         self._count: dict[tuple[int, int], int] = {}
         self._next_ns = 0
         self._change_ns = 0
@@ -91,7 +91,7 @@ class ActiveFaults:
 
     def copy_state(self, before: Self) -> None:
         """Continue with the same faults: how often they came, and a broadcast under way."""
-        self._active, self._told = set(before._active), set(before._told)
+        self._active, self._sent = set(before._active), set(before._sent)
         self._count, self._packets = dict(before._count), list(before._packets)
         self._next_ns, self._change_ns = before._next_ns, before._change_ns
         self._packet_ns = before._packet_ns
@@ -110,9 +110,9 @@ class ActiveFaults:
         for code in now - self._active:
             self._count[code] = self._count.get(code, 0) + 1
         self._active = now
-        changed = now != self._told and now_ns >= self._change_ns
+        changed = now != self._sent and now_ns >= self._change_ns
         if not self._packets and (requested or changed or now_ns >= self._next_ns):
-            self._told = now
+            self._sent = now
             self._next_ns = now_ns + CYCLE_NS
             self._change_ns = now_ns + LEAST_BETWEEN_NS
             data = dm1_data([Fault(*code, self._count[code]) for code in active])

@@ -12,27 +12,31 @@ from canshaper.protocols.interface import DrivenAxis
 
 @dataclass(frozen=True, slots=True)
 class SourceEvent:
-    """A message comes from an address that is taken now, or from one that is not."""
+    """A message comes from the address that is received now, or from another one."""
 
     bus: str
     message: str
     source: int
-    taken: int
+    received: int
 
     @property
     def text(self) -> str:
         """For the log."""
         found = f"bus={self.bus} message={self.message} source={self.source:#04x}"
-        return found if self.source == self.taken else f"{found} ignored, taken={self.taken:#04x}"
+        return (
+            found
+            if self.source == self.received
+            else f"{found} ignored, taken={self.received:#04x}"
+        )
 
 
 class AnySource:
-    """An input from the first address that is heard; from another one when that falls silent.
+    """An input from the first address that sends; from another one when that falls silent.
 
     Args:
         bus: name of the bus.
         message: name of the message.
-        taken: the input.
+        received: the input.
         timeout_ns: its age limit.
         runners: axes that it moves. One that takes over is another joystick: neutral comes first.
 
@@ -44,60 +48,60 @@ class AnySource:
         self,
         bus: str,
         message: str,
-        taken: Receiver,
+        received: Receiver,
         timeout_ns: int,
         runners: Sequence[DrivenAxis] = (),
     ) -> None:
         self.events: list[SourceEvent] = []
         self._bus, self._message = bus, message
-        self._input = taken
+        self._input = received
         self._timeout_ns = timeout_ns
         self._runners = runners
         self._source: int | None = None
         self._ignored: set[int] = set()
-        self._heard_ns = 0
+        self._last_frame_ns = 0
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Take a frame; two joysticks that send the same group cannot be told apart."""
+        """Receive a frame; two joysticks that send the same group look alike."""
         source = frame.can_id & 0xFF
         if source != self._source:
             if self._source is not None:
-                if arrived_ns - self._heard_ns <= self._timeout_ns:
+                if arrived_ns - self._last_frame_ns <= self._timeout_ns:
                     return self._other(source, self._source)
                 # No tick need have seen the silence in between.
-                self._input.forget()
+                self._input.invalidate()
                 for runner in self._runners:
                     runner.invalidate()
             self._source = source
             self._ignored.clear()
             self.events.append(SourceEvent(self._bus, self._message, source, source))
-        self._heard_ns = arrived_ns
+        self._last_frame_ns = arrived_ns
         return self._input.receive(frame.data, arrived_ns)
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Nothing received so far counts any more."""
-        self._input.forget()
+        self._input.invalidate()
 
     def copy_state(self, before: Self) -> None:
         """The address that counted still does; another one has to wait for its silence."""
-        self._source, self._heard_ns = before._source, before._heard_ns
+        self._source, self._last_frame_ns = before._source, before._last_frame_ns
         self._ignored = set(before._ignored)
 
-    def _other(self, source: int, taken: int) -> FrameFault:
+    def _other(self, source: int, received: int) -> FrameFault:
         if source not in self._ignored:
             self._ignored.add(source)
-            self.events.append(SourceEvent(self._bus, self._message, source, taken))
+            self.events.append(SourceEvent(self._bus, self._message, source, received))
         return FrameFault.SECOND_SENDER
 
 
-class TakenGroup:
+class ReceivedGroup:
     """The inputs of one group: of one address each, or of whatever address comes.
 
     Args:
         own: our address on the bus; nobody else may send from it.
 
     Attributes:
-        of: input by the address it is taken from.
+        of: input by the address it is received from.
         rest: the input from any address.
     """
 
@@ -107,7 +111,7 @@ class TakenGroup:
         self.rest: AnySource | None = None
 
     def receive(self, frame: Frame, arrived_ns: int) -> FrameFault:
-        """Take a frame; from an address that nobody asked for it is other traffic."""
+        """Receive a frame; from any other address it is other traffic."""
         source = frame.can_id & 0xFF
         if source == self._own:
             return FrameFault.SECOND_SENDER

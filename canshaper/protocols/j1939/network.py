@@ -18,8 +18,8 @@ from canshaper.protocols.j1939.dm1 import FMI_OF, FMI_OF_FOLLOWING
 from canshaper.protocols.j1939.groups import (
     AnySource,
     CommandedByOthers,
+    ReceivedGroup,
     SourceEvent,
-    TakenGroup,
 )
 from canshaper.protocols.j1939.node import Node
 
@@ -44,7 +44,7 @@ class J1939Network(BusProtocol):
     Args:
         deployment: the machine.
         axes: its axes, whose interlock is the node on the bus of their valve.
-        taken: its inputs with their messages.
+        inputs: its inputs with their messages.
 
     Attributes:
         nodes: our node on each bus of J1939.
@@ -54,7 +54,7 @@ class J1939Network(BusProtocol):
         self,
         deployment: Deployment,
         axes: Mapping[str, DrivenAxis],
-        taken: Sequence[tuple[BoundInput, MessageInput]],
+        inputs: Sequence[tuple[BoundInput, MessageInput]],
     ) -> None:
         buses = deployment.config.buses
         self._configs: dict[str, J1939] = {n: b.j1939 for n, b in buses.items() if b.j1939}
@@ -65,7 +65,7 @@ class J1939Network(BusProtocol):
             )
             for name, config in self._configs.items()
         }
-        self._told = dict.fromkeys(self.nodes, ClaimState.WAITING)
+        self._reported = dict.fromkeys(self.nodes, ClaimState.WAITING)
         routing = deployment.routing
         self._buses = {bus for bus, routes in routing.buses.items() if routes.j1939}
         self._groups: dict[tuple[str, int], FrameHandler] = {}
@@ -80,16 +80,16 @@ class J1939Network(BusProtocol):
                 self._groups[bus, group] = CommandedByOthers(commanded)
             elif route.claims:
                 self._groups[bus, group] = self.nodes[bus]
-        for bound, one in taken:
+        for bound, one in inputs:
             if bound.by_group:
-                self._take(bound, one)
+                self._add_input(bound, one)
 
-    def _take(self, bound: BoundInput, one: MessageInput) -> None:
+    def _add_input(self, bound: BoundInput, one: MessageInput) -> None:
         bus, can_id = bound.config.bus, bound.key[1]
         entry = self._groups.get((bus, group_of(can_id)))
-        if not isinstance(entry, TakenGroup):
+        if not isinstance(entry, ReceivedGroup):
             config = self._configs.get(bus)
-            entry = TakenGroup(config.address if config else None)
+            entry = ReceivedGroup(config.address if config else None)
             self._groups[bus, group_of(can_id)] = entry
         if not bound.any_source:
             entry.of[can_id & 0xFF] = one
@@ -124,20 +124,20 @@ class J1939Network(BusProtocol):
     def changes(self) -> Iterator[AddressEvent | SourceEvent]:
         """What became of our addresses since the last call, and which others are new."""
         for bus, node in self.nodes.items():
-            if node.state is not self._told[bus]:
-                self._told[bus] = node.state
+            if node.state is not self._reported[bus]:
+                self._reported[bus] = node.state
                 yield AddressEvent(bus, self._configs[bus].address, node.state)
         for one, _ in self._any.values():
             yield from one.events
             one.events.clear()
 
     def send_failed(self, frame: Frame) -> None:
-        """A frame did not reach its bus: who has lost what we say may have taken our address."""
+        """A frame did not reach its bus: who has lost what we say may have inputs our address."""
         if node := self.nodes.get(frame.bus):
             node.send_failed(claim=frame.extended and pgn_of(frame.can_id) == CLAIMED)
 
     def on_bus_off(self, bus: str) -> None:
-        """Claims of others were missed on this bus: claim anew before anything else."""
+        """Claims of others were missed on this bus: claim again before anything else."""
         if node := self.nodes.get(bus):
             node.on_bus_off()
 
@@ -146,11 +146,11 @@ class J1939Network(BusProtocol):
         for node in self.nodes.values():
             node.on_bus_off()
 
-    def forget(self, bus: str | None = None) -> None:
+    def invalidate(self, bus: str | None = None) -> None:
         """Of inputs from any address nothing received so far counts; of one bus, or of all."""
         for (where, _), (one, _) in self._any.items():
             if bus in (None, where):
-                one.forget()
+                one.invalidate()
 
     def parts(self, places: Mapping[str, Key]) -> Iterator[tuple[Key, Part]]:
         """What a reload carries over, see ``parts``; ``places`` is what the buses are, by name."""

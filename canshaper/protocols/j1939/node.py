@@ -18,7 +18,7 @@ class Node:
         bus: name of the bus.
         config: address and NAME.
         cyclic: groups (PGN) that are sent anyhow, so that nobody has to ask for them.
-        guest: whether the address may be another's, and no fault is told.
+        guest: whether the address may be another's, and no fault is sent.
 
     Attributes:
         state: of our address.
@@ -83,4 +83,4 @@ class Node:
 
     def on_bus_off(self) -> None:
         """Claims of others were missed."""
-        self._claim.anew()
+        self._claim.restart()
