@@ -29,7 +29,7 @@ def check(file: str = FILE) -> None:
     signal. A bus that is loaded above 50 % at its bit rate
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
-    not start.
+    not start; and a filter that was designed for another swing or valve than the file has now.
 
     Examples:
 
@@ -39,6 +39,7 @@ def check(file: str = FILE) -> None:
     from canshaper.cli.stopping import print_stopping
     from canshaper.config.source import Source
     from canshaper.errors import ConfigError
+    from canshaper.machine.filters import unfit
     from canshaper.machine.stopping import unstated
 
     try:
@@ -72,7 +73,7 @@ def check(file: str = FILE) -> None:
     for line in identity.lines()[1:]:
         echo(f"    {line}")
     print_stopping(deployment, SafeConsole())
-    for place, text in unstated(deployment):
+    for place, text in (*unfit(deployment.config), *unstated(deployment)):
         echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
 
 

@@ -1,6 +1,6 @@
 """``canshaper robust``: design the robust shaper of an axis."""
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 from rich.box import SIMPLE_HEAD
@@ -13,7 +13,9 @@ from canshaper.cli.console import SafeConsole, echo
 if TYPE_CHECKING:
     from canshaper.config.filters import Filter
     from canshaper.design.tuning.evaluate import Evaluation
+    from canshaper.design.tuning.robust import RobustShaper
     from canshaper.machine.deployment import Deployment
+    from canshaper.shaping.sway import SwayMode
 
 # Digits of a tap in the file: below a thousandth of the smallest tap that matters.
 _DIGITS = 7
@@ -44,7 +46,7 @@ def robust(
 
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
     """
-    from canshaper.config.edit import Value, set_values
+    from canshaper.config.edit import Value, flow, set_values
     from canshaper.config.filters import filter_of
     from canshaper.design.tuning.evaluate import Machine, evaluate
     from canshaper.design.tuning.robust import least_residual, shortest
@@ -93,10 +95,11 @@ def robust(
             lambda sway: build_shaper("robust", tick_s, sway, valve_rate_per_s=rate, taps=taps),
             machine,
         )
+        section = _section(found, mode, range_pct, rate, tick_ms)
         if write:
             gone = bound.config.filter.model_dump(exclude_none=True).keys()
-            values: dict[str, Value] = {"kind": "robust", **dict.fromkeys(gone - {"kind"})}
-            values |= {"tick_ms": tick_ms, "taps": taps}
+            values: dict[str, Value] = dict.fromkeys(gone)
+            values |= section
             set_values(deployment.path, ("axes", axis, "filter"), values)
     except ConfigError as error:
         raise fail(error) from None
@@ -114,8 +117,27 @@ def robust(
     if write:
         console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     else:
-        text = ", ".join(f"{tap:g}" for tap in taps)
-        echo(f"filter: {{ kind: robust, tick_ms: {tick_ms}, taps: [{text}] }}")
+        echo(f"filter: {flow(section)}")
+
+
+def _section(
+    found: "RobustShaper", mode: "SwayMode", range_pct: float, rate_per_s: float, tick_ms: int
+) -> dict[str, Any]:
+    """The filter section of the file."""
+    from canshaper.config.filters import designed
+    from canshaper.config.runs import shortened
+
+    return {
+        "kind": "robust",
+        "tick_ms": tick_ms,
+        "taps": shortened([round(tap, _DIGITS) for tap in found.taps]),
+        "designed_for": {
+            **designed(mode),
+            "length_range_pct": range_pct,
+            "duration_s": round(found.duration_s, 4),
+            "valve_rate_per_s": rate_per_s,
+        },
+    }
 
 
 def _tell_stop(

@@ -230,7 +230,7 @@ def _report(
     sentence = deploy.recommendation(bound.name, found, tail)
     picture = _draw(bound, task, found, before, machine, out)
     if write:
-        _write(deployment.path, bound, found)
+        _write(deployment.path, bound, task, found)
     if as_json:
         result = deploy.as_dict(tuning, found) | {
             "axis": bound.name,
@@ -293,10 +293,16 @@ def _draw(
     return path
 
 
-def _write(path: Path, bound: "BoundAxis", found: "Setting") -> None:
+def _write(path: Path, bound: "BoundAxis", task: "Task", found: "Setting") -> None:
     from canshaper.config.edit import Value, set_values
+    from canshaper.config.filters import designed
 
-    values: dict[str, Value] = {**found.values()}
+    designed_for = designed(task.mode)
+    if task.length_range_pct is not None:
+        designed_for["length_range_pct"] = task.length_range_pct
+    if task.require.max_rate_per_s is not None:
+        designed_for["valve_rate_per_s"] = task.require.max_rate_per_s
+    values: dict[str, Value] = {**found.values(), "designed_for": designed_for}
     if bound.config.filter.kind != "gff":
         gone = bound.config.filter.model_dump(exclude_none=True).keys()
         values = {"kind": "gff", **dict.fromkeys(gone - {"kind"}), **values}

@@ -2,11 +2,15 @@
 
 import re
 from collections.abc import Iterator, Mapping
-from typing import NamedTuple, Self
+from typing import Any, NamedTuple, Self, TypeVar
 
 from pydantic import ValidationError
 
 from canshaper.config.schema import AxisConfig
+from canshaper.config.section import Section
+from canshaper.shaping.registry import KINDS
+
+S = TypeVar("S", bound=Section)
 
 # Limits that no filter and no run-on has in its memory.
 LIMITS = ("max_pct", "rise_per_s", "fall_per_s")
@@ -38,25 +42,40 @@ def value(config: AxisConfig, key: Key) -> float | None:
     return found if isinstance(found, float) else None
 
 
-def adjusted(config: AxisConfig, values: Mapping[Key, float]) -> AxisConfig:
+def adjusted(config: AxisConfig, values: Mapping[Key, float], file: AxisConfig) -> AxisConfig:
     """The configuration of an axis with other numbers.
+
+    A filter that is made for one period is drawn out to another one, always from that of the file.
+
+    Args:
+        config: as it is now.
+        values: the other numbers.
+        file: as it stands in the file.
 
     Raises:
         ValueError: that is no valid configuration; the message says where and why.
     """
-    parts = {}
+    parts: dict[str, Any] = {}
     for name in {key.section for key in values}:
-        section = getattr(config, name)
         new = {key.name: float(one) for key, one in values.items() if key.section == name}
-        try:
-            parts[name] = type(section).model_validate(section.model_dump(exclude_none=True) | new)
-        except ValidationError as error:
-            first = error.errors()[0]
-            where = ".".join((name, *(str(part) for part in first["loc"])))
-            raise ValueError(
-                f"{where}: {first.get('ctx', {}).get('error', first['msg'])}"
-            ) from None
-    return config.model_copy(update=parts)
+        parts[name] = _with(getattr(config, name), name, new)
+    result = config.model_copy(update=parts)
+    stretch = KINDS[file.filter.kind].stretched
+    if stretch and "sway" in parts and result.sway and file.sway:
+        factor = result.sway.mode().period_s / file.sway.mode().period_s
+        new = stretch(file.filter.parameters(), factor) if factor != 1.0 else {}
+        result = result.model_copy(update={"filter": _with(file.filter, "filter", new)})
+    return result
+
+
+def _with(section: S, name: str, new: Mapping[str, Any]) -> S:
+    """The section with other values, checked."""
+    try:
+        return type(section).model_validate(section.model_dump(exclude_none=True) | {**new})
+    except ValidationError as error:
+        first = error.errors()[0]
+        where = ".".join((name, *(str(part) for part in first["loc"])))
+        raise ValueError(f"{where}: {first.get('ctx', {}).get('error', first['msg'])}") from None
 
 
 def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[str]:

@@ -7,6 +7,7 @@ no moment is there a half-written file, and a file that cannot be changed stays 
 
 import copy
 import os
+import re
 import stat
 import tempfile
 from collections.abc import Mapping, Sequence
@@ -17,11 +18,13 @@ import yaml
 
 from canshaper.config.bounded import read_bounded
 from canshaper.config.load import load_config
+from canshaper.config.runs import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source
 from canshaper.errors import ConfigError, Problem
 
-Value = float | str | Sequence[float] | None
-"""A value to write, a number, a plain word or a list of numbers; None takes the key away."""
+Value = float | str | Sequence[float | str] | Mapping[str, float] | None
+"""A value to write: a number, a plain word, a list of numbers and of runs of them (``39 x 0``), or
+numbers by their keys; None takes the key away."""
 
 
 def set_values(path: Path, place: Place, values: Mapping[str, Value]) -> None:
@@ -57,8 +60,8 @@ def edited(text: str, place: Place, values: Mapping[str, Value], name: str = "")
     for key, value in values.items():
         if value is None:
             edit.remove(key)
-        elif not edit.replace(key, _written(value)):
-            absent.append((key, _written(value)))
+        elif not edit.replace(key, flow(value)):
+            absent.append((key, flow(value)))
     edit.insert(absent)
     return edit.text()
 
@@ -194,14 +197,16 @@ class _Edit:
         return ConfigError([Problem(self._name, line, where, message)])
 
 
-def _written(value: float | str | Sequence[float]) -> str:
-    """Plain scalar; of a number the shortest decimal form that the loader reads back as it is."""
+def flow(value: float | str | Sequence[float | str] | Mapping[str, Any]) -> str:
+    """A value on one line; of a number the shortest decimal form that is read back as it is."""
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(f'{key}: {flow(one)}' for key, one in value.items())} }}"
     if not isinstance(value, str | int | float):
-        return f"[{', '.join(_written(v) for v in value)}]"
+        return f"[{', '.join(flow(v) for v in value)}]"
     if isinstance(value, int):
         return str(value)
     if isinstance(value, str):
-        if not value.isidentifier():
+        if not value.isidentifier() and not re.fullmatch(RUN, value):
             raise ValueError(f"found {value!r}, allowed is a word")
         return value
     text = repr(float(value))
@@ -222,7 +227,7 @@ def _expected(data: Any, place: Place, values: Mapping[str, Value]) -> Any:
         elif isinstance(value, str):
             section[name] = value
         else:
-            section[name] = yaml.safe_load(_written(value))
+            section[name] = yaml.safe_load(flow(value))
     return result
 
 

@@ -1,12 +1,67 @@
 """Filters as they stand in a deployment file: one section for each kind of the registry."""
 
+import math
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
-from pydantic import ConfigDict, Field, create_model, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
 
+from canshaper.config.runs import RUN, expanded
 from canshaper.config.section import Section, number
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.shapers.kind import Parameter, ShaperKind
+from canshaper.shaping.sway import SwayMode
+
+# Lists of the filters that are longer than this may have runs of equal numbers as one entry.
+_FEW = 8
+
+
+# A filter still does what it was designed for where the file's swing differs by no more than this:
+# length, where it covers no range of its own (a stopwatch is not better), and damping ratio.
+_LENGTH_PCT = 5.0
+_DAMPING = 0.03
+
+
+class DesignedFor(Section):
+    """What a filter was designed for; written with it, and held against what the file says now."""
+
+    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")]
+    damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")]
+    length_range_pct: (
+        Annotated[float, number(0, 60, "%", "error of the pendulum length that it covers, +-")]
+        | None
+    ) = None
+    duration_s: Annotated[float, number(0, 60, "s", "length of its impulse response")] | None = None
+    valve_rate_per_s: (
+        Annotated[float, number(0, 100, "full speeds per s", "rate of the valve that it keeps to")]
+        | None
+    ) = None
+
+    def faults(self, mode: SwayMode, valve_rate_per_s: float) -> Iterator[tuple[str, str]]:
+        """Keys of what does not fit, and why.
+
+        Args:
+            mode: sway mode of the axis.
+            valve_rate_per_s: rate of its valve, full speeds per second.
+        """
+        # The period grows with the root of the length.
+        share = max(self.length_range_pct or 0.0, _LENGTH_PCT) / 100.0
+        low, high = (self.period_s * math.sqrt(1.0 + sign * share) for sign in (-1, 1))
+        if not low <= mode.period_s <= high:
+            yield (
+                "period_s",
+                f"expected a swing of {low:.2f} to {high:.2f} s, got {mode.period_s:.2f} s",
+            )
+        low, high = max(self.damping_ratio - _DAMPING, 0.0), self.damping_ratio + _DAMPING
+        if not low <= mode.damping_ratio <= high:
+            text = f"expected a damping ratio of {low:.3f} to {high:.3f}"
+            yield "damping_ratio", f"{text}, got {mode.damping_ratio:.3f}"
+        rate = self.valve_rate_per_s or 0.0
+        if valve_rate_per_s < rate:
+            text = (
+                f"expected a valve of {rate:g} full speeds per s or more, got {valve_rate_per_s:g}"
+            )
+            yield "valve_rate_per_s", text
 
 
 class FilterSection(Section):
@@ -25,7 +80,11 @@ class FilterSection(Section):
 
     def parameters(self) -> dict[str, Any]:
         """Parameters for ``build_shaper``."""
-        return self.model_dump(exclude={"kind"}, exclude_none=True)
+        return self.model_dump(exclude={"kind", "designed_for"}, exclude_none=True)
+
+    def design(self) -> DesignedFor | None:
+        """What it was designed for, where the file says so."""
+        return getattr(self, "designed_for", None)
 
     def __reduce__(self) -> Any:
         # The class of a kind is in no module; another process has made its own from the same row.
@@ -36,6 +95,9 @@ def _section(kind: ShaperKind) -> type[FilterSection]:
     """The section of a kind, such as ``TwoModeFilter``."""
     fields: dict[str, Any] = {"kind": (Literal[kind.name], Field(description=kind.summary))}
     fields |= {p.name: _field(p) for p in kind.parameters}
+    if kind.designed_by:
+        text = f"what canshaper {kind.designed_by} designed it for"
+        fields["designed_for"] = (DesignedFor | None, Field(None, description=text))
     return create_model(
         f"{kind.name.title().replace('_', '')}Filter",
         __base__=FilterSection,
@@ -51,10 +113,22 @@ def _field(parameter: Parameter) -> tuple[Any, Any]:
     if parameter.entries:
         least, most = parameter.entries
         text = parameter.description
-        one = Annotated[list[one], Field(min_length=least, max_length=most, description=text)]
+        many = most > _FEW
+        extra = _with_runs if many else None
+        field = Field(min_length=least, max_length=most, description=text, json_schema_extra=extra)
+        one = Annotated[list[one], field]
+        if many:
+            one = Annotated[one, BeforeValidator(expanded)]
     if parameter.optional:
         return Optional[one], None  # noqa: UP045  (made while the program runs)
     return one, ... if parameter.default is None else parameter.default
+
+
+def _with_runs(schema: dict[str, Any]) -> None:
+    """Runs into the JSON schema of a list, when that is made."""
+    text = "so many equal numbers"
+    run = {"type": "string", "pattern": f"^{RUN}$", "description": text}
+    schema["items"] = {"anyOf": [schema["items"], run]}
 
 
 SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}
@@ -79,3 +153,8 @@ def filter_of(kind: str, **parameters: Any) -> Filter:
         ValidationError: the file would be refused.
     """
     return SECTIONS[kind].model_validate({"kind": kind, **parameters})
+
+
+def designed(mode: SwayMode) -> dict[str, float]:
+    """What ``designed_for`` says of the swing that a filter was designed for."""
+    return {"period_s": round(mode.period_s, 4), "damping_ratio": round(mode.damping_ratio, 4)}

@@ -90,7 +90,7 @@ class Adjuster:
 
     def _config(self, name: str, runner: AxisRunner, values: Mapping[Key, float]) -> AxisConfig:
         try:
-            config = adjusted(runner.bound.config, values)
+            config = adjusted(runner.bound.config, values, self._deployment.config.axes[name])
         except ValueError as error:
             raise ValueError(f"axes.{name}.{error}") from None
         if config.limits != runner.bound.config.limits and not runner.axis.neutral:

@@ -32,6 +32,7 @@ from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
 from canshaper.daemon.standstill import Standstill
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import unfit
 from canshaper.machine.identity import program_sha256
 
 log = logging.getLogger("canshaper")
@@ -349,6 +350,8 @@ class Daemon:
         if count := self._controller.deployment.messages.warnings()[0]:
             text = "of messages in the DBC files that are not used; canshaper check shows them"
             log.warning("dbc-warnings=%d %s", count, text)
+        for place, fault in unfit(self._controller.deployment.config):
+            log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""

@@ -1,6 +1,6 @@
 """Filters of a deployment against the period of the valve that they drive."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from canshaper.config.adjust import Key, faults
@@ -11,7 +11,7 @@ from canshaper.config.source import Place
 from canshaper.config.sway import Sway
 from canshaper.machine.diagnostics import Diagnostics
 from canshaper.machine.lookup import Lookup
-from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.sets import STEPS_BETWEEN, ParameterSet, at_position
 from canshaper.shaping.sway import SwayMode, SwayModel
 
@@ -19,13 +19,8 @@ from canshaper.shaping.sway import SwayMode, SwayModel
 def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: float) -> None:
     """Every filter that the axis may get has to run at the period of its valve."""
     add, rate = lookup.diagnostics.add, axis.limits.slowest_per_s
-    parts: list[tuple[Place, AxisConfig | Profile]] = [(place, axis)]
-    parts += [((*place, "profiles", name), profile) for name, profile in axis.profiles.items()]
-    filters: list[tuple[Place, Filter, Sway | None]] = []
+    parts, filters = _parts(place, axis), _filters(place, axis)
     for at, part in parts:
-        filters.append(((*at, "filter"), part.filter, axis.sway))
-        for i, one in enumerate(part.gain_schedule):
-            filters.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
         if part.gain_schedule and not lookup.config.load_state:
             add((*at, "gain_schedule"), "need the signal that chooses them; found no load_state")
     wrong = {at: filter_fault(chosen, sway, period_s, rate) for at, chosen, sway in filters}
@@ -42,6 +37,34 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
         if name not in codes:
             allowed = ", ".join(codes) or "none: there is no profile at the top level"
             add((*place, "profiles", name), f"found {name!r}, profiles are {allowed}")
+
+
+def _parts(place: Place, axis: AxisConfig) -> list[tuple[Place, AxisConfig | Profile]]:
+    """The axis and its profiles, by their places."""
+    profiles = axis.profiles.items()
+    return [(place, axis), *(((*place, "profiles", name), one) for name, one in profiles)]
+
+
+def _filters(place: Place, axis: AxisConfig) -> list[tuple[Place, Filter, Sway | None]]:
+    """Every filter that the axis may get, by its place, with the sway data that it runs with."""
+    found: list[tuple[Place, Filter, Sway | None]] = []
+    for at, part in _parts(place, axis):
+        found.append(((*at, "filter"), part.filter, axis.sway))
+        for i, one in enumerate(part.gain_schedule):
+            found.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
+    return found
+
+
+def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
+    """Filters that were designed for another swing or valve than the file has now: where, why."""
+    for name, axis in config.axes.items():
+        for place, chosen, sway in _filters(("axes", name), axis):
+            design = chosen.design()
+            if design and sway:
+                rate = axis.limits.slowest_per_s
+                for key, fault in design.faults(sway.mode(), rate):
+                    again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
+                    yield (*place, "designed_for", key), f"{fault}; {again}"
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:

@@ -18,6 +18,7 @@ from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
+ROBUST = Path(__file__).parents[2] / "config" / "forwarder-robust.yaml"
 SHIPPED = ROOT / "config" / "forwarder.yaml"
 VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
 
@@ -101,6 +102,34 @@ def test_check_says_which_axis_moves_without_its_joystick() -> None:
     )
     assert note in invoke("check", "forwarder-robust.yaml").stdout.splitlines()
     assert "without its joystick" not in invoke("check", str(SHIPPED)).stdout
+
+
+def test_check_says_where_a_filter_no_longer_fits(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "machine.yaml"
+    text = ROBUST.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    assert "designed" not in invoke("check", str(ROBUST)).stdout
+    text = text.replace("sway: { period_s: 2.356", "sway: { period_s: 2.6")
+    file.write_text(
+        text.replace("mass_kg: 300", "mass_kg: 120").replace("fall_per_s: 5", "fall_per_s: 4")
+    )
+    result = invoke("check", str(file))
+    assert result.exit_code == 0
+    slew, near_far = (
+        number for number, row in enumerate(text.splitlines(), 1) if "designed_for" in row
+    )
+    again = "; design it again: canshaper robust"
+    slew_for, near_for = "axes.slew.filter.designed_for", "axes.near_far.filter.designed_for"
+    valve = "valve_rate_per_s: expected a valve of 5 full speeds per s or more, got 4"
+    assert [row for row in result.stdout.splitlines() if "designed_for" in row] == [
+        f"WARNING: {file}:{slew}: {slew_for}.period_s:"
+        f" expected a swing of 2.17 to 2.53 s, got 2.60 s{again}",
+        f"WARNING: {file}:{slew}: {slew_for}.{valve}{again}",
+        f"WARNING: {file}:{near_far}: {near_for}.damping_ratio:"
+        f" expected a damping ratio of 0.019 to 0.079, got 0.121{again}",
+        f"WARNING: {file}:{near_far}: {near_for}.{valve}{again}",
+    ]
 
 
 def unstated(tmp_path: Path) -> Path:

@@ -183,7 +183,36 @@ def test_the_new_filter_is_made_as_the_file_makes_it(
     )
     at_first = next(one for one in made if number in one[1])
     Adjuster(rig.controller).change({"axes.slew.sway.period_s": 2.5})
+    if number == "taps":  # drawn out in time, see below
+        assert made[-1][1]["taps"] != at_first[1]["taps"]
+        at_first[1]["taps"] = made[-1][1]["taps"]
     assert made[-1] == at_first
+
+
+def test_a_filter_made_for_one_period_is_drawn_out_to_another(make: Make) -> None:
+    """Two impulses half a swing apart: they stay that, and the file's own come back bit for bit."""
+    taps = [0.5, *[0.0] * 58, 0.5]
+    robust = f"filter: {{ kind: robust, tick_ms: 20, taps: {taps} }}"
+    rig = make(
+        {
+            f"{SLEW}\n    {FILTER}": f"{SLEW}\n    {robust}\n",
+            "    axes.slew.filter.a1: [0.3, 1.0]\n    axes.slew.filter.a2: [0.03, 0.2]\n": "",
+        }
+    )
+    adjuster, runner = Adjuster(rig.controller), rig.controller.axes["slew"]
+    adjuster.change({"axes.slew.sway.period_s": 2.9})
+    drawn = runner.bound.config.filter.parameters()["taps"]
+    half = len(drawn) // 2
+    first, second = (
+        sum(k * tap for k, tap in part) / 0.5
+        for part in ([*enumerate(drawn)][:half], [*enumerate(drawn)][half:])
+    )
+    assert second - first == pytest.approx(59 * 2.9 / 2.356, abs=0.25)  # ticks
+    for period in (1.8, 3.0, 2.0):
+        adjuster.change({"axes.slew.sway.period_s": period})
+    assert runner.bound.config.filter.parameters()["taps"] != taps
+    adjuster.change({"axes.slew.sway.period_s": 2.356})
+    assert runner.bound.config.filter.parameters()["taps"] == taps
 
 
 def test_limits_change_in_neutral_only(make: Make) -> None:

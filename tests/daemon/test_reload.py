@@ -465,6 +465,26 @@ def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
     assert caplog.text.count("dbc-warnings=1 of messages in the DBC files that are not used") == 1
 
 
+def test_a_filter_that_no_longer_fits_is_told_in_the_log(
+    bench: Bench, caplog: pytest.LogCaptureFixture
+) -> None:
+    old = "a1: 0.708, a2: 0.12 } #"
+    new = "a1: 0.708, a2: 0.12, designed_for: { period_s: 1.9, damping_ratio: 0.05 } } #"
+
+    def script(number: int) -> None:
+        if number == 60:
+            assert "unfit" not in caplog.text
+            bench.reload(old, new)
+        elif number == 120:
+            bench.stop()
+
+    with caplog.at_level("INFO", "canshaper"):
+        bench.run(script)
+    assert "reload=applied" in caplog.text
+    says = "expected a swing of 1.85 to 1.95 s, got 2.20 s; design it again: canshaper tune"
+    assert f"unfit=axes.near_far.filter.designed_for.period_s {says}" in caplog.text
+
+
 def test_the_program_is_read_before_a_bus_is_open(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:

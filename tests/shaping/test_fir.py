@@ -5,7 +5,7 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, residual_left, zv_taps
+from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, residual_left, stretched, zv_taps
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 MODES = [SwayMode.from_period(2.2, zeta) for zeta in (0.0, 0.05, 0.3)]
@@ -126,3 +126,19 @@ def test_a_long_day_takes_no_memory() -> None:
     finally:
         tracemalloc.stop()
     assert grown < 20_000  # a place kept for every command would take eight bytes each
+
+
+@pytest.mark.parametrize("factor", [0.5, 0.84, 1.0, 1.07, 1.4, 2.0])
+def test_taps_drawn_out_do_for_a_swing_that_is_so_much_slower(factor: float) -> None:
+    taps = [0.1] * 3 + [0.03] + [0.0] * 39 + [0.005] + [0.1] * 4 + [0.007] + [0.0] * 39
+    taps += [0.058, 0.1, 0.1]
+    mode = SwayMode(2.67, 0.038)
+    slower = SwayMode(mode.omega_rad_s / factor, mode.damping_ratio)
+    drawn = stretched(taps, factor)
+    assert len(drawn) == math.ceil(len(taps) * factor - 1e-9)
+    assert min(drawn) >= 0.0
+    assert math.fsum(drawn) == pytest.approx(math.fsum(taps), abs=1e-12)
+    left = residual_left(taps, mode, 0.02)
+    assert residual_left(drawn, slower, 0.02) == pytest.approx(left, abs=0.004)
+    if factor == 1.0:
+        assert drawn == pytest.approx(taps, abs=1e-15)

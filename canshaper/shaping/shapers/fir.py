@@ -9,6 +9,7 @@ import cmath
 import math
 from collections import deque
 from collections.abc import Sequence
+from itertools import accumulate, pairwise
 from operator import mul
 
 from canshaper.shaping.shapers.kind import Parameter, Shaper, ShaperKind
@@ -69,6 +70,23 @@ def zv_taps(mode: SwayMode, tick_s: float) -> list[float]:
     taps = [0.0] * (n + 2)
     taps[0], taps[n], taps[n + 1] = 1.0 / total, a / total, b / total
     return taps if b else taps[:-1]
+
+
+def stretched(taps: Sequence[float], factor: float) -> list[float]:
+    """Taps of the same response in ``factor`` of its time; their sum stays what it is.
+
+    A tap stands for its whole tick: the step response is drawn out in time, straight between ticks.
+    """
+    steps = [0.0, *accumulate(taps)]
+    ticks = math.ceil((len(steps) - 1) * factor - 1e-9)
+
+    def step(tick: int) -> float:
+        at = min(tick / factor, len(steps) - 1.0)
+        low = min(int(at), len(steps) - 2)
+        return steps[low] + (at - low) * (steps[low + 1] - steps[low])
+
+    response = [step(tick) for tick in range(ticks + 1)]
+    return [max(after - before, 0.0) for before, after in pairwise(response)]
 
 
 def convolved(first: Sequence[float], second: Sequence[float]) -> list[float]:

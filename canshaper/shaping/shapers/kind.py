@@ -91,6 +91,8 @@ class ShaperKind:
         check: called with the parameters of a file; ValueError says what does not go together.
         interpolable: gives the same parameters in a form in which each number may run in a straight
             line from one set to another.
+        stretched: the same filter for a swing of so many times the period; of a kind whose
+            parameters hold for one period only.
         designed_by: verb of ``canshaper`` that finds the parameters, "" without one.
 
     Raises:
@@ -107,6 +109,7 @@ class ShaperKind:
     limit_aware: bool = False
     check: Callable[..., object] | None = None
     interpolable: Callable[[Parameters], Parameters] | None = None
+    stretched: Callable[[Parameters, float], Parameters] | None = None
     designed_by: str = ""
 
     def __post_init__(self) -> None:

@@ -9,7 +9,7 @@ docs/decisions/0003-limit-aware-by-a-twin.md.
 import math
 from collections.abc import Sequence
 
-from canshaper.shaping.shapers.fir import Fir, zv_taps
+from canshaper.shaping.shapers.fir import Fir, stretched, zv_taps
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Parameter, Parameters, Shaper, ShaperKind
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -103,6 +103,10 @@ def _settings(mode: SwayMode, tick_s: float) -> dict[str, Parameters]:
     return {"limit-aware ZV": {"tick_ms": round(1000.0 * tick_s), "taps": taps}}
 
 
+def _stretched(parameters: Parameters, factor: float) -> Parameters:
+    return parameters | {"taps": stretched(parameters["taps"], factor)}
+
+
 KINDS = (
     ShaperKind(
         "robust",
@@ -118,5 +122,6 @@ KINDS = (
         limit_aware=True,
         check=_check,
         designed_by="robust",
+        stretched=_stretched,
     ),
 )

@@ -4,6 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.config.filters import DesignedFor
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[3]
@@ -42,7 +43,16 @@ def test_write_changes_the_filter_and_nothing_else(file: Path) -> None:
     changed = [i for i, (a, b) in enumerate(zip(before, after, strict=True)) if a != b]
     assert len(changed) == 1
     assert before[changed[0]].split("#")[1:] == after[changed[0]].split("#")[1:]
-    assert load_deployment(file).axes["slew"].config.filter.kind == "robust"
+    chosen = load_deployment(file).axes["slew"].config.filter
+    assert chosen.kind == "robust"
+    assert chosen.design() == DesignedFor(
+        period_s=2.356,
+        damping_ratio=0.038,
+        length_range_pct=30.0,
+        duration_s=1.82,
+        valve_rate_per_s=5.0,
+    )
+    assert len(after[changed[0]]) < 280  # nobody reads a line of a hundred taps
 
 
 def test_a_tail_too_short_is_told(file: Path) -> None:

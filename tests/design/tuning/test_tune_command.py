@@ -20,6 +20,7 @@ from canshaper.shaping.sway import SwayMode
 
 ROOT = Path(__file__).resolve().parents[3]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
+DESIGNED = "designed_for: { period_s: 2.356, damping_ratio: 0.038, valve_rate_per_s: 5.0 }"
 
 
 @pytest.fixture
@@ -87,7 +88,7 @@ def test_write_and_write_back(file: Path) -> None:
     after = load_config(file)[0].axes["slew"].filter.parameters()
     assert after == {"a1": found["a1"], "a2": found["a2"]}
     expected = before.replace(
-        "a1: 0.708, a2: 0.12 }\n", f"a1: {found['a1']}, a2: {found['a2']} }}\n"
+        "a1: 0.708, a2: 0.12 }\n", f"a1: {found['a1']}, a2: {found['a2']}, {DESIGNED} }}\n"
     )
     assert file.read_text() == expected
 
