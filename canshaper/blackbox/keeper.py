@@ -24,9 +24,10 @@ from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
-# Between two states of the controller: to keep one takes a third to two thirds of a millisecond,
-# behind the tick, and a replay can begin at each of them.
+# Between two states of the controller; a replay can begin at each of them. To keep one takes a
+# millisecond, behind the tick: one that is shorter than this does it only while nothing moves.
 STATE_NS = 10_000_000_000
+SHORT_TICK_MS = 5
 # How long after a trip the recording goes on.
 AFTER_NS = 5_000_000_000
 # A machine that trips again and again writes one file a minute, with all of them in it.
@@ -48,6 +49,7 @@ class BlackBox:
         self._recorder: Recorder | None = None
         self._deployment: Deployment | None = None
         self._states: States | None = None
+        self._short = False
         self._next_ns = 0  # when the next state is due
         self._why = ""  # what happened, and is to be written
         self._due_ns = 0
@@ -66,6 +68,7 @@ class BlackBox:
             self._freeze()
             self._ring.clear()  # its frames would be read with the wrong files
         self._deployment, self._states = deployment, None
+        self._short = deployment.config.tick_ms < SHORT_TICK_MS
         try:
             self._states = States(guarded, controller)
         except StateError as error:  # of a filter of another package
@@ -95,7 +98,7 @@ class BlackBox:
             self._not_before_ns = now_ns + BETWEEN_NS
             self._freeze()
             self._keep_state(now_ns, follows=True)
-        elif now_ns >= self._next_ns:
+        elif now_ns >= self._next_ns and (neutral or not self._short or self._ring.cut_off):
             self._keep_state(now_ns, follows=True)
         if self._writer:
             self._look_after_writer()

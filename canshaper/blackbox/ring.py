@@ -64,6 +64,11 @@ class Ring:
             self._open.used = self._at
         return tuple(self._segments)
 
+    @property
+    def cut_off(self) -> bool:
+        """Whether there was no room for all of the newest segment."""
+        return bool(self._segments) and self._segments[-1].cut_off
+
     def put(  # noqa: PLR0917  (names would cost as much as the rest of it)
         self,
         kind: int,
@@ -85,7 +90,7 @@ class Ring:
         """Begin a segment; what is older than it has to be is dropped."""
         self.pause()
         segments = self._segments
-        follows = follows and bool(segments) and not segments[-1].cut_off
+        follows = follows and bool(segments) and not self.cut_off
         while len(segments) > 1 and segments[1].begin_ns <= now_ns - KEPT_NS:
             self._drop()
         self._open = Segment(state, now_ns, follows=follows)

@@ -7,6 +7,7 @@ import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -328,3 +329,22 @@ def test_a_steady_ring_takes_no_more_memory() -> None:
     finally:
         tracemalloc.stop()
     assert ring.KEPT_NS == 60 * 10**9
+
+
+@pytest.mark.parametrize(("tick_ms", "states"), [(20, 10), (2, 1)])
+def test_a_short_tick_keeps_a_state_only_while_nothing_moves(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, tick_ms: int, states: int
+) -> None:
+    monkeypatch.setattr(keeper, "STATE_NS", 10**9)
+    deployment = load_deployment(bench.file)
+    config = deployment.config.model_copy(update={"tick_ms": tick_ms})
+    deployment = replace(deployment, config=config)
+    black_box = keeper.BlackBox(None)
+    controller = Controller(deployment)
+    black_box.around(Guarded(controller), controller)
+    black_box.begin(0)
+    for tick in range(1, 500):
+        black_box.after_tick(tick * 20_000_000, (), neutral=False)
+    assert len(black_box._ring.segments) == states
+    black_box.after_tick(10**10, (), neutral=True)
+    assert len(black_box._ring.segments) == states + 1

@@ -2,15 +2,19 @@
 
 import os
 from collections import Counter
+from functools import cached_property
 from pathlib import Path
 from unittest.mock import patch
 
 import pytest
 
-from canshaper.blackbox import keeper
+from canshaper.blackbox import keeper, state
+from canshaper.controller.controller import Controller
+from canshaper.controller.guarded import Guarded
 from canshaper.daemon import daemon
 from canshaper.recording import play
 from tests.blackbox.kept import Kept, unpacked
+from tests.faults import variants
 from tests.faults.guarded import Unrefused
 from tests.faults.sequence import Sequence
 from tests.faults.shipped import NAMES
@@ -55,3 +59,34 @@ def test_what_is_played_is_the_same(name: str, tmp_path: Path) -> None:
             seen["boxes"] += 1
     assert seen["ticks"] > 50 * COUNT
     assert seen["frames"] > seen["ticks"]
+
+
+def held(one: object, seen: dict[int, object]) -> None:
+    """Note every object of ours that can be reached."""
+    if id(one) in seen or isinstance(one, (*state.FIXED, type, str, bytes, int, float)):
+        return
+    seen[id(one)] = one
+    if isinstance(one, dict):
+        parts = [*one.keys(), *one.values()]
+    elif isinstance(one, (list, tuple, set, frozenset)):
+        parts = list(one)
+    else:
+        parts = [*getattr(one, "__dict__", {}).values(), getattr(one, "__self__", None)]
+    for part in parts:
+        held(part, seen)
+
+
+@pytest.mark.parametrize("name", variants.NAMES)
+def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
+    """They are found in the code of the classes; here in what the objects have."""
+    controller = Controller(variants.machine(name)[1])
+    seen: dict[int, object] = {}
+    held(Guarded(controller), seen)
+    looked_at = Counter[str]()
+    for one in seen.values():
+        kind = type(one)
+        if names := state.attributes(kind):
+            cached = {n for n, one in vars(kind).items() if isinstance(one, cached_property)}
+            assert vars(one).keys() - cached <= set(names), kind
+            looked_at[kind.__name__] += 1
+    assert looked_at["Axis"] and looked_at["AxisRunner"] and looked_at["Controller"]
