@@ -3,12 +3,13 @@
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from pathlib import Path
 from typing import Any
 
 from playwright.sync_api import Browser, Page, expect, sync_playwright
 
 from tests.lane.outcome import NoLane
-from tests.lane.packages import install, missing, which
+from tests.lane.packages import install, missing
 
 PROGRAMS = {"chromium": "chromium"}
 FLAGS = [
@@ -39,7 +40,9 @@ def browser() -> Iterator[Browser]:
     except NoLane as error:
         raise NoBrowserError(str(error)) from None
     with sync_playwright() as playwright:
-        one = playwright.chromium.launch(executable_path=which("chromium"), args=FLAGS)
+        one = playwright.chromium.launch(
+            executable_path=str(Path(__file__).parent / "chromium.sh"), args=FLAGS
+        )
         try:
             yield one
         finally:
