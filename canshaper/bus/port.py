@@ -49,7 +49,7 @@ class Port(Protocol):
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order; ends when there is none or the bus fails."""
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """What can wait until the valves have been told: other senders with our ids, and so on."""
 
     def send(self, frame: Frame) -> bool:
@@ -126,9 +126,9 @@ class ListeningPort:
         """Every frame that waits."""
         return self._port.frames()
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """What can wait."""
-        return self._port.others()
+        return self._port.background()
 
     def send(self, frame: Frame) -> bool:
         """Send a status; of anything else only say so."""
@@ -194,7 +194,7 @@ class PythonCanPort:
                 else:
                     yield frame
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """Nothing: ``frames`` hands out everything."""
         return iter(())
 

@@ -130,19 +130,19 @@ class RawPort:
                 self.arrived_ns = arrivals.of(ancillary)
                 yield frame
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """What can wait until the valves have been told: our own frames, seen back, are taken in.
 
         Frames of other senders with our ids, and of ids that nobody knows, are handed out.
         """
         for number, most in ((1, MOST_FRAMES), (2, MOST_UNKNOWN)):
-            yield from self._others(number, most)
+            yield from self._background(number, most)
         if self._sockets and (dropped := dropped_frames(self._sockets[:2])) != self._dropped:
             self._dropped = dropped
             self._forget()  # confirmations may be among them
             self._on_fault(FrameFault.FRAMES_LOST)
 
-    def _others(self, number: int, most: int) -> Iterator[Frame]:
+    def _background(self, number: int, most: int) -> Iterator[Frame]:
         if number >= len(self._sockets):
             return
         waiting, receive = self._waiting[number], self._sockets[number].recvmsg

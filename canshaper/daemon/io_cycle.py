@@ -44,7 +44,7 @@ class FramePort(Protocol):
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits, in order."""
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """What can wait until the valves have been told."""
 
     def send(self, frame: Frame) -> bool:
@@ -114,5 +114,5 @@ def io_cycle(
             processor.send_failed(frame)
     standstill.last_ns = made_ns
     for port in ports.values():
-        for frame in port.others():
+        for frame in port.background():
             processor.receive(frame, now_ns)

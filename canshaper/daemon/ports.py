@@ -49,7 +49,7 @@ def new_ports(ports: Mapping[str, Port], opened: Mapping[Bus, Port]) -> list[Por
 
 def waiting(ports: Iterable[Port]) -> list[Frame]:
     """What waits in ports that are about to be closed."""
-    return [frame for port in ports for frame in (*port.frames(), *port.others())]
+    return [frame for port in ports for frame in (*port.frames(), *port.background())]
 
 
 def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame]:
@@ -62,7 +62,7 @@ def received_at_first(new: Iterable[Port], deployment: Deployment) -> list[Frame
     return [
         frame
         for port in new
-        for frame in (*port.frames(), *port.others())
+        for frame in (*port.frames(), *port.background())
         if frame[1:3] not in ours[port.name].sent | ours[port.name].claims
     ]
 

@@ -59,7 +59,7 @@ class PlantPort:
         waiting, self._waiting = self._waiting, []
         return iter(waiting)
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         """There are none."""
         return iter(())
 

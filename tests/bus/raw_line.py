@@ -113,7 +113,7 @@ class Line:
 
     def heard(self) -> list[Frame]:
         """What the port hands out in a tick."""
-        return [*self.port.frames(), *self.port.others()]
+        return [*self.port.frames(), *self.port.background()]
 
     def sent(self) -> list[bytes]:
         """What went out since the last call."""

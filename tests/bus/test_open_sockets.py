@@ -229,7 +229,7 @@ class Below:
     def frames(self) -> Iterator[Frame]:
         yield Frame("crane", 1, False, b"")
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         yield Frame("crane", 2, False, b"")
 
     def send(self, frame: Frame) -> bool:
@@ -259,7 +259,7 @@ def test_a_port_that_listens_is_the_port_below_it() -> None:
         5,
     )
     assert [f.can_id for f in port.frames()] == [1]
-    assert [f.can_id for f in port.others()] == [2]
+    assert [f.can_id for f in port.background()] == [2]
     port.close()
     assert below.closed
 
@@ -317,7 +317,7 @@ def test_what_is_no_data_frame_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> No
     assert list(port.frames()) == []
     wrong = FrameFault.WRONG_LENGTH
     assert faults == [FrameFault.ERROR_FRAME, wrong, wrong]
-    assert list(port.others()) == []
+    assert list(port.background()) == []
     port.watch("second", IDS)
     assert (port.name, port.fileno()) == ("second", 9)
 

@@ -114,7 +114,7 @@ def test_a_flood_cannot_hold_up_the_tick_for_ever(line: Line) -> None:
     for number in (TAKEN, SENT_BACK, UNKNOWN):
         line.put(message(number), number)
     seen: list[int] = []
-    for source in (line.port.frames, line.port.others):
+    for source in (line.port.frames, line.port.background):
         for frame in source():
             seen.append(frame.can_id)
             line.put(message(frame.can_id), frame.can_id)
@@ -127,7 +127,7 @@ def test_what_can_wait_does_not_come_with_the_joysticks(line: Line) -> None:
     line.put(message(0x200), SENT_BACK)
     line.put(message(0x110))
     assert [f.can_id for f in line.port.frames()] == [0x110]
-    assert [f.can_id for f in line.port.others()] == [0x200, 0x7F0]
+    assert [f.can_id for f in line.port.background()] == [0x200, 0x7F0]
 
 
 @pytest.mark.parametrize("number", [TAKEN, SENT_BACK])
@@ -142,10 +142,10 @@ def test_a_queue_that_has_run_over_is_told_once_for_each_time(number: int) -> No
     for overflows in (1, 2):
         for _ in range(100):
             far.send(frame)
-        assert 0 < len([*port.frames(), *port.others()]) < 100
+        assert 0 < len([*port.frames(), *port.background()]) < 100
         for _ in range(3):
             far.send(frame)
-            assert len([*port.frames(), *port.others()]) == 1
+            assert len([*port.frames(), *port.background()]) == 1
         assert faults == [FrameFault.FRAMES_LOST] * overflows
     for one in (*near, *(far for _, far in pairs)):
         one.close()

@@ -46,7 +46,7 @@ class Notes:
 class TwoQueues(Waiting):
     """A bus with a frame that can wait."""
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         yield OTHER
 
 

@@ -50,7 +50,7 @@ class FakePort:
             self.arrived_ns = arrived_ns
             yield frame
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         yield from (frame for _, frame in self._heard(lambda can_id: can_id >= 0x200))
 
     def _heard(self, wanted: Callable[[int], bool]) -> list[tuple[int, Frame]]:

@@ -49,7 +49,7 @@ class BenchPort:
         yield from self._read(self.waiting)
         self._bench.has_read(self)
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         yield from self._read(self.late)
 
     def _read(self, waiting: deque[tuple[Frame, int]]) -> Iterator[Frame]:

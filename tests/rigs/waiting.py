@@ -37,7 +37,7 @@ class Waiting:
             self.arrived_ns, frame = self.queue.pop(0)
             yield frame
 
-    def others(self) -> Iterator[Frame]:
+    def background(self) -> Iterator[Frame]:
         return iter(())
 
     def send(self, frame: Frame) -> bool:
