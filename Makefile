@@ -10,7 +10,7 @@
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test quick versions test-others test-long test-socketcan test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
+.PHONY: demo test quick versions test-others test-long test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -61,6 +61,10 @@ quick: .venv/test-ready
 # The daemon's rooms with the lowest versions of every dependency, and with the newest Python.
 versions:
 	tools/versions.sh
+
+# docs/architecture.svg
+drawing:
+	python3 tools/architecture.py
 
 # J1939, CANopen, a valve being measured, a gateway: foreign counterparts on real SocketCAN.
 test-machines: .venv/test-ready

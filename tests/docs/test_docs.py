@@ -1,6 +1,8 @@
 """What README and docs name is there: files, verbs and their options, states, reasons, faults."""
 
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +21,12 @@ COMMANDS: Any = typer.main.get_command(app)
 CODE = re.compile(r"`([^`\n]+)`|^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"\bcanshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")
 NAMES = {member.name for kind in (State, Reason, FrameFault) for member in kind}
+
+
+def test_the_drawing_of_the_rooms_is_that_of_the_tree() -> None:
+    command = [sys.executable, str(ROOT / "tools" / "architecture.py"), "--check"]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
