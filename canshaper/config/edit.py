@@ -99,9 +99,22 @@ class _Edit:
         for key_node, node in self._pairs:
             if key_node.value == key:
                 self._not_shared(node)
-                self._spans.append((*self._span(node), value))
+                self._put(key_node, node, value)
                 return True
         return False
+
+    def _put(self, key: yaml.Node, node: yaml.Node, value: str) -> None:
+        """Put a value in place of another; that of a block, however indented, behind its key."""
+        start, end = self._span(node)
+        if isinstance(node, yaml.CollectionNode) and not node.flow_style:
+            colon = self._text.index(":", key.end_mark.index) + 1
+            if "#" in self._text[start:end]:
+                raise self._error(key, f"a comment stands inside {key.value}; change it by hand")
+            self._spans.append((colon, colon, f" {value}"))
+            start = self._text.rindex("\n", 0, start)
+            start -= self._text[:start].endswith("\r")
+            value = ""
+        self._spans.append((start, end, value))
 
     def remove(self, key: str) -> None:
         """Take a key out with its value; a comment behind it stays, on a line of its own."""

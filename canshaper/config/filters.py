@@ -140,10 +140,21 @@ def restored_filter(kind: str, given: set[str], values: dict[str, Any]) -> Filte
     return SECTIONS[kind].model_construct(given, **values)
 
 
+def _named_off(section: Any) -> Any:
+    """YAML 1.1 takes ``off`` for false, and so its tools write it back."""
+    if isinstance(section, dict) and section.get("kind") is False:
+        return section | {"kind": "off"}
+    return section
+
+
 if TYPE_CHECKING:
     Filter = FilterSection
 else:
-    Filter = Union[tuple(SECTIONS.values())]  # noqa: UP007  (the same)
+    Filter = Annotated[
+        Union[tuple(SECTIONS.values())],  # noqa: UP007  (the same)
+        Field(discriminator="kind"),
+        BeforeValidator(_named_off),
+    ]
 
 
 def filter_of(kind: str, **parameters: Any) -> Filter:

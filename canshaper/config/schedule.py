@@ -18,13 +18,13 @@ class Breakpoint(Section):
 
     breakpoint: Annotated[float, number(-1e6, 1e6, "", "value of the load state")]
     sway: Sway = Field(description="sway data at this value")
-    filter: Filter = Field(discriminator="kind", description="filter at this value")
+    filter: Filter = Field(description="filter at this value")
 
 
 class Profile(Section):
     """Response of an axis while the operator has chosen it."""
 
-    filter: Filter = Field(discriminator="kind", description="filter of the axis")
+    filter: Filter = Field(description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
 
     @model_validator(mode="after")

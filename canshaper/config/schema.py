@@ -267,7 +267,7 @@ class AxisConfig(Section):
     """Swing of the tool on this axis."""
     slewing: Slewing | None = None
     """Of an axis that turns: what its full speed is in angle."""
-    filter: Filter = Field(discriminator="kind", description="filter of the axis")
+    filter: Filter = Field(description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
     profiles: dict[str, Profile] = Field(
         {}, description="other filters that the operator may choose"

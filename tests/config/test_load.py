@@ -96,7 +96,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         # filters
         ("kind: off", "kind: on", "axes.lift.filter.kind: found 'on', allowed is 'off', 'gff'"),
         ("kind: off", "", "axes.lift.filter.kind: found None, allowed is 'off', 'gff'"),
-        ("kind: off", "kind: false", "found False, allowed is 'off', 'gff'"),
+        ("kind: off", "kind: true", "found True, allowed is 'off', 'gff'"),
         ("a1: 0.708, a2: 0.12", "", "filter: found neither; allowed are a1 and a2, or poles_rad_s"),
         (", a2: 0.12", "", "axes.slew.filter: found a1; allowed are a1 and a2, or poles_rad_s"),
         ("a1: 0.708", "a1: null", "axes.slew.filter: found a2; allowed are a1 and a2, or poles"),
@@ -215,9 +215,15 @@ def test_missing_file(tmp_path: Path) -> None:
 
 
 def test_off_needs_no_quotes(shipped: str, load: Load) -> None:
-    for word in ("off", "'off'", '"off"'):
+    for word in ("off", "'off'", '"off"', "false", "False", "FALSE"):  # as tools of YAML 1.1 write
         config = load(shipped.replace("kind: off", f"kind: {word}"))
         assert config.axes["lift"].filter.kind == "off"
+
+
+@pytest.mark.parametrize("word", ["true", "'false'", "no", "0", "null"])
+def test_nothing_else_is_off(shipped: str, problems: Problems, word: str) -> None:
+    (found,) = problems(shipped.replace("kind: off", f"kind: {word}"))
+    assert "axes.lift.filter.kind: found " in found
 
 
 def test_numbers_with_an_exponent_are_numbers(shipped: str, load: Load) -> None:
