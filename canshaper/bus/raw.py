@@ -93,10 +93,8 @@ class RawPort:
         self._on_fault = on_fault
         self._confirms = confirms
         self._matched = matched
-        self._sockets: list[socket.socket] = []
         self._unconfirmed: dict[int, int] = {}
         self._since_ns: dict[int, int] = {}
-        self._not_before_ns = 0
         self._dropped = 0
         self._ids = ids
         self._valves = _words(ids.valves if ids else ())
@@ -293,6 +291,7 @@ class RawPort:
             self._on_fault(fault)
 
     def _use(self) -> None:
+        """Begin with new sockets, of which nothing is known yet."""
         arrivals = Arrivals()  # before a frame can arrive
         self._sockets = sockets = self._open(self._ids)
         self._arrivals = arrivals

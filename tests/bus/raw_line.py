@@ -68,13 +68,9 @@ class Line:
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
+        options = {"matched": True} if matched else {}
         self.port = RawPort(
-            "crane",
-            self._open,
-            ids,
-            self.faults.append,
-            confirms=ids is not None,
-            matched=matched,
+            "crane", self._open, ids, self.faults.append, confirms=ids is not None, **options
         )
 
     def _open(self, ids: BusRoutes | None) -> list[socket.socket]:

@@ -161,6 +161,7 @@ def stamped(line: Line, *stamps: int | None) -> None:
     assert receive == near.recvmsg
 
     def recvmsg(*sizes: int) -> Any:
+        assert sizes == (raw.SIZE, arrival.ANCILLARY_BYTES)  # room for a frame and its stamp
         data, _, flags, sender = receive(*sizes)
         stamp = waiting.pop(0)
         return data, [] if stamp is None else ancillary(stamp), flags, sender

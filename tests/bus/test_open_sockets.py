@@ -3,6 +3,7 @@
 import errno
 import socket
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 import can
@@ -73,7 +74,7 @@ def test_one_socket_takes_everything(made: list[Made]) -> None:
     open_sockets(BUS, None)
     (one,) = made
     assert one.arguments == (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-    assert not one.blocking
+    assert one.blocking is False
     assert one.bound == ("can0",)
     assert options(one, SOL) == {socket.SO_RCVBUF: 1 << 20}
     assert options(one, RAW) == {socketcan.CAN_RAW_ERR_FILTER: 0x1FFFFFFD}
@@ -84,7 +85,7 @@ def test_three_sockets_each_for_its_frames(made: list[Made]) -> None:
     open_sockets(BUS, IDS)
     taken, sent, unknown = made
     assert [one.bound for one in made] == [("can0",)] * 3
-    assert not any(one.blocking or one.closed for one in made)
+    assert [(one.blocking, one.closed) for one in made] == [(False, False)] * 3
     assert options(taken, SOL) == {socket.SO_RCVBUF: 1 << 20}
     assert options(sent, SOL) == options(unknown, SOL) == {}
     assert options(taken, RAW).keys() == {socket.CAN_RAW_FILTER}
@@ -134,16 +135,17 @@ def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() ->
     eff = 0x80000000
     taken, sent, unknown = filtered(ids)
     assert (0x0CFDD633 | eff, 0x1FFFFFFF | eff) in taken
-    assert {word for word, _ in taken} == {0x0CFDD633 | eff, 0xEE00 << 8 | eff}
-    assert {word for word, _ in sent} == {0xFE30 << 8 | eff}
+    assert taken == {
+        (0x0CFDD633 | eff, 0x1FFFFFFF | eff),
+        (0xEE00 << 8 | eff, 0x03FF0000 | eff),  # to a destination, which is no part of the group
+    }
+    assert sent == {(0xFE30 << 8 | eff, 0x03FFFF00 | eff)}
     assert unknown == {(0x110 | NOT, MASK), (eff | NOT, eff)}
 
 
 def test_services_of_canopen_are_not_unknown() -> None:
-    unknown = filtered(BusRoutes(frozenset(), frozenset(), frozenset(), frozenset(), canopen=True))[
-        2
-    ]
-    assert unknown == {(base | NOT, mask | 0x80000000) for base, mask, _ in socketcan.SERVICES}
+    services = {(base | NOT, mask | 0x80000000) for base, mask, _ in socketcan.SERVICES}
+    assert filtered(replace(IDS, canopen=True))[2] == filtered(IDS)[2] | services
 
 
 def test_in_the_line_nothing_is_unknown() -> None:
@@ -156,9 +158,19 @@ def many(count: int) -> BusRoutes:
     return BusRoutes(frozenset({(0, False)}), frozenset({(1, False)}), frozenset(), known)
 
 
-def test_more_filters_than_the_kernel_takes_are_left_to_the_reader() -> None:
-    assert len(filtered(many(512))[2]) == 512
-    assert filtered(many(513))[2] == {(0 | NOT, MASK), (1 | NOT, MASK)}
+@pytest.mark.parametrize(
+    ("kinds", "more"),
+    [({}, 0), ({"j1939": True}, 1), ({"canopen": True}, 8), ({"j1939": True, "canopen": True}, 9)],
+)
+def test_more_filters_than_the_kernel_takes_are_left_to_the_reader(
+    kinds: dict[str, bool], more: int
+) -> None:
+    """Of J1939 all extended frames are known, of CANopen eight services: a filter each."""
+    assert len(socketcan.SERVICES) == 8
+    for known, used in ((512 - more, 512), (513 - more, 2 + more)):
+        made = [Made(), Made(), Made()]
+        set_filters(made, replace(many(known), **kinds))  # type: ignore[arg-type]
+        assert len(options(made[2], RAW)[socket.CAN_RAW_FILTER]) == 8 * used
 
 
 def test_what_was_opened_is_closed_when_the_interface_is_not_there(made: list[Made]) -> None:
@@ -202,6 +214,29 @@ def test_a_port_of_another_device_says_which_bus_and_why(monkeypatch: pytest.Mon
     assert error.value.bus == "crane"
     assert error.value.why.startswith("expected serial number 1, found 2")
     assert str(error.value) == f"bus crane: {error.value.why}"
+
+
+@pytest.mark.parametrize("ids", [IDS, None])
+def test_a_port_of_socketcan_has_the_name_the_messages_and_the_faults_of_its_bus(
+    monkeypatch: pytest.MonkeyPatch, ids: BusRoutes | None
+) -> None:
+    opened: list[tuple[Bus, BusRoutes | None]] = []
+    pair = socket.socketpair()
+    faults: list[FrameFault] = []
+
+    def opens(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
+        opened.append((bus, ids))
+        return [pair[0]]
+
+    monkeypatch.setattr(bus_module, "open_sockets", opens)
+    port = open_port("crane", BUS, faults.append, ids)
+    assert opened == [(BUS, ids)]
+    assert port.name == "crane"
+    pair[1].send(b"too short")
+    assert list(port.frames()) == []
+    assert faults == [FrameFault.WRONG_LENGTH]
+    for one in pair:
+        one.close()
 
 
 def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -6,7 +6,8 @@ from typing import Any
 import can
 import pytest
 
-from canshaper.bus.port import MOST_FAILURES, Port, open_port
+from canshaper.bus import port as bus_module
+from canshaper.bus.port import MOST_ECHOES, MOST_FAILURES, Port, open_port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 
@@ -20,8 +21,11 @@ class Adapter:
     def __init__(self) -> None:
         self.found: list[can.Message | Exception] = []
         self.always: Exception | None = None
+        self.options: dict[str, Any] = {}
+        self.closed = False
 
-    def recv(self, _timeout: float) -> can.Message | None:
+    def recv(self, timeout_s: float) -> can.Message | None:
+        assert timeout_s == 0  # a tick does not wait
         one = self.found.pop(0) if self.found else self.always
         if isinstance(one, Exception):
             raise one
@@ -32,6 +36,7 @@ class Adapter:
             raise self.always
 
     def shutdown(self) -> None:
+        self.closed = True
         if self.always:
             raise self.always
 
@@ -42,7 +47,12 @@ class Adapter:
 @pytest.fixture
 def adapter(monkeypatch: pytest.MonkeyPatch) -> Adapter:
     made = Adapter()
-    monkeypatch.setattr(can, "Bus", lambda **_options: made)
+
+    def opened(**options: Any) -> Adapter:
+        made.options = options
+        return made
+
+    monkeypatch.setattr(can, "Bus", opened)
     return made
 
 
@@ -78,9 +88,11 @@ def test_a_bus_that_is_gone_is_a_fault_and_no_error(
     adapter.always = error
     assert list(port.frames()) == []
     assert faults == [FrameFault.BUS_ERROR] * MOST_FAILURES
+    assert port.state is BusState.FAILED
     assert not port.send(FRAME)
     assert port.state is BusState.FAILED
     port.close()
+    assert adapter.closed
     adapter.always = None
     adapter.found = [received(FRAME)]
     assert list(port.frames()) == [FRAME]
@@ -89,3 +101,48 @@ def test_a_bus_that_is_gone_is_a_fault_and_no_error(
 
 def test_without_a_file_descriptor_it_is_minus_one(port: Port) -> None:
     assert port.fileno() == -1
+
+
+@pytest.mark.parametrize(
+    ("bitrate", "passed"), [(None, {}), (250_000, {"bitrate": 250_000})], ids=["none", "one"]
+)
+def test_the_bit_rate_of_the_file_is_that_of_the_adapter(
+    adapter: Adapter, bitrate: int | None, passed: dict[str, int]
+) -> None:
+    """Without one it is the adapter's own."""
+    port = open_port("crane", Bus(interface="slcan", channel="x", bitrate=bitrate), lambda _: None)
+    assert port.state is BusState.UP
+    options = {"interface": "slcan", "channel": "x", "ignore_config": True}
+    assert adapter.options == {**options, "receive_own_messages": False, **passed}
+
+
+def test_a_frame_like_one_of_ours_is_that_of_another_sender(adapter: Adapter, port: Port) -> None:
+    """An adapter does not bring back what was sent through it."""
+    assert port.send(FRAME)
+    adapter.found = [received(FRAME)]
+    assert list(port.frames()) == [FRAME]
+
+
+@pytest.fixture
+def multicast(adapter: Adapter, monkeypatch: pytest.MonkeyPatch) -> Port:
+    """A group that brings back what was sent."""
+    monkeypatch.setattr(Adapter, "fileno", lambda _: 9)
+    monkeypatch.setattr(bus_module, "receive_one_group", lambda _fileno: None)
+    config = Bus(interface="udp_multicast", channel="239.1.2.3", network=True)
+    return open_port("crane", config, lambda _: None)
+
+
+def test_what_comes_back_is_ours_once(adapter: Adapter, multicast: Port) -> None:
+    assert multicast.send(FRAME)
+    adapter.found = [received(FRAME), received(FRAME)]
+    assert list(multicast.frames()) == [FRAME]
+
+
+def test_of_what_never_comes_back_no_more_than_a_few_are_kept(
+    adapter: Adapter, multicast: Port
+) -> None:
+    frames = [FRAME._replace(data=n.to_bytes(2, "big")) for n in range(MOST_ECHOES + 1)]
+    for frame in frames:
+        assert multicast.send(frame)
+    adapter.found = [received(frame) for frame in frames]
+    assert list(multicast.frames()) == frames[:1]

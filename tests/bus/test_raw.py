@@ -9,12 +9,9 @@ from typing import Any
 import can
 import pytest
 from can.interfaces.socketcan.socketcan import build_can_frame, dissect_can_frame
-from hypothesis import given
-from hypothesis import strategies as st
 
 from canshaper.bus import raw
 from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
-from canshaper.bus.socketcan import CAN_INV_FILTER, MOST_FILTERS, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
@@ -130,6 +127,64 @@ def test_what_can_wait_does_not_come_with_the_joysticks(line: Line) -> None:
     assert [f.can_id for f in line.port.background()] == [0x200, 0x7F0]
 
 
+def test_no_read_waits_for_a_frame(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A tick has other things to do."""
+    asked: list[int] = []
+    for number, waiting in enumerate(line.port._waiting):
+
+        def waits(timeout_ms: int, ask: Any = waiting) -> Any:
+            asked.append(timeout_ms)
+            return ask(timeout_ms)
+
+        line.port._waiting[number] = waits
+        line.put(message(0x110), number)
+    assert len(line.heard()) == 3
+    assert asked == [0] * 6
+
+
+def test_a_gateway_waits_on_the_socket_of_what_is_taken(line: Line) -> None:
+    assert line.port.fileno() == line.near[TAKEN].fileno()
+
+
+def test_another_deployment_gets_its_own_filters(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    filtered: list[tuple[Any, BusRoutes]] = []
+    monkeypatch.setattr(raw, "set_filters", lambda *to: filtered.append(to))
+    others = BusRoutes(frozenset(), frozenset(), frozenset(), frozenset())
+    line.port.watch("crane", others)
+    assert filtered == [(line.near, others)]
+
+
+def test_what_overflows_of_ids_that_nobody_knows_is_no_fault() -> None:
+    """Frames of others at their own pace: nothing of ours is lost."""
+    faults, _ = overflowing(UNKNOWN)
+    assert faults == []
+
+
+def test_confirmations_may_be_among_the_frames_that_were_lost() -> None:
+    """What was under way is not waited for any more, or a valve would be cut off."""
+    faults, port = overflowing(SENT_BACK)
+    assert faults == [FrameFault.FRAMES_LOST]
+    assert port._unconfirmed == {}
+
+
+def overflowing(number: int) -> tuple[list[FrameFault], RawPort]:
+    """Faults of a port one of whose queues has run over, with a valve's frame under way."""
+    faults: list[FrameFault] = []
+    pairs = [udp_pair() for _ in range(3)]
+    near, far = [near for near, _ in pairs], [far for _, far in pairs]
+    near[SENT_BACK].connect(far[SENT_BACK].getsockname())
+    port = RawPort("crane", lambda _ids: near, IDS, faults.append, confirms=True)
+    assert port.send(VALVE)
+    for _ in range(100):
+        far[number].send(build_can_frame(message(0x110)))
+    assert len([*port.frames(), *port.others()]) < 100
+    for one in (*near, *far):
+        one.close()
+    return faults, port
+
+
 @pytest.mark.parametrize("number", [TAKEN, SENT_BACK])
 def test_a_queue_that_has_run_over_is_told_once_for_each_time(number: int) -> None:
     """On UDP, whose queue overflows as that of a CAN socket does."""
@@ -227,107 +282,3 @@ def test_without_confirmations_nothing_is_said_about_the_bus(
     line = make_line(None)
     assert line.unconfirmed(most=500) == 500
     assert line.port.state is BusState.UP
-
-
-# -- filters ---------------------------------------------------------------------------------------
-
-
-class Filtered(socket.socket):
-    """Keeps the filters that it is given, and asks them as net/can/af_can.c and raw.c do."""
-
-    def setsockopt(self, *arguments: Any) -> None:
-        level, option, value = arguments
-        assert (level, option) == (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER)
-        self.filters = list(struct.iter_unpack("=II", value))
-
-    def hears(self, word: int, *, join: bool) -> bool:
-        found = []
-        for can_id, mask in self.filters:
-            wanted = can_id & ~CAN_INV_FILTER
-            found.append((word & mask == wanted & mask) is not bool(can_id & CAN_INV_FILTER))
-        return all(found) if join else any(found)
-
-
-MESSAGES = st.frozensets(
-    st.one_of(
-        st.tuples(st.integers(0, 0x7FF), st.just(False)),
-        st.tuples(st.integers(0, 0x7FF), st.just(True)),
-        st.tuples(st.integers(0, 2**29 - 1), st.just(True)),
-    ),
-    max_size=8,
-)
-
-
-@given(taken=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
-def test_each_message_is_heard_by_the_socket_that_is_for_it(
-    taken: frozenset[tuple[int, bool]],
-    sent: frozenset[tuple[int, bool]],
-    known: frozenset[tuple[int, bool]],
-    others: frozenset[tuple[int, bool]],
-) -> None:
-    """And by no other one, whatever ids of the two widths are alike."""
-    sent -= taken  # checked with the deployment
-    with Filtered() as first, Filtered() as second, Filtered() as third:
-        set_filters([first, second, third], BusRoutes(taken, sent, sent, known))
-        everything = taken | sent | known | others
-        for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
-            word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
-            heard = [
-                first.hears(word, join=False),
-                second.hears(word, join=False),
-                third.hears(word, join=True),
-            ]
-            message = (can_id, extended)
-            assert heard == [
-                message in taken,
-                message in sent,
-                message not in taken | sent | known,
-            ]
-
-
-def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
-    taken = frozenset({(0x110, False)})
-    for size, heard in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
-        known = frozenset((0x1000 + i, True) for i in range(size))
-        with Filtered() as first, Filtered() as second, Filtered() as third:
-            ids = BusRoutes(taken, frozenset(), frozenset(), known)
-            set_filters([first, second, third], ids)
-            assert len(third.filters) <= MOST_FILTERS
-            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
-            assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
-            assert not third.hears(0x110, join=True)
-
-
-CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
-NODE = BusRoutes(
-    received=frozenset(),
-    sent=IDS.sent,
-    valves=IDS.valves,
-    known=frozenset(),
-    claims=frozenset({(CLAIM.can_id, True)}),
-)
-
-
-def claimed(line: Line, frame: Frame = CLAIM) -> None:
-    """It comes to the socket of what is taken, as every frame of its group does."""
-    line.put(can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data), TAKEN)
-
-
-def test_a_claim_of_ours_that_comes_back_is_no_claim_of_another(
-    make_line: Callable[..., Line],
-) -> None:
-    line = make_line(NODE)
-    assert line.port.send(CLAIM)
-    claimed(line)
-    assert line.heard() == []
-    claimed(line)  # ours came back once; this is of one that has our NAME
-    assert line.heard() == [CLAIM]
-
-
-def test_a_claim_of_another_that_comes_before_ours_is_one(make_line: Callable[..., Line]) -> None:
-    line = make_line(NODE)
-    other = CLAIM._replace(data=bytes(8))
-    assert line.port.send(CLAIM)
-    claimed(line, other)
-    claimed(line)
-    assert line.heard() == [other]

@@ -114,6 +114,14 @@ def test_a_fast_loop_on_a_slow_bus_is_no_fault(line: Line) -> None:
     assert line.faults == []
 
 
+def test_of_several_frames_under_way_a_confirmation_confirms_one(line: Line) -> None:
+    """Two on their way, one confirmed: only two more may follow the one that is left."""
+    assert line.unconfirmed(most=2) == 2
+    line.confirm(VALVE)
+    line.heard()
+    assert line.unconfirmed() == 2
+
+
 def test_a_bus_that_takes_no_frames_gets_no_more(line: Line) -> None:
     assert line.unconfirmed() == 3
     assert line.port.state is BusState.NOT_CONFIRMED
@@ -200,6 +208,7 @@ def test_a_status_message_that_a_driver_has_dropped_is_tried_again(line: Line) -
         refused += 1
         assert refused < 100
     assert (refused - 2) * TICK_NS <= PROBE_NS
+    assert line.unconfirmed(STATUS) == 2  # and the one that was just sent
 
 
 def test_another_deployment_begins_without_the_frames_of_the_last(
@@ -263,6 +272,30 @@ def test_a_passive_controller_still_sends(line: Line, passive: int, better: int)
     line.error(CONTROLLER, better)
     line.heard()
     assert line.port.state is BusState.UP
+
+
+@pytest.mark.parametrize("kind", [0x8, 0x80, 0x200])
+def test_the_state_of_a_controller_counts_in_its_own_class_only(line: Line, kind: int) -> None:
+    """In other classes the byte means something else."""
+    line.error(kind, TX_PASSIVE)
+    line.heard()
+    assert line.port.state is BusState.UP
+    assert line.faults == [FrameFault.ERROR_FRAME]
+
+
+@pytest.mark.parametrize("state", [BusState.PASSIVE, BusState.BUS_OFF, BusState.NOT_CONFIRMED])
+def test_a_frame_that_is_received_does_not_show_that_ours_get_through(
+    line: Line, state: BusState
+) -> None:
+    if state is BusState.NOT_CONFIRMED:
+        line.unconfirmed()
+    else:
+        line.error(*((BUS_OFF,) if state is BusState.BUS_OFF else (CONTROLLER, TX_PASSIVE)))
+    line.put(message(0x110))
+    line.heard()
+    line.put(message(0x110))
+    assert len(line.heard()) == 1
+    assert line.port.state is state
 
 
 def test_passive_is_less_than_bus_off_and_than_not_confirmed(line: Line) -> None:

@@ -1,0 +1,77 @@
+"""Which of the sockets of a bus hears a message, by the filters that they are given."""
+
+import socket
+import struct
+from typing import Any
+
+from hypothesis import given
+from hypothesis import strategies as st
+
+from canshaper.bus.socketcan import CAN_INV_FILTER, MOST_FILTERS, set_filters
+from canshaper.machine.routing import BusRoutes
+
+
+class Filtered(socket.socket):
+    """Keeps the filters that it is given, and asks them as net/can/af_can.c and raw.c do."""
+
+    def setsockopt(self, *arguments: Any) -> None:
+        level, option, value = arguments
+        assert (level, option) == (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER)
+        self.filters = list(struct.iter_unpack("=II", value))
+
+    def hears(self, word: int, *, join: bool) -> bool:
+        found = []
+        for can_id, mask in self.filters:
+            wanted = can_id & ~CAN_INV_FILTER
+            found.append((word & mask == wanted & mask) is not bool(can_id & CAN_INV_FILTER))
+        return all(found) if join else any(found)
+
+
+MESSAGES = st.frozensets(
+    st.one_of(
+        st.tuples(st.integers(0, 0x7FF), st.just(False)),
+        st.tuples(st.integers(0, 0x7FF), st.just(True)),
+        st.tuples(st.integers(0, 2**29 - 1), st.just(True)),
+    ),
+    max_size=8,
+)
+
+
+@given(taken=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
+def test_each_message_is_heard_by_the_socket_that_is_for_it(
+    taken: frozenset[tuple[int, bool]],
+    sent: frozenset[tuple[int, bool]],
+    known: frozenset[tuple[int, bool]],
+    others: frozenset[tuple[int, bool]],
+) -> None:
+    """And by no other one, whatever ids of the two widths are alike."""
+    sent -= taken  # checked with the deployment
+    with Filtered() as first, Filtered() as second, Filtered() as third:
+        set_filters([first, second, third], BusRoutes(taken, sent, sent, known))
+        everything = taken | sent | known | others
+        for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
+            word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
+            heard = [
+                first.hears(word, join=False),
+                second.hears(word, join=False),
+                third.hears(word, join=True),
+            ]
+            message = (can_id, extended)
+            assert heard == [
+                message in taken,
+                message in sent,
+                message not in taken | sent | known,
+            ]
+
+
+def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
+    taken = frozenset({(0x110, False)})
+    for size, heard in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
+        known = frozenset((0x1000 + i, True) for i in range(size))
+        with Filtered() as first, Filtered() as second, Filtered() as third:
+            ids = BusRoutes(taken, frozenset(), frozenset(), known)
+            set_filters([first, second, third], ids)
+            assert len(third.filters) <= MOST_FILTERS
+            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
+            assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
+            assert not third.hears(0x110, join=True)
