@@ -29,7 +29,8 @@ class Wrong:
         self.controller = kind(deployment)
         self.guarded, self.hand = Guarded(self.controller), Hand(deployment)
         self.valve = deployment.axes["slew"].valve
-        self.sound, self.valve.put = self.valve.put, lambda _steps: self.sound(99)  # type: ignore[method-assign]
+        self.runner = self.controller.axes["slew"]
+        self.sound, self.runner._put = self.runner._put, lambda _steps: self.sound(99)
         self.number = 0
 
     def tick(self) -> list[Frame]:
@@ -86,7 +87,7 @@ def test_the_last_frames_are_neutral(name: str) -> None:
 
 def test_what_the_loop_says_reaches_the_controller() -> None:
     wrong = Wrong()
-    wrong.valve.put = wrong.sound  # type: ignore[method-assign]
+    wrong.runner._put = wrong.sound
     (frame,) = wrong.tick()
     assert not wrong.guarded.moves
     assert not wrong.guarded.withhold(frame)

@@ -107,10 +107,10 @@ class Planted:
     def run(self, wrong: Wrong) -> list[Frame]:
         """Plant it with the next command; frames of this valve that leave with it and behind it."""
         codec = self.runner.bound.valve
-        sound, key = codec.put, codec.message.sender.key
+        sound, key = self.runner._put, codec.message.sender.key
 
         def put(steps: int) -> None:
-            codec.put = sound  # type: ignore[method-assign]
+            self.runner._put = sound
             sound(steps)
             wrong(codec.message.raw, self.runner)
 
@@ -122,12 +122,12 @@ class Planted:
                 frames = self.frames if number >= self.at else self.made.frames
                 passed = [self.guarded.receive(f, now_ns) for f in frames[number]]
                 if number == self.at:
-                    codec.put = put  # type: ignore[method-assign]
+                    self.runner._put = put
                     passed = []
                 self.left += [f for f in passed if f]
                 self.left += self.guarded.tick(now_ns)
         finally:
-            codec.put = sound  # type: ignore[method-assign]
+            self.runner._put = sound
         return [frame for frame in self.left if frame[:3] == key]
 
     def caught(self, wrong: Wrong) -> bool:
