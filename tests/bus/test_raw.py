@@ -179,7 +179,7 @@ def overflowing(number: int) -> tuple[list[FrameFault], RawPort]:
     assert port.send(VALVE)
     for _ in range(100):
         far[number].send(build_can_frame(message(0x110)))
-    assert len([*port.frames(), *port.others()]) < 100
+    assert len([*port.frames(), *port.background()]) < 100
     for one in (*near, *far):
         one.close()
     return faults, port
