@@ -1,5 +1,6 @@
 """Codecs of joysticks, valves and status, judged by plain cantools."""
 
+import pickle
 import struct
 from pathlib import Path
 from typing import Any
@@ -14,7 +15,7 @@ from canshaper.codec.codecs import JoystickCodec, Sender
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.signals import VelocitySignal
-from canshaper.codec.status import AXIS_STATUS, SERVICE_STATUS, StatusCodec
+from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, StatusCodec
 from canshaper.codec.valve import ValveCodec, ValveMessage
 from canshaper.errors import WrongLengthError
 from canshaper.shaping.states import Reason, State
@@ -347,6 +348,11 @@ def test_a_status_is_decoded_as_it_was_encoded() -> None:
         "ActiveSet": 3,
     }
     assert codec.decode(b"") is None
+
+
+def test_a_status_can_be_sent_to_another_process() -> None:
+    for table in (AXIS_STATUS, SERVICE_STATUS, IDENTITY):
+        assert [one.name for one in pickle.loads(pickle.dumps(table))] == [o.name for o in table]
 
 
 def test_a_code_of_another_version_is_shown_by_its_number() -> None:
