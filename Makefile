@@ -8,6 +8,7 @@
 # make paper   the paper's figures and numbers beside ours, in out/paper
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
+# make generate   value tables of the DBC files and the tables of docs/states.md, from the program
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
 .PHONY: demo test quick versions test-others test-long test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
@@ -141,6 +142,10 @@ deb:
 # Newer versions for the package: tools/deb/*requirements.txt
 lock:
 	tools/lock.sh
+
+.PHONY: generate
+generate: .venv/test-ready
+	.venv/bin/python tools/generate.py
 
 clean:
 	rm -rf .venv out dist .mypy_cache .pytest_cache .ruff_cache .hypothesis

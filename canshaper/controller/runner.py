@@ -15,7 +15,7 @@ from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.states import Reason, State, StickInput, Transition
+from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
 
 if TYPE_CHECKING:
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
 FOREIGN_NS = 1_000_000_000
-# Reasons from here on are for neutral at once.
-TRIPS = Reason.ENABLE_LOST
 
 
 class StickSource(Protocol):
@@ -231,7 +229,7 @@ class AxisRunner:
         neutral, fault = self.axis.neutral, None
         for interlock in self._interlocks:
             found = interlock(neutral, now_ns)
-            if found is not None and found >= TRIPS:
+            if found is not None and REACTION_OF[found] is Reaction.NEUTRAL:
                 trip = trip or found
             else:
                 fault = fault or found

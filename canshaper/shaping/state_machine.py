@@ -4,7 +4,7 @@ Nothing but MOVING states may give anything but neutral, and a MOVING state is e
 READY, which takes a fresh, valid, enabled stick seen in neutral.
 """
 
-from canshaper.shaping.states import MOVING, Reason, State, StickInput
+from canshaper.shaping.states import MOVING, TRANSITIONS, Reason, State, StickInput
 
 # A member by way of its class takes ten times as long as a name, and a tick looks at many.
 NEUTRAL_WAIT, READY, ACTIVE, BYPASS_ON, STOPPING, TRIPPED = State
@@ -51,11 +51,11 @@ class StateMachine:
         """
         if state in MOVING:
             raise ValueError(f"state: expected one with neutral output, got {state.name}")
-        self._go(state, reason)
+        self.state, self.reason = state, reason
 
     def trip(self, reason: Reason) -> None:
         """Neutral and latched, for a reason that is not in the input."""
-        self._go(TRIPPED, reason)
+        self.state, self.reason = TRIPPED, reason
 
     def hold(self, ticks: int) -> None:
         """So many ticks were missed: they lengthen no stop."""
@@ -147,4 +147,10 @@ class StateMachine:
             self._go(NEUTRAL_WAIT, Reason.STOP_DONE)
 
     def _go(self, state: State, reason: Reason) -> None:
+        """The one place where an input changes the state.
+
+        A change that is not declared is a fault of the program: neutral and latched.
+        """
+        if reason not in TRANSITIONS.get((self.state, state), ()):
+            state = TRIPPED
         self.state, self.reason = state, reason

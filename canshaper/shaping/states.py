@@ -1,11 +1,13 @@
 """States of an axis, the reasons for which it enters them, and what it decides on.
 
-The numbers are those of the status frames; the DBC files carry the same tables. State names follow
-OPC 40020-1 where it has one (BYPASS_ON).
+The numbers are those of the status frames; ``make generate`` writes the tables of the DBC files and
+of docs/states.md from here. A new reason is a member here and a row in ``reasons.py``. State names
+follow OPC 40020-1 where it has one (BYPASS_ON).
 """
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from enum import IntEnum
+from enum import Enum, IntEnum
 from typing import NamedTuple
 
 
@@ -69,6 +71,52 @@ class Reason(IntEnum):
     ADDRESS_LOST = 71
     VALVE_FAULT = 72
     OUTPUT_REFUSED = 73
+
+
+class Reaction(Enum):
+    """What a reason does to an axis."""
+
+    NONE = "none"
+    """It is no fault: what the driver does, or what is waited for."""
+    SHAPED_STOP = "shaped stop"
+    """At rest the axis stays there; in motion it stops through the filter, bounded in time."""
+    NEUTRAL = "neutral at once"
+    """Neutral in the same tick, and latched."""
+
+
+REACTION_OF: Mapping[Reason, Reaction] = {
+    reason: Reaction.NEUTRAL
+    if reason >= Reason.ENABLE_LOST
+    else (Reaction.SHAPED_STOP if reason >= Reason.STICK_TIMEOUT else Reaction.NONE)
+    for reason in Reason
+}
+"""By the number, so that who reads a log knows it without this table."""
+
+_STOPS, _TRIPS = (
+    frozenset(reason for reason, reaction in REACTION_OF.items() if reaction is kind)
+    for kind in (Reaction.SHAPED_STOP, Reaction.NEUTRAL)
+)
+
+TRANSITIONS: Mapping[tuple[State, State], frozenset[Reason]] = {
+    (State.NEUTRAL_WAIT, State.READY): frozenset({Reason.STICK_NEUTRAL}),
+    (State.READY, State.NEUTRAL_WAIT): _STOPS | {Reason.ENABLE_OFF, Reason.EMERGENCY_STOP_LOST},
+    (State.READY, State.ACTIVE): frozenset({Reason.STICK_MOVED, Reason.COMPENSATING}),
+    (State.READY, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
+    (State.ACTIVE, State.READY): frozenset({Reason.AT_REST}),
+    (State.ACTIVE, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
+    (State.ACTIVE, State.STOPPING): _STOPS,
+    (State.BYPASS_ON, State.READY): frozenset({Reason.AT_REST}),
+    (State.BYPASS_ON, State.ACTIVE): frozenset({Reason.BYPASS_RELEASED}),
+    (State.BYPASS_ON, State.STOPPING): _STOPS - {Reason.LOOP_OVERRUN},
+    (State.STOPPING, State.NEUTRAL_WAIT): frozenset({Reason.STOP_DONE}),
+    (State.NEUTRAL_WAIT, State.TRIPPED): _TRIPS - {Reason.ENABLE_LOST},
+    (State.READY, State.TRIPPED): _TRIPS - {Reason.ENABLE_LOST},
+    (State.ACTIVE, State.TRIPPED): _TRIPS,
+    (State.BYPASS_ON, State.TRIPPED): _TRIPS,
+    (State.STOPPING, State.TRIPPED): _TRIPS,
+    (State.TRIPPED, State.NEUTRAL_WAIT): frozenset({Reason.RESET}),
+}
+"""Every change of state with the reasons for which it may happen; there is no other."""
 
 
 class StickInput(NamedTuple):

@@ -9,9 +9,10 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.shaping.states import Reason, State
 from canshaper.studio.view import SILENT_S, CraneView
-from canshaper.studio.words import FAULTS, REASONS, STATES, fault_words, reason_words, state_words
+from canshaper.studio.words import FAULTS, fault_words, reason_words, state_words
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.hand import Hand, Held
@@ -191,7 +192,7 @@ def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
 
 
 def test_every_state_reason_and_fault_has_words() -> None:
-    assert STATES.keys() == {*State} and REASONS.keys() == {*Reason}
+    assert STATE_TEXTS.keys() == {*State} and REASON_TEXTS.keys() == {*Reason}
     assert FAULTS.keys() == {*FrameFault}
     assert state_words(15) == "state 15"
     assert reason_words(99) == "reason 99"

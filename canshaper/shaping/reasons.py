@@ -1,0 +1,247 @@
+"""Reasons and states in words: for the page, the monitor and docs/states.md."""
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+from canshaper.shaping.states import Reason, State
+
+
+class ReasonText(NamedTuple):
+    """A reason in words.
+
+    Attributes:
+        words: a few, for a display.
+        cause: when the axis has this reason.
+        remedy: what helps; the way back.
+    """
+
+    words: str
+    cause: str
+    remedy: str = ""
+
+
+class StateText(NamedTuple):
+    """A state in words.
+
+    Attributes:
+        words: a few, for a display.
+        valve: what the valve gets.
+        meaning: what the axis does.
+    """
+
+    words: str
+    valve: str
+    meaning: str
+
+
+REASON_TEXTS: Mapping[Reason, ReasonText] = {
+    Reason.START: ReasonText(
+        "nothing received yet",
+        "nothing received yet",
+        "joysticks on, bus up",
+    ),
+    Reason.STICK_NEUTRAL: ReasonText(
+        "stick in neutral",
+        "the stick is valid, fresh, enabled and in neutral",
+    ),
+    Reason.STICK_MOVED: ReasonText(
+        "stick moved",
+        "the stick was moved out of neutral",
+    ),
+    Reason.AT_REST: ReasonText(
+        "at rest",
+        "the stick is in neutral, neutral is sent, and the tail is over",
+    ),
+    Reason.BYPASS_REQUESTED: ReasonText(
+        "anti-sway is off",
+        "the anti-sway switch is off and the stick is moved",
+    ),
+    Reason.BYPASS_RELEASED: ReasonText(
+        "anti-sway is on again",
+        "the anti-sway switch is on again",
+    ),
+    Reason.STOP_DONE: ReasonText(
+        "stopped",
+        "stopped, or `stop_s` is over",
+        "stick in neutral; the cause is in the log",
+    ),
+    Reason.RESET: ReasonText(
+        "reset",
+        "a trip was reset: its cause is gone, the stick valid and in neutral, and then "
+        "came a rising edge of reset or enable",
+    ),
+    Reason.COMPENSATING: ReasonText(
+        "moves for slewing, without its own stick",
+        "another axis asks this one for compensation: it moves without its own "
+        'joystick, within the bounds of [safety.md](safety.md), "Added velocity"',
+    ),
+    Reason.STICK_NOT_NEUTRAL: ReasonText(
+        "let go of the stick",
+        "the stick is deflected before the axis is ready",
+        "let go of the stick",
+    ),
+    Reason.ENABLE_OFF: ReasonText(
+        "enable is off",
+        "enable switch off",
+        "press enable with the stick in neutral",
+    ),
+    Reason.STICK_TIMEOUT: ReasonText(
+        "no joystick message",
+        "no joystick message within `timeout_ms`",
+        "bus, joystick",
+    ),
+    Reason.STICK_ERROR: ReasonText(
+        "the joystick tells an error",
+        "the signal carries its error code",
+        "joystick",
+    ),
+    Reason.STICK_NOT_AVAILABLE: ReasonText(
+        "the stick is not available",
+        "the signal carries its not-available code",
+        "joystick, DBC",
+    ),
+    Reason.STICK_OUT_OF_RANGE: ReasonText(
+        "the stick is out of range",
+        "beyond the range of the DBC",
+        "joystick, DBC",
+    ),
+    Reason.STICK_NOT_A_NUMBER: ReasonText(
+        "the stick is no number",
+        "a float signal without a number",
+        "joystick",
+    ),
+    Reason.SWITCH_INVALID: ReasonText(
+        "a switch is invalid",
+        "enable is neither 0 nor 1",
+        "joystick",
+    ),
+    Reason.STICK_CONTRADICTORY: ReasonText(
+        "flags and stick do not agree",
+        "direction flags and position do not agree, or a rocker is pressed both ways",
+        "joystick, DBC",
+    ),
+    Reason.STICK_FROZEN: ReasonText(
+        "the stick has not changed for too long",
+        "the stick is deflected and has not changed for longer than `stuck_s`",
+        "move the stick, then neutral; joystick",
+    ),
+    Reason.STICK_UNTRUSTED: ReasonText(
+        "joystick messages are not right",
+        "joystick messages come, but their checksum is wrong or their alive counter "
+        "repeats or jumps; or too few good ones for `qualify`",
+        "joystick, a gateway that repeats, two senders of one id",
+    ),
+    Reason.LOOP_OVERRUN: ReasonText(
+        "the daemon is too late",
+        "ten ticks in a row came a deadline or more too late, or more than one in six "
+        "for long; over after fifty punctual ones. An axis in BYPASS_ON goes on: late "
+        "ticks spoil a filter, and there is none",
+        "load of the PC",
+    ),
+    Reason.ADDRESS_NOT_CLAIMED: ReasonText(
+        "our address is being claimed",
+        "our address on the bus of the valve is claimed and waited for: 250 ms after "
+        "the start, an outage, a stall or a reload with another address or bus",
+        "nothing; else the bus",
+    ),
+    Reason.NODE_FAULT: ReasonText(
+        "a CANopen node is not operational",
+        "CANopen: the node of the joystick or, at rest, of the valve is not "
+        "operational, not heard, or tells an emergency",
+        "the log names node and code; see [canopen.md](canopen.md)",
+    ),
+    Reason.VALVE_NOT_READY: ReasonText(
+        "the valve is not ready",
+        "a valve of CiA 408 is being brought to work, or has a fault, or its status "
+        "word is not heard",
+        "nothing; else the valve",
+    ),
+    Reason.ENABLE_LOST: ReasonText(
+        "enable released in motion",
+        "enable released in motion",
+        "press enable again with the stick in neutral",
+    ),
+    Reason.OUTPUT_INVALID: ReasonText(
+        "the filter gave no number",
+        "the filter gave no number",
+        "report it; reset",
+    ),
+    Reason.SEND_FAILED: ReasonText(
+        "a valve frame did not go out",
+        "the valve frame did not go out in motion",
+        "bus, queue; reset",
+    ),
+    Reason.LOOP_STALLED: ReasonText(
+        "the daemon stood still",
+        "the loop stood still for longer than the shortest `timeout_ms` of a joystick, a valve or "
+        "the emergency stop; a valve that gets a frame in every n-th tick only may have waited for "
+        "n - 1 ticks before, which are taken off its own",
+        "load of the PC; reset",
+    ),
+    Reason.EMERGENCY_STOP: ReasonText(
+        "emergency stop",
+        "the emergency stop on the bus is pressed, or was for a moment",
+        "release it; reset",
+    ),
+    Reason.EMERGENCY_STOP_LOST: ReasonText(
+        "emergency stop not heard",
+        "no good message of the emergency stop within its `timeout_ms`. In motion "
+        "latched; at rest it is waited for",
+        "its sender, bus; reset",
+    ),
+    Reason.SECOND_SENDER: ReasonText(
+        "somebody else commands this valve",
+        "a frame with the id of this axis' valve, in J1939 with its group, came from somebody else",
+        "end the other one; reset after 1 s without its frames",
+    ),
+    Reason.ADDRESS_LOST: ReasonText(
+        "another node has our address",
+        "another node with a lower NAME, or with ours, has claimed our address; we are silent",
+        "end it, or change address or NAME; reload",
+    ),
+    Reason.VALVE_FAULT: ReasonText(
+        "the valve tells a fault",
+        "a valve of CANopen in motion left its state active, told an emergency, "
+        "restarted, or was not heard",
+        "the valve, see [canopen.md](canopen.md); reset",
+    ),
+    Reason.OUTPUT_REFUSED: ReasonText(
+        "the output guard refused a command",
+        "the output guard refused a frame of this valve: beyond a limit, or not asked "
+        "for; the log says which",
+        "report it with the log; reset",
+    ),
+}
+
+STATE_TEXTS: Mapping[State, StateText] = {
+    State.NEUTRAL_WAIT: StateText(
+        "waiting for neutral",
+        "neutral",
+        "waits for a valid, enabled stick in neutral; the reason says what is missing",
+    ),
+    State.READY: StateText(
+        "ready",
+        "neutral",
+        "the next movement of the stick moves the axis",
+    ),
+    State.ACTIVE: StateText(
+        "moving, shaped",
+        "shaped",
+        "the stick drives the axis through the filter; also the run-on after release",
+    ),
+    State.BYPASS_ON: StateText(
+        "moving, unshaped",
+        "limited",
+        "the stick drives the axis through the output limits only",
+    ),
+    State.STOPPING: StateText(
+        "stopping",
+        "shaped",
+        "the input is lost or invalid: command to zero through the filter",
+    ),
+    State.TRIPPED: StateText(
+        "tripped: neutral",
+        "neutral",
+        "neutral at once, latched",
+    ),
+}

@@ -1,0 +1,76 @@
+"""What is generated from the program is current, and a new reason reaches all of it."""
+
+import runpy
+from enum import IntEnum
+from pathlib import Path
+from typing import Any
+
+import cantools
+import pytest
+
+from canshaper.codec.frame import FrameFault
+from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
+from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+
+ROOT = Path(__file__).parents[2]
+generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))
+GENERATED: dict[Path, str] = generate["generated"](ROOT)
+ADDED = IntEnum("Reason", {**{one.name: int(one) for one in Reason}, "HOSE_BURST": 74})  # type: ignore[misc]
+
+
+@pytest.mark.parametrize("path", GENERATED, ids=[path.name for path in GENERATED])
+def test_files_are_as_generated(path: Path) -> None:
+    assert path.read_text(encoding="utf-8") == GENERATED[path], "run make generate"
+
+
+@pytest.mark.parametrize("path", sorted((ROOT / "dbc").glob("*.dbc")), ids=lambda path: path.name)
+def test_every_status_of_a_dbc_has_the_tables_of_the_program(path: Path) -> None:
+    database: Any = cantools.database.load_file(path)
+    for message in database.messages:
+        names = {signal.name: signal for signal in message.signals}
+        kinds: dict[str, type[IntEnum]] = {}
+        if {"State", "Reason", "ShapedCommand"} <= names.keys():
+            kinds |= {"State": State, "Reason": Reason}
+        if "LastFault" in names:
+            kinds |= {"LastFault": FrameFault}
+        for name, kind in kinds.items():
+            table = {number: str(text) for number, text in names[name].choices.items()}
+            assert table == {int(one): one.name for one in kind}
+
+
+def test_a_reason_that_is_added_reaches_dbc_and_page() -> None:
+    text = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="utf-8")
+    new = generate["with_value_tables"](text, {"Reason": ADDED})
+    assert new.count('74 "HOSE_BURST" ;') == text.count('73 "OUTPUT_REFUSED" ;')
+    texts = {**REASON_TEXTS, 74: ReasonText("a hose burst", "no pressure", "a new hose")}
+    rows = list(generate["reason_rows"](ADDED, texts))
+    assert rows[-1] == "| 74 | HOSE_BURST | no pressure | a new hose |"
+    page = "a\n<!-- generated: reasons -->\nLAST YEAR\n<!-- end: reasons -->\nb\n"
+    written = generate["with_sections"](page, {"reasons": rows})
+    assert rows[-1] in written
+    assert "LAST YEAR" not in written
+    assert written.startswith("a\n") and written.endswith("\nb\n")
+
+
+def test_a_valve_state_of_another_message_keeps_its_table() -> None:
+    text = 'VAL_ 5 State 0 "Block" 1 "Extend" ;\n'
+    assert generate["with_value_tables"](text, {"State": State}) == text
+
+
+def test_every_reason_and_state_has_its_texts() -> None:
+    assert REASON_TEXTS.keys() == {*Reason}
+    assert STATE_TEXTS.keys() == {*State}
+    assert all(text.words and text.cause for text in REASON_TEXTS.values())
+
+
+def test_the_reaction_is_told_by_the_number() -> None:
+    assert REACTION_OF.keys() == {*Reason}
+    for reason, reaction in REACTION_OF.items():
+        kinds = [Reaction.NONE, Reaction.SHAPED_STOP, Reaction.NEUTRAL]
+        assert reaction is kinds[int(reason) // 32]
+
+
+def test_the_page_names_every_transition() -> None:
+    text = GENERATED[ROOT / "docs" / "states.md"]
+    for old, new in TRANSITIONS:
+        assert f"    {old.name} --> {new.name}: " in text

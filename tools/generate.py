@@ -1,0 +1,117 @@
+"""Write what is declared in the program into the files that repeat it: ``make generate``.
+
+Value tables of the DBC files and the tables of docs/states.md come from the enumerations of states,
+reasons and faults, from their texts and from the transitions.
+"""
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from enum import IntEnum
+from pathlib import Path
+from typing import TypeVar
+
+from canshaper.codec.frame import FrameFault
+from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
+from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+
+Key = TypeVar("Key", bound=IntEnum)
+ROOT = Path(__file__).parents[1]
+TABLES: Mapping[str, type[IntEnum]] = {"State": State, "Reason": Reason, "LastFault": FrameFault}
+
+
+def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:
+    """Text of a DBC file with the members of enumerations in its value tables.
+
+    Args:
+        dbc: the text.
+        tables: enumerations by the signals that carry them; a signal of that name whose table
+            begins with another word is one of another message.
+    """
+    for signal, kind in tables.items():
+        (first, *_), rows = kind, " ".join(f'{int(m)} "{m.name}"' for m in kind)
+        table = re.compile(rf'^(VAL_ \d+ {signal}) {int(first)} "{first.name}" .*;$', re.MULTILINE)
+        dbc = table.sub(lambda found, rows=rows: f"{found[1]} {rows} ;", dbc)  # type: ignore[misc]
+    return dbc
+
+
+def with_sections(page: str, sections: Mapping[str, Iterable[str]]) -> str:
+    """Text of a page with the lines of its generated sections, by their names."""
+    for name, lines in sections.items():
+        begin, end = f"<!-- generated: {name} -->\n", f"<!-- end: {name} -->\n"
+        before, _, rest = page.partition(begin)
+        _, _, after = rest.partition(end)
+        page = before + begin + "\n" + "".join(f"{line}\n" for line in lines) + "\n" + end + after
+    return page
+
+
+def state_rows() -> Iterator[str]:
+    """Table of the states."""
+    yield "| no. | state | valve | meaning |"
+    yield "|---|---|---|---|"
+    for state, text in STATE_TEXTS.items():
+        yield f"| {int(state)} | {state.name} | {text.valve} | {text.meaning} |"
+
+
+def diagram() -> Iterator[str]:
+    """The transitions as a diagram."""
+    yield "```mermaid"
+    yield "stateDiagram-v2"
+    yield "    [*] --> NEUTRAL_WAIT"
+    for (old, new), reasons in TRANSITIONS.items():
+        yield f"    {old.name} --> {new.name}: {_names(reasons, ', ')}"
+    yield "```"
+
+
+def transition_rows() -> Iterator[str]:
+    """Table of the transitions."""
+    yield "| from | to | reason |"
+    yield "|---|---|---|"
+    rows: dict[tuple[State, frozenset[Reason]], list[str]] = {}
+    for (old, new), reasons in TRANSITIONS.items():
+        rows.setdefault((new, reasons), []).append(old.name)
+    for (new, reasons), olds in rows.items():
+        yield f"| {', '.join(olds)} | {new.name} | {_names(reasons, '; ')} |"
+
+
+def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iterator[str]:
+    """Table of the reasons."""
+    yield "| no. | reason | meaning | what helps |"
+    yield "|---|---|---|---|"
+    for reason in reasons:
+        text = texts[reason]
+        yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} |"
+
+
+def _names(reasons: frozenset[Reason], between: str) -> str:
+    """Reasons by name; most of a kind as that kind, with those that are missing."""
+    words = []
+    for reaction in (Reaction.SHAPED_STOP, Reaction.NEUTRAL):
+        kind = {reason for reason, one in REACTION_OF.items() if one is reaction}
+        if len(kind & reasons) > len(kind) / 2:
+            missing = "".join(f", but {one.name}" for one in sorted(kind - reasons))
+            words.append(f"any reason for: {reaction.value}{missing}")
+            reasons -= kind
+    return between.join([*words, *(reason.name for reason in sorted(reasons))])
+
+
+def generated(root: Path) -> dict[Path, str]:
+    """Texts of all files with generated parts, as they should be."""
+    files = {
+        path: with_value_tables(path.read_text(encoding="utf-8"), TABLES)
+        for path in sorted((root / "dbc").glob("*.dbc"))
+    }
+    page = root / "docs" / "states.md"
+    sections = {
+        "states": state_rows(),
+        "diagram": diagram(),
+        "transitions": transition_rows(),
+        "reasons": reason_rows(Reason, REASON_TEXTS),
+    }
+    return {**files, page: with_sections(page.read_text(encoding="utf-8"), sections)}
+
+
+if __name__ == "__main__":
+    for path, text in generated(ROOT).items():
+        if path.read_text(encoding="utf-8") != text:
+            path.write_text(text, encoding="utf-8")
+            print(f"written: {path.relative_to(ROOT)}")
