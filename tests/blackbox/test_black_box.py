@@ -19,12 +19,13 @@ from canshaper.blackbox.records import RECORD, Kind, records
 from canshaper.blackbox.ring import BLOCK, Ring
 from canshaper.blackbox.state import States
 from canshaper.cli.app import app
+from canshaper.codec.frame import BusState
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
-from tests.daemon.test_reload import Bench
+from tests.daemon.test_reload import Bench, FakePort
 from tests.rigs.forwarder import ROOT
 
 SECOND = 50  # ticks
@@ -181,6 +182,40 @@ def inside(box: Path, folder: Path) -> Path:
     path = folder / write.BOX
     path.write_bytes(zipfile.ZipFile(box).read(write.BOX))
     return path
+
+
+def test_frames_that_were_not_sent_are_not_sent_again(
+    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The axis trips in the replay as it did then; a bus that is off, and its faults, count too."""
+    folder = tmp_path / "boxes"
+    folder.mkdir()
+    off: list[str] = []
+    on_bus_off = Controller.on_bus_off
+
+    def counted(controller: Controller, bus: str) -> None:
+        off.append(bus)
+        on_bus_off(controller, bus)
+
+    monkeypatch.setattr(Controller, "on_bus_off", counted)
+    send, joysticks, numbers = FakePort.send, bench.joysticks, iter(range(10_000))
+
+    def before(**raw: int) -> None:
+        number = next(numbers)
+        bench.ports[0].state = BusState.BUS_OFF if 60 <= number < 70 else BusState.UP
+        joysticks(**raw)
+
+    monkeypatch.setattr(bench, "joysticks", before)
+    monkeypatch.setattr(
+        FakePort,
+        "send",
+        lambda port, frame: port.state is BusState.UP and send(port, frame),
+    )
+    drive(bench, folder, 8 * SECOND, trips=())
+    assert len(off) == 10
+    text = replayed(folder / "machine-0001.zip", "--verify", "--out", tmp_path / "out")
+    assert "state=TRIPPED from=ACTIVE reason=SEND_FAILED" in text
+    assert len(off) == 20
 
 
 # -- files that are not as they were written ---------------------------------------------------
