@@ -44,11 +44,11 @@ class Checksum:
         """The bytes of a frame in which no bit of it lies."""
         return data[: self.byte] + data[self.byte + (CHECKSUMS[self.kind].bits + 7) // 8 :]
 
-    def right(self, data: bytes) -> bool:
+    def verify(self, data: bytes) -> bool:
         """Whether a frame has the checksum that it should."""
-        return self.seal(data, 0) == data
+        return self.protect(data, 0) == data
 
-    def seal(self, data: bytes, count: int) -> bytes:
+    def protect(self, data: bytes, count: int) -> bytes:
         """The same frame with its checksum; the counter is one of its signals."""
         row, first, order = CHECKSUMS[self.kind], self.byte, self.order
         bits = row.bits

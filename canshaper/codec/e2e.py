@@ -34,12 +34,12 @@ class E2e:
     def __hash__(self) -> int:
         return hash(type(self))
 
-    def right(self, data: bytes) -> bool:
+    def verify(self, data: bytes) -> bool:
         """Whether a frame of two bytes or more has the header that it should."""
         count = data[1] & COUNTER
         return count < self.counts and data[0] == self.crc(data, count)
 
-    def seal(self, data: bytes, count: int) -> bytes:
+    def protect(self, data: bytes, count: int) -> bytes:
         """The same frame with its header."""
         data = bytes((0, self.second(data[1], count))) + data[2:]
         return bytes((self.crc(data, count),)) + data[1:]
@@ -86,11 +86,11 @@ class Profile1(E2e):
         self._nibble = (high & 0x0F) << 4 if mode == "nibble" else None
         self.bits = 12 if self._nibble is None else 16
 
-    def right(self, data: bytes) -> bool:
+    def verify(self, data: bytes) -> bool:
         """Whether header and sent part of the data ID are what they should be."""
         if self._nibble is not None and data[1] & 0xF0 != self._nibble:
             return False
-        return super().right(data)
+        return super().verify(data)
 
     def second(self, byte: int, count: int) -> int:
         """Byte 1 with this counter, and the part of the data ID that is sent."""

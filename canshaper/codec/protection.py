@@ -34,7 +34,7 @@ UNPROTECTED = Protection()
 
 
 class Protector:
-    """Protects the frames of one message that is sent: the next counter, and the check anew.
+    """Protects the frames of one message that is sent: the next counter, and its check.
 
     Args:
         protection: that of the message.
@@ -61,9 +61,9 @@ class Protector:
         Raises:
             OverflowError: a value is not within the bits of its signal.
         """
-        return self.seal(self.unsealed(raw))
+        return self.add_check(self.without_check(raw))
 
-    def unsealed(self, raw: dict[str, Any]) -> bytes:
+    def without_check(self, raw: dict[str, Any]) -> bytes:
         """The next frame, as ``protect``, without its check."""
         if self._counts:
             self._count = (self._count + 1) % self._counts
@@ -75,13 +75,13 @@ class Protector:
         """The last frame did not leave: the next one has its count."""
         self._count = (self._count - 1) % self._counts if self._counts else 0
 
-    def seal(self, data: bytes) -> bytes:
+    def add_check(self, data: bytes) -> bytes:
         """The same frame with the check of the count it has come to."""
-        return data if self._check is None else self._check.seal(data, self._count)
+        return data if self._check is None else self._check.protect(data, self._count)
 
 
-class Guard:
-    """Judges the frames of one message that is taken.
+class SequenceChecker:
+    """Checks the sequence and the content of the frames of one message that is received.
 
     Args:
         protection: that of the message.
@@ -100,30 +100,30 @@ class Guard:
         self._in_header = isinstance(protection.check, E2e)
         self._qualify = qualify
         self._last: int | None = None
-        self._anew = True
+        self._resynced = True
         self._good = 0
         self.qualified = False
 
     def copy_state(self, before: Self) -> None:
         """Continue the sequence of the same message, where its protection is the same."""
         if self._protection == before._protection:
-            self._last, self._anew, self._good = before._last, before._anew, before._good
+            self._last, self._resynced, self._good = before._last, before._resynced, before._good
             self.qualified = self._good >= self._qualify
 
-    def begin_anew(self) -> None:
+    def resync(self) -> None:
         """The sender was silent: its next counter may be any but the last one."""
-        self._anew = True
-        self._qualify_anew()
+        self._resynced = True
+        self._requalify()
 
-    def judge(self, data: bytes, count: int) -> FrameFault:
+    def check(self, data: bytes, count: int) -> FrameFault:
         """What is wrong with a frame of the right length.
 
         Args:
             data: its bytes.
             count: value of its alive counter; E2E has one of its own, which counts instead.
         """
-        if self._check is not None and not self._check.right(data):
-            self._qualify_anew()
+        if self._check is not None and not self._check.verify(data):
+            self._requalify()
             return FrameFault.CHECKSUM
         if self._range:
             if self._in_header:
@@ -134,15 +134,15 @@ class Guard:
                 step = (count - last) % self._range
                 if step == 0:
                     return FrameFault.COUNTER_REPEATED
-                if step > self._max_step and not self._anew:
-                    self._qualify_anew()
+                if step > self._max_step and not self._resynced:
+                    self._requalify()
                     return FrameFault.COUNTER_JUMP
-            self._anew = False
+            self._resynced = False
         if not self.qualified:
             self._good += 1
             self.qualified = self._good >= self._qualify
         return GOOD
 
-    def _qualify_anew(self) -> None:
+    def _requalify(self) -> None:
         self._good = 0
         self.qualified = False

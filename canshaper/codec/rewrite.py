@@ -57,10 +57,10 @@ class RewrittenMessage(ValveMessage):
 
     def onto(self, data: bytes) -> Frame:
         """The next frame: this one of the joystick with our velocities, protected anew."""
-        ours = int.from_bytes(self._protector.unsealed(self.raw), "little") & self._mask_of_all
+        ours = int.from_bytes(self._protector.without_check(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
-        sealed = self._protector.seal(word.to_bytes(self._length, "little"))
-        return new_frame(Frame, (self.bus, self._id, self._extended, sealed))
+        protected = self._protector.add_check(word.to_bytes(self._length, "little"))
+        return new_frame(Frame, (self.bus, self._id, self._extended, protected))
 
     def instead(self, frame: Frame) -> Frame:
         """The same frame with what the axes have put in now, and with the same count."""

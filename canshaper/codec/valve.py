@@ -26,7 +26,7 @@ class ValveMessage:
         self.bus, self._id, self._extended = sender.key
         # Where there is nothing to seal: a call less on the way of every frame.
         protector = sender.protector
-        self._next = protector.protect if sender.protection.check else protector.unsealed
+        self._next = protector.protect if sender.protection.check else protector.without_check
 
     def frame(self) -> Frame:
         """The next frame, protected, with what its axes have put in."""

@@ -134,7 +134,7 @@ class GuardedStop(GuardedInput):
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if len(data) == self._length and not (self._check and not self._check.right(data)):
+        if len(data) == self._length and not (self._check and not self._check.verify(data)):
             self.heard_ns = now_ns
             self.pressed = int.from_bytes(data, "little") & self._bits != 0
             if self.pressed:
@@ -184,7 +184,7 @@ class GuardedJoystick(GuardedInput):
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if len(data) != self._length or (self._check and not self._check.right(data)):
+        if len(data) != self._length or (self._check and not self._check.verify(data)):
             return
         part = data[self._span]
         if part != self._part:

@@ -40,7 +40,7 @@ class Input(ABC):
 
     def __init__(self, bound: BoundInput) -> None:
         self._codec = bound.codec
-        self._guard = bound.guard()
+        self._sequence = bound.sequence_checker()
         self._counter = bound.protection.counter
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
         self._last_frame_ns: int | None = None
@@ -55,15 +55,15 @@ class Input(ABC):
             raw, commands = self._codec.decode(data)
         except WrongLengthError:
             return FrameFault.WRONG_LENGTH
-        guard = self._guard
+        sequence = self._sequence
         if self._last_frame_ns is None or arrived_ns - self._last_frame_ns > self._timeout_ns:
-            guard.begin_anew()
-        fault = guard.judge(data, raw[self._counter] if self._counter else 0)
+            sequence.resync()
+        fault = sequence.check(data, raw[self._counter] if self._counter else 0)
         if fault is CHECKSUM:
             self._refused_ns = arrived_ns
             return fault
         self._last_frame_ns = arrived_ns
-        accepted = guard.qualified and not fault
+        accepted = sequence.qualified and not fault
         content = self.on_frame(raw, commands, arrived_ns, accepted)
         if not accepted:
             self._refused_ns = arrived_ns
@@ -97,7 +97,7 @@ class Input(ABC):
 
     def copy_state(self, before: Self) -> None:
         """Continue the sequence of the same message; its values have to come again to count."""
-        self._guard.copy_state(before._guard)
+        self._sequence.copy_state(before._sequence)
         self._last_frame_ns, self._refused_ns = before._last_frame_ns, before._refused_ns
 
     def lost(self, now_ns: int) -> Reason | None:

@@ -8,7 +8,7 @@ from cantools.database.can import Message
 from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.identifier import NULL, at_every_priority, has_destination, with_source
 from canshaper.codec.layout import is_j1939
-from canshaper.codec.protection import Guard, Protection
+from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.input import Input
 from canshaper.config.schedule import LoadState, ProfileSwitch
@@ -57,11 +57,11 @@ class BoundInput:
         """Whether its frames are known by group and source, whatever their priority."""
         return is_j1939(self.message) and not has_destination(self.message.frame_id)
 
-    def guard(self) -> Guard:
+    def sequence_checker(self) -> SequenceChecker:
         """A new guard of its protection."""
         config = self.config
         step = config.alive_max_step or min(USUAL_MAX_STEP, self.protection.counts // 2)
-        return Guard(self.protection, step, config.qualify)
+        return SequenceChecker(self.protection, step, config.qualify)
 
 
 @dataclass(frozen=True)

@@ -50,7 +50,7 @@ def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None
         text = f"found {kind!r}, which depends on the id, and {message.name} may come from any"
         add(place, f"{text} source; allowed is it with a known one")
     try:
-        checksum.seal(bytes(message.length), 0)
+        checksum.protect(bytes(message.length), 0)
     except Exception as error:  # of a package: now, and not in the first tick
         text = f"found {kind!r}, which fails on {message.name}: {type(error).__name__}: {error}"
         add(place, text)

@@ -6,7 +6,7 @@ from typing import Any
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
-from canshaper.codec.protection import UNPROTECTED, Guard
+from canshaper.codec.protection import UNPROTECTED, SequenceChecker
 from canshaper.codec.signals import find_signal
 from canshaper.codec.valve import ValveCodec
 from canshaper.errors import ConfigError, Problem
@@ -49,7 +49,9 @@ class _ValveInput:
         self._codec: ValveCodec = bound.valve
         protection = bound.valve.message.sender.protection
         self._counter = protection.counter
-        self._guard = Guard(protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1)
+        self._sequence = SequenceChecker(
+            protection, min(USUAL_MAX_STEP, protection.counts // 2), qualify=1
+        )
         self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0
@@ -60,8 +62,8 @@ class _ValveInput:
         if len(data) == self._message.length:
             raw: Any = self._message.decode(data, decode_choices=False, scaling=False)
             if self.age_s >= self.timeout_s:
-                self._guard.begin_anew()
-            if self._guard.judge(data, raw[self._counter] if self._counter else 0):
+                self._sequence.resync()
+            if self._sequence.check(data, raw[self._counter] if self._counter else 0):
                 return
             steps = self._codec.read(raw)
         self.age_s = 0.0

@@ -67,7 +67,7 @@ def test_every_row_has_a_value_and_a_reference() -> None:
 def test_published_check_values(kind: str) -> None:
     size = (CHECKSUMS[kind].bits + 7) // 8
     little, big = (
-        Checksum(kind, len(DIGITS), 0, order).seal(DIGITS + bytes(size), 0)
+        Checksum(kind, len(DIGITS), 0, order).protect(DIGITS + bytes(size), 0)
         for order in ("little", "big")
     )
     value = VALUES[kind]
@@ -85,26 +85,26 @@ def test_a_frame_is_sealed_as_by_the_reference(
     """The other bits stay, and what lay in its own counts for nothing."""
     place = at.draw(st.sampled_from(places(kind)))
     place = Checksum(kind, place.byte, place.shift, place.order, can_id)
-    sealed = place.seal(data, 0)
+    protected = place.protect(data, 0)
     word, own = int.from_bytes(data, "little"), mask(place)
-    assert int.from_bytes(sealed, "little") & ~own == word & ~own
+    assert int.from_bytes(protected, "little") & ~own == word & ~own
     clear = (word & ~own).to_bytes(8, "little")
     rest = place.others(data) if CHECKSUMS[kind].bits > 4 else clear
     size = (CHECKSUMS[kind].bits + 7) // 8
-    found = int.from_bytes(sealed[place.byte : place.byte + size], place.order) >> place.shift
+    found = int.from_bytes(protected[place.byte : place.byte + size], place.order) >> place.shift
     assert found & (1 << CHECKSUMS[kind].bits) - 1 == REFERENCE[kind](can_id, rest, 8)
-    assert place.right(sealed)
+    assert place.verify(protected)
 
 
 @pytest.mark.parametrize("place", ALL)
 def test_every_bit_of_a_frame_is_covered(place: Checksum) -> None:
-    frame = place.seal(BODY, 0)
-    assert place.right(frame)
+    frame = place.protect(BODY, 0)
+    assert place.verify(frame)
     for bit in range(64):
         wrong = (int.from_bytes(frame, "little") ^ 1 << bit).to_bytes(8, "little")
-        assert not place.right(wrong)
+        assert not place.verify(wrong)
         own = mask(place) >> bit & 1
-        assert (place.seal(wrong, 0) == frame) == bool(own)
+        assert (place.protect(wrong, 0) == frame) == bool(own)
 
 
 @pytest.mark.parametrize("kind", CHECKSUMS)
@@ -112,7 +112,7 @@ def test_a_frame_that_is_the_checksum_alone(kind: str) -> None:
     size = (CHECKSUMS[kind].bits + 7) // 8
     place = Checksum(kind, 0)
     frames = [value.to_bytes(size, "little") for value in range(256**size)]
-    right = [frame for frame in frames if place.right(frame)]
+    right = [frame for frame in frames if place.verify(frame)]
     # the upper half of a byte is no part of a checksum of four bits
     assert len(right) == (16 if CHECKSUMS[kind].bits == 4 else 1)
 
@@ -120,7 +120,7 @@ def test_a_frame_that_is_the_checksum_alone(kind: str) -> None:
 @pytest.mark.parametrize("kind", CHECKSUMS)
 def test_whether_the_id_counts_is_what_the_row_says(kind: str) -> None:
     one, other = (Checksum(kind, 0, can_id=can_id) for can_id in (0x18FE4A03, 0x18FE4A04))
-    assert (one.seal(BODY, 0) != other.seal(BODY, 0)) == CHECKSUMS[kind].needs_id
+    assert (one.protect(BODY, 0) != other.protect(BODY, 0)) == CHECKSUMS[kind].needs_id
     assert one == other  # of two deployments: what decides is which message it is
 
 
@@ -128,8 +128,10 @@ def test_a_result_that_is_too_large_loses_its_upper_bits(monkeypatch: pytest.Mon
     for bits, size in ((4, 1), (8, 1), (16, 2)):
         row = ChecksumKind("large", bits, lambda _id, _place, _data: 0x12345)
         monkeypatch.setitem(CHECKSUMS, "large", row)
-        sealed = Checksum("large", 1).seal(bytes(4), 0)
-        assert sealed == b"\0" + (0x12345 % (1 << bits)).to_bytes(size, "little") + bytes(3 - size)
+        protected = Checksum("large", 1).protect(bytes(4), 0)
+        assert protected == b"\0" + (0x12345 % (1 << bits)).to_bytes(size, "little") + bytes(
+            3 - size
+        )
 
 
 # -- rows ------------------------------------------------------------------------------------------

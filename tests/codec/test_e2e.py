@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 from canshaper.codec.e2e import E2e, Profile1, Profile2
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import Guard, Protection
+from canshaper.codec.protection import Protection, SequenceChecker
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
@@ -24,8 +24,8 @@ lists = st.lists(st.integers(0, 255), min_size=16, max_size=16)
 frames = st.binary(min_size=2, max_size=8)
 
 
-def guard(check: E2e, max_step: int = 3, qualify: int = 1) -> Guard:
-    return Guard(Protection(None, check.counts, check), max_step, qualify)
+def made(check: E2e, max_step: int = 3, qualify: int = 1) -> SequenceChecker:
+    return SequenceChecker(Protection(None, check.counts, check), max_step, qualify)
 
 
 def flipped(frame: bytes, bit: int) -> bytes:
@@ -50,13 +50,13 @@ def test_the_examples_of_profile_1(mode: str, first: str, second: str) -> None:
     profile = Profile1(0x123, mode)
     for count, text in enumerate((first, second)):
         frame = bytes.fromhex(text)
-        assert profile.seal(bytes(8), count) == frame
-        assert profile.right(frame)
+        assert profile.protect(bytes(8), count) == frame
+        assert profile.verify(frame)
 
 
 @pytest.mark.parametrize("frame", ["cc10000000000000", "ce00000000000000", "cc00000000000001"])
 def test_frames_that_profile_1_refuses(frame: str) -> None:
-    assert not Profile1(0x123, "both").right(bytes.fromhex(frame))
+    assert not Profile1(0x123, "both").verify(bytes.fromhex(frame))
 
 
 CRCS_OF_ZEROS = "0e1b98310d189b65081d9e370b1e9dcd"
@@ -67,8 +67,8 @@ def test_the_counters_of_profile_2() -> None:
     profile = Profile2(range(1, 17))
     for count, crc in enumerate(bytes.fromhex(CRCS_OF_ZEROS)):
         frame = bytes((crc, count)) + bytes(6)
-        assert profile.seal(bytes(8), count) == frame
-        assert profile.right(frame)
+        assert profile.protect(bytes(8), count) == frame
+        assert profile.verify(frame)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +80,7 @@ def test_the_counters_of_profile_2() -> None:
     ],
 )
 def test_other_frames_of_profile_2(ids: bytes, data: bytes, count: int, frame: str) -> None:
-    assert Profile2(ids).seal(data, count) == bytes.fromhex(frame)
+    assert Profile2(ids).protect(data, count) == bytes.fromhex(frame)
 
 
 # -- against the library ---------------------------------------------------------------------------
@@ -100,16 +100,16 @@ def test_profile_1_by_the_library(data_id: int, mode: str, data: bytes, count: i
     body = bytes([top | count]) + data[2:]
     crc = Crc8SaeJ1850.calc(bytes(included) + body, initvalue=0) ^ 0xFF
     profile = Profile1(data_id, mode)
-    assert profile.seal(data, count) == bytes([crc]) + body
-    assert profile.right(bytes([crc]) + body)
+    assert profile.protect(data, count) == bytes([crc]) + body
+    assert profile.verify(bytes([crc]) + body)
 
 
 @given(lists, frames, st.integers(0, 15))
 def test_profile_2_by_the_library(ids: list[int], data: bytes, count: int) -> None:
     body = bytes([data[1] & 0xF0 | count]) + data[2:]
     crc = Crc8Autosar.calc(body + bytes([ids[count]]))
-    assert Profile2(ids).seal(data, count) == bytes([crc]) + body
-    assert Profile2(ids).right(bytes([crc]) + body)
+    assert Profile2(ids).protect(data, count) == bytes([crc]) + body
+    assert Profile2(ids).verify(bytes([crc]) + body)
 
 
 # -- what is refused -------------------------------------------------------------------------------
@@ -120,26 +120,26 @@ def test_every_flipped_bit_of_profile_1_is_seen(
     data_id: int, mode: str, data: bytes, count: int
 ) -> None:
     profile = Profile1(data_id, mode)
-    frame = profile.seal(data, count)
+    frame = profile.protect(data, count)
     # The one weak place: the counter's lowest bit chooses another byte of the data ID, and with
     # some IDs both changes cancel.
     low, high = data_id & 0xFF, data_id >> 8
     change = Crc8SaeJ1850.calc(bytes([low ^ high]), initvalue=0) ^ 0xFF
     assume(mode != "alternating" or change != 1)
     for bit in range(8 * len(frame)):
-        assert not profile.right(flipped(frame, bit)), bit
+        assert not profile.verify(flipped(frame, bit)), bit
 
 
 @given(lists, frames, st.integers(0, 15))
 def test_every_flipped_bit_of_profile_2_is_seen(ids: list[int], data: bytes, count: int) -> None:
     """A flipped bit of the counter chooses another data ID; with the same one in all it is seen."""
     profile = Profile2(ids)
-    frame = profile.seal(data, count)
+    frame = profile.protect(data, count)
     same = Profile2([ids[0]] * 16)
     for bit in range(8 * len(frame)):
         if not 8 <= bit < 12:
-            assert not profile.right(flipped(frame, bit)), bit
-        assert not same.right(flipped(same.seal(data, count), bit)), bit
+            assert not profile.verify(flipped(frame, bit)), bit
+        assert not same.verify(flipped(same.protect(data, count), bit)), bit
 
 
 @given(modes, st.integers(0, 0xFFF), st.integers(0, 0xFFF), frames)
@@ -151,22 +151,22 @@ def test_a_frame_for_another_data_id_is_refused(
         other = mine & 0xFF00 | other & 0xFF
     differs = mine != other if mode in ("both", "nibble") else mine & 0xFF != other & 0xFF
     assume(differs)
-    frame = Profile1(other, mode).seal(data, 0)
-    assert not Profile1(mine, mode).right(frame)
-    assert Profile1(mine, mode).right(Profile1(mine, mode).seal(data, 0))
+    frame = Profile1(other, mode).protect(data, 0)
+    assert not Profile1(mine, mode).verify(frame)
+    assert Profile1(mine, mode).verify(Profile1(mine, mode).protect(data, 0))
 
 
 @pytest.mark.parametrize("mine", range(16))
 def test_the_part_of_the_data_id_that_is_sent_is_compared(mine: int) -> None:
     """The CRC covers it, so only that tells it from another sender's."""
     for other in range(16):
-        frame = Profile1(other << 8 | 0x42, "nibble").seal(bytes(8), 3)
-        assert Profile1(mine << 8 | 0x42, "nibble").right(frame) is (mine == other)
+        frame = Profile1(other << 8 | 0x42, "nibble").protect(bytes(8), 3)
+        assert Profile1(mine << 8 | 0x42, "nibble").verify(frame) is (mine == other)
 
 
 def test_of_all_data_ids_one_in_256_has_the_same_crc() -> None:
-    frame = Profile1(0x123, "both").seal(bytes(range(8)), 7)
-    assert sum(Profile1(i, "both").right(frame) for i in range(0x10000)) == 256
+    frame = Profile1(0x123, "both").protect(bytes(range(8)), 7)
+    assert sum(Profile1(i, "both").verify(frame) for i in range(0x10000)) == 256
 
 
 @given(lists, st.integers(0, 15), st.integers(1, 255), frames)
@@ -177,21 +177,21 @@ def test_a_frame_for_another_list_is_refused(
     other = list(ids)
     other[count] ^= change
     for n in range(16):
-        frame = Profile2(other).seal(data, n)
-        assert Profile2(ids).right(frame) is (n != count)
+        frame = Profile2(other).protect(data, n)
+        assert Profile2(ids).verify(frame) is (n != count)
 
 
 @pytest.mark.parametrize("mode", MODES)
 def test_counter_15_of_profile_1_is_invalid_even_with_its_crc(mode: str) -> None:
     profile = Profile1(0x123, mode)
-    assert not profile.right(profile.seal(bytes(8), 15))
-    assert profile.right(profile.seal(bytes(8), 14))
+    assert not profile.verify(profile.protect(bytes(8), 15))
+    assert profile.verify(profile.protect(bytes(8), 14))
 
 
 def test_the_profiles_do_not_take_each_other() -> None:
     for count in range(15):
-        frame = Profile2([0x23] * 16).seal(bytes(8), count)
-        assert not Profile1(0x23, "low").right(frame)
+        frame = Profile2([0x23] * 16).protect(bytes(8), count)
+        assert not Profile1(0x23, "low").verify(frame)
 
 
 # -- sequence --------------------------------------------------------------------------------------
@@ -213,20 +213,20 @@ def test_the_counter_is_that_of_the_header(
     check: E2e, counts: list[int], found: list[FrameFault]
 ) -> None:
     """Whatever else is told as the counter."""
-    judge = guard(check)
-    assert [judge.judge(check.seal(bytes(8), c), 99) for c in counts] == found
+    checker = made(check)
+    assert [checker.check(check.protect(bytes(8), c), 99) for c in counts] == found
 
 
 def test_qualification_counts_good_headers() -> None:
     check = Profile1(0x123, "both")
-    judge = guard(check, qualify=3)
+    checker = made(check, qualify=3)
     told = []
     for count in (0, 1, 2, 3):
-        judge.judge(check.seal(bytes(8), count), 0)
-        told.append(judge.qualified)
-    judge.judge(flipped(check.seal(bytes(8), 4), 60), 0)
-    told.append(judge.qualified)
+        checker.check(check.protect(bytes(8), count), 0)
+        told.append(checker.qualified)
+    checker.check(flipped(check.protect(bytes(8), 4), 60), 0)
+    told.append(checker.qualified)
     for count in (5, 6, 7):
-        judge.judge(check.seal(bytes(8), count), 0)
-        told.append(judge.qualified)
+        checker.check(check.protect(bytes(8), count), 0)
+        told.append(checker.qualified)
     assert told == [False, False, True, True, False, False, False, True]

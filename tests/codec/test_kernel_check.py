@@ -57,7 +57,7 @@ def test_a_row_is_possible_by_what_it_says() -> None:
 @pytest.mark.parametrize("check", POSSIBLE, ids=str)
 @given(data=frames)
 def test_checksums(check: Checksum, data: bytes) -> None:
-    assert by_the_kernel(check, data) == check.seal(data, 0)
+    assert by_the_kernel(check, data) == check.protect(data, 0)
 
 
 @pytest.mark.parametrize("kind", [kind for kind, row in CHECKSUMS.items() if not row.kernel])
@@ -74,22 +74,22 @@ def test_exclusive_or_with_another_start(data: bytes) -> None:
     with pytest.MonkeyPatch.context() as patch:
         patch.setitem(CHECKSUMS, "xor_5a", ChecksumKind("from 0x5A", 8, Xor(0x5A)))
         check = Checksum("xor_5a", 2)
-        assert by_the_kernel(check, data) == check.seal(data, 0)
+        assert by_the_kernel(check, data) == check.protect(data, 0)
 
 
 @pytest.mark.parametrize("mode", ["both", "low", "nibble"])
 @given(data=frames, count=st.integers(0, 14))
 def test_profile_1(mode: str, data: bytes, count: int) -> None:
     profile = Profile1(0x5A7, mode)
-    sealed = profile.seal(data, count)  # what the joystick sent; then a stick is made neutral
-    changed = sealed[:3] + b"\0\0" + sealed[5:]
-    assert by_the_kernel(profile, changed) == profile.seal(changed, count)
+    protected = profile.protect(data, count)  # what the joystick sent; then a stick is made neutral
+    changed = protected[:3] + b"\0\0" + protected[5:]
+    assert by_the_kernel(profile, changed) == profile.protect(changed, count)
 
 
 @given(data=frames)
 def test_profile_2(data: bytes) -> None:
     profile = Profile2(range(3, 35, 2))
-    assert by_the_kernel(profile, data) == profile.seal(data, data[1] & COUNTER)
+    assert by_the_kernel(profile, data) == profile.protect(data, data[1] & COUNTER)
 
 
 def test_a_data_id_that_alternates_is_refused() -> None:

@@ -9,22 +9,22 @@ from hypothesis import strategies as st
 from canshaper.checksums import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import Guard, Protection, Protector
+from canshaper.codec.protection import Protection, Protector, SequenceChecker
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
 
 
-def guard(
+def made(
     bits: int = 8, max_step: int = 3, qualify: int = 1, checksum: tuple[str, int] | None = None
-) -> Guard:
+) -> SequenceChecker:
     check = Checksum(*checksum) if checksum else None
     counts = 1 << bits if bits else 0
-    return Guard(Protection("C" if bits else None, counts, check), max_step, qualify)
+    return SequenceChecker(Protection("C" if bits else None, counts, check), max_step, qualify)
 
 
-def faults(judge: Guard, *counts: int) -> list[FrameFault]:
-    return [judge.judge(b"", count) for count in counts]
+def faults(checker: SequenceChecker, *counts: int) -> list[FrameFault]:
+    return [checker.check(b"", count) for count in counts]
 
 
 # -- checksums -------------------------------------------------------------------------------------
@@ -32,14 +32,14 @@ def faults(judge: Guard, *counts: int) -> list[FrameFault]:
 
 @pytest.mark.parametrize("kind", CHECKSUMS)
 def test_a_frame_whose_checksum_is_wrong_is_not_qualified(kind: str) -> None:
-    frame = Checksum(kind, 3).seal(bytes(range(1, 9)), 0)
-    judge = guard(bits=0, checksum=(kind, 3))
-    assert judge.judge(frame, 0) is GOOD
+    frame = Checksum(kind, 3).protect(bytes(range(1, 9)), 0)
+    checker = made(bits=0, checksum=(kind, 3))
+    assert checker.check(frame, 0) is GOOD
     wrong = frame[:7] + bytes((frame[7] ^ 0x10,))
-    assert judge.judge(wrong, 0) is WRONG
-    assert not judge.qualified
-    assert judge.judge(frame, 0) is GOOD
-    assert judge.qualified
+    assert checker.check(wrong, 0) is WRONG
+    assert not checker.qualified
+    assert checker.check(frame, 0) is GOOD
+    assert checker.qualified
 
 
 # -- the alive counter -----------------------------------------------------------------------------
@@ -68,47 +68,47 @@ def test_a_frame_whose_checksum_is_wrong_is_not_qualified(kind: str) -> None:
 def test_steps_of_the_counter(
     bits: int, max_step: int, counts: list[int], found: list[FrameFault]
 ) -> None:
-    assert faults(guard(bits, max_step), *counts) == found
+    assert faults(made(bits, max_step), *counts) == found
 
 
 def test_without_a_counter_every_frame_is_news() -> None:
-    judge = guard(bits=0)
-    assert faults(judge, 0, 0, 0) == [GOOD] * 3
-    assert judge.qualified
+    checker = made(bits=0)
+    assert faults(checker, 0, 0, 0) == [GOOD] * 3
+    assert checker.qualified
 
 
 def test_two_senders_with_counters_of_their_own_are_never_trusted() -> None:
-    judge = guard()
+    checker = made()
     counts = [c % 256 for i in range(50) for c in (i, i + 100)]
-    assert faults(judge, *counts) == [GOOD] + [JUMP] * 99
+    assert faults(checker, *counts) == [GOOD] + [JUMP] * 99
 
 
 def test_a_frozen_counter_is_no_news_however_often_its_sender_was_silent() -> None:
-    judge = guard()
-    faults(judge, 7)
+    checker = made()
+    faults(checker, 7)
     for _ in range(5):
-        judge.begin_anew()
-        assert faults(judge, 7, 7, 7) == [REPEATED] * 3
-        assert not judge.qualified
+        checker.resync()
+        assert faults(checker, 7, 7, 7) == [REPEATED] * 3
+        assert not checker.qualified
 
 
 def test_after_silence_any_counter_but_the_last_begins_anew_once() -> None:
     for restart in range(256):
-        judge = guard()
-        faults(judge, 100)
-        judge.begin_anew()
-        first, second = faults(judge, restart, (restart + 50) % 256)
+        checker = made()
+        faults(checker, 100)
+        checker.resync()
+        first, second = faults(checker, restart, (restart + 50) % 256)
         assert first is (REPEATED if restart == 100 else GOOD)
         # what was repeated has not begun anew yet
         assert second is (GOOD if restart == 100 else JUMP)
 
 
 def test_a_restart_on_the_last_counter_loses_one_frame_only() -> None:
-    judge = guard()
-    faults(judge, 100)
-    judge.begin_anew()
-    assert faults(judge, 100, 101, 102) == [REPEATED, GOOD, GOOD]
-    assert judge.qualified
+    checker = made()
+    faults(checker, 100)
+    checker.resync()
+    assert faults(checker, 100, 101, 102) == [REPEATED, GOOD, GOOD]
+    assert checker.qualified
 
 
 def test_a_wrong_checksum_says_nothing_about_the_sequence() -> None:
@@ -117,55 +117,55 @@ def test_a_wrong_checksum_says_nothing_about_the_sequence() -> None:
     def frame(count: int, error: int = 0) -> bytes:
         return bytes([count, count ^ error])
 
-    judge = guard(checksum=("xor", 1))
-    assert judge.judge(frame(7), 7) is GOOD
-    assert judge.judge(frame(90, error=1), 90) is WRONG
-    assert judge.judge(frame(7, error=1), 7) is WRONG
-    assert judge.judge(frame(8), 8) is GOOD
+    checker = made(checksum=("xor", 1))
+    assert checker.check(frame(7), 7) is GOOD
+    assert checker.check(frame(90, error=1), 90) is WRONG
+    assert checker.check(frame(7, error=1), 7) is WRONG
+    assert checker.check(frame(8), 8) is GOOD
 
 
 # -- qualification ---------------------------------------------------------------------------------
 
 
-def qualified(judge: Guard, counts: list[int]) -> list[bool]:
+def qualified(checker: SequenceChecker, counts: list[int]) -> list[bool]:
     """Whether each frame may be used."""
-    return [judge.judge(b"", count) is GOOD and judge.qualified for count in counts]
+    return [checker.check(b"", count) is GOOD and checker.qualified for count in counts]
 
 
 def test_one_good_frame_is_enough_unless_told() -> None:
-    assert qualified(guard(), [1, 9, 10]) == [True, False, True]
+    assert qualified(made(), [1, 9, 10]) == [True, False, True]
 
 
 @pytest.mark.parametrize("qualify", [2, 5, 20])
 def test_so_many_good_frames_in_a_row_at_the_start_and_after_a_wrong_one(qualify: int) -> None:
-    judge = guard(qualify=qualify)
+    checker = made(qualify=qualify)
     counts = list(range(qualify + 3))
     wanted = [False] * (qualify - 1) + [True] * 4
-    assert qualified(judge, counts) == wanted
+    assert qualified(checker, counts) == wanted
     jump = [counts[-1] + 50]
-    assert qualified(judge, jump) == [False]
-    assert qualified(judge, [jump[0] + 1 + i for i in counts]) == wanted
+    assert qualified(checker, jump) == [False]
+    assert qualified(checker, [jump[0] + 1 + i for i in counts]) == wanted
 
 
 def test_silence_begins_the_count_again() -> None:
-    judge = guard(qualify=3)
-    assert qualified(judge, [0, 1, 2]) == [False, False, True]
-    judge.begin_anew()
-    assert not judge.qualified
-    assert qualified(judge, [3, 4, 5]) == [False, False, True]
+    checker = made(qualify=3)
+    assert qualified(checker, [0, 1, 2]) == [False, False, True]
+    checker.resync()
+    assert not checker.qualified
+    assert qualified(checker, [3, 4, 5]) == [False, False, True]
 
 
 def test_a_repeated_frame_neither_counts_as_good_nor_breaks_the_row() -> None:
-    judge = guard(qualify=3)
-    assert qualified(judge, [0, 0, 0, 1, 1, 2, 2, 3]) == [False] * 5 + [True, False, True]
+    checker = made(qualify=3)
+    assert qualified(checker, [0, 0, 0, 1, 1, 2, 2, 3]) == [False] * 5 + [True, False, True]
 
 
 def test_a_wrong_checksum_breaks_the_row() -> None:
-    judge = guard(bits=0, qualify=2, checksum=("sum", 0))
+    checker = made(bits=0, qualify=2, checksum=("sum", 0))
     good, wrong = b"\x05\x05", b"\x05\x06"
     results: list[tuple[Any, bool]] = []
     for frame in (good, wrong, good, good, wrong, good):
-        results.append((judge.judge(frame, 0), judge.qualified))
+        results.append((checker.check(frame, 0), checker.qualified))
     assert results == [
         (GOOD, False),
         (WRONG, False),
@@ -185,23 +185,23 @@ def test_what_is_used_is_always_the_end_of_a_row(
     counts: list[tuple[int, bool]], max_step: int, qualify: int
 ) -> None:
     """Whatever comes: a used frame ends ``qualify`` frames that each followed the one before."""
-    judge = guard(4, max_step, qualify)
+    checker = made(4, max_step, qualify)
     row: list[int] = []  # steps since the last wrong frame or silence, as far as they are good
     last: int | None = None
     rested = True
     for count, silent in counts:
         if silent:
-            judge.begin_anew()
+            checker.resync()
             rested, row = True, []
         step = (count - last) % 16 if last is not None else None
-        fault = judge.judge(b"", count)
+        fault = checker.check(b"", count)
         if step == 0:
             assert fault is REPEATED
             continue
         follows = rested or step is None or step <= max_step
         assert fault is (GOOD if follows else JUMP)
         row = [*row, count] if follows else []
-        assert judge.qualified is (len(row) >= qualify)
+        assert checker.qualified is (len(row) >= qualify)
         last, rested = count, False
 
 
@@ -221,31 +221,31 @@ SAME = Protection("C", 16, Checksum("xor", 0))
 )
 def test_a_sequence_goes_on_where_its_protection_is_the_same(after: Protection, good: bool) -> None:
     """After counter 5 comes 5 again: with another protection that is a first frame."""
-    before, judge = Guard(SAME, 3, 1), Guard(after, 3, 1)
-    assert before.judge(b"\0\0", 5) is FrameFault.NONE
-    judge.copy_state(before)
-    assert judge.qualified is not good
-    found = judge.judge(b"\0\0", 5)
+    before, checker = SequenceChecker(SAME, 3, 1), SequenceChecker(after, 3, 1)
+    assert before.check(b"\0\0", 5) is FrameFault.NONE
+    checker.copy_state(before)
+    assert checker.qualified is not good
+    found = checker.check(b"\0\0", 5)
     assert found is (FrameFault.NONE if good else FrameFault.COUNTER_REPEATED)
 
 
 def test_a_jump_from_one_deployment_to_the_next_is_one() -> None:
-    before, judge = Guard(SAME, 3, 1), Guard(SAME, 3, 1)
-    before.judge(b"\0\0", 5)
-    judge.copy_state(before)
-    assert judge.judge(b"\0\0", 9) is FrameFault.COUNTER_JUMP
+    before, checker = SequenceChecker(SAME, 3, 1), SequenceChecker(SAME, 3, 1)
+    before.check(b"\0\0", 5)
+    checker.copy_state(before)
+    assert checker.check(b"\0\0", 9) is FrameFault.COUNTER_JUMP
 
 
 def test_frames_in_a_row_count_on_up_to_the_number_that_is_asked_for_now() -> None:
-    before = Guard(SAME, 3, 2)
+    before = SequenceChecker(SAME, 3, 2)
     for count in (1, 2):
-        before.judge(b"\0\0", count)
+        before.check(b"\0\0", count)
     assert before.qualified
-    judge = Guard(SAME, 3, 3)
-    judge.copy_state(before)
-    assert not judge.qualified
-    assert judge.judge(b"\0\0", 3) is FrameFault.NONE
-    assert judge.qualified
+    checker = SequenceChecker(SAME, 3, 3)
+    checker.copy_state(before)
+    assert not checker.qualified
+    assert checker.check(b"\0\0", 3) is FrameFault.NONE
+    assert checker.qualified
 
 
 @pytest.mark.parametrize(
@@ -263,10 +263,10 @@ def test_a_counter_that_we_send_goes_on_where_it_is_the_same(
     raw = {"C": 0, "D": 0}
     first, second = (Protector(p, Encoded()) for p in (SAME, after))  # type: ignore[arg-type]
     for _ in range(3):
-        first.unsealed(raw)
+        first.without_check(raw)
     second.copy_state(first)
     raw = {"C": 0, "D": 0}
-    second.unsealed(raw)
+    second.without_check(raw)
     assert max(raw.values()) == next_count
 
 

@@ -217,10 +217,10 @@ def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, us
     protected.in_yaml(COUNTER, f"alive_counter: {counter}")
     bound = protected.load().joysticks["left"]
     for step in range(1, bound.protection.counts):
-        guard = bound.guard()
-        assert guard.judge(b"", 0) is FrameFault.NONE
+        checker = bound.sequence_checker()
+        assert checker.check(b"", 0) is FrameFault.NONE
         wanted = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
-        assert guard.judge(b"", step) is wanted
+        assert checker.check(b"", step) is wanted
 
 
 @pytest.mark.parametrize(

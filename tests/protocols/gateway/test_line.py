@@ -280,10 +280,10 @@ def test_e2e_is_made_anew(tmp_path: Path) -> None:
         ),
     )  # fmt: skip
     for count in range(1, 40):
-        data = profile.seal(rig.joystick(Slew=1000 if count > 3 else 0).data, count % 16)
+        data = profile.protect(rig.joystick(Slew=1000 if count > 3 else 0).data, count % 16)
         passed = rig.receive(Frame("joysticks", 0x110, False, data))
         assert passed is not None
-        assert profile.right(passed.data)
+        assert profile.verify(passed.data)
         assert passed.data[1] & 0x0F == count % 16
         rig.tick()
     assert rig.decoded(rig.left[-1])["Slew"] > 200
