@@ -82,6 +82,10 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
                 if state is State.STOPPING and at_rest:
                     machine.hold(5)
                 new = machine.step(stick, added, at_rest)
+                if new is State.TRIPPED is not state and machine.reason is not stick.trip:
+                    # What a controller never gives to an axis in that state ends here too.
+                    never = (Reason.EMERGENCY_STOP_LOST, Reason.LOOP_OVERRUN)
+                    assert machine.reason in (Reason.ENABLE_LOST, *never), (state, stick)
                 if new is not state:
                     found.setdefault((state, new), set()).add(machine.reason)
     for way, reasons in TRANSITIONS.items():
