@@ -47,6 +47,11 @@ class Record(NamedTuple):
     time_ns: int
     data: bytes
 
+    @property
+    def payload(self) -> bytes:
+        """Data of its frame; of one that is too long for CAN, and so refused, the length counts."""
+        return self.data[: self.length].ljust(self.length, b"\0")
+
 
 def records(data: bytes | memoryview) -> Iterator[Record]:
     """Every record of a segment, in the order in which things happened."""

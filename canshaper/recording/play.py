@@ -33,7 +33,7 @@ def frames_of(box: Box) -> Iterator[TimedFrame]:
     for segment in box.segments:
         for record in records(segment.records):
             if record.kind == Kind.RX:
-                data = record.data[: record.length]
+                data = record.payload
                 at_ns = record.time_ns + since_1970_ns
                 yield TimedFrame(at_ns, buses[record.bus], record.number, record.extended, data)
 
@@ -145,7 +145,7 @@ class _Played:
 
     def _frame(self, record: Record) -> Frame:
         bus = self._buses[record.bus]
-        return Frame(bus, record.number, record.extended, record.data[: record.length])
+        return Frame(bus, record.number, record.extended, record.payload)
 
     def _tick(self, record: Record) -> None:
         for frame in self._guarded.tick(record.time_ns, record.number):
@@ -168,7 +168,7 @@ class _Played:
         elif kind == Kind.FAULT:
             controller.counters.add(FrameFault(record.number))
         elif kind == Kind.SET:
-            self._text += record.data[: record.length]
+            self._text += record.payload
             if record.number == record.length:  # that was the last part
                 values, self._text = json.loads(self._text), b""
                 self._adjuster.change(values)

@@ -9,6 +9,7 @@ from unittest.mock import patch
 import pytest
 
 from canshaper.blackbox import keeper, state
+from canshaper.blackbox.records import records
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon import daemon
@@ -90,3 +91,15 @@ def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
             assert vars(one).keys() - cached <= set(names), kind
             looked_at[kind.__name__] += 1
     assert looked_at["Axis"] and looked_at["AxisRunner"] and looked_at["Controller"]
+
+
+def test_a_frame_that_is_too_long_stays_so(tmp_path: Path) -> None:
+    """No classical bus has one; an adapter that is broken might, and it is refused in both."""
+    lengths: set[int] = set()
+    for found in kept("forwarder-robust", 12):
+        deployment, box = unpacked(found, tmp_path)
+        lengths |= {r.length for one in box.segments for r in records(one.records)}
+        with patch.object(play, "Controller", Unrefused):
+            played = list(play.Player(box, deployment).run(lambda part: None))
+        assert not [result.differences for _, result in played if result.differences]
+    assert 9 in lengths
