@@ -24,7 +24,7 @@ from canshaper.blackbox.ring import Ring
 from canshaper.blackbox.state import States
 from canshaper.blackbox.write import header_of
 from canshaper.cli.common import loader
-from canshaper.cli.replay import _without_collector
+from canshaper.cli.verbs.replay import _without_collector
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded

@@ -3,6 +3,9 @@
 The peer imports python-can and cantools, loads the same DBC and sends one frame. Both are separate
 processes on a multicast group of python-can, started in turn.
 
+Then the processor time of ``canshaper --help``, beside the same with what the work of the verbs
+imports: a deployment, its check, tables.
+
     python benchmarks/startup.py [--runs 7]
 """
 
@@ -28,6 +31,27 @@ data = message.encode({"Velocity": 0, "AliveCounter": 0})
 with LocalMulticastBus(sys.argv[2]) as bus:
     bus.send(can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data))
 """
+
+
+HELP_RUNS = 20
+HELP = "import sys; sys.argv = ['canshaper', '--help']; from canshaper.cli.app import main; main()"
+WITH_ALL = "import canshaper.machine.binding, canshaper.bus.port, rich.progress, rich.table;" + HELP
+
+
+def cpu_s(code: str) -> float:
+    """Seconds of a processor, user and system, that a program takes."""
+    before = os.times()
+    subprocess.run([sys.executable, "-c", code], stdout=subprocess.DEVNULL, check=True)
+    after = os.times()
+    return sum(after[2:4]) - sum(before[2:4])
+
+
+def help_share() -> float:
+    """Processor time of the help over that with all imports, medians of runs in turn."""
+    pairs = [(cpu_s(HELP), cpu_s(WITH_ALL)) for _ in range(HELP_RUNS)]
+    alone, with_all = (statistics.median(times) for times in zip(*pairs, strict=True))
+    print(f"canshaper --help         {alone:.3f} s of a processor, with all imports {with_all:.3f}")
+    return alone / with_all
 
 
 def first_frame_s(command: list[str], port: Port) -> float:
@@ -71,6 +95,7 @@ def main() -> None:
         print(f"{name:24} median {statistics.median(row):.3f} s   max {max(row):.3f} s")
     ours, peer = (statistics.median(times[name]) for name in commands)
     print(f"canshaper run / bare start: {ours / peer:.2f}")
+    print(f"canshaper --help / with all imports: {help_share():.2f}")
 
 
 if __name__ == "__main__":

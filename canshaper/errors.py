@@ -4,6 +4,7 @@
 
     CanshaperError
      +-- ConfigError            a deployment that must not start; carries every problem
+     +-- UsageError             an option or argument cannot be
      +-- BusError               a bus cannot be opened
      |    +-- WrongBusError         it is another device than the deployment names
      |    +-- WrongDeviceError      so is an interface
@@ -15,15 +16,15 @@
      |    +-- CutOffError           it ends in the middle
      |    +-- BoxError              a black box cannot be used
      |    +-- StateError            nor can the state that is kept in it
-     +-- DesignError            nothing fits
+     +-- DesignError            a design or simulation that cannot be, or finds nothing that fits
      |    +-- InfeasibleError       no poles keep all requirements
      |    +-- DriveError            a simulated drive could not be made
      +-- MeasurementError       a measurement failed, or says nothing
           +-- IdentificationError   of the swing
           +-- CalibrationError      of a valve
 
-Those about data (``LogError``, ``DesignError``, ``IdentificationError``, ``PageMessageError``) are
-``ValueError`` too.
+Those about data (``UsageError``, ``LogError``, ``DesignError``, ``IdentificationError``,
+``PageMessageError``) are ``ValueError`` too.
 """
 
 from collections.abc import Sequence
@@ -73,6 +74,10 @@ class ConfigError(CanshaperError):
             lines.append(f"and {more} more problems")
         super().__init__("\n".join(lines))
         self.problems = list(problems)
+
+
+class UsageError(CanshaperError, ValueError):
+    """An option or argument of the command cannot be; says what was found and what is allowed."""
 
 
 class BusError(CanshaperError):
@@ -129,7 +134,7 @@ class StateError(LogError):
 
 
 class DesignError(CanshaperError, ValueError):
-    """Nothing fits; says what conflicts."""
+    """A design or simulation that cannot be, or finds nothing that fits; says what is allowed."""
 
 
 class InfeasibleError(DesignError):

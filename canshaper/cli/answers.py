@@ -5,8 +5,7 @@ from typing import TypeVar
 
 import typer
 
-from canshaper.cli.console import echo
-from canshaper.config.first import plain
+from canshaper.cli.common import echo
 
 _T = TypeVar("_T")
 NONE = "-"
@@ -23,6 +22,8 @@ def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
 
 def name(taken: Collection[str]) -> Callable[[str], str]:
     """Takes a word that can be a name in a deployment file and is none of those taken, or NONE."""
+
+    from canshaper.config.first import plain
 
     def parse(text: str) -> str:
         if text != NONE and not (text.isidentifier() and plain(text) == text):

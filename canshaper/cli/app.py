@@ -1,36 +1,59 @@
-"""The ``canshaper`` command. Each verb imports what it needs when it is called."""
+"""The ``canshaper`` command: a module of ``canshaper.cli.verbs`` is a verb, loaded when used."""
 
 import sys
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any, cast
 
 import typer
+from typer.core import TyperGroup
 
-from canshaper import __version__
-from canshaper.cli import (
-    calibrate,
-    check,
-    compare,
-    config_schema,
-    demo,
-    doctor,
-    gateway,
-    identify,
-    init,
-    monitor,
-    record,
-    replay,
-    robust,
-    run,
-    set,
-    sim,
-    studio,
-    tune,
-)
-from canshaper.cli.common import EXIT_WITHOUT_TOOLS, INSTALL_TOOLS, TOOLS
+from canshaper.cli import verbs
+from canshaper.cli.common import EXIT_WRONG, EXTRAS, echo, fail, install_line
+from canshaper.errors import CanshaperError
+
+
+class Verbs(TyperGroup):
+    """Verbs by the modules that are there; what canshaper raises for a person ends any of them."""
+
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        names = sorted(module.name.replace("_", "-") for module in iter_modules(verbs.__path__))
+        self.commands = cast(Any, dict.fromkeys(names))  # each loaded when it is used
+
+    def list_commands(self, ctx: Any) -> list[str]:
+        """Their names."""
+        return list(self.commands)
+
+    def get_command(self, ctx: Any, cmd_name: str) -> Any:
+        """One of them; None where there is no such verb."""
+        if cmd_name not in self.commands:
+            return None
+        return self.commands[cmd_name] or self._load(cmd_name)
+
+    def _load(self, name: str) -> Any:
+        word = name.replace("-", "_")
+        one = typer.Typer(
+            add_completion=False,
+            rich_markup_mode=None,
+            context_settings={"help_option_names": ["-h", "--help"]},
+        )
+        one.command(name)(getattr(import_module(f"{verbs.__name__}.{word}"), word))
+        self.commands[name] = typer.main.get_command(one)
+        return self.commands[name]
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run the verb that is named."""
+        try:
+            return super().invoke(ctx)
+        except CanshaperError as error:
+            raise fail(error) from None
+
 
 app = typer.Typer(
+    cls=Verbs,
     help="Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN.",
     no_args_is_help=True,
-    add_completion=False,
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
     rich_markup_mode=None,
@@ -39,7 +62,9 @@ app = typer.Typer(
 
 def _version(value: bool) -> None:
     if value:
-        typer.echo(f"canshaper {__version__}")
+        from canshaper import __version__
+
+        echo(f"canshaper {__version__}")
         raise typer.Exit
 
 
@@ -52,35 +77,13 @@ def _main(
     """Sensor-less anti-sway for hydraulic cranes, between joystick and valves on CAN."""
 
 
-app.command("init")(init.init)
-app.command("run")(run.run)
-app.command("set")(set.set_)
-app.command("check")(check.check)
-app.command("calibrate")(calibrate.calibrate)
-app.command("doctor")(doctor.doctor)
-app.command("gateway")(gateway.gateway)
-app.command("demo")(demo.demo)
-app.command("identify")(identify.identify)
-app.command("replay")(replay.replay)
-app.command("record")(record.record)
-app.command("monitor")(monitor.monitor)
-app.command("sim")(sim.sim)
-app.command("operator")(sim.operator)
-app.command("studio")(studio.studio)
-app.command("compare")(compare.compare)
-app.command("tune")(tune.tune)
-app.command("robust")(robust.robust)
-app.command("config-schema")(config_schema.config_schema)
-
-
 def main() -> None:
     """Entry point of the command."""
     try:
         app(prog_name="canshaper")
     except ModuleNotFoundError as error:
         name = (error.name or "").partition(".")[0]
-        install = INSTALL_TOOLS if name in TOOLS else studio.INSTALL
-        if name not in (*TOOLS, *studio.NEEDS):
+        if name not in EXTRAS:
             raise
-        typer.echo(f"this command needs {name}, which is missing: {install}", err=True)
-        sys.exit(EXIT_WITHOUT_TOOLS)
+        echo(f"this command needs {name}, which is missing: {install_line(name)}", err=True)
+        sys.exit(EXIT_WRONG)

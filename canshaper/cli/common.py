@@ -1,24 +1,39 @@
-"""What several verbs share: deployments by name, bus options, errors for people."""
+"""What several verbs share: deployments by name, bus options, pictures, errors for people."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.console import echo
-from canshaper.errors import ConfigError, Problem
-from canshaper.machine.binding import load_deployment
-from canshaper.machine.deployment import Deployment
+from canshaper.config.printable import printable
+from canshaper.errors import (
+    BusError,
+    CalibrationError,
+    ConfigError,
+    ControlError,
+    Problem,
+    UsageError,
+)
+
+if TYPE_CHECKING:
+    from canshaper.machine.deployment import Deployment
 
 MOST_WARNINGS = 10  # of DBC files; the others are counted
-EXIT_BAD_DEPLOYMENT = 2
-EXIT_WITHOUT_TOOLS = 2
-EXIT_NO_BUS = 3  # the file is good; the service manager tries again until the interface is there
-
-# What only the extra ``tools`` installs.
-TOOLS = ("casadi", "matplotlib", "numpy", "scipy")
-INSTALL_TOOLS = "pip install 'canshaper[tools]'"
+EXIT_WRONG = 2  # of a file, an option, or what is not installed
+# What ends a command with another code.
+EXITS: dict[type[Exception], int] = {
+    ControlError: 1,
+    CalibrationError: 1,
+    BusError: 3,  # the file is good; the service manager tries again until the interface is there
+}
+# The extra that installs a package.
+EXTRAS = {
+    **dict.fromkeys(("casadi", "matplotlib", "numpy", "scipy"), "tools"),
+    **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
+}
 
 FILE = typer.Argument(..., help="Deployment file (YAML), or the name of a shipped one.")
 INTERFACE = typer.Option(None, "--interface", help="python-can interface instead of the file's.")
@@ -27,10 +42,60 @@ CHANNEL = typer.Option(
     "--channel",
     help="Channel instead of the file's; with several buses NAME=CHANNEL, once for each.",
 )
-
+CRANE = typer.Option(
+    None,
+    "--crane",
+    help="Which one, where the deployment has several: the first part of axis names.",
+)
+SET = typer.Option(
+    None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
+)
 NETWORK = typer.Option(
     False, "--network", help="Share a bus of udp_multicast over the network; else it stays local."
 )
+
+
+def echo(text: str, *, err: bool = False) -> None:
+    """Print lines; control characters of what others wrote are shown, and do nothing."""
+    typer.echo(printable(text), err=err)
+
+
+def fail(error: Exception, code: int | None = None) -> typer.Exit:
+    """Print an error as it is; its exit, which is that of its kind where ``code`` is None."""
+    echo(str(error), err=True)
+    codes = (exit_code for kind, exit_code in EXITS.items() if isinstance(error, kind))
+    return typer.Exit(next(codes, EXIT_WRONG) if code is None else code)
+
+
+@contextmanager
+def os_errors(path: Path) -> Iterator[None]:
+    """What the system refuses in the block is an error for the person: which file, and why."""
+    try:
+        yield
+    except OSError as error:
+        raise UsageError(f"{error.filename or path}: {error.strerror or error}") from None
+
+
+def install_line(package: str) -> str:
+    """How to get what an extra installs."""
+    return f"pip install 'canshaper[{EXTRAS[package]}]'"
+
+
+def picture(path: Path, draw: Callable[[Path], None]) -> Path | None:
+    """Let a picture be drawn, in a folder that is made; None where matplotlib is missing."""
+    try:
+        import matplotlib  # noqa: F401
+    except ImportError:
+        return None
+    path.parent.mkdir(parents=True, exist_ok=True)
+    draw(path)
+    return path
+
+
+def picture_line(path: Path | None) -> str:
+    """Where it is, or why there is none."""
+    none = f"none, matplotlib is missing: {install_line('matplotlib')}"
+    return f"Picture: {path or none}"
 
 
 def data_directory() -> Path:
@@ -67,14 +132,16 @@ def loader(
     *,
     network: bool = False,
     inside: Path | None = None,
-) -> Callable[[], Deployment]:
+) -> "Callable[[], Deployment]":
     """A function that loads the deployment with the bus options of the command line put in.
 
     With ``inside`` it reads no DBC file outside of that directory.
     """
+    from canshaper.machine.binding import load_deployment
+
     path = deployment_path(file)
 
-    def load() -> Deployment:
+    def load() -> "Deployment":
         deployment = load_deployment(path, inside)
         if not interface and not channels and not network:
             return deployment
@@ -103,22 +170,20 @@ def loader(
     return load
 
 
-def control_socket(deployment: Deployment) -> Path:
-    """Path of the control socket of its daemon; ends the command where the file has none."""
+def control_socket(deployment: "Deployment") -> Path:
+    """Path of the control socket of its daemon.
+
+    Raises:
+        UsageError: the file has none.
+    """
     section = deployment.config.control
     if section is None:
         text = (
             "this file has no control section; it says which numbers may be changed, for example"
             " control: { adjustable: { axes.slew.sway.period_s: [1.8, 3.0] } }"
         )
-        raise fail(ValueError(f"{deployment.path}: {text}"))
+        raise UsageError(f"{deployment.path}: {text}")
     return section.path(deployment.path)
-
-
-def fail(error: Exception, code: int = EXIT_BAD_DEPLOYMENT) -> typer.Exit:
-    """Print an error as it is and give the exit, that of a bad deployment unless told."""
-    echo(str(error), err=True)
-    return typer.Exit(code)
 
 
 def print_warnings(count: int, warnings: list[Problem], are: str) -> None:

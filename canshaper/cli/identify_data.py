@@ -1,14 +1,12 @@
 """What ``canshaper identify`` was given: logs and tables, or a stopwatch, to findings."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.progress import BarColumn, Progress, TextColumn
-
 from canshaper.cli.common import data_directory
-from canshaper.cli.console import SafeConsole
+from canshaper.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:
     from canshaper.commissioning.identification.judge import Finding
@@ -33,7 +31,7 @@ def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) ->
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
         found = f"without {', '.join(missing)}" if missing else f"with the log {logs[0]}"
-        raise ValueError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
+        raise UsageError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
     period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
     return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
 
@@ -44,7 +42,7 @@ def axis_named(axis: str | None, deployment: "Deployment | None") -> str:
         return axis or UNNAMED
     if axis not in deployment.axes:
         found = repr(axis) if axis else "none"
-        raise ValueError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
+        raise UsageError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
     return axis
 
 
@@ -54,16 +52,15 @@ def signals_named(pairs: Sequence[str], deployment: "Deployment | None") -> dict
     for pair in pairs:
         axis, equals, name = pair.partition("=")
         if not (axis and equals and name):
-            raise ValueError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
+            raise UsageError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
         if axis in signals:
-            raise ValueError(f"--signal: found two signals of {axis}, allowed is one")
+            raise UsageError(f"--signal: found two signals of {axis}, allowed is one")
         signals[axis_named(axis, deployment)] = name
     return signals
 
 
 def messages_of(files: Sequence[Path], deployment: "Deployment | None") -> "Messages":
     """Messages that name the signals."""
-    from canshaper.errors import ConfigError
     from canshaper.machine.database import Messages, load_dbc
 
     if not files and deployment:
@@ -93,14 +90,15 @@ def logged(
     from canshaper.commissioning.identification.judge import identify as judged
     from canshaper.commissioning.identification.phone import series_of
     from canshaper.commissioning.identification.table import is_table, read_table
+    from canshaper.report.console import progress_bar
 
     if not logs:
-        raise ValueError("found no log and no stopwatch; see canshaper identify --help")
+        raise UsageError("found no log and no stopwatch; see canshaper identify --help")
     series: dict[tuple[str, str], list[Series]] = {}
-    with _progress() as tell:
+    with progress_bar("") as on_progress:
         for text in logs:
             label, path = _labelled(text)
-            report = tell(path.name)
+            report = partial(on_progress, what=path.name)
             if is_table(path):
                 table = read_table(path, report)
                 wanted: dict[str, str | None] = {**signals}
@@ -114,13 +112,13 @@ def logged(
                     messages,
                     deployment=deployment,
                     channel=channel,
-                    progress=report,
+                    on_progress=report,
                 )
             for name, one in found.items():
                 series.setdefault((name, label), []).append(one)
         findings = []
         for (name, label), parts in series.items():
-            tell(f"{name} {label}")(0.5)
+            on_progress(0.5, f"{name} {label}")
             finding = judged(name, label, parts, about_s)
             if finding.at is None:
                 finding.at = _number(label)
@@ -150,24 +148,7 @@ def _simulated(
     axes = list(deployment.axes) if deployment else list(SIMULATED)
     there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
     if not there or isinstance(messages.find("GrappleSway"), str):
-        raise ValueError(
+        raise UsageError(
             "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL with what shows the swing"
         )
     return there
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], Callable[[float], None]]]:
-    """A bar on the terminal, beside the output; gone when done."""
-    console = SafeConsole(stderr=True)
-    columns = (TextColumn("{task.description}"), BarColumn())
-    with Progress(
-        *columns, console=console, transient=True, disable=not console.is_terminal
-    ) as bar:
-        task = bar.add_task("", total=1.0)
-
-        def tell(what: str) -> Callable[[float], None]:
-            bar.update(task, completed=0.0, description=what)
-            return lambda done: bar.update(task, completed=done)
-
-        yield tell

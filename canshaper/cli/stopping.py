@@ -113,7 +113,7 @@ def print_stopping(deployment: Deployment, console: Console) -> None:
     axes = stopping(deployment)
     for first in range(0, len(axes), _AXES_A_TABLE):
         console.print(_table(axes[first : first + _AXES_A_TABLE]))
-    console.print(Group(*_notes(axes)), highlight=False)
+    console.print(Group(*_notes(axes)))
 
 
 def _table(axes: list[Stopping]) -> Table:

@@ -122,7 +122,7 @@ def drive(
     sway: Sway | None = None,
     prepare: Callable[[Controller], None] | None = None,
     crane: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] | None = None,
 ) -> Recording:
     """Drive a script through a deployment.
 
@@ -135,7 +135,7 @@ def drive(
         sway: swing of the grapple at the start; by default it hangs still.
         crane: which one moves, where the deployment has several; the others' joysticks stand still.
         prepare: called with the fresh controller, to put another filter in.
-        progress: called with the simulated seconds now and then.
+        on_progress: called with the simulated seconds now and then.
 
     Returns:
         The recorded drive, one row a tick.
@@ -164,6 +164,6 @@ def drive(
     while (time_ms := lock_step.time_ms) < end_ms:
         lock_step.step()
         controller.events.clear()
-        if progress and time_ms % 1000 == 0:
-            progress(time_ms / 1000.0)
+        if on_progress and time_ms % 1000 == 0:
+            on_progress(time_ms / 1000.0)
     return recorder.recording()

@@ -88,7 +88,7 @@ def drive_on_bus(
     changes: list[str],
     *,
     bypass: bool,
-    progress: Callable[[float], None],
+    on_progress: Callable[[float], None],
 ) -> BusDrive:
     """Drive a script with the three processes; the frames heard on the bus are recorded.
 
@@ -98,7 +98,7 @@ def drive_on_bus(
         script: what the operator does.
         changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
         bypass: drive with anti-sway switched off.
-        progress: called with the seconds driven.
+        on_progress: called with the seconds driven.
 
     Raises:
         DriveError: a process ended early or does not answer.
@@ -120,7 +120,7 @@ def drive_on_bus(
                 recorder,
                 crew,
                 lambda: crew.ended("operator"),
-                lambda: progress(min(time.monotonic() - begin, script.duration_s)),
+                lambda: on_progress(min(time.monotonic() - begin, script.duration_s)),
             )
         finally:
             crew.stop()
@@ -134,9 +134,9 @@ def _listen(
     recorder: Recorder,
     crew: "Crew",
     done: Callable[[], bool],
-    tell: Callable[[], None] | None = None,
+    report: Callable[[], None] | None = None,
 ) -> None:
-    """Record what is on the buses until ``done``; without ``tell`` within the start limit."""
+    """Record what is on the buses until ``done``; without ``report`` within the start limit."""
     limit = time.monotonic() + START_LIMIT_S
     files = [port.fileno() for port in ports.values()]
     while not done():
@@ -145,8 +145,8 @@ def _listen(
             for frame in port.frames():
                 recorder.receive(frame, time.monotonic())
         crew.check()
-        if tell:
-            tell()
+        if report:
+            report()
         elif time.monotonic() > limit:
             raise DriveError(f"no frames within {START_LIMIT_S:g} s; heard {recorder.seen}")
 

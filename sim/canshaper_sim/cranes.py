@@ -6,6 +6,7 @@ The crane of an axis is the first part of its name, where what follows is the na
 
 from dataclasses import replace
 
+from canshaper.errors import DesignError
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import ALL_AXES, ROTATOR
@@ -25,11 +26,11 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
     """The same deployment with one crane's axes, under their own names, its joysticks and buses.
 
     Raises:
-        ValueError: no such crane.
+        DesignError: no such crane.
     """
     names = cranes(deployment)
     if crane not in names:
-        raise ValueError(f"crane {crane!r}, allowed {', '.join(names) or 'none: there is one'}")
+        raise DesignError(f"crane {crane!r}, allowed {', '.join(names) or 'none: there is one'}")
     axes: dict[str, BoundAxis] = {
         name.removeprefix(f"{crane}_"): axis
         for name, axis in deployment.axes.items()

@@ -9,6 +9,7 @@ import math
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
+from canshaper.errors import DesignError
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT_CYLINDER, SLEW
 from canshaper_sim.grapple import TipMotion
@@ -72,9 +73,9 @@ class JointParameters:
         for name in ("lift", "knuckle"):
             low, high = getattr(self, f"{name}_min_deg"), getattr(self, f"{name}_max_deg")
             if low >= high:
-                raise ValueError(f"joints: {name}_max_deg = {high}, allowed above {low}")
+                raise DesignError(f"joints: {name}_max_deg = {high}, allowed above {low}")
         if self.start_extension_m > self.extension_max_m:
-            raise ValueError(
+            raise DesignError(
                 f"joints: start_extension_m = {self.start_extension_m},"
                 f" allowed 0.0 .. {self.extension_max_m}"
             )
@@ -116,7 +117,7 @@ class JointBoom:
         """Stand still with the tip at start: theta1 in rad, radius and height in m.
 
         Raises:
-            ValueError: the joints do not reach the start within their ranges.
+            DesignError: the joints do not reach the start within their ranges.
         """
         p = parameters
         theta1, radius_m, height_m = start
@@ -134,7 +135,7 @@ class JointBoom:
         for name, (low, high) in p.ranges.items():
             value = joints[name]
             if not low <= value <= high:
-                raise ValueError(
+                raise DesignError(
                     f"joints: the start pose puts {name} at {_readable(name, [value])},"
                     f" allowed {_readable(name, (low, high))}"
                 )

@@ -1,6 +1,7 @@
 """The operator's joysticks as a node on CAN: a script in, joystick frames out."""
 
 from canshaper.codec.frame import Frame
+from canshaper.errors import DesignError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.axes import JOINT_AXES, SLEW
 from canshaper_sim.hand import Hand, Held
@@ -16,7 +17,7 @@ class JoystickNode:
         bypass: the operator has switched anti-sway off.
 
     Raises:
-        ValueError: the script was made for the other kind of crane, one driven by its tip or by
+        DesignError: the script was made for the other kind of crane, one driven by its tip or by
             its joints. Axes that a crane merely lacks are left out.
     """
 
@@ -24,7 +25,7 @@ class JoystickNode:
         joints = {*JOINT_AXES} - {SLEW}
         foreign = {*script.axes} - {*deployment.axes}
         if foreign & joints or (foreign and joints & deployment.axes.keys()):
-            raise ValueError(
+            raise DesignError(
                 f"script {script.name} moves {', '.join(script.axes)};"
                 f" the deployment has {', '.join(deployment.axes)}"
             )

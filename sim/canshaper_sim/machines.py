@@ -9,6 +9,7 @@ import math
 from collections.abc import Mapping
 from typing import Final, Protocol
 
+from canshaper.errors import DesignError
 from canshaper_sim.axes import JOINT_AXES, SLEW, TIP_AXES
 from canshaper_sim.crane import Crane, CraneParameters, joint_crane
 from canshaper_sim.grapple import Sway
@@ -79,7 +80,7 @@ class TipControlledCrane:
             raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
         for name, command in commands.items():
             if name not in self._commands:
-                raise ValueError(f"crane: axis {name!r}, allowed {', '.join(TIP_AXES)}")
+                raise DesignError(f"crane: axis {name!r}, allowed {', '.join(TIP_AXES)}")
             if not math.isfinite(command):
                 raise ValueError(f"tip controller: command = {command}, allowed finite values")
             self._commands[name] = command
@@ -100,7 +101,7 @@ def build_machine(
     """The machine of that name, standing in its start pose, the grapple with this initial sway.
 
     Raises:
-        ValueError: no such machine, or the joints do not reach the start pose.
+        DesignError: no such machine, or the joints do not reach the start pose.
     """
     if name == TIP:
         return ValveDrivenCrane(Crane(parameters, sway))
@@ -108,7 +109,7 @@ def build_machine(
         return TipControlledCrane(parameters, sway)
     if name == JOINTS:
         return ValveDrivenCrane(joint_crane(parameters, sway))
-    raise ValueError(f"machine {name!r}, allowed {', '.join(MACHINES)}")
+    raise DesignError(f"machine {name!r}, allowed {', '.join(MACHINES)}")
 
 
 def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
@@ -118,11 +119,11 @@ def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
     moves the tip.
 
     Raises:
-        ValueError: no such machine.
+        DesignError: no such machine.
     """
     if wish is None:
         joints = {*JOINT_AXES} - {SLEW}
         return JOINTS if joints & axes.keys() else TIP
     if wish not in AXES_OF:
-        raise ValueError(f"machine {wish!r}, allowed {', '.join(MACHINES)}")
+        raise DesignError(f"machine {wish!r}, allowed {', '.join(MACHINES)}")
     return wish

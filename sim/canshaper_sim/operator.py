@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Sequence
 
+from canshaper.errors import DesignError
 from canshaper_sim.axes import ALL_AXES, EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.scripts import SCRIPTS
@@ -22,7 +23,7 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
     strokes: list[Stroke] = []
     for axis in axes:
         if axis not in ALL_AXES:
-            raise ValueError(f"random script: axis {axis!r}, allowed {', '.join(ALL_AXES)}")
+            raise DesignError(f"random script: axis {axis!r}, allowed {', '.join(ALL_AXES)}")
         # A source for each axis: its strokes do not depend on which other axes move. A string
         # seeds the same way in every Python version.
         source = random.Random(f"canshaper operator {seed} {axis}")
@@ -85,7 +86,7 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """A built-in script, or `random-<seed>` of 30 s on these axes.
 
     Raises:
-        ValueError: no script of that name; lists the names.
+        DesignError: no script of that name; lists the names.
     """
     script = SCRIPTS.get(name)
     if script is not None:
@@ -93,4 +94,4 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     kind, _, seed = name.partition("-")
     if kind == "random" and seed.isdecimal():
         return random_script(int(seed), axes=axes)
-    raise ValueError(f"script {name!r}, allowed {', '.join(SCRIPTS)}, random-<seed>")
+    raise DesignError(f"script {name!r}, allowed {', '.join(SCRIPTS)}, random-<seed>")

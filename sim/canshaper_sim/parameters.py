@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from canshaper.errors import DesignError
 from canshaper_sim.crane import CraneParameters
 
 
@@ -23,18 +24,20 @@ def changed_parameters(changes: list[str]) -> CraneParameters:
     """The nominal crane with NAME=VALUE changes put in, such as grapple.l2_m=1.5.
 
     Raises:
-        ValueError: no such parameter, no number, or a value that makes no crane.
+        DesignError: no such parameter, no number, or a value that makes no crane.
     """
     parameters = CraneParameters()
     known = parameter_names()
     for change in changes:
         name, _, text = change.partition("=")
         if name not in known:
-            raise ValueError(f"--set {change}: no parameter {name!r}, there are {', '.join(known)}")
+            raise DesignError(
+                f"--set {change}: no parameter {name!r}, there are {', '.join(known)}"
+            )
         try:
             value = float(text)
         except ValueError:
-            raise ValueError(f"--set {change}: found {text!r}, allowed is a number") from None
+            raise DesignError(f"--set {change}: found {text!r}, allowed is a number") from None
         parameters = _replaced(parameters, name, value)
     return parameters
 

@@ -3,6 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
+from canshaper.errors import DesignError
+
 
 def check_ranges(owner: str, values: Any, allowed: Mapping[str, tuple[float, float]]) -> None:
     """Refuse the first attribute of `values` outside its range, and every value that is no number.
@@ -13,9 +15,9 @@ def check_ranges(owner: str, values: Any, allowed: Mapping[str, tuple[float, flo
         allowed: attribute name -> (lowest, highest) value.
 
     Raises:
-        ValueError: names owner, attribute, value and the allowed range.
+        DesignError: names owner, attribute, value and the allowed range.
     """
     for name, (low, high) in allowed.items():
         value = getattr(values, name)
         if not low <= value <= high:  # not-a-number compares false and is refused too
-            raise ValueError(f"{owner}: {name} = {value}, allowed {low} .. {high}")
+            raise DesignError(f"{owner}: {name} = {value}, allowed {low} .. {high}")

@@ -9,6 +9,7 @@ reversal included. The area under a stroke is level times duration, whatever the
 import math
 from dataclasses import dataclass, field
 
+from canshaper.errors import DesignError
 from canshaper_sim.axes import ALL_AXES
 
 _HUMAN_RAMP_S = 0.12  # a trained hand moves a stick from neutral to full in 0.1 .. 0.15 s
@@ -34,13 +35,13 @@ class Stroke:
 
     def __post_init__(self) -> None:
         if self.axis not in ALL_AXES:
-            raise ValueError(f"stroke: axis {self.axis!r}, allowed {', '.join(ALL_AXES)}")
+            raise DesignError(f"stroke: axis {self.axis!r}, allowed {', '.join(ALL_AXES)}")
         for name, (low, high) in _ALLOWED.items():
             value = getattr(self, name)
             if not (low <= value <= high and math.isfinite(value)):
-                raise ValueError(f"stroke: {name} = {value}, allowed {low} .. {high}")
+                raise DesignError(f"stroke: {name} = {value}, allowed {low} .. {high}")
         if self.duration_s < self.ramp_s:
-            raise ValueError(
+            raise DesignError(
                 f"stroke: duration_s = {self.duration_s}, allowed from ramp_s = {self.ramp_s} on"
             )
 
@@ -77,7 +78,7 @@ class Script:
         for stroke in self.strokes:
             # The margin forgives rounding of start + duration + ramp.
             if stroke.end_s > self.duration_s + 1e-9:
-                raise ValueError(
+                raise DesignError(
                     f"script {self.name}: a {stroke.axis} stroke ends at {stroke.end_s} s, "
                     f"allowed up to duration_s = {self.duration_s}"
                 )

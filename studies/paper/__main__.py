@@ -8,8 +8,8 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import INSTALL_TOOLS, data_directory, fail, loader
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import data_directory, echo, fail, loader, picture_line
+from canshaper.report.console import SafeConsole
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -98,11 +98,11 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
     if table is not None:
         _write(out / "paper.json", table)
         print_paper_table(table, console)
-        console.print(f"Table: {out / 'paper.json'}", highlight=False, markup=False)
+        console.print(f"Table: {out / 'paper.json'}")
     for finding, path in drawn:
-        console.print(f"{path}: {finding}", highlight=False, markup=False)
+        console.print(f"{path}: {finding}")
     if not drawn:
-        console.print(f"No pictures: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
+        console.print(picture_line(None))
 
 
 def _picture(study: "Study", number: int) -> "tuple[str, Figure | None]":

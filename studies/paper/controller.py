@@ -39,7 +39,7 @@ class Fact:
         what: what the number is of.
         paper: as printed.
         ours: what comes out here.
-        agrees: whether it is the same; None where the paper leaves too much open to tell.
+        agrees: whether it is the same; None where the paper leaves too much open to on_progress.
         remark: why, or on which assumption.
     """
 
@@ -55,7 +55,7 @@ def facts(
     curves: tuple[BodeCurve, BodeCurve],
     turning: Slewing,
     ladders: Mapping[tuple[str, str], list[Run]],
-    tell: Callable[[], None],
+    on_progress: Callable[[], None],
 ) -> list[Fact]:
     """Every printed number that is not a reduction.
 
@@ -63,13 +63,13 @@ def facts(
         curves: of figure 6.
         turning: the linearisation while slewing.
         ladders: runs of figures 3 and 4 by (axis, plant).
-        tell: called ``TUNINGS`` times, after every tuning.
+        on_progress: called ``TUNINGS`` times, after every tuning.
     """
     result = []
     for axis in ("slew", "near_far"):
         result.append(_roots(axis))
-        result.append(_optimum(axis, tell))
-    result += [_pole_distance(tell), _manual_rule(), *_poles_and_sway(ladders)]
+        result.append(_optimum(axis, on_progress))
+    result += [_pole_distance(on_progress), _manual_rule(), *_poles_and_sway(ladders)]
     return [*result, *_model(curves, turning)]
 
 
@@ -88,13 +88,13 @@ def _roots(axis: str) -> Fact:
     )
 
 
-def _optimum(axis: str, tell: Callable[[], None]) -> Fact:
+def _optimum(axis: str, on_progress: Callable[[], None]) -> Fact:
     a1, a2 = printed.DENOMINATORS[axis]
     assumed = printed_mode(Grapple())
     ours = tune(Task(assumed, TICK_S, weights=_WEIGHTS[axis], require=_FREE))
-    tell()
+    on_progress()
     fitted = tune(_fitted_task(axis, _FREE))
-    tell()
+    on_progress()
     mode = printed.FITTED[axis]
     length = GRAVITY_M_S2 / mode.omega_rad_s**2
     return Fact(
@@ -115,10 +115,10 @@ def _fitted_task(axis: str, require: Requirements) -> Task:
     return Task(mode, TICK_S, _FITTED_HORIZON_S, weights, "deviation", require)
 
 
-def _pole_distance(tell: Callable[[], None]) -> Fact:
+def _pole_distance(on_progress: Callable[[], None]) -> Fact:
     require = Requirements(pole_distance="printed", within_command=False)
     found: Tuning = tune(_fitted_task("slew", require))
-    tell()
+    on_progress()
     needed = min(printed.POLES["slew"]) / 5.0
     return Fact(
         "3.1",

@@ -86,7 +86,7 @@ def _judged(ours: dict[str, dict[Metric, float]], more_than_pct: float) -> dict[
     return {"ours_pct": rounded, "holds_for": holds}
 
 
-def assumptions(tell: Callable[[], None]) -> list[dict[str, Any]]:
+def assumptions(on_progress: Callable[[], None]) -> list[dict[str, Any]]:
     """The claims of the linear plant over the length l2 of the grapple and the length of rest.
 
     All other parameters stay as assumed, and the filter knows the grapple. The rest matters to the
@@ -94,7 +94,7 @@ def assumptions(tell: Callable[[], None]) -> list[dict[str, Any]]:
     left weighs.
 
     Args:
-        tell: called after every length and rest.
+        on_progress: called after every length and rest.
 
     Returns:
         Per claim, the reductions by l2 in m and by rest in s.
@@ -102,10 +102,10 @@ def assumptions(tell: Callable[[], None]) -> list[dict[str, Any]]:
     result: list[dict[str, Any]] = [asdict(c) | {"by_l2_m": {}, "by_rest_s": {}} for c in CLAIMS]
     for length_m in LENGTHS_M:
         _vary(result, "by_l2_m", length_m, replace(Grapple(), l2_m=length_m), REST_S)
-        tell()
+        on_progress()
     for rest_s in RESTS_S:
         _vary(result, "by_rest_s", rest_s, Grapple(), rest_s)
-        tell()
+        on_progress()
     return result
 
 

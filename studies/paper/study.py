@@ -26,19 +26,19 @@ class Study:
 
     Args:
         deployment: the shipped one, for the real plant.
-        tell: called after every drive and tuning; see ``steps``.
+        on_progress: called after every drive and tuning; see ``steps``.
 
     Raises:
         ValueError: the deployment lacks slew or near_far, or one of them has no sway data.
     """
 
-    def __init__(self, deployment: Deployment, tell: Callable[[], None]) -> None:
+    def __init__(self, deployment: Deployment, on_progress: Callable[[], None]) -> None:
         for axis in (SLEW, NEAR_FAR):
             bound = deployment.axes.get(axis)
             if bound is None or bound.config.sway is None:
                 raise ValueError(f"the deployment has no axis {axis} with sway data")
         self._deployment = deployment
-        self._tell = tell
+        self._on_progress = on_progress
         self._runs: dict[tuple[str, tuple[float, float], str], Run] = {}
         self._curves: tuple[bode.BodeCurve, bode.BodeCurve] | None = None
         self._turning: bode.Slewing | None = None
@@ -51,7 +51,7 @@ class Study:
                 self._runs[key] = linear_run(axis, poles_rad_s)
             else:
                 self._runs[key] = real_run(self._deployment, axis, poles_rad_s)
-            self._tell()
+            self._on_progress()
         return self._runs[key]
 
     def ladder(self, figure: int) -> list[tuple[Run, Run]]:
@@ -78,7 +78,7 @@ class Study:
         """Figure 6."""
         if self._curves is None:
             self._curves = bode.bode()
-            self._tell()
+            self._on_progress()
         return self._curves
 
     def turning(self) -> bode.Slewing:
@@ -106,13 +106,13 @@ class Study:
             for plant in PLANTS
         }
         rows = reductions.rows(runs)
-        varied = reductions.assumptions(self._tell)
+        varied = reductions.assumptions(self._on_progress)
         ladders = {
             (AXIS_OF[figure], plant): [pair[i] for pair in self.ladder(figure)]
             for figure in (3, 4)
             for i, plant in enumerate(PLANTS)
         }
-        found = controller.facts(self.curves(), self.turning(), ladders, self._tell)
+        found = controller.facts(self.curves(), self.turning(), ladders, self._on_progress)
         return {
             "paper": "Optimal sway motion reduction in forestry cranes, Front. Robot. AI, 2024",
             "assumed": {"why": PARAMETERS, "grapple": asdict(Grapple())},
@@ -125,7 +125,7 @@ class Study:
 
 
 def steps(figures: tuple[int, ...], *, table: bool) -> int:
-    """How often a study of these figures will call ``tell``."""
+    """How often a study of these figures will call ``on_progress``."""
     wanted = set(FIGURES) if table else set(figures)
     count = sum(len(LADDER) * len(PLANTS) for f in (3, 4) if f in wanted)
     count += sum(len(PLANTS) for f in (7, 8) if f in wanted) + (6 in wanted)

@@ -65,7 +65,7 @@ def main() -> None:
         file = loader("forwarder.yaml")()
         script = script_named("pulse-slew", list(file.axes))
         way = choose_transport("udp_multicast", file)
-        done_drive = drive_on_bus(file, way, script, [], bypass=False, progress=lambda _: None)
+        done_drive = drive_on_bus(file, way, script, [], bypass=False, on_progress=lambda _: None)
         told["drive"] = max(done_drive.recording.axes["slew"].sent) > 0
     told["outside"] = outgoing(capture)
     told["from_outside"] = injected(sender, receiver, capture.getsockname()[4])

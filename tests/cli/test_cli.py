@@ -380,7 +380,7 @@ def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> Non
     arguments = ("demo", "--lockstep", "--script", "pulse-near_far")
     done = without(("casadi", "matplotlib", "numpy", "scipy"), tmp_path, *arguments)
     assert (done.returncode, done.stderr) == (0, "")
-    assert "No picture: matplotlib is missing: pip install 'canshaper[tools]'" in done.stdout
+    assert "Picture: none, matplotlib is missing: pip install 'canshaper[tools]'" in done.stdout
     assert [path.name for path in tmp_path.rglob("*.*")] == ["report.json"]
 
 

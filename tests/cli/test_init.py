@@ -189,7 +189,7 @@ def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path
     assert result.exit_code == 2
     told = [line for line in result.output.splitlines() if str(tmp_path) in line][1:]
     assert "has GenMsgCycleTime 50 ms, allowed is a multiple of tick_ms, 20 ms" in told[0]
-    assert told[1:] == [f"{draft}: kept with all answers; mend it there and rename it to {file}"]
+    assert told[1:] == [f"{draft}: kept with all answers; fix it there and rename it to {file}"]
     assert not file.exists()
     again = CliRunner().invoke(app, arguments, input=given)
     assert (again.exit_code, f"{draft}: is there already" in again.output) == (2, True)

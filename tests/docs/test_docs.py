@@ -43,7 +43,7 @@ def test_commands_and_options_are_there(page: Path) -> None:
     wrong = []
     for code in CODE.finditer(text):
         for verb, rest in COMMAND.findall(code[1] or code[2]):
-            command = COMMANDS.commands.get(verb)
+            command = COMMANDS.get_command(None, verb)
             if command is None:
                 wrong.append(verb)
                 continue

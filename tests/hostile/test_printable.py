@@ -10,9 +10,9 @@ from rich.table import Table
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.cli.console import SafeConsole
 from canshaper.config.printable import printable
 from canshaper.daemon.journal import JournalHandler
+from canshaper.report.console import SafeConsole
 from tests.hostile.inputs import DBC, SHIPPED
 
 CLEAR = "\x1b[2J"

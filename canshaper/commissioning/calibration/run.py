@@ -21,7 +21,7 @@ STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SI
 
 
 def run_live(
-    drive: CalibrationDrive, deployment: Deployment, tell: Callable[[CalibrationDrive], None]
+    drive: CalibrationDrive, deployment: Deployment, on_progress: Callable[[CalibrationDrive], None]
 ) -> None:
     """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
 
@@ -30,7 +30,7 @@ def run_live(
     Args:
         drive: the measurement.
         deployment: its machine.
-        tell: called now and then.
+        on_progress: called now and then.
 
     Raises:
         BusError: a bus cannot be opened.
@@ -55,7 +55,7 @@ def run_live(
         io_cycle(drive, ports, now_ns, missed, standstill)
         if now_ns >= told_ns:
             told_ns = now_ns + 200_000_000
-            tell(drive)
+            on_progress(drive)
         if stopped and not drive.ended:
             drive.ended = f"stopped: {stopped}"
         return not drive.ended
@@ -71,4 +71,4 @@ def run_live(
                 for frame in drive.neutral_frames():
                     ports[frame.bus].send(frame)
                 time.sleep(deployment.config.tick_ms / 1000.0)
-    tell(drive)
+    on_progress(drive)

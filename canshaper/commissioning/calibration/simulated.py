@@ -18,7 +18,7 @@ def run_simulated(
     drive: CalibrationDrive,
     deployment: Deployment,
     parameters: CraneParameters | None,
-    tell: Callable[[CalibrationDrive], None],
+    on_progress: Callable[[CalibrationDrive], None],
 ) -> None:
     """Drive the axis of the simulated crane, with the enable switch held, to the end.
 
@@ -33,4 +33,4 @@ def run_simulated(
         if drive.waiting_for and lock_step.time_ms > 1000 * LONGEST_WAIT_S:
             drive.ended = f"stopped: waits for {drive.waiting_for}"
         if lock_step.time_ms % 1000 == 0:
-            tell(drive)
+            on_progress(drive)

@@ -28,7 +28,7 @@ def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
 
 
 def listen(
-    deployment: Deployment, seconds: float, tell: Callable[[float], None]
+    deployment: Deployment, seconds: float, on_progress: Callable[[float], None]
 ) -> dict[str, list[int]]:
     """Times of reception, ns, of the messages on SocketCAN buses, by the names of ``inputs_of``.
 
@@ -51,7 +51,7 @@ def listen(
                 heard |= {name: [] for name in wanted}
         begin = time.monotonic()
         while sockets and (passed := time.monotonic() - begin) < seconds:
-            tell(passed)
+            on_progress(passed)
             ready, _, _ = select.select(list(sockets), [], [], min(LOOK_S, seconds - passed))
             for one in ready:
                 if taken := _next(one, sockets[one]):

@@ -51,14 +51,14 @@ class Run:
 
 
 def measure(
-    deployment: Deployment, seconds: float, tell: Callable[[float], None], *, load: bool
+    deployment: Deployment, seconds: float, on_progress: Callable[[float], None], *, load: bool
 ) -> Run:
     """Run the loop of a deployment without its buses.
 
     Args:
         deployment: what is run.
         seconds: how long.
-        tell: called with the seconds that have passed.
+        on_progress: called with the seconds that have passed.
         load: keep the PC busy meanwhile.
 
     Raises:
@@ -85,7 +85,7 @@ def measure(
                 bytes(CAN_FRAME.size)
             )  # the joysticks begin, and the loop with their first frame
         ends.close()  # the children see each other end
-        record = _result(loop, hand, seconds, tell)
+        record = _result(loop, hand, seconds, on_progress)
         return run_of(deployment, record, json.loads(output(hand, PATIENCE_S)))
 
 
@@ -93,11 +93,11 @@ def _result(
     loop: "subprocess.Popen[str]",
     hand: "subprocess.Popen[str]",
     seconds: float,
-    tell: Callable[[float], None],
+    on_progress: Callable[[float], None],
 ) -> dict[str, Any]:
     begin = time.monotonic()
     while (passed := time.monotonic() - begin) < seconds + PATIENCE_S:
-        tell(passed)
+        on_progress(passed)
         if hand.poll():  # it fails before the loop can know
             output(hand, PATIENCE_S)
         with suppress(subprocess.TimeoutExpired):

@@ -98,7 +98,7 @@ def read_can(
     *,
     deployment: Deployment | None = None,
     channel: str | None = None,
-    progress: Callable[[float], None] | None = None,
+    on_progress: Callable[[float], None] | None = None,
 ) -> dict[str, Series]:
     """Signals of a log by axis.
 
@@ -109,7 +109,7 @@ def read_can(
         messages: of the DBC files.
         deployment: names the commands of the axes and the signal of the grapple, where known.
         channel: bus of the log that is read; by default all of them.
-        progress: is told what part is read, 0 to 1.
+        on_progress: called with the part that is read, 0 to 1.
 
     Raises:
         IdentificationError: a signal is not in the log, or from two senders.
@@ -127,7 +127,7 @@ def read_can(
     frames, first_ns = 0, None
     channels: set[str] = set()
     try:
-        for frame in LogFile(path, progress):
+        for frame in LogFile(path, on_progress):
             channels.add(frame.channel)
             if channel is not None and frame.channel != channel:
                 continue

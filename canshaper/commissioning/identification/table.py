@@ -32,7 +32,7 @@ _WRONG_LINES = 50
 _LARGEST = 1e30
 # The year 2286; no clock is there.
 _LATEST_S = 1e10
-_TELL_EVERY = 20_000
+_REPORT_EVERY = 20_000
 
 Lines = NDArray[np.int64]
 
@@ -107,12 +107,12 @@ def is_table(path: Path) -> bool:
         return "arbitration_id" not in file.readline(10_000)
 
 
-def read_table(path: Path, progress: Callable[[float], None] | None = None) -> Table:
+def read_table(path: Path, on_progress: Callable[[float], None] | None = None) -> Table:
     """Read a table.
 
     Args:
         path: the file.
-        progress: is told what part is read, 0 to 1.
+        on_progress: called with the part that is read, 0 to 1.
 
     Raises:
         IdentificationError: it is none, has no times, or its clock goes back.
@@ -128,8 +128,8 @@ def read_table(path: Path, progress: Callable[[float], None] | None = None) -> T
         for line, text in enumerate(file, number + 1):
             row = _row(path, line, text, delimiter)
             read += sum(len(f) for f in row) + len(row) + 1
-            if progress and line % _TELL_EVERY == 0:
-                progress(min(1.0, read / size))
+            if on_progress and line % _REPORT_EVERY == 0:
+                on_progress(min(1.0, read / size))
             if not row or not any(row):
                 continue
             numbers = _numbers(row, delimiter)

@@ -5,6 +5,7 @@ from dataclasses import dataclass, replace
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.schema import RadialConfig
 from canshaper.design.tuning.robust import RobustShaper, least_residual
+from canshaper.errors import DesignError
 from canshaper.machine.bound_axis import BoundRadial
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
@@ -37,14 +38,14 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
     """Every filter for this axis; the impulse responses are designed for its valve's rate.
 
     Raises:
-        ValueError: there is no such axis, or it has no sway data.
+        DesignError: there is no such axis, or it has no sway data.
     """
     bound = deployment.axes.get(axis)
     if bound is None:
-        raise ValueError(f"axis {axis!r}, allowed {', '.join(deployment.axes)}")
+        raise DesignError(f"axis {axis!r}, allowed {', '.join(deployment.axes)}")
     config = bound.config
     if config.sway is None:
-        raise ValueError(f"axis {axis} has no sway data: nothing to compare")
+        raise DesignError(f"axis {axis} has no sway data: nothing to compare")
     mode = config.sway.mode()
     tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
     rate = config.limits.slowest_per_s

@@ -90,17 +90,17 @@ def measure_all(
     found: list[Candidate],
     tasks: list[Manoeuvre],
     *,
-    progress: Callable[[int, int], None],
+    on_progress: Callable[[float], None],
     processes: int | None = None,
 ) -> list[Outcome]:
     """Every candidate through every manoeuvre, on all processors.
 
     Args:
-        file: deployment file, loaded anew in every process.
+        file: deployment file, loaded again in every process.
         axis: the axis that is driven.
         found: the candidates.
         tasks: the manoeuvres.
-        progress: called with (done, all).
+        on_progress: called with the part done, 0 to 1.
         processes: number of processes; by default one a processor.
     """
     jobs = [(c, t, p) for c in found for t in tasks for p in t.lengths_pct]
@@ -110,7 +110,7 @@ def measure_all(
         try:
             for done, future in enumerate(as_completed(futures), 1):
                 outcomes.append(future.result())
-                progress(done, len(jobs))
+                on_progress(done / len(jobs))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
             raise

@@ -10,6 +10,7 @@ from pydantic import Field, model_validator
 from canshaper.config.load import load_section
 from canshaper.config.section import Section, number
 from canshaper.config.source import Source
+from canshaper.errors import DesignError
 
 _Length = Annotated[float, number(-20, 20, "m", "link length a_(i-1)")]
 _Twist = Annotated[float, number(-180, 180, "deg", "link twist alpha_(i-1)")]
@@ -35,7 +36,7 @@ class RotaryJoint(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.min_deg >= self.max_deg:
-            raise ValueError(f"min_deg is {self.min_deg:g}, allowed is below max_deg")
+            raise DesignError(f"min_deg is {self.min_deg:g}, allowed is below max_deg")
         return self
 
 
@@ -53,7 +54,7 @@ class SlidingJoint(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.min_m >= self.max_m:
-            raise ValueError(f"min_m is {self.min_m:g}, allowed is below max_m")
+            raise DesignError(f"min_m is {self.min_m:g}, allowed is below max_m")
         return self
 
 
@@ -74,7 +75,7 @@ class Joints(Section):
         for name, twist in _PLANE.items():
             found = getattr(self, name).alpha_deg
             if found != twist:
-                raise ValueError(f"{name}.alpha_deg is {found:g}, allowed is {twist:g} (Eq. 3)")
+                raise DesignError(f"{name}.alpha_deg is {found:g}, allowed is {twist:g} (Eq. 3)")
         for name, value in (
             ("slew.a_m", self.slew.a_m),
             ("lift.d_m", self.lift.d_m),
@@ -82,7 +83,7 @@ class Joints(Section):
             ("extension.theta_deg", self.extension.theta_deg),
         ):
             if value != 0.0:
-                raise ValueError(f"{name} is {value:g}, allowed is 0 (boom in one plane, Eq. 3)")
+                raise DesignError(f"{name} is {value:g}, allowed is 0 (boom in one plane, Eq. 3)")
         return self
 
 

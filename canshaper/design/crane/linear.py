@@ -22,6 +22,7 @@ from canshaper.design.crane.config import GrappleData
 from canshaper.design.crane.dynamics import SwayDynamics
 from canshaper.design.crane.kinematics import Array, Kinematics, Vector, evaluate
 from canshaper.design.crane.statespace import SwayStateSpace
+from canshaper.errors import DesignError
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
 
 # States of `SwayStateSpace` that the sway depends on: all but heading and height.
@@ -111,11 +112,11 @@ class LinearSway:
         """The upper sway poles, rad/s, the slower mode first.
 
         Raises:
-            ValueError: a mode does not swing (damping beyond the critical one).
+            DesignError: a mode does not swing (damping beyond the critical one).
         """
         upper = [complex(p) for p in np.linalg.eigvals(self.a[:4, :4]) if p.imag > 1e-9]
         if len(upper) != 2:
-            raise ValueError("a sway mode does not swing: damping beyond the critical one")
+            raise DesignError("a sway mode does not swing: damping beyond the critical one")
         slow, fast = sorted(upper, key=abs)
         return slow, fast
 
@@ -215,7 +216,7 @@ def sway_modes(grapple: GrappleData, point: OperatingPoint | None = None) -> Swa
     whose place in the order is that of mode5 at rest.
 
     Raises:
-        ValueError: a mode does not swing or is outside the range of `SwayMode`.
+        DesignError: a mode does not swing or is outside the range of `SwayMode`.
     """
     at_rest = closed_form(grapple, OperatingPoint(radius_m=1.0))
     _, twice5, square5 = at_rest[0][0].den

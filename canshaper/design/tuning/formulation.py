@@ -11,6 +11,7 @@ import math
 from dataclasses import dataclass, field
 from typing import Literal, get_args
 
+from canshaper.errors import DesignError
 from canshaper.shaping.sway import SwayMode
 
 PoleDistance = Literal["text", "printed", "off"]
@@ -39,7 +40,7 @@ def in_range(name: str, value: float, low: float, high: float, unit: str = "") -
     """ValueError with the value found and the range allowed, unless finite and in [low, high]."""
     if not (math.isfinite(value) and low <= value <= high):
         text = f"{name} is {value:g} {unit}".rstrip()
-        raise ValueError(f"{text}, allowed is {low:g} to {high:g} {unit}".rstrip())
+        raise DesignError(f"{text}, allowed is {low:g} to {high:g} {unit}".rstrip())
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +54,7 @@ class Weights:
         p: weight P of the change of the output from sample to sample.
 
     Raises:
-        ValueError: a weight is negative or no number, or R and S are both zero (then the best
+        DesignError: a weight is negative or no number, or R and S are both zero (then the best
             filter would be one that never moves).
     """
 
@@ -67,7 +68,7 @@ class Weights:
         for name, value in named:
             in_range(f"weight {name}", value, 0.0, 1e6)
         if self.r + self.s == 0.0:
-            raise ValueError("weights R and S are both 0, allowed is at least one above 0")
+            raise DesignError("weights R and S are both 0, allowed is at least one above 0")
 
 
 PAPER_SLEW = Weights()
@@ -88,7 +89,7 @@ class Requirements:
         third_pole: a third real pole, so that nothing comes out at once.
 
     Raises:
-        ValueError: a value is out of range.
+        DesignError: a value is out of range.
     """
 
     pole_distance: PoleDistance = "text"
@@ -101,7 +102,7 @@ class Requirements:
     def __post_init__(self) -> None:
         if self.pole_distance not in get_args(PoleDistance):
             allowed = ", ".join(get_args(PoleDistance))
-            raise ValueError(f"pole distance is {self.pole_distance}, allowed are {allowed}")
+            raise DesignError(f"pole distance is {self.pole_distance}, allowed are {allowed}")
         if self.max_jump is not None:
             in_range("first jump", self.max_jump, 0.01, 100.0, "of the command")
         if self.max_rate_per_s is not None:
@@ -125,7 +126,7 @@ class Task:
             of -range ... +range percent. Slow filters leave less, so a run-on has to be required.
 
     Raises:
-        ValueError: a value is out of range.
+        DesignError: a value is out of range.
     """
 
     mode: SwayMode
@@ -141,11 +142,11 @@ class Task:
         in_range("horizon", self.horizon_s, max(0.2, 5.0 * self.tick_s), 60.0, "s")
         if self.states not in get_args(States):
             allowed = ", ".join(get_args(States))
-            raise ValueError(f"states are {self.states}, allowed are {allowed}")
+            raise DesignError(f"states are {self.states}, allowed are {allowed}")
         if self.length_range_pct is not None:
             in_range("length range", self.length_range_pct, 1.0, 60.0, "%")
             if self.require.max_run_on_s is None:
-                raise ValueError(
+                raise DesignError(
                     "length range without a run-on: slower is always more robust, so the longest"
                     " run-on has to be given"
                 )

@@ -2,6 +2,7 @@
 
 from canshaper.design.tuning.formulation import FASTEST_RAD_S, POLE_DISTANCE, SLOWEST_RAD_S
 from canshaper.design.tuning.optimal import Tuning
+from canshaper.errors import DesignError
 from canshaper.shaping.shapers.gff import denominator_from_poles
 from canshaper.shaping.sway import SwayMode
 
@@ -13,14 +14,14 @@ def manual(mode: SwayMode) -> Tuning:
     """Setting by the rule: first pole at five times the real part of the sway pole.
 
     Raises:
-        ValueError: the sway is damped so little or so much that the poles are outside what a
+        DesignError: the sway is damped so little or so much that the poles are outside what a
             deployment may have.
     """
     first = POLE_DISTANCE * mode.pole.real
     poles = first, SECOND_TO_FIRST * first
     if -first < SLOWEST_RAD_S or -poles[1] > FASTEST_RAD_S:
         ratio = SLOWEST_RAD_S / POLE_DISTANCE / mode.omega_rad_s
-        raise ValueError(
+        raise DesignError(
             f"the manual rule puts the poles at {-first:.3g} and {-poles[1]:.3g} rad/s from a"
             f" damping ratio of {mode.damping_ratio:.3g}, allowed are {SLOWEST_RAD_S:g} to"
             f" {FASTEST_RAD_S:g} rad/s (damping ratio {ratio:.3g} or more);"

@@ -11,7 +11,7 @@ import numpy as np
 from canshaper.design.tuning.conflict import box_conflict, explain, feasible_point
 from canshaper.design.tuning.formulation import Task
 from canshaper.design.tuning.program import Program, Solution, Vector
-from canshaper.errors import InfeasibleError
+from canshaper.errors import DesignError, InfeasibleError
 from canshaper.shaping.shapers.gff import denominator_from_poles
 
 # "As good": what the poles may do within so much of the optimal cost.
@@ -57,24 +57,24 @@ class Tuning:
 def tune(
     task: Task,
     starts: int | Sequence[tuple[float, ...]] = 3,
-    progress: Callable[[str, float], None] | None = None,
+    on_progress: Callable[[float, str], None] | None = None,
 ) -> Tuning:
     """Solve a task.
 
     Args:
         task: what is asked.
         starts: how many starts, or the poles of each in rad/s (negative, slowest first).
-        progress: called with what is being done and the part done, 0 to 1.
+        on_progress: called with the part done, 0 to 1, and what is done next.
 
     Raises:
         InfeasibleError: no poles keep all requirements; says which conflict and what is attainable.
-        ValueError: a value is out of range, or no start converged.
+        DesignError: a value is out of range, or no start converged.
     """
-    tell = progress or (lambda _what, _done: None)
+    report = on_progress or (lambda _done, _what: None)
     if isinstance(starts, int) and not 1 <= starts <= 1000:
-        raise ValueError(f"starts is {starts}, allowed is 1 to 1000")
+        raise DesignError(f"starts is {starts}, allowed is 1 to 1000")
     box_conflict(task)
-    tell("building the programme", 0.0)
+    report(0.0, "building the programme")
     begin = time.perf_counter()
     program = Program(task)
     built = time.perf_counter()
@@ -82,16 +82,16 @@ def tune(
     ranges_at = 0.7
     found: list[Solution] = []
     for i, point in enumerate(points):
-        tell(f"start {i + 1} of {len(points)}", ranges_at * i / len(points))
+        report(ranges_at * i / len(points), f"start {i + 1} of {len(points)}")
         found.append(program.solve(point))
     good = [solution for solution in found if solution.success]
     if not good:
         good = [_second_try(program)]
     best = min(good, key=lambda solution: solution.cost)
     converged = sum(s.cost <= best.cost * (1.0 + _SAME_COST) + 1e-9 for s in good)
-    tell("range of the poles", ranges_at)
+    report(ranges_at, "range of the poles")
     ranges = _ranges(program, best)
-    tell("solved", 1.0)
+    report(1.0, "solved")
     q = _settled(program, best)
     a1, a2 = denominator_from_poles((-q[0], -q[1]))
     return Tuning(
@@ -134,7 +134,7 @@ def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]
     for poles in starts:
         if len(poles) != program.size or not all(p < 0.0 for p in poles):
             text = f"start is {poles}, allowed are {program.size} negative poles"
-            raise ValueError(text)
+            raise DesignError(text)
         q = np.log(np.sort(-np.array(poles)))
         points.append(np.array([q[0], *np.diff(q)]))
     return points
@@ -147,7 +147,7 @@ def _second_try(program: Program) -> Solution:
         raise InfeasibleError(explain(program))
     solution = program.solve(point)
     if not solution.success:
-        raise ValueError("the solver did not converge from any start; try more starts")
+        raise DesignError("the solver did not converge from any start; try more starts")
     return solution
 
 

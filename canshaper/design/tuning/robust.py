@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from canshaper.errors import DesignError
 from canshaper.shaping.sway import SwayMode
 
 # |H| <= r is a disc; a polygon of so many sides around it is at most 0.3 % larger.
@@ -67,12 +68,12 @@ def least_residual(
             between; by default the same at every length. The residual then is in its unit.
 
     Raises:
-        ValueError: a value is out of range, or the rate cannot reach full speed in the duration.
+        DesignError: a value is out of range, or the rate cannot reach full speed in the duration.
     """
     _check(tick_s, duration_s, range_pct, rate_per_s)
     count = round(duration_s / tick_s) + 1
     if count * tick_s * rate_per_s < 1.0:
-        raise ValueError(
+        raise DesignError(
             f"duration is {duration_s:g} s, allowed is {1.0 / rate_per_s:g} s or more:"
             f" the valve takes that long to full speed at {rate_per_s:g} /s"
         )
@@ -91,7 +92,7 @@ def least_residual(
         method="highs",
     )
     if not solution.success:
-        raise ValueError(f"no impulse response found: {solution.message}")
+        raise DesignError(f"no impulse response found: {solution.message}")
     taps = np.clip(solution.x[:count], 0.0, None)
     return _shaper(taps, mode, tick_s, range_pct, swing)
 
@@ -102,7 +103,7 @@ def shortest(
     """Shortest impulse response with at most this residual over the range (bisection).
 
     Raises:
-        ValueError: not reached within five swings, or a value out of range.
+        DesignError: not reached within five swings, or a value out of range.
     """
     longest = 5.0 * mode.period_s
     _check(tick_s, longest, range_pct, rate_per_s)
@@ -120,7 +121,7 @@ def shortest(
 
     best = design(high)
     if best.residual > residual_pct / 100.0:
-        raise ValueError(
+        raise DesignError(
             f"residual is {residual_pct:g} %, allowed is {100.0 * best.residual:.2g} % or more"
             f" for +-{range_pct:g} % length with a valve rate of {rate_per_s:g} /s"
         )
@@ -218,4 +219,4 @@ def _check(tick_s: float, duration_s: float, range_pct: float, rate_per_s: float
         ("valve rate", rate_per_s, 0.2, 1000.0, "1/s"),
     ):
         if not low <= value <= high:
-            raise ValueError(f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}")
+            raise DesignError(f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}")

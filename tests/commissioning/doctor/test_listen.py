@@ -13,7 +13,7 @@ import pytest
 
 from canshaper.bus.arrival import SO_TIMESTAMPNS
 from canshaper.bus.raw import CAN_FRAME
-from canshaper.cli.doctor import _listened
+from canshaper.cli.verbs.doctor import _listened
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening
 from canshaper.commissioning.doctor.finding import Finding, Level

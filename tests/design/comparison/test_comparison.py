@@ -79,12 +79,10 @@ def test_initial_sway_is_hung_in_the_plane_of_the_axis(deployment: Deployment) -
 def test_processes_give_what_one_gives(deployment: Deployment) -> None:
     found = candidates(deployment, "near_far")[:2]
     tasks = [replace(manoeuvres("near_far")[2], lengths_pct=(0,))]
-    seen: list[tuple[int, int]] = []
-    outcomes = measure_all(
-        FILE, "near_far", found, tasks, progress=lambda *a: seen.append(a), processes=2
-    )
+    seen: list[float] = []
+    outcomes = measure_all(FILE, "near_far", found, tasks, on_progress=seen.append, processes=2)
     assert outcomes == [measure(deployment, "near_far", c, tasks[0], 0) for c in found]
-    assert seen == [(1, 2), (2, 2)]
+    assert seen == [0.5, 1.0]
 
 
 def made(name: str, stop_s: float, residual_deg: float) -> list[Outcome]:

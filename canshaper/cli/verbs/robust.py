@@ -3,14 +3,14 @@
 from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.table import Table
 
-from canshaper.cli.common import FILE, fail, loader, refuse_shipped
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import FILE, echo, loader, refuse_shipped
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
     from canshaper.config.filters import Filter
     from canshaper.design.tuning.evaluate import Evaluation
     from canshaper.design.tuning.robust import RobustShaper
@@ -50,7 +50,7 @@ def robust(
     from canshaper.config.filters import filter_of
     from canshaper.design.tuning.evaluate import Machine, evaluate
     from canshaper.design.tuning.robust import least_residual, shortest
-    from canshaper.errors import ConfigError
+    from canshaper.report.console import SafeConsole
     from canshaper.shaping.registry import build_shaper
 
     console = SafeConsole()
@@ -61,7 +61,7 @@ def robust(
         bound = deployment.axes.get(axis)
         if bound is None or bound.config.sway is None:
             having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway)
-            raise ValueError(f"axis {axis!r}, allowed are axes with sway data: {having or 'none'}")
+            raise UsageError(f"axis {axis!r}, allowed are axes with sway data: {having or 'none'}")
         mode = bound.config.sway.mode()
         limits = bound.config.limits
         tick_ms = bound.period_ticks * deployment.config.tick_ms
@@ -73,7 +73,7 @@ def robust(
                 mode, tick_s=tick_s, duration_s=seconds, range_pct=range_pct, rate_per_s=rate
             )
         elif duration_s is not None:
-            raise ValueError("allowed is one of --duration and --residual")
+            raise UsageError("allowed is one of --duration and --residual")
         else:
             found = shortest(
                 mode,
@@ -101,19 +101,16 @@ def robust(
             values: dict[str, Value] = dict.fromkeys(gone)
             values |= section
             set_values(deployment.path, ("axes", axis, "filter"), values)
-    except ConfigError as error:
-        raise fail(error) from None
     except ValueError as error:
-        raise fail(ValueError(f"axis {axis}: {error}")) from None
+        raise UsageError(f"axis {axis}: {error}") from None
     console.print(
         f"Robust shaper for {axis}: {found.duration_s:.2f} s, mean delay"
         f" {found.mean_delay_s:.2f} s, at most {100.0 * found.residual:.1f} % of the swing left at"
-        f" lengths within ±{range_pct:g} %.",
-        highlight=False,
+        f" lengths within ±{range_pct:g} %."
     )
     console.print(_table(measured))
     chosen = filter_of("robust", tick_ms=tick_ms, taps=taps)
-    _tell_stop(deployment, axis, chosen, found.duration_s, console)
+    _print_stop(deployment, axis, chosen, found.duration_s, console)
     if write:
         console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
     else:
@@ -140,10 +137,10 @@ def _section(
     }
 
 
-def _tell_stop(
-    deployment: "Deployment", axis: str, chosen: "Filter", duration_s: float, console: Console
+def _print_stop(
+    deployment: "Deployment", axis: str, chosen: "Filter", duration_s: float, console: "Console"
 ) -> None:
-    """Tell what tail the filter needs, and how far the tip travels."""
+    """Say what tail the filter needs, and how far the tip travels."""
     from canshaper.cli.stopping import consequences
 
     tail_s = deployment.axes[axis].config.limits.tail_s
@@ -151,17 +148,15 @@ def _tell_stop(
     if needed_s is not None:
         console.print(
             f"tail_s is {tail_s:g} s: it ends the run-on early; give {axis} at least"
-            f" tail_s: {needed_s:.1f}",
-            highlight=False,
+            f" tail_s: {needed_s:.1f}"
         )
-    console.print(consequences(deployment, axis, chosen, needed_s), highlight=False)
+    console.print(consequences(deployment, axis, chosen, needed_s))
 
 
-def _table(measured: "Evaluation") -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
-    table.add_column("swing left, %", no_wrap=True)
-    for residual in measured.residuals:
-        table.add_column(f"{residual.length_pct:+g} %", justify="right", no_wrap=True)
+def _table(measured: "Evaluation") -> "Table":
+    from canshaper.report.console import new_table
+
+    table = new_table("swing left, %", *(f"{r.length_pct:+g} %" for r in measured.residuals))
     table.add_row("through the machine", *(f"{100 * r.machine:.1f}" for r in measured.residuals))
     table.add_row("shaper alone", *(f"{100 * r.linear:.1f}" for r in measured.residuals))
     return table

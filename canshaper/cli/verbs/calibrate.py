@@ -3,20 +3,18 @@
 from typing import TYPE_CHECKING
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn
 
 from canshaper.cli.common import (
     CHANNEL,
-    EXIT_NO_BUS,
     FILE,
     INTERFACE,
     NETWORK,
-    fail,
+    SET,
+    echo,
     loader,
     refuse_shipped,
 )
-from canshaper.cli.console import SafeConsole, echo
-from canshaper.cli.sim import SET
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from canshaper.commissioning.calibration.drive import CalibrationDrive
@@ -32,7 +30,6 @@ SIMULATED = {
     "knuckle": "JointVelocity.KnuckleRate",
     "extension": "JointVelocity.ExtensionSpeed",
 }
-EXIT_NOT_MEASURED = 1
 
 
 def calibrate(
@@ -72,45 +69,37 @@ def calibrate(
     from canshaper.commissioning.calibration.drive import CalibrationDrive
     from canshaper.commissioning.calibration.ramp import Ramp
     from canshaper.commissioning.calibration.run import run_live
-    from canshaper.errors import BusError, CalibrationError, ConfigError
+    from canshaper.report.console import progress_bar
 
-    try:
-        deployment = loader(file, interface, channel, network=network)()
-        if write:
-            refuse_shipped(file)
-        ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
-        drive = CalibrationDrive(deployment, axis, _speed(deployment, axis, speed), ramp)
-        if live and not yes:
-            typer.confirm(
-                f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
-                f" {top_pct:.0f} % of its command in both directions. Is everybody away, and the"
-                " enable switch held?",
-                abort=True,
-            )
-        with _progress(axis) as progress:
-            task = progress.add_task("", total=1.0, text="")
+    deployment = loader(file, interface, channel, network=network)()
+    if write:
+        refuse_shipped(file)
+    ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
+    drive = CalibrationDrive(deployment, axis, _speed(deployment, axis, speed), ramp)
+    if live and not yes:
+        typer.confirm(
+            f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
+            f" {top_pct:.0f} % of its command in both directions. Is everybody away, and the"
+            " enable switch held?",
+            abort=True,
+        )
+    with progress_bar(axis) as on_progress:
 
-            def tell(now: "CalibrationDrive") -> None:
-                waits = f"waits for {now.waiting_for}" if now.waiting_for else ""
-                progress.update(task, completed=now.progress, text=waits)
+        def report(now: "CalibrationDrive") -> None:
+            waits = f" waits for {now.waiting_for}" if now.waiting_for else ""
+            on_progress(now.progress, f"{axis}{waits}")
 
-            if live:
-                run_live(drive, deployment, tell)
-            else:
-                from canshaper.commissioning.calibration.simulated import run_simulated
-                from canshaper_sim.parameters import changed_parameters
+        if live:
+            run_live(drive, deployment, report)
+        else:
+            from canshaper.commissioning.calibration.simulated import run_simulated
+            from canshaper_sim.parameters import changed_parameters
 
-                run_simulated(drive, deployment, changed_parameters(changes or []), tell)
-        result = drive.result()
-    except BusError as error:
-        raise fail(error, EXIT_NO_BUS) from None
-    except (ConfigError, ValueError) as error:
-        raise fail(error) from None
-    except CalibrationError as error:
-        raise fail(error, EXIT_NOT_MEASURED) from None
+            run_simulated(drive, deployment, changed_parameters(changes or []), report)
+    result = drive.result()
     if write:  # first: what reads the output may end before its last line
         _write(deployment, axis, result)
-    _told(deployment, axis, result, top_pct)
+    _print_curve(deployment, axis, result, top_pct)
     if write:
         echo(f"written: {deployment.path}")
 
@@ -123,22 +112,19 @@ def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str,
     """
     bound = deployment.axes.get(axis)
     if bound is None:
-        raise ValueError(f"--axis: found {axis!r}, axes are {', '.join(deployment.axes)}")
+        raise UsageError(f"--axis: found {axis!r}, axes are {', '.join(deployment.axes)}")
     if speed is None and bound.config.feedback:
         return bound.config.feedback.message, bound.config.feedback.signal
     message, dot, signal = (speed or SIMULATED.get(axis, "")).partition(".")
     if not (message and dot and signal):
-        raise ValueError(f"--speed: found {speed or 'none'}, allowed is MESSAGE.SIGNAL")
+        raise UsageError(f"--speed: found {speed or 'none'}, allowed is MESSAGE.SIGNAL")
     return message, signal
 
 
-def _progress(axis: str) -> Progress:
-    columns = (TextColumn(f"{axis}"), BarColumn(), TextColumn("{task.fields[text]}"))
-    return Progress(*columns, console=SafeConsole(stderr=True), transient=True)
-
-
-def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: float) -> None:
-    """The result for people, beside what the file has."""
+def _print_curve(
+    deployment: "Deployment", axis: str, result: "Calibration", top_pct: float
+) -> None:
+    """The result for people, after what the file has."""
     limits = deployment.axes[axis].config.limits
     now = f"deadband_pct {limits.deadband_pct:g}"
     if limits.curve_command_pct and limits.curve_speed_pct:
@@ -161,7 +147,6 @@ def _told(deployment: "Deployment", axis: str, result: "Calibration", top_pct: f
 
 def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
     from canshaper.config.edit import set_values
-    from canshaper.errors import ConfigError
 
     commands, speeds = result.curve()
     values = {
@@ -169,7 +154,4 @@ def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
         "curve_command_pct": commands,
         "curve_speed_pct": speeds,
     }
-    try:
-        set_values(deployment.path, ("axes", axis, "limits"), values)
-    except ConfigError as error:
-        raise fail(error) from None
+    set_values(deployment.path, ("axes", axis, "limits"), values)

@@ -11,16 +11,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, INTERFACE, deployment_path, fail, loader
-from canshaper.cli.console import echo
-from canshaper.cli.sim import SET
+from canshaper.cli.common import CHANNEL, INTERFACE, SET, deployment_path, echo, fail, loader
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from canshaper.design.processes import Transport
 
-# What only the extra ``studio`` installs.
-NEEDS = ("starlette", "uvicorn", "websockets")
-INSTALL = "pip install 'canshaper[studio]'"
 EXIT_NO_ADDRESS = 1
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
@@ -55,7 +51,6 @@ def studio(
 
       canshaper studio machine.yaml --shadow --host 0.0.0.0
     """
-    from canshaper.errors import BusError, ConfigError
     from canshaper.studio.access import Access
     from canshaper.studio.crane import copied
     from canshaper.studio.events import Events
@@ -66,26 +61,23 @@ def studio(
     # As a service manager ends it; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, _interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
-        try:
-            parameters = changed_parameters(changes or [])
-            if shadow:
-                stage = Stage(loader(file, interface, channel)(), Events())
-                stage.watch()
-            else:
-                directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-                transports = _transports(interface, channel or [])
-                _, deployment = copied(deployment_path(file), directory)
-                if len(deployment.config.buses) > 1:
-                    raise ValueError("this deployment has several buses; only --shadow shows it")
-                stage = Stage(deployment, Events())
-                stage.drive(transports, directory, changes or [])
-        except (ConfigError, BusError, ValueError) as error:
-            raise fail(error) from None
+        parameters = changed_parameters(changes or [])
+        if shadow:
+            stage = Stage(loader(file, interface, channel)(), Events())
+            stage.watch()
+        else:
+            directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+            transports = _transports(interface, channel or [])
+            _, deployment = copied(deployment_path(file), directory)
+            if len(deployment.config.buses) > 1:
+                raise UsageError("this deployment has several buses; only --shadow shows it")
+            stage = Stage(deployment, Events())
+            stage.drive(transports, directory, changes or [])
         try:
             one = stack.enter_context(listening(host, port))
         except OSError as error:
             text = f"cannot serve at {host} port {port}: {error.strerror or error}; try --port 0"
-            raise fail(OSError(text), EXIT_NO_ADDRESS) from None
+            raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
         port = one.getsockname()[1]
         token = None if host in LOOPBACK else secrets.token_urlsafe(16)
         names = (host, socket.gethostname()) if token else ()
@@ -121,10 +113,10 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     for one in channels:
         link = read_link(one)
         if link is None:
-            raise ValueError(f"there is no interface {one}")
+            raise UsageError(f"there is no interface {one}")
         if link.kind not in ("vcan", "vxcan"):
             text = f"{one} is no virtual bus; the sticks of the page would move a real machine"
-            raise ValueError(f"{text}. --shadow shows it")
+            raise UsageError(f"{text}. --shadow shows it")
     return [Transport("socketcan", one, f"{one} (SocketCAN)") for one in channels[:2]]
 
 

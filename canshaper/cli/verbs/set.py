@@ -5,18 +5,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.table import Table
 
-from canshaper.cli.common import FILE, control_socket, fail, loader, refuse_shipped
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import FILE, control_socket, echo, loader, refuse_shipped
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
-    pass
-
-EXIT_REFUSED = 1
+    from rich.table import Table
 
 
-def set_(
+def set(
     file: str = FILE,
     changes: list[str] | None = typer.Argument(
         None, metavar="[KEY=VALUE]...", help="What to change; without any, show what can be."
@@ -47,24 +44,19 @@ def set_(
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
     from canshaper.daemon import control_client as client
-    from canshaper.errors import ConfigError, ControlError
+    from canshaper.report.console import SafeConsole
 
-    try:
-        deployment = loader(file)()
-        if write:
-            refuse_shipped(file)
-        path = control or control_socket(deployment)
-        values = dict(_parsed(change) for change in changes or [])
-        before = client.table(path)
-        if values:
-            client.change(path, values)
-        table = client.table(path)
-        if values and write:
-            _write(deployment.path, values)
-    except ConfigError as error:
-        raise fail(error) from None
-    except ControlError as error:
-        raise fail(error, EXIT_REFUSED) from None
+    deployment = loader(file)()
+    if write:
+        refuse_shipped(file)
+    path = control or control_socket(deployment)
+    values = dict(_parsed(change) for change in changes or [])
+    before = client.table(path)
+    if values:
+        client.change(path, values)
+    table = client.table(path)
+    if values and write:
+        _write(deployment.path, values)
     if as_json:
         echo(json.dumps(table, indent=2))
         return
@@ -83,11 +75,13 @@ def _parsed(text: str) -> tuple[str, float]:
         return key.strip(), float(number)
     except ValueError:
         text = f"found {text!r}, allowed is KEY=NUMBER, as in axes.slew.sway.period_s=2.45"
-        raise fail(ValueError(text)) from None
+        raise UsageError(text) from None
 
 
-def _table(adjustable: dict[str, dict[str, float]]) -> Table:
-    table = Table("number", "now", "in the file", "from", "to", box=None, pad_edge=False)
+def _table(adjustable: dict[str, dict[str, float]]) -> "Table":
+    from canshaper.report.console import new_table
+
+    table = new_table("number", "now", "in the file", "from", "to")
     for key, one in adjustable.items():
         numbers = (one["now"], one["file"], one["low"], one["high"])
         table.add_row(key, *(f"{number:g}" for number in numbers))

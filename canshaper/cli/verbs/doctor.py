@@ -1,22 +1,20 @@
 """``canshaper doctor``: is this PC fit to run a deployment?"""
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, fail, loader
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, echo, loader
+from canshaper.errors import UsageError, WrongDeviceError
 
 if TYPE_CHECKING:
     from canshaper.commissioning.doctor.finding import Finding
     from canshaper.machine.deployment import Deployment
 
 EXIT_NOT_FIT = 1
+REFRESH_HZ = 1  # of the bar, which is load too
 
 
 def doctor(
@@ -63,7 +61,7 @@ def doctor(
     from canshaper.commissioning.doctor.machine import machine_findings
     from canshaper.commissioning.doctor.measure import measure
     from canshaper.commissioning.doctor.report import as_dict, print_report
-    from canshaper.errors import ConfigError, MeasurementError
+    from canshaper.report.console import SafeConsole, progress_bar
 
     try:
         deployment = loader(file, interface, channel)()
@@ -73,14 +71,14 @@ def doctor(
             findings += _listened(deployment, listen_s)
         runs = {}
         for name in (IDLE, LOADED) if load else (IDLE,):
-            with _progress(f"{name}, {seconds:g} s", seconds) as tell:
-                runs[name] = measure(deployment, seconds, tell, load=name == LOADED)
+            with progress_bar(f"{name}, {seconds:g} s", seconds, refresh_hz=REFRESH_HZ) as passed:
+                runs[name] = measure(deployment, seconds, passed, load=name == LOADED)
         findings = measured_findings(deployment, runs) + findings
         if as_json:
             data = as_dict(deployment, seconds, runs, findings)
             as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
-    except (ConfigError, MeasurementError, OSError) as error:
-        raise fail(error) from None
+    except OSError as error:
+        raise UsageError(str(error)) from None
     except KeyboardInterrupt:
         echo("interrupted", err=True)
         raise typer.Exit(130) from None
@@ -92,29 +90,13 @@ def doctor(
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
     from canshaper.commissioning.doctor.finding import Finding, Level
     from canshaper.commissioning.doctor.listen import heard_findings, listen
-    from canshaper.errors import WrongDeviceError
+    from canshaper.report.console import progress_bar
 
     try:
-        with _progress(f"listening, {seconds:g} s", seconds) as tell:
-            heard = listen(deployment, seconds, tell)
+        with progress_bar(f"listening, {seconds:g} s", seconds, refresh_hz=REFRESH_HZ) as passed:
+            heard = listen(deployment, seconds, passed)
     except (OSError, WrongDeviceError) as error:
         remedy = "mend the interface first"
         why = error.strerror if isinstance(error, OSError) else error
         return [Finding("joysticks", Level.BAD, f"cannot listen: {why}", remedy)]
     return heard_findings(deployment, heard)
-
-
-@contextmanager
-def _progress(what: str, seconds: float) -> Iterator[Callable[[float], None]]:
-    """A bar on the terminal, beside the output; gone when done. Drawn seldom: it is load too."""
-    console = SafeConsole(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        console=console,
-        transient=True,
-        refresh_per_second=1,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task(what, total=seconds)
-        yield lambda passed: bar.update(task, completed=min(passed, seconds))

@@ -2,20 +2,18 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import INSTALL_TOOLS, fail, loader
-from canshaper.cli.console import SafeConsole, echo
-from canshaper.cli.sim import SET
+from canshaper.cli.common import SET, echo, fail, loader, picture, picture_line
+from canshaper.errors import DriveError
 
 if TYPE_CHECKING:
     from canshaper_sim.recording import Recording
 
 # What `report.json` says of a drive without a bus.
+EXIT_NOT_DRIVEN = 1
 LOCKSTEP = "lock-step, no bus"
 
 
@@ -47,50 +45,42 @@ def demo(
     """
     from canshaper.design.lockstep import drive
     from canshaper.design.processes import choose_transport, drive_on_bus
-    from canshaper.errors import ConfigError, DriveError
+    from canshaper.report.console import SafeConsole, progress_bar
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
     from canshaper_sim.operator import script_named
     from canshaper_sim.parameters import changed_parameters
 
     console = SafeConsole()
-    try:
-        played = script_named(script)
-        crane = changed_parameters(changes or [])
-        load = loader(file)
-        deployment = load()
-        way = None if lockstep else choose_transport(transport, deployment)
-    except (ConfigError, DriveError, ValueError) as error:
-        raise fail(error) from None
+    played = script_named(script)
+    crane = changed_parameters(changes or [])
+    deployment = loader(file)()
+    way = None if lockstep else choose_transport(transport, deployment)
     console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
-    console.print(f"Transport: {way.description if way else LOCKSTEP}", highlight=False)
+    console.print(f"Transport: {way.description if way else LOCKSTEP}")
 
     recordings: dict[str, Recording] = {}
     missed = 0
     try:
-        with Progress(
-            TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console
-        ) as progress:
-            for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
-                task = progress.add_task(f"{name:13}", total=played.duration_s)
-
-                def tell(seconds: float, task: Any = task) -> None:
-                    progress.update(task, completed=seconds)
-
+        for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
+            with progress_bar(name, played.duration_s) as on_progress:
                 if way is None:
                     recordings[name] = drive(
-                        deployment, played, bypass=bypass, parameters=crane, progress=tell
+                        deployment, played, bypass=bypass, parameters=crane, on_progress=on_progress
                     )
                 else:
                     run = drive_on_bus(
-                        deployment, way, played, changes or [], bypass=bypass, progress=tell
+                        deployment,
+                        way,
+                        played,
+                        changes or [],
+                        bypass=bypass,
+                        on_progress=on_progress,
                     )
                     recordings[name] = run.recording
                     missed += run.missed_deadlines
-                tell(played.duration_s)
     except DriveError as error:
-        echo(str(error), err=True)
-        raise typer.Exit(1) from None
+        raise fail(error, EXIT_NOT_DRIVEN) from None
     except KeyboardInterrupt:
         echo("interrupted; every process was stopped, valves neutral", err=True)
         raise typer.Exit(130) from None
@@ -106,17 +96,11 @@ def demo(
     out.mkdir(parents=True, exist_ok=True)
     print_report(report, console)
     (out / "report.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
-    _draw(raw, shaped, report, out / "demo.png", console)
-    console.print(f"Report: {out / 'report.json'}", highlight=False)
 
+    def draw(path: Path) -> None:
+        from canshaper.report.plot import draw as draw_drives
 
-def _draw(
-    raw: "Recording", shaped: "Recording", report: dict[str, Any], path: Path, console: Console
-) -> None:
-    try:
-        from canshaper.report.plot import draw
-    except ImportError:
-        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
-        return
-    draw(raw, shaped, report, path)
-    console.print(f"Picture: {path}", highlight=False)
+        draw_drives(raw, shaped, report, path)
+
+    console.print(picture_line(picture(out / "demo.png", draw)))
+    console.print(f"Report: {out / 'report.json'}")

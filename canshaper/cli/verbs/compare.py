@@ -6,15 +6,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.box import SIMPLE_HEAD
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
-from canshaper.cli.common import INSTALL_TOOLS, fail, loader
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import echo, loader, picture, picture_line
 
 if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+
     from canshaper.design.comparison.summary import Row
 
 
@@ -48,27 +46,16 @@ def compare(
     from canshaper.design.comparison.manoeuvres import manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
-    from canshaper.errors import ConfigError
+    from canshaper.report.console import SafeConsole, progress_bar
 
     console = SafeConsole(stderr=as_json)
+    deployment = loader(file)()
+    found = candidates(deployment, axis)
+    tasks = manoeuvres(axis)
     try:
-        load = loader(file)
-        deployment = load()
-        found = candidates(deployment, axis)
-        tasks = manoeuvres(axis)
-    except (ConfigError, ValueError) as error:
-        raise fail(error) from None
-    try:
-        with Progress(
-            TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console
-        ) as progress:
-            task = progress.add_task(f"{len(found)} filters, {len(tasks)} manoeuvres")
-
-            def tell(done: int, total: int) -> None:
-                progress.update(task, completed=done, total=total)
-
+        with progress_bar(f"{len(found)} filters, {len(tasks)} manoeuvres") as on_progress:
             outcomes = measure_all(
-                deployment.path, axis, found, tasks, progress=tell, processes=processes
+                deployment.path, axis, found, tasks, on_progress=on_progress, processes=processes
             )
     except KeyboardInterrupt:
         echo("interrupted", err=True)
@@ -86,48 +73,47 @@ def compare(
     if as_json:
         echo(json.dumps(data, indent=2))
     else:
-        _tell(table, [why for _, why in advice.values()], console, slew=axis == "slew")
-    try:
+        _print_rows(table, [why for _, why in advice.values()], console, slew=axis == "slew")
+
+    def draw(path: Path) -> None:
         from canshaper.design.comparison.limits import limits_for
-        from canshaper.report.pareto import Point, draw
-    except ImportError:
-        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
-        return
+        from canshaper.report.pareto import Point
+        from canshaper.report.pareto import draw as draw_points
+
+        points = [Point(r.name, r.ours, r.stop_s, r.rise_s, r.worst_30_deg) for r in table]
+        draw_points(points, limits_for(deployment, axis, outcomes), title, path)
+
     off = next(row for row in table if row.name == "off")
     calm = advice["calm"][0]
     title = (
         f"{axis.replace('_', '-').capitalize()}: {calm.name} leaves {calm.worst_30_deg:.1f}°"
         f" of {off.worst_30_deg:.1f}° in the worst case"
     )
-    points = [Point(r.name, r.ours, r.stop_s, r.rise_s, r.worst_30_deg) for r in table]
-    picture = out / f"compare-{axis}.png"
-    draw(points, limits_for(deployment, axis, outcomes), title, picture)
-    console.print(f"Picture: {picture}", highlight=False)
+    console.print(picture_line(picture(out / f"compare-{axis}.png", draw)))
 
 
-def _tell(table: "list[Row]", advice: list[str], console: Console, *, slew: bool) -> None:
+def _print_rows(table: "list[Row]", advice: list[str], console: "Console", *, slew: bool) -> None:
     """Table, recommendations, and which of ours beats each of the others."""
     from canshaper.design.comparison.summary import beaten_by
 
     console.print(_table(table, slew=slew))
     for why in advice:
-        console.print(f"- {why}.", highlight=False)
+        console.print(f"- {why}.")
     for row in table:
         if row.name != "off" and not row.ours:
             better = beaten_by(row, table)
             text = f"beaten by {better.name}" if better else "not beaten by any of ours"
-            console.print(f"  {row.name}: {text}", style="dim", highlight=False)
+            console.print(f"  {row.name}: {text}", style="dim")
 
 
-def _table(table: "list[Row]", *, slew: bool) -> Table:
-    drawn = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    drawn.add_column("filter", no_wrap=True)
+def _table(table: "list[Row]", *, slew: bool) -> "Table":
+    from canshaper.report.console import new_table
+
     heads = ["stop\ns"] + ([] if slew else ["rise\ns"])
     heads += ["res.\ndeg", "15 %\ndeg", "30 %\ndeg", "rand.\ndeg"]
     heads += ["other\ndeg"] if slew else []
     heads += ["peak\ndeg", "dip\n%"] + ([] if slew else ["re-\nrise"])
-    for head in heads:
-        drawn.add_column(head, justify="right", no_wrap=True)
+    drawn = new_table("filter", *heads)
     for row in table:
         cells = [f"{row.stop_s:.2f}"] + ([] if slew else [f"{row.rise_s:.2f}"])
         cells += [f"{row.residual_deg:.2f}", f"{row.worst_15_deg:.1f}", f"{row.worst_30_deg:.1f}"]

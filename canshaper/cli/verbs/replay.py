@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import INSTALL_TOOLS, deployment_path, fail, loader
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import deployment_path, echo, loader, os_errors, picture, picture_line
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from canshaper.machine.deployment import Deployment
     from canshaper.recording.replay import Drive
     from canshaper.recording.report import Replayed
@@ -63,11 +63,11 @@ def replay(
 
       canshaper replay recording.zip --verify
     """
-    from canshaper.errors import ConfigError, LogError
     from canshaper.recording.bundle import unpack
+    from canshaper.report.console import SafeConsole
 
     console = SafeConsole()
-    with tempfile.TemporaryDirectory() as folder:
+    with os_errors(out), tempfile.TemporaryDirectory() as folder:
         try:
             inside = None
             if log.suffix.lower() == ".zip":
@@ -79,17 +79,12 @@ def replay(
             replays = _run(log, configs, _channels(channel or []), (begin_s, end_s), out, inside)
             for one in replays:
                 one.measure()
-        except (LogError, ConfigError) as error:
-            raise fail(error) from None
-        except OSError as error:
-            text = f"{error.filename or out}: {error.strerror or error}"
-            raise fail(ValueError(text)) from None
         except KeyboardInterrupt:
             echo("interrupted; what was written so far stays", err=True)
             raise typer.Exit(130) from None
     if verify and not all(one.replay.exact for one in replays):
         text = f"--verify: {log} is no black box of these files; allowed is one, without --config"
-        raise fail(LogError(text))
+        raise UsageError(text)
     different = _show(replays, out, console)
     if verify and different:
         raise typer.Exit(EXIT_DIFFERENT)
@@ -104,9 +99,9 @@ def _run(
     inside: Path | None,
 ) -> "list[Replayed]":
     """Replay every deployment, one after the other."""
-    from canshaper.errors import LogError
     from canshaper.recording.replay import look
     from canshaper.recording.report import Replayed
+    from canshaper.report.console import progress_bar
 
     names = _names([deployment_path(config) for config in configs])
     deployments = [loader(config, inside=inside)() for config in configs]
@@ -114,13 +109,13 @@ def _run(
         if unknown := channels.keys() - deployment.config.buses.keys():
             buses = ", ".join(deployment.config.buses)
             text = f"--channel: found the bus {', '.join(unknown)}, allowed are {buses}"
-            raise LogError(text)
+            raise UsageError(text)
     drives = [look(one, log, channels, own=inside is not None) for one in deployments]
     out.mkdir(parents=True, exist_ok=True)
     replays: list[Replayed] = []
     for name, deployment, drive in zip(names, deployments, drives, strict=True):
-        with _progress(name) as tell, _without_collector():
-            replays.append(_one(name, deployment, drive, window, out, tell))
+        with progress_bar(name) as on_progress, _without_collector():
+            replays.append(_one(name, deployment, drive, window, out, on_progress))
     return replays
 
 
@@ -130,7 +125,7 @@ def _one(
     drive: "Drive",
     window: tuple[float, float | None],
     out: Path,
-    tell: Callable[[float], None],
+    on_progress: Callable[[float], None],
 ) -> "Replayed":
     """Replay one deployment, and write its log and its events."""
     from canshaper.recording.replay import Replay
@@ -147,7 +142,7 @@ def _one(
         (out / f"{name}.events.txt").open("w", encoding="utf-8") as events,
     ):
         writer = LogWriter(log, channel_of)
-        for tick, result in replay.run(tell):
+        for tick, result in replay.run(on_progress):
             done.ticks += 1
             if number is not None and tick.number > number:
                 done.missed += tick.number - number - 1
@@ -161,41 +156,44 @@ def _one(
     return done
 
 
-def _show(replays: "list[Replayed]", out: Path, console: Console) -> bool:
+def _show(replays: "list[Replayed]", out: Path, console: "Console") -> bool:
     """Print and write everything; whether anything was not the same as in the log."""
     from canshaper.recording.report import print_replays, verdict_lines
 
     first = replays[0]
     seconds = (first.trace.end_ns - (first.trace.start_ns or 0)) / 1e9
-    console.print(f"{seconds:.1f} s of driving.", highlight=False)
+    console.print(f"{seconds:.1f} s of driving.")
     for one in replays:
-        console.print(f"{one.name}: {one.replay.ticks_of()}", highlight=False, soft_wrap=True)
+        console.print(f"{one.name}: {one.replay.ticks_of()}", soft_wrap=True)
         for warning in one.replay.warnings():
-            console.print(f"WARNING: {one.name}: {warning}", style="yellow", highlight=False)
+            console.print(f"WARNING: {one.name}: {warning}", style="yellow")
         if one.trace.full:
             console.print(f"{one.name}: table and picture are of the first {one.trace.rows} ticks.")
     print_replays(replays, console)
     for one in replays:
         for time_ns, text in one.events[:MOST_EVENTS]:
             after_s = (time_ns - (one.trace.start_ns or 0)) / 1e9
-            console.print(f"{after_s:9.3f} s {one.name} {text}", highlight=False, soft_wrap=True)
+            console.print(f"{after_s:9.3f} s {one.name} {text}", soft_wrap=True)
         if len(one.events) > MOST_EVENTS:
             more = len(one.events) - MOST_EVENTS
-            console.print(f"  and {more} more in {out / one.name}.events.txt", highlight=False)
+            console.print(f"  and {more} more in {out / one.name}.events.txt")
         for line in verdict_lines(one, examples=len(replays) == 1):
-            console.print(line, highlight=False, soft_wrap=True)
+            console.print(line, soft_wrap=True)
     data = {one.name: one.as_dict() for one in replays}
     (out / "replay.json").write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     made = [f"{one.name}.log" for one in replays] + ["replay.json"]
-    try:
-        from canshaper.recording.plot import draw
-    except ImportError:
-        console.print(f"No picture: matplotlib is missing: {INSTALL_TOOLS}", markup=False)
-    else:
-        if all(one.trace.rows > 1 for one in replays):
-            draw(replays, out / "replay.png")
+    if all(one.trace.rows > 1 for one in replays):
+
+        def draw(path: Path) -> None:
+            from canshaper.recording.plot import draw as draw_replays
+
+            draw_replays(replays, path)
+
+        if picture(out / "replay.png", draw):
             made.append("replay.png")
-    console.print(f"Written to {out}: {', '.join(made)}", highlight=False, soft_wrap=True)
+        else:
+            console.print(picture_line(None))
+    console.print(f"Written to {out}: {', '.join(made)}", soft_wrap=True)
     return any(one.replay.verdict.different for one in replays)
 
 
@@ -217,15 +215,6 @@ def _channels(given: list[str]) -> dict[str, str]:
             raise typer.BadParameter(f"found {item!r}, allowed is --channel BUS=CHANNEL")
         found[bus] = channel
     return found
-
-
-@contextmanager
-def _progress(name: str) -> Iterator[Callable[[float], None]]:
-    console = SafeConsole(stderr=True)
-    columns = (TextColumn(name), BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=console, transient=True) as progress:
-        task = progress.add_task("", total=1.0)
-        yield lambda part: progress.update(task, completed=part)
 
 
 @contextmanager

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, loader
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
@@ -57,18 +57,11 @@ def run(
     """
     from canshaper.daemon import journal
     from canshaper.daemon.daemon import Daemon
-    from canshaper.errors import BusError, ConfigError
 
     journal.set_up()
-    try:
-        load = loader(file, interface, channel, network=network)
-        changed = _changed(load, listen_only=listen_only, control=control)
-        daemon = Daemon(changed, black_box or _log_folder())
-    except ConfigError as error:
-        raise fail(error) from None
-    except BusError as error:
-        raise fail(error, EXIT_NO_BUS) from None
-    daemon.run()
+    load = loader(file, interface, channel, network=network)
+    changed = _changed(load, listen_only=listen_only, control=control)
+    Daemon(changed, black_box or _log_folder()).run()
 
 
 def _log_folder() -> Path | None:

@@ -1,14 +1,16 @@
 """``canshaper check``: is a deployment fit to start?"""
 
+from typing import TYPE_CHECKING
+
 import typer
 
-from canshaper.bus.device import match_fault, whereabouts
-from canshaper.cli.common import EXIT_BAD_DEPLOYMENT, FILE, loader, print_warnings
-from canshaper.cli.console import SafeConsole, echo
-from canshaper.config.bus import Bus
-from canshaper.config.schema import RadialConfig
-from canshaper.machine.bus_load import BUSY
-from canshaper.machine.deployment import Deployment
+from canshaper.cli.common import EXIT_WRONG, FILE, echo, loader, print_warnings
+from canshaper.errors import ConfigError
+
+if TYPE_CHECKING:
+    from canshaper.config.bus import Bus
+    from canshaper.config.schema import RadialConfig
+    from canshaper.machine.deployment import Deployment
 
 # What joysticks do while the daemon is away.
 FALLBACKS = {
@@ -38,9 +40,9 @@ def check(file: str = FILE) -> None:
 
     from canshaper.cli.stopping import print_stopping
     from canshaper.config.source import Source
-    from canshaper.errors import ConfigError
     from canshaper.machine.filters import unfit
     from canshaper.machine.stopping import unstated
+    from canshaper.report.console import SafeConsole
 
     try:
         deployment = loader(file)()
@@ -48,7 +50,7 @@ def check(file: str = FILE) -> None:
         echo(str(error), err=True)
         count = len(error.problems)
         echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
-        raise typer.Exit(EXIT_BAD_DEPLOYMENT) from None
+        raise typer.Exit(EXIT_WRONG) from None
     config = deployment.config
     echo(f"{deployment.path}: good")
     print_warnings(*deployment.messages.warnings(), "not used")
@@ -77,8 +79,10 @@ def check(file: str = FILE) -> None:
         echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
 
 
-def _match(bus: Bus) -> str:
+def _match(bus: "Bus") -> str:
     """Whether it holds on this machine, in words; the file is good either way."""
+    from canshaper.bus.device import match_fault, whereabouts
+
     try:
         fault = match_fault(bus)
     except OSError as error:
@@ -86,7 +90,7 @@ def _match(bus: Bus) -> str:
     return f"WARNING: {fault}" if fault else "holds now"
 
 
-def _compensation(deployment: Deployment, slew: str, radial: RadialConfig) -> str:
+def _compensation(deployment: "Deployment", slew: str, radial: "RadialConfig") -> str:
     """How far an axis moves for another one, in words."""
     sway = deployment.axes[radial.axis].config.sway
     assert sway is not None  # checked with the deployment
@@ -97,8 +101,10 @@ def _compensation(deployment: Deployment, slew: str, radial: RadialConfig) -> st
     )
 
 
-def _load(deployment: Deployment, bus: str) -> str:
+def _load(deployment: "Deployment", bus: str) -> str:
     """What its messages make of a bus, in words."""
+    from canshaper.machine.bus_load import BUSY
+
     load = deployment.load(bus)
     if load is None:
         return ", no bitrate given, so its load is not known"

@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Literal
 
 import typer
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, fail, loader
-from canshaper.cli.console import echo
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, echo, loader
+from canshaper.errors import BusError, UsageError
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
@@ -37,37 +37,30 @@ def gateway(
 
       sudo canshaper gateway config/gateway-forwarder.yaml running
     """
-    from canshaper.errors import BusError, ConfigError, GatewayError
     from canshaper.protocols.gateway.cangw import between, load_module, make, rules
     from canshaper.protocols.gateway.rules import channels, fallback_rules, passing_rules
 
-    try:
-        deployment = loader(file, interface, channel)()
-    except ConfigError as error:
-        raise fail(error) from None
+    deployment = loader(file, interface, channel)()
     if deployment.config.gateway is None:
-        raise fail(ValueError(f"{deployment.path}: found no gateway; allowed is a file with one"))
+        raise UsageError(f"{deployment.path}: found no gateway; allowed is a file with one")
     kernel = deployment.config.gateway.forwarding == "kernel"
     passing = passing_rules(deployment) if kernel else []
     fallback = fallback_rules(deployment) if kernel else []
     wanted = {"running": passing, "away": passing + fallback, "down": []}
     ends = channels(deployment)
-    try:
-        if state == "show":
-            found = between(ends, rules())
-            states = [name for name, those in wanted.items() if sorted(found) == sorted(those)]
-            echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
-            for rule in found:
-                echo(f"  {rule}")
-            if not {"running", "away"} & {*states}:
-                raise typer.Exit(EXIT_OTHER_RULES)
-            return
-        if wanted[state]:
-            _look_at_devices(deployment)
-            load_module()
-        removed, added = make(ends, wanted[state])
-    except (GatewayError, BusError) as error:
-        raise fail(error, EXIT_NO_BUS) from None
+    if state == "show":
+        found = between(ends, rules())
+        states = [name for name, those in wanted.items() if sorted(found) == sorted(those)]
+        echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
+        for rule in found:
+            echo(f"  {rule}")
+        if not {"running", "away"} & {*states}:
+            raise typer.Exit(EXIT_OTHER_RULES)
+        return
+    if wanted[state]:
+        _look_at_devices(deployment)
+        load_module()
+    removed, added = make(ends, wanted[state])
     echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
     for rule in (rule for rule in removed if rule not in passing + fallback):
         echo(f"  removed {rule}")
@@ -80,7 +73,6 @@ def _look_at_devices(deployment: "Deployment") -> None:
         BusError: it is another one than the deployment names, or cannot be looked at.
     """
     from canshaper.bus.device import match_fault
-    from canshaper.errors import BusError
 
     assert deployment.config.gateway is not None  # only such deployments have rules
     for name in deployment.config.gateway.between:

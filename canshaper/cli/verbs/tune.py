@@ -1,19 +1,18 @@
-"""``canshaper tune``: the optimal filter of an axis, told, drawn and written on request."""
+"""``canshaper tune``: the optimal filter of an axis, shown, drawn and written on request."""
 
 import json
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import typer
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn
 
-from canshaper.cli.common import FILE, INSTALL_TOOLS, fail, loader, refuse_shipped
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import FILE, echo, loader, picture, picture_line, refuse_shipped
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
+    from rich.console import Console
+
     from canshaper.design.tuning.deploy import Setting
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task
@@ -84,7 +83,7 @@ def tune(
 
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
-    from canshaper.errors import ConfigError
+    from canshaper.report.console import SafeConsole, progress_bar
 
     console = SafeConsole()
     try:
@@ -109,23 +108,25 @@ def tune(
             horizon_s=horizon_s,
             length_range_pct=length_range_pct,
         )
-        with _progress(axis) as tell:
-            tuning = _solve(task, method, starts, tell, beyond=beyond)
+        with progress_bar(axis) as on_progress:
+
+            def report(done: float, what: str) -> None:
+                on_progress(done, f"{axis}: {what}")
+
+            tuning = _solve(task, method, starts, report, beyond=beyond)
         _report(deployment, bound, task, tuning, out, console, write=write, as_json=as_json)
-    except ConfigError as error:
-        raise fail(error) from None
     except (OSError, ValueError) as error:
-        raise fail(ValueError(f"axis {axis}: {error}")) from None
+        raise UsageError(f"axis {axis}: {error}") from None
 
 
 def _axis(deployment: "Deployment", name: str) -> "BoundAxis":
     """The axis, which has sway data."""
     if name not in deployment.axes:
-        raise ValueError(f"not in {deployment.path}; allowed are {', '.join(deployment.axes)}")
+        raise UsageError(f"not in {deployment.path}; allowed are {', '.join(deployment.axes)}")
     bound = deployment.axes[name]
     if bound.config.sway is None:
         having = [n for n, a in deployment.axes.items() if a.config.sway is not None]
-        raise ValueError(
+        raise UsageError(
             "found no sway data, without which there is nothing to tune for;"
             f" allowed are axes with a section sway ({', '.join(having) or 'none here'})"
         )
@@ -163,38 +164,23 @@ def _task(
 
 
 def _solve(
-    task: "Task", method: str, starts: int, tell: Callable[[str, float], None], *, beyond: bool
+    task: "Task", method: str, starts: int, report: Callable[[float, str], None], *, beyond: bool
 ) -> "Tuning":
     from canshaper.design.tuning.manual import manual
 
     if method == "manual":
         if beyond:
-            raise ValueError(
+            raise UsageError(
                 "the manual rule knows the damping of the sway only; limits, a third pole and"
                 " a length range are for --method optimal"
             )
         return manual(task.mode)
     if method != "optimal":
-        raise ValueError(f"method is {method}, allowed are optimal, manual")
-    tell("loading the solver", 0.0)
+        raise UsageError(f"method is {method}, allowed are optimal, manual")
+    report(0.0, "loading the solver")
     from canshaper.design.tuning.optimal import tune as optimal
 
-    return optimal(task, starts, tell)
-
-
-@contextmanager
-def _progress(axis: str) -> Iterator[Callable[[str, float], None]]:
-    """A bar on the terminal, beside the output; gone when done."""
-    console = SafeConsole(stderr=True)
-    with Progress(
-        TextColumn("{task.description}"),
-        BarColumn(),
-        console=console,
-        transient=True,
-        disable=not console.is_terminal,
-    ) as bar:
-        task = bar.add_task(axis, total=1.0)
-        yield lambda what, done: bar.update(task, completed=done, description=f"{axis}: {what}")
+    return optimal(task, starts, report)
 
 
 def _report(
@@ -203,12 +189,12 @@ def _report(
     task: "Task",
     tuning: "Tuning",
     out: Path,
-    console: Console,
+    console: "Console",
     *,
     write: bool,
     as_json: bool,
 ) -> None:
-    """Measure, draw, write, tell."""
+    """Measure, draw, write, print."""
     from canshaper.cli.stopping import consequences
     from canshaper.design.tuning import deploy
     from canshaper.design.tuning.evaluate import Machine
@@ -228,7 +214,9 @@ def _report(
         before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
     tail = deploy.tail_needed(found, task.mode, task.tick_s, machine)
     sentence = deploy.recommendation(bound.name, found, tail)
-    picture = _draw(bound, task, found, before, machine, out)
+    drawn = picture(
+        out / f"{bound.name}.png", lambda path: _draw(path, bound, task, found, before, machine)
+    )
     if write:
         _write(deployment.path, bound, task, found)
     if as_json:
@@ -237,7 +225,7 @@ def _report(
             "in_file": deploy.measures_dict(before.measures) if before else None,
             "recommendation": sentence,
             "tail_needed_s": tail[0] if tail else None,
-            "picture": str(picture) if picture else None,
+            "picture": str(drawn) if drawn else None,
             "written": str(deployment.path) if write else None,
         }
         echo(json.dumps(result, indent=2))
@@ -245,40 +233,31 @@ def _report(
     console.print(table(found, before, tuning.method))
     if tuning.method == "optimal":
         held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
-        console.print(f"Held by: {held}", highlight=False)
-        console.print(f"Flat: poles of {deploy.flatness(tuning)}", highlight=False)
+        console.print(f"Held by: {held}")
+        console.print(f"Flat: poles of {deploy.flatness(tuning)}")
         console.print(
             f"Solver: {tuning.converged} of {tuning.starts} starts ended here,"
-            f" {tuning.build_s + tuning.solve_s:.2f} s",
-            highlight=False,
+            f" {tuning.build_s + tuning.solve_s:.2f} s"
         )
     stop = consequences(deployment, bound.name, found.filter, tail[0] if tail else None)
-    console.print(f"\n{sentence}", style="bold", highlight=False)
-    console.print(stop, highlight=False)
-    none = f"none, matplotlib is missing: {INSTALL_TOOLS}"
-    console.print(f"Picture: {picture or none}", highlight=False, markup=False)
+    console.print(f"\n{sentence}", style="bold")
+    console.print(stop)
+    console.print(picture_line(drawn))
     if write:
-        console.print(
-            f"Written to {deployment.path}; a running daemon takes it with SIGHUP.", highlight=False
-        )
+        console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
 
 
 def _draw(
+    path: Path,
     bound: "BoundAxis",
     task: "Task",
     found: "Setting",
     before: "Setting | None",
     machine: "Machine",
-    out: Path,
-) -> Path | None:
-    """Draw the picture; None where matplotlib is missing."""
-    try:
-        from canshaper.design.tuning.plot import draw
-    except ImportError:
-        return None
+) -> None:
+    from canshaper.design.tuning.plot import draw
+
     assert bound.config.sway is not None
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / f"{bound.name}.png"
     speed = bound.config.sway.full_speed_m_s
     draw(
         path,
@@ -290,7 +269,6 @@ def _draw(
         full_speed_m_s=speed,
         before=before,
     )
-    return path
 
 
 def _write(path: Path, bound: "BoundAxis", task: "Task", found: "Setting") -> None:

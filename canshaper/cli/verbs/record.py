@@ -9,19 +9,18 @@ from types import FrameType
 from typing import TYPE_CHECKING
 
 import typer
-from rich.live import Live
 
 from canshaper.cli.common import (
     CHANNEL,
-    EXIT_NO_BUS,
     FILE,
     INTERFACE,
     NETWORK,
     control_socket,
+    echo,
     fail,
     loader,
 )
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.errors import BusError, CanshaperError, UsageError
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
@@ -71,8 +70,10 @@ def record(
 
       canshaper record machine.yaml --last
     """
-    from canshaper.errors import BusError, ConfigError
+    from rich.live import Live
+
     from canshaper.recording.record import Recording
+    from canshaper.report.console import SafeConsole
 
     if last:
         _last(file, control)
@@ -80,30 +81,27 @@ def record(
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", ".log"):
         raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
-    try:
-        deployment = loader(file, interface, channel, network=network)()
-    except ConfigError as error:
-        raise fail(error) from None
+    deployment = loader(file, interface, channel, network=network)()
     console = SafeConsole(stderr=True)
     recording = Recording(deployment)
-    failure: Exception | None = None
-    code = EXIT_NO_BUS
+    failure: CanshaperError | None = None
+    code: int | None = None
     stop = _Stop()
     log = out
     try:
         log = out if out.suffix == ".log" else _beside(out)
         with Live(console=console, refresh_per_second=4) as live:
 
-            def tell(so_far: "Recording") -> bool:
+            def report(so_far: "Recording") -> bool:
                 live.update(_line(so_far, out))
                 return not stop.asked
 
-            recording.run(log, seconds, tell)
+            recording.run(log, seconds, report)
             live.update(_line(recording, out))
     except BusError as error:
         failure = error
     except OSError as error:
-        failure, code = ValueError(f"{log}: {error.strerror or error}"), EXIT_NOT_WRITTEN
+        failure, code = UsageError(f"{log}: {error.strerror or error}"), EXIT_NOT_WRITTEN
     if out != log:
         if recording.frames or failure is None:  # what there is is worth having, whatever came then
             _bundle(deployment, recording, log, out, failure)
@@ -119,15 +117,10 @@ def record(
 def _last(file: str, control: Path | None) -> None:
     """Let the daemon write what it has."""
     from canshaper.daemon.control_client import write_black_box
-    from canshaper.errors import ConfigError, ControlError
 
     try:
         path = control or control_socket(loader(file)())
         folder = write_black_box(path, lambda: time.sleep(ASK_AGAIN_S))
-    except ConfigError as error:
-        raise fail(error) from None
-    except ControlError as error:
-        raise fail(error, EXIT_NOT_WRITTEN) from None
     except KeyboardInterrupt:
         echo("the daemon writes it when every axis is neutral", err=True)
         raise typer.Exit(130) from None
@@ -151,7 +144,7 @@ def _bundle(
     recording: "Recording",
     log: Path,
     out: Path,
-    failure: Exception | None,
+    failure: CanshaperError | None,
 ) -> None:
     """Put everything into one file."""
     from canshaper.recording.bundle import pack
@@ -166,7 +159,7 @@ def _bundle(
         pack(out, log, deployment, recording.history, facts)
     except OSError as error:
         text = f"{error.filename or out}: {error.strerror or error}; the log is {log}"
-        raise fail(ValueError(text), EXIT_NOT_WRITTEN) from None
+        raise fail(UsageError(text), EXIT_NOT_WRITTEN) from None
 
 
 class _Stop:

@@ -7,9 +7,8 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import INSTALL_TOOLS, fail, loader, refuse_shipped
-from canshaper.cli.console import SafeConsole, echo
-from canshaper.shaping.registry import KINDS
+from canshaper.cli.common import echo, loader, os_errors, picture, picture_line, refuse_shipped
+from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
     from canshaper.commissioning.identification.judge import Finding
@@ -83,14 +82,13 @@ def identify(
         timed_by_hand,
     )
     from canshaper.commissioning.identification.recommend import advise
-    from canshaper.errors import ConfigError
 
-    try:
-        deployment = loader(file)() if file else None
-        if write and (deployment is None or file is None):
-            raise ValueError("--write: allowed with --file, the deployment to write to")
-        if write and file:
-            refuse_shipped(file)
+    deployment = loader(file)() if file else None
+    if write and (deployment is None or file is None):
+        raise UsageError("--write: allowed with --file, the deployment to write to")
+    if write and file:
+        refuse_shipped(file)
+    with os_errors(out):
         timed = {"--swings": swings, "--seconds": seconds, "--first": first_deg, "--last": last_deg}
         if any(v is not None for v in timed.values()):
             findings = [timed_by_hand(timed, logs or [], axis_named(axis, deployment))]
@@ -114,11 +112,9 @@ def identify(
             )
             for name in names
         ]
-        picture = _draw(findings, advice, out)
+        drawn = _draw(findings, advice, out)
         written = _write(deployment, findings, advice) if write and deployment else []
-    except (ConfigError, OSError, ValueError) as error:
-        raise fail(error) from None
-    _tell(findings, advice, deployment, picture, written, as_json=as_json)
+    _print_result(findings, advice, deployment, drawn, written, as_json=as_json)
     if not all(f.usable for f in findings):
         raise typer.Exit(EXIT_TOO_POOR)
 
@@ -131,19 +127,19 @@ def _speed(deployment: "Deployment | None", axis: str) -> float | None:
 
 def _draw(
     findings: Sequence["Finding"], advice: Sequence["Advice"], out: Path
-) -> Path | str | None:
-    """Draw the picture; None where there is nothing to draw, and why where it cannot be drawn."""
+) -> tuple[Path | None, str]:
+    """Draw the picture, and a line that names it; empty where there is nothing to draw."""
     seen = [f for f in findings if f.free or f.driven]
     if not seen:
-        return None
-    try:
-        from canshaper.commissioning.identification.plot import draw
-    except ImportError:
-        return f"none, matplotlib is missing: {INSTALL_TOOLS}"
-    out.mkdir(parents=True, exist_ok=True)
-    path = out / "identify.png"
-    draw(path, seen, [a.text for a in advice])
-    return path
+        return None, ""
+
+    def draw(path: Path) -> None:
+        from canshaper.commissioning.identification.plot import draw as draw_swings
+
+        draw_swings(path, seen, [a.text for a in advice])
+
+    path = picture(out / "identify.png", draw)
+    return path, picture_line(path)
 
 
 def _write(
@@ -159,12 +155,12 @@ def _write(
     for one in usable:
         config = deployment.axes[one.axis].config
         if config.sway is None:
-            raise ValueError(
+            raise UsageError(
                 f"axis {one.axis}: found no section sway to write to; put in sway: {flow(one.sway)}"
             )
         faster = config.model_copy(update={"sway": Sway.model_validate(one.sway)})
         if fault := stop_fault(deployment, one.axis, faster):
-            raise ValueError(
+            raise UsageError(
                 f"axis {one.axis}: with sway: {flow(one.sway)}, limits.stop_distance_m: {fault};"
                 " change the limits first"
             )
@@ -177,31 +173,34 @@ def _write(
     return [one.axis for one in usable]
 
 
-def _tell(
+def _print_result(
     findings: Sequence["Finding"],
     advice: Sequence["Advice"],
     deployment: "Deployment | None",
-    picture: Path | str | None,
+    drawn: tuple[Path | None, str],
     written: Sequence[str],
     *,
     as_json: bool,
 ) -> None:
     from canshaper.commissioning.identification.report import as_dict, lines, set_lines
+    from canshaper.report.console import SafeConsole
+    from canshaper.shaping.registry import KINDS
 
+    path, line = drawn
     if as_json:
         result = as_dict(findings, advice)
-        result |= {"picture": str(picture) if picture else None, "written": list(written)}
+        result |= {"picture": str(path) if path else None, "written": list(written)}
         echo(json.dumps(result, indent=2))
         return
     for finding in findings:
         echo("\n".join(lines(finding)))
     console = SafeConsole(soft_wrap=True)
     for one in advice:
-        console.print(f"\n{one.text}", style="bold", highlight=False)
+        console.print(f"\n{one.text}", style="bold")
         if one.gain_schedule:
             echo("\n".join(set_lines(one)))
-    if picture:
-        echo(f"Picture: {picture}")
+    if line:
+        echo(line)
     if not deployment:
         return
     if written:

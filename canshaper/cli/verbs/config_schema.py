@@ -2,12 +2,15 @@
 
 import json
 from collections.abc import Iterable, Iterator
+from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import fail
-from canshaper.cli.console import echo
-from canshaper.shaping.shapers.kind import Parameter, ShaperKind
+from canshaper.cli.common import echo
+from canshaper.errors import UsageError
+
+if TYPE_CHECKING:
+    from canshaper.shaping.shapers.kind import Parameter, ShaperKind
 
 
 def config_schema(
@@ -38,14 +41,13 @@ def config_schema(
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
     from canshaper.config.version import VERSION
-    from canshaper.errors import ConfigError
     from canshaper.shaping.registry import KINDS
 
     try:
         check_packages()
         table = [*checksum_table()] if checksums else []
-    except (ConfigError, ValueError) as error:  # of a package
-        raise fail(error) from None
+    except ValueError as error:  # of a package
+        raise UsageError(str(error)) from None
     if filters:
         table += filter_table(KINDS.values())
     if table:
@@ -58,7 +60,7 @@ def config_schema(
     echo(json.dumps(schema, indent=2))
 
 
-def filter_table(kinds: Iterable[ShaperKind]) -> Iterator[str]:
+def filter_table(kinds: "Iterable[ShaperKind]") -> Iterator[str]:
     """Lines of a Markdown table of filters."""
     yield "| `kind` | parameters | what it is | needs `sway` |"
     yield "|---|---|---|---|"
@@ -70,7 +72,7 @@ def filter_table(kinds: Iterable[ShaperKind]) -> Iterator[str]:
         yield f"| `{kind.name}` | {parameters} | {text} | {'yes' if kind.needs_sway else ''} |"
 
 
-def _cell(parameter: Parameter) -> str:
+def _cell(parameter: "Parameter") -> str:
     default = "" if parameter.default is None else f" (default {parameter.default:g})"
     optional = " (optional)" if parameter.optional else ""
     least, most = parameter.entries or (1, 1)

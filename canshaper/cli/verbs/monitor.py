@@ -5,8 +5,7 @@ from types import FrameType
 
 import typer
 
-from canshaper.cli.common import CHANNEL, EXIT_NO_BUS, FILE, INTERFACE, NETWORK, fail, loader
-from canshaper.cli.console import SafeConsole, echo
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, echo, loader
 
 
 def monitor(
@@ -40,26 +39,18 @@ def monitor(
       canshaper monitor machine.yaml --plain | tee monitor.txt
     """
     from canshaper.commissioning.monitor.run import run_live, run_plain
-    from canshaper.errors import BusError, ConfigError
+    from canshaper.report.console import SafeConsole
 
     stop = _Stop()
     console = SafeConsole()
+    deployment = loader(file, interface, channel, network=network)()
     try:
-        deployment = loader(file, interface, channel, network=network)()
         if plain or not console.is_terminal:
-            run_plain(deployment, _write, stop.going)
+            run_plain(deployment, echo, stop.going)
         else:
             run_live(deployment, console, refresh_hz, stop.going)
-    except ConfigError as error:
-        raise fail(error) from None
-    except BusError as error:
-        raise fail(error, EXIT_NO_BUS) from None
     except BrokenPipeError:  # who read it has enough
         raise typer.Exit(0) from None
-
-
-def _write(line: str) -> None:
-    echo(line)
 
 
 class _Stop:

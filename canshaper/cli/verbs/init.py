@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 import typer
 
 from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
-from canshaper.cli.common import data_directory, fail, print_warnings
-from canshaper.cli.console import echo
+from canshaper.cli.common import data_directory, echo, os_errors, print_warnings
+from canshaper.errors import ConfigError, UsageError
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
@@ -45,20 +45,15 @@ def init(
       canshaper init     (tries it with the shipped forwarder.dbc)
     """
     from canshaper.config.first import first_deployment
-    from canshaper.errors import ConfigError
 
     draft = file.with_name(f"{file.stem}.draft.yaml")
     for path in (file, draft):
         if path.exists() and not force:
-            raise fail(ValueError(f"{path}: is there already; --force replaces it"))
-    try:
+            raise UsageError(f"{path}: is there already; --force replaces it")
+    with os_errors(file):
         messages = _messages(files := dbc or [data_directory() / "dbc" / "forwarder.dbc"])
         machine = _machine(messages, files, file.resolve().parent)
         _write(file, draft, first_deployment(machine))
-    except ConfigError as error:
-        raise fail(error) from None
-    except OSError as error:
-        raise fail(ValueError(f"{error.filename or file}: {error.strerror}")) from None
     echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed. What comes next:")
     swinging = next((axis.name for axis in machine.axes if axis.swing), machine.axes[0].name)
     echo(f"  canshaper check {file}")
@@ -68,7 +63,6 @@ def init(
 
 
 def _messages(files: Sequence[Path]) -> "list[Message]":
-    from canshaper.errors import ConfigError
     from canshaper.machine.database import load_dbc
 
     found, problems = [], []
@@ -92,12 +86,10 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     echo(f"{len(messages)} messages in {', '.join(str(path) for path in files)}.")
     possible = suggest.joysticks(messages)
     if not possible:
-        raise fail(
-            ValueError(
-                "no message has a GenMsgCycleTime, a signal with a symmetrical range (a stick) and"
-                " one of one or two bits (its enable switch); see docs/deployment.md, and"
-                " j1939-forwarder.yaml for joysticks with direction flags"
-            )
+        raise UsageError(
+            "no message has a GenMsgCycleTime, a signal with a symmetrical range (a stick) and"
+            " one of one or two bits (its enable switch); see docs/deployment.md, and"
+            " j1939-forwarder.yaml for joysticks with direction flags"
         )
     interface = asked("CAN interface", channel, "can0")
     bitrate = asked("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
@@ -111,7 +103,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     for joystick, message in zip(joysticks, (m for m in possible if m.name in chosen), strict=True):
         axes += _axes(joystick, message, others, [axis.name for axis in axes])
     if not axes:
-        raise fail(ValueError("no axis was named; nothing is written"))
+        raise UsageError("no axis was named; nothing is written")
     status, identity = suggest.service_status(messages), suggest.identity(messages)
     return FirstMachine(
         interface,
@@ -249,15 +241,14 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
 
 def _write(file: Path, draft: Path, text: str) -> None:
     """Write it when it is a good deployment: read like every other first. Else it stays a draft."""
-    from canshaper.errors import ConfigError
     from canshaper.machine.binding import load_deployment
 
     draft.write_text(text, encoding="utf-8")
     try:
         load_deployment(draft)
     except ConfigError as error:
-        kept = f"{draft}: kept with all answers; mend it there and rename it to {file}"
-        raise fail(ValueError(f"{error}\n{kept}")) from None
+        kept = f"{draft}: kept with all answers; fix it there and rename it to {file}"
+        raise UsageError(f"{error}\n{kept}") from None
     draft.replace(file)
 
 

@@ -1,0 +1,44 @@
+"""``canshaper operator``: the hand, simulated on CAN."""
+
+import typer
+
+from canshaper.cli.common import CHANNEL, CRANE, FILE, INTERFACE, NETWORK, echo, loader
+
+
+def operator(
+    file: str = FILE,
+    script: str = typer.Option("demo", "--script", help="What the operator does; see --list."),
+    bypass: bool = typer.Option(False, "--bypass", help="Drive with anti-sway switched off."),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
+    crane: str | None = CRANE,
+    show: bool = typer.Option(False, "--list", help="List the scripts and exit."),
+) -> None:
+    """Play a scripted operator: joystick frames with the enable switch held.
+
+    Examples:
+
+      canshaper operator config/forwarder.yaml --script loading
+
+      canshaper operator config/forwarder.yaml --script random-7 --bypass
+
+      canshaper operator config/forwarder-joints.yaml --script loading-joints
+
+      canshaper operator config/forwarder.yaml --list
+    """
+    from canshaper_sim.axes import ALL_AXES
+    from canshaper_sim.cranes import one_crane
+    from canshaper_sim.operator import SCRIPTS, script_named
+    from canshaper_sim.realtime import run_operator
+
+    if show:
+        for item in SCRIPTS.values():
+            echo(f"{item.name:19} {item.duration_s:5.1f} s  {', '.join(item.axes)}")
+        echo("random-<seed>        30.0 s  any number, always the same strokes")
+        return
+    deployment = loader(file, interface, channel, network=network)()
+    if crane:
+        deployment = one_crane(deployment, crane)
+    axes = [axis for axis in ALL_AXES if axis in deployment.axes]
+    run_operator(deployment, script_named(script, axes), bypass=bypass)

@@ -1,0 +1,101 @@
+"""Verbs: a new one is one file, errors end each of them alike, --help loads none of their work."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli import verbs
+from canshaper.cli.app import app
+
+NEW = '''
+from canshaper import errors
+
+def greet_crane(kind: str) -> None:
+    """Greet the crane, or fail."""
+    if kind in vars(errors):
+        raise vars(errors)[kind]("no luck")
+    print(f"hello {kind}")
+'''
+# What only the work of a verb needs. (typer takes pydantic itself, where it is there.)
+NOT_FOR_HELP = ("can", "cantools", "numpy", "rich", "yaml")
+
+
+@pytest.fixture
+def with_another(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "greet_crane.py").write_text(NEW, encoding="utf-8")
+    monkeypatch.setattr(verbs, "__path__", [*verbs.__path__, str(tmp_path)])
+
+
+@pytest.mark.usefixtures("with_another")
+def test_a_new_verb_is_one_file() -> None:
+    runner = CliRunner()
+    assert "  greet-crane    Greet the crane, or fail." in runner.invoke(app, "--help").stdout
+    assert runner.invoke(app, "greet-crane there").stdout == "hello there\n"
+    assert "Greet the crane" in runner.invoke(app, "greet-crane -h").stdout
+
+
+@pytest.mark.usefixtures("with_another")
+@pytest.mark.parametrize(
+    ("kind", "code"),
+    [
+        ("CanshaperError", 2),
+        ("UsageError", 2),
+        ("LogError", 2),
+        ("DesignError", 2),
+        ("IdentificationError", 2),
+        ("CalibrationError", 1),
+        ("ControlError", 1),
+        ("BusError", 3),
+        ("GatewayError", 3),
+    ],
+)
+def test_an_error_for_a_person_is_one_line_and_an_exit_code(kind: str, code: int) -> None:
+    result = CliRunner().invoke(app, f"greet-crane {kind}")
+    assert (result.exit_code, result.stderr, result.stdout) == (code, "no luck\n", "")
+
+
+def test_an_unknown_verb_is_answered_with_one_like_it() -> None:
+    result = CliRunner().invoke(app, "chek")
+    assert result.exit_code == 2
+    assert "No such command 'chek'" in result.stderr
+
+
+def loaded_by(*arguments: str) -> set[str]:
+    """Packages that a command has imported when it ends."""
+    code = (
+        "import sys, atexit\n"
+        "atexit.register(lambda: print(*{m.partition('.')[0] for m in sys.modules}))\n"
+        f"sys.argv = ['canshaper', *{arguments!r}]\n"
+        "from canshaper.cli.app import main\n"
+        "main()\n"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    return {*done.stdout.splitlines()[-1].split()}
+
+
+@pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("--version",)])
+def test_help_loads_nothing_of_the_work(arguments: tuple[str, ...]) -> None:
+    assert not loaded_by(*arguments) & {*NOT_FOR_HELP}
+
+
+def test_the_work_would_be_seen() -> None:
+    assert {"cantools", "pydantic", "rich", "yaml"} <= loaded_by("check", "forwarder.yaml")
+
+
+def test_a_shell_completes_verbs_and_options() -> None:
+    environment = {"_CANSHAPER_COMPLETE": "complete_bash", "COMP_CWORD": "1"}
+    for words, word, expected in (
+        ("canshaper ca", "1", "calibrate"),
+        ("canshaper run --li", "2", "--listen-only"),
+    ):
+        done = subprocess.run(
+            [sys.executable, "-m", "canshaper"],
+            env={**environment, "COMP_WORDS": words, "COMP_CWORD": word},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert expected in done.stdout.splitlines(), done.stderr
