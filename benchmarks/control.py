@@ -14,7 +14,9 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from canshaper.cli.common import data_directory, loader
+from canshaper.cli.common import (
+    loader,
+)
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.daemon.control_server import (
@@ -23,6 +25,7 @@ from canshaper.daemon.control_server import (
     MOST_REQUEST,
     ControlServer,
 )
+from canshaper.shipped import data_directory
 
 RANGES = {
     "axes.slew.sway.period_s": (2.0, 2.6),

@@ -10,9 +10,9 @@ import argparse
 import statistics
 import time
 
-from canshaper.cli.common import deployment_path
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
+from canshaper.shipped import deployment_path
 from canshaper_sim.crane import Crane
 from canshaper_sim.operator import SCRIPTS
 

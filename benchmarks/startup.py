@@ -19,8 +19,8 @@ import sys
 import time
 
 from canshaper.bus.port import Port, open_port
-from canshaper.cli.common import data_directory
 from canshaper.config.bus import Bus
+from canshaper.shipped import data_directory
 
 PEER = """
 import sys, can, cantools

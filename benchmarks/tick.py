@@ -24,13 +24,13 @@ from canshaper.blackbox.recorder import Recorder
 from canshaper.blackbox.ring import Ring
 from canshaper.blackbox.state import States
 from canshaper.bus.port import Port, open_port
-from canshaper.cli.common import data_directory
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.shipped import data_directory
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
 

@@ -140,6 +140,16 @@ class ChecksumKind:
 
     Raises:
         ValueError: another width, or one that the kernel computes and has not 8 bits.
+
+    Examples:
+        A package adds one by an entry point of the group ``canshaper.checksums`` that names it:
+
+        >>> from canshaper import ChecksumKind, Xor
+        >>> kind = ChecksumKind("exclusive or, start 0x55", 8, Xor(0x55))
+        >>> hex(kind.algorithm.of(bytes([1, 2, 4])))
+        '0x52'
+        >>> kind.kernel is kind.algorithm  # can-gw computes it too
+        True
     """
 
     text: str

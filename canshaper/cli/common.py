@@ -17,6 +17,7 @@ from canshaper.errors import (
     Problem,
     UsageError,
 )
+from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
     from canshaper.machine.deployment import Deployment
@@ -96,22 +97,6 @@ def picture_line(path: Path | None) -> str:
     """Where it is, or why there is none."""
     none = f"none, matplotlib is missing: {install_line('matplotlib')}"
     return f"Picture: {path or none}"
-
-
-def data_directory() -> Path:
-    """Directory that holds ``config`` and ``dbc``: in the installed package, or the checkout."""
-    package = Path(__file__).resolve().parent.parent
-    inside = package / "data"
-    return inside if inside.is_dir() else package.parent
-
-
-def deployment_path(name: str) -> Path:
-    """Path of a deployment: a file that is there, else a shipped one of that name."""
-    path = Path(name)
-    if path.exists():
-        return path
-    shipped = data_directory() / "config" / path.name
-    return shipped if shipped.exists() and path.parent in (Path(), Path("config")) else path
 
 
 def refuse_shipped(file: str) -> None:

@@ -5,8 +5,8 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from canshaper.cli.common import data_directory
 from canshaper.errors import ConfigError, UsageError
+from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from canshaper.commissioning.identification.judge import Finding

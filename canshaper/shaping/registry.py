@@ -68,6 +68,18 @@ def build_shaper(
 
     Raises:
         ValueError: the parameters make no filter, or it needs sway data and there is none.
+
+    Returns:
+        The filter, in neutral.
+
+    Examples:
+        A joystick that is moved at once, through the mean of the last 0.1 s:
+
+        >>> from canshaper import SwayMode, SwayModel, build_shaper
+        >>> sway = SwayModel(SwayMode.from_period(2.4, 0.02), tick_s=0.02)
+        >>> shaper = build_shaper("first_order", 0.02, sway, time_constant_s=0.1)
+        >>> [round(shaper.wanted(1.0), 2) for _ in range(4)]
+        [0.18, 0.33, 0.45, 0.55]
     """
     declared = KINDS[kind]
     if declared.needs_valve_rate:

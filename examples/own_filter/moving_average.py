@@ -1,7 +1,6 @@
 """A filter of another package: the mean of the commands of the last seconds, one of each tick."""
 
-from canshaper.shaping.shapers.fir import Fir
-from canshaper.shaping.shapers.kind import Parameter, ShaperKind
+from canshaper import Fir, Parameter, ShaperKind
 
 
 def moving_average(tick_s: float, *, window_s: float) -> Fir:

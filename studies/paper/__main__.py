@@ -8,8 +8,14 @@ import typer
 from rich.console import Console
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 
-from canshaper.cli.common import data_directory, echo, fail, loader, picture_line
+from canshaper.cli.common import (
+    echo,
+    fail,
+    loader,
+    picture_line,
+)
 from canshaper.report.console import SafeConsole
+from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

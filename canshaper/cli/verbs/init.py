@@ -9,8 +9,13 @@ from typing import TYPE_CHECKING
 import typer
 
 from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
-from canshaper.cli.common import data_directory, echo, os_errors, print_warnings
+from canshaper.cli.common import (
+    echo,
+    os_errors,
+    print_warnings,
+)
 from canshaper.errors import ConfigError, UsageError
+from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from cantools.database.can import Message

@@ -10,8 +10,15 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import deployment_path, echo, loader, os_errors, picture, picture_line
+from canshaper.cli.common import (
+    echo,
+    loader,
+    os_errors,
+    picture,
+    picture_line,
+)
 from canshaper.errors import UsageError
+from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -11,8 +11,16 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, INTERFACE, SET, deployment_path, echo, fail, loader
+from canshaper.cli.common import (
+    CHANNEL,
+    INTERFACE,
+    SET,
+    echo,
+    fail,
+    loader,
+)
 from canshaper.errors import UsageError
+from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
     from canshaper.design.processes import Transport

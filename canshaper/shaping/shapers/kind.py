@@ -97,6 +97,21 @@ class ShaperKind:
 
     Raises:
         ValueError: a name is no word, is reserved, or stands twice.
+
+    Examples:
+        A package adds one by an entry point of the group ``canshaper.shapers`` that names it:
+
+        >>> from canshaper import Fir, Parameter, ShaperKind
+        >>> kind = ShaperKind(
+        ...     "halved",
+        ...     "Half of the command now, half of it a tick later.",
+        ...     lambda tick_s, *, first: Fir([first, 1.0 - first]),
+        ...     lambda mode, tick_s: {"halved": {"first": 0.5}},
+        ...     (Parameter("first", 0.0, 1.0, "", "part that comes at once"),),
+        ... )
+        >>> shaper = kind.build(0.02, first=0.5)
+        >>> [shaper.wanted(command) for command in (1.0, 1.0, 0.0)]
+        [0.5, 1.0, 0.5]
     """
 
     name: str

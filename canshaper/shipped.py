@@ -1,0 +1,19 @@
+"""Files that come with canshaper: deployments of example machines, and their DBC files."""
+
+from pathlib import Path
+
+
+def data_directory() -> Path:
+    """Directory that holds ``config`` and ``dbc``: in the installed package, or the checkout."""
+    package = Path(__file__).resolve().parent
+    inside = package / "data"
+    return inside if inside.is_dir() else package.parent
+
+
+def deployment_path(name: str | Path) -> Path:
+    """Path of a deployment: a file that is there, else a shipped one of that name."""
+    path = Path(name)
+    if path.exists():
+        return path
+    shipped = data_directory() / "config" / path.name
+    return shipped if shipped.exists() and path.parent in (Path(), Path("config")) else path
