@@ -19,7 +19,7 @@ EVERY_PAGE = {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")}
 PAGES = sorted(EVERY_PAGE - {ROOT / "CHANGELOG.md"})
 COMMANDS: Any = typer.main.get_command(app)
 CODE = re.compile(r"`([^`\n]+)`|^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
-COMMAND = re.compile(r"\bcanshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")
+COMMAND = re.compile(r"\b(?<!from )canshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")
 NAMES = {member.name for kind in (State, Reason, FrameFault) for member in kind}
 
 
