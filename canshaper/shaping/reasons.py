@@ -42,19 +42,19 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.STICK_NEUTRAL: ReasonText(
         "stick in neutral",
-        "the stick is valid, fresh, enabled and in neutral",
+        "the joystick is valid, fresh, enabled and in neutral",
     ),
     Reason.STICK_MOVED: ReasonText(
         "stick moved",
-        "the stick was moved out of neutral",
+        "the joystick left neutral",
     ),
     Reason.AT_REST: ReasonText(
         "at rest",
-        "the stick is in neutral, neutral is sent, and the tail is over",
+        "the joystick is in neutral, neutral is sent, and the tail is over",
     ),
     Reason.BYPASS_REQUESTED: ReasonText(
         "anti-sway is off",
-        "the anti-sway switch is off and the stick is moved",
+        "the anti-sway switch is off and the joystick is moved",
     ),
     Reason.BYPASS_RELEASED: ReasonText(
         "anti-sway is on again",
@@ -63,27 +63,27 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.STOP_DONE: ReasonText(
         "stopped",
         "stopped, or `stop_s` is over",
-        "stick in neutral; the cause is in the log",
+        "joystick in neutral; the cause is in the log",
     ),
     Reason.RESET: ReasonText(
         "reset",
-        "a trip was reset: its cause is gone, the stick valid and in neutral, and then "
-        "came a rising edge of reset or enable",
+        "the cause of a trip is gone, the joystick valid and in neutral, and then came a "
+        "rising edge of reset or enable",
     ),
     Reason.COMPENSATING: ReasonText(
         "moves for slewing, without its own stick",
-        "another axis asks this one for compensation: it moves without its own "
-        'joystick, within the bounds of [safety.md](safety.md), "Added velocity"',
+        "another axis moves this one without its own joystick, within "
+        "[bounds](safety.md#added-velocity)",
     ),
     Reason.STICK_NOT_NEUTRAL: ReasonText(
         "let go of the stick",
-        "the stick is deflected before the axis is ready",
-        "let go of the stick",
+        "the joystick is deflected before the axis is ready",
+        "let go of the joystick",
     ),
     Reason.ENABLE_OFF: ReasonText(
         "enable is off",
         "enable switch off",
-        "press enable with the stick in neutral",
+        "press enable with the joystick in neutral",
     ),
     Reason.STICK_TIMEOUT: ReasonText(
         "no joystick message",
@@ -122,44 +122,42 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.STICK_FROZEN: ReasonText(
         "the stick has not changed for too long",
-        "the stick is deflected and has not changed for longer than `stuck_s`",
-        "move the stick, then neutral; joystick",
+        "the joystick is deflected and has not changed for longer than `stuck_s`",
+        "move the joystick, then neutral; joystick",
     ),
     Reason.STICK_UNTRUSTED: ReasonText(
         "joystick messages are not right",
-        "joystick messages come, but their checksum is wrong or their alive counter "
-        "repeats or jumps; or too few good ones for `qualify`",
+        "messages with a wrong checksum, a repeated or jumping alive counter, or too few "
+        "good ones for `qualify`",
         "joystick, a gateway that repeats, two senders of one id",
     ),
     Reason.LOOP_OVERRUN: ReasonText(
         "the daemon is too late",
-        "ten ticks in a row came a deadline or more too late, or more than one in six "
-        "for long; over after fifty punctual ones. An axis in BYPASS_ON goes on: late "
-        "ticks spoil a filter, and there is none",
+        "ten ticks in a row missed a deadline, or more than one in six for long; over "
+        "after fifty punctual ones. An axis in BYPASS_ON goes on",
         "load of the PC",
     ),
     Reason.ADDRESS_NOT_CLAIMED: ReasonText(
         "our address is being claimed",
-        "our address on the bus of the valve is claimed and waited for: 250 ms after "
-        "the start, an outage, a stall or a reload with another address or bus",
+        "we wait for our address on the bus of the valve: 250 ms after the start, an "
+        "outage, a stall or a reload with another address or bus",
         "nothing; else the bus",
     ),
     Reason.NODE_FAULT: ReasonText(
         "a CANopen node is not operational",
         "CANopen: the node of the joystick or, at rest, of the valve is not "
-        "operational, not heard, or tells an emergency",
+        "operational, silent, or sends an emergency",
         "the log names node and code; see [canopen.md](canopen.md)",
     ),
     Reason.VALVE_NOT_READY: ReasonText(
         "the valve is not ready",
-        "a valve of CiA 408 is being brought to work, or has a fault, or its status "
-        "word is not heard",
+        "a valve of CiA 408 is brought up, or has a fault, or its status word is lost",
         "nothing; else the valve",
     ),
     Reason.ENABLE_LOST: ReasonText(
         "enable released in motion",
         "enable released in motion",
-        "press enable again with the stick in neutral",
+        "press enable again with the joystick in neutral",
     ),
     Reason.OUTPUT_INVALID: ReasonText(
         "the filter gave no number",
@@ -173,9 +171,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.LOOP_STALLED: ReasonText(
         "the daemon stood still",
-        "the loop stood still for longer than the shortest `timeout_ms` of a joystick, a valve or "
-        "the emergency stop; a valve that gets a frame in every n-th tick only may have waited for "
-        "n - 1 ticks before, which are taken off its own",
+        "the loop stood still for longer than the shortest `timeout_ms` of a joystick, the "
+        "emergency stop, or a valve (less the ticks that it may have waited for its frame)",
         "load of the PC; reset",
     ),
     Reason.EMERGENCY_STOP: ReasonText(
@@ -185,13 +182,13 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.EMERGENCY_STOP_LOST: ReasonText(
         "emergency stop not heard",
-        "no good message of the emergency stop within its `timeout_ms`. In motion "
-        "latched; at rest it is waited for",
+        "no accepted message of the emergency stop within its `timeout_ms`. In motion "
+        "latched; at rest the axis waits for it",
         "its sender, bus; reset",
     ),
     Reason.SECOND_SENDER: ReasonText(
         "somebody else commands this valve",
-        "a frame with the id of this axis' valve, in J1939 with its group, came from somebody else",
+        "a frame with the id of this axis' valve, in J1939 with its group, came from another node",
         "end the other one; reset after 1 s without its frames",
     ),
     Reason.ADDRESS_LOST: ReasonText(
@@ -201,14 +198,14 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.VALVE_FAULT: ReasonText(
         "the valve tells a fault",
-        "a valve of CANopen in motion left its state active, told an emergency, "
-        "restarted, or was not heard",
+        "a valve of CANopen in motion left its state active, sent an emergency, "
+        "restarted, or was silent",
         "the valve, see [canopen.md](canopen.md); reset",
     ),
     Reason.OUTPUT_REFUSED: ReasonText(
         "the output guard refused a command",
-        "the output guard refused a frame of this valve: beyond a limit, or not asked "
-        "for; the log says which",
+        "the output guard refused a frame of this valve: beyond a limit, or not "
+        "commanded; the log says which",
         "report it with the log; reset",
     ),
 }
@@ -217,22 +214,22 @@ STATE_TEXTS: Mapping[State, StateText] = {
     State.NEUTRAL_WAIT: StateText(
         "waiting for neutral",
         "neutral",
-        "waits for a valid, enabled stick in neutral; the reason says what is missing",
+        "waits for a valid, enabled joystick in neutral; the reason says what is missing",
     ),
     State.READY: StateText(
         "ready",
         "neutral",
-        "the next movement of the stick moves the axis",
+        "the next movement of the joystick moves the axis",
     ),
     State.ACTIVE: StateText(
         "moving, shaped",
         "shaped",
-        "the stick drives the axis through the filter; also the run-on after release",
+        "the joystick drives the axis through the filter; also the run-on after release",
     ),
     State.BYPASS_ON: StateText(
         "moving, unshaped",
         "limited",
-        "the stick drives the axis through the output limits only",
+        "the joystick drives the axis through the output limits only",
     ),
     State.STOPPING: StateText(
         "stopping",
