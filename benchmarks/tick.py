@@ -146,6 +146,28 @@ def black_box(one: Deployment, other: Deployment, ticks: int) -> None:
     )
 
 
+def print_rows(ticks: int, pure: list[int], spent: dict[str, list[int]]) -> None:
+    """Print what a tick took, and the ratios."""
+    print(f"{ticks} ticks, 2 joystick frames in, 4 axes (3 with G_FF, 1 off), us per tick")
+    print(f"{'':34}{'median':>9}{'p99':>9}{'max':>9}")
+    rows = (
+        ("controller tick (no bus)", pure),
+        ("daemon body (bus, checks, status)", spent["ours"]),
+        ("the same without the output guard", spent["open"]),
+        ("bare python-can + cantools loop", spent["bare"]),
+    )
+    for title, row in rows:
+        p99 = statistics.quantiles(row, n=100)[98]
+        print(f"{title:34}{statistics.median(row) / 1e3:9.1f}{p99 / 1e3:9.1f}{max(row) / 1e3:9.1f}")
+    ratio = statistics.median(spent["ours"]) / statistics.median(spent["bare"])
+    print(f"daemon body / bare loop: {ratio:.2f}")
+    guard = statistics.median(spent["ours"]) / statistics.median(spent["open"])
+    more = statistics.median(a - b for a, b in zip(spent["ours"], spent["open"], strict=True))
+    print(
+        f"with / without the output guard: {guard:.2f}, {more / 1e3:.1f} us more in the same tick"
+    )
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -193,24 +215,7 @@ def main() -> None:
     port.close()
     unguarded.close()
 
-    print(f"{ticks} ticks, 2 joystick frames in, 4 axes (3 with G_FF, 1 off), us per tick")
-    print(f"{'':34}{'median':>9}{'p99':>9}{'max':>9}")
-    rows = (
-        ("controller tick (no bus)", pure),
-        ("daemon body (bus, checks, status)", spent["ours"]),
-        ("the same without the output guard", spent["open"]),
-        ("bare python-can + cantools loop", spent["bare"]),
-    )
-    for title, row in rows:
-        p99 = statistics.quantiles(row, n=100)[98]
-        print(f"{title:34}{statistics.median(row) / 1e3:9.1f}{p99 / 1e3:9.1f}{max(row) / 1e3:9.1f}")
-    ratio = statistics.median(spent["ours"]) / statistics.median(spent["bare"])
-    print(f"daemon body / bare loop: {ratio:.2f}")
-    guard = statistics.median(spent["ours"]) / statistics.median(spent["open"])
-    more = statistics.median(a - b for a, b in zip(spent["ours"], spent["open"], strict=True))
-    print(
-        f"with / without the output guard: {guard:.2f}, {more / 1e3:.1f} us more in the same tick"
-    )
+    print_rows(ticks, pure, spent)
     black_box(*boxed, ticks)
 
 

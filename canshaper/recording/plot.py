@@ -8,25 +8,28 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
 from canshaper.report.style import (
-    MINUS,
+    DPI,
     RAW_COLOUR,
     SHAPED_COLOUR,
     STICK_COLOUR,
     TEXT_COLOUR,
     coloured_words,
+    command_scale,
+    new_figure,
     plain,
+    save,
+    zero_line,
 )
 from canshaper.report.table import axis_title
+from canshaper_sim.recording import Recording
 
 # The first deployment, the second; all others. Of Okabe and Ito, as in the other pictures.
 COLOURS = (SHAPED_COLOUR, RAW_COLOUR, "#009E73", "#CC79A7")
 STRAIGHT_COLOUR = "#888888"
-WIDTH_IN, BLOCK_IN, DPI = 16, 4.2, 100
+WIDTH_PX, BLOCK_IN = 1600, 4.2
 
 
 def draw(replays: Sequence[Replayed], path: Path) -> None:
@@ -40,10 +43,10 @@ def draw(replays: Sequence[Replayed], path: Path) -> None:
     straight = replays[0].trace.straight()
     names = list(dict.fromkeys(name for recording in recordings for name in recording.axes))
     swinging = {n for r in recordings for n, trace in r.axes.items() if trace.sway_deg is not None}
-    heights = [h for n in names for h in ((1.0, 1.6) if n in swinging else (1.0,))]
+    rows = [(n, sway) for n in names for sway in ((False, True) if n in swinging else (False,))]
+    heights = [1.6 if sway else 1.0 for _, sway in rows]
     inches = 0.7 + BLOCK_IN * sum(heights) / 2.6
-    fig = Figure(figsize=(WIDTH_IN, inches), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(fig)
+    fig = new_figure(WIDTH_PX, inches * DPI)
     words = [("stick straight to the valve", STRAIGHT_COLOUR)]
     words += [(one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(replays)]
     coloured_words(fig, words, (0.052, 1.0 - 0.08 / inches), size=15, sep=14)
@@ -52,42 +55,43 @@ def draw(replays: Sequence[Replayed], path: Path) -> None:
         height_ratios=heights, hspace=0.28,
     )  # fmt: skip
     panels: list[Axes] = []
-    row = 0
-    for name in names:
+    for row, (name, sway) in enumerate(rows):
         panel = fig.add_subplot(grid[row], sharex=panels[0] if panels else None)
-        row += 1
         panels.append(panel)
-        title = axis_title(name)
-        panel.set_title(title, loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
-        stick = straight.axes.get(name)
-        if stick is not None:
-            panel.fill_between(
-                straight.t_s, stick.stick, step="post", color=STICK_COLOUR, linewidth=0
-            )
-        panel.set_ylim(-1.1, 1.1)
-        panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
-        panel.set_ylabel("command, %", color=TEXT_COLOUR)
-        for i, recording in enumerate(recordings):
-            if name in recording.axes:
-                colour = COLOURS[i % len(COLOURS)]
-                sent = recording.axes[name].sent
-                panel.plot(recording.t_s, sent, color=colour, linewidth=1.4, drawstyle="steps-post")
-        if name not in swinging:
-            continue
-        panel = fig.add_subplot(grid[row], sharex=panels[0])
-        row += 1
-        panels.append(panel)
-        panel.set_ylabel("predicted sway, degrees", color=TEXT_COLOUR)
-        if stick is not None and stick.sway_deg is not None:
-            panel.plot(straight.t_s, stick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
-        for i, recording in enumerate(recordings):
-            if name in recording.axes and (sway := recording.axes[name].sway_deg) is not None:
-                panel.plot(recording.t_s, sway, color=COLOURS[i % len(COLOURS)], linewidth=1.8)
-    for panel in panels:
+        (_draw_sway if sway else _draw_command)(panel, name, recordings, straight)
         plain(panel)
-        panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
-    for panel in panels[:-1]:
-        panel.tick_params(labelbottom=False)
+        zero_line(panel)
+        panel.tick_params(labelbottom=row == len(rows) - 1)
     panels[-1].set_xlabel("time since the first tick, s", color=TEXT_COLOUR)
     panels[0].set_xlim(straight.t_s[0], straight.t_s[-1])
-    fig.savefig(path, dpi=DPI, format="png")
+    save(fig, path)
+
+
+def _draw_command(
+    panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
+) -> None:
+    """Draw what the valve was told, over the stick as a filled step."""
+    panel.set_title(axis_title(name), loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
+    if name in straight.axes:
+        stick = straight.axes[name].stick
+        panel.fill_between(straight.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0)
+    command_scale(panel, 1.1)
+    panel.set_ylabel("command, %", color=TEXT_COLOUR)
+    for i, recording in enumerate(recordings):
+        if name in recording.axes:
+            colour = COLOURS[i % len(COLOURS)]
+            sent = recording.axes[name].sent
+            panel.plot(recording.t_s, sent, color=colour, linewidth=1.4, drawstyle="steps-post")
+
+
+def _draw_sway(
+    panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
+) -> None:
+    """Draw the predicted sway, and that of the stick straight to the valve."""
+    panel.set_ylabel("predicted sway, degrees", color=TEXT_COLOUR)
+    stick = straight.axes.get(name)
+    if stick is not None and stick.sway_deg is not None:
+        panel.plot(straight.t_s, stick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
+    for i, recording in enumerate(recordings):
+        if name in recording.axes and (sway := recording.axes[name].sway_deg) is not None:
+            panel.plot(recording.t_s, sway, color=COLOURS[i % len(COLOURS)], linewidth=1.8)

@@ -5,15 +5,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, plain
+from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, new_figure, plain, save
 
 LIMIT_COLOUR = "#666666"
-_SIZE_IN = (20.0, 9.5)
+_SIZE_PX = (2000, 950)
 # Of the labels, at 100 dots per inch: width of a character, and heights to try beside a dot.
 _CHARACTER_PX = 8.5
 _OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -104.0)
@@ -47,13 +46,12 @@ class Limits:
 def draw(points: Sequence[Point], limits: Limits, title: str, path: Path) -> None:
     """Write the picture."""
     drawn = figure(points, limits, title)
-    drawn.savefig(path)
+    save(drawn, path)
 
 
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
     """The picture as a figure: run-on at the left, rise at the right; direct labels."""
-    drawn = Figure(figsize=_SIZE_IN, dpi=100, layout="constrained")
-    FigureCanvasAgg(drawn)
+    drawn = new_figure(*_SIZE_PX, layout="constrained")
     drawn.suptitle(title, x=0.01, ha="left", fontsize=17, fontweight="bold")
     panels = drawn.subplots(1, 2, sharey=True)
     panels[0].set_title(

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from canshaper.report.strokes import (
@@ -26,13 +25,17 @@ from canshaper.report.style import (
     STICK_COLOUR,
     TEXT_COLOUR,
     coloured_words,
+    command_scale,
+    new_figure,
     plain,
+    save,
+    zero_line,
 )
 from canshaper.report.table import NOTHING, axis_title, change_text
 from canshaper_sim.recording import Recording
 
 WINDOW_COLOUR = "#FFF1BF"
-SIZE_PX, DPI = (1600, 1000), 100
+SIZE_PX = (1600, 1000)
 _LEFT, _RIGHT = 0.052, 0.988  # of the figure: room for the units at the left
 
 
@@ -48,7 +51,7 @@ def draw(raw: Recording, shaped: Recording, report: Mapping[str, Any], path: Pat
     Raises:
         ValueError: no axis has sway, or the drives cannot be compared (see ``aligned``).
     """
-    figure(raw, shaped, report).savefig(path, dpi=DPI, format="png")
+    save(figure(raw, shaped, report), path)
 
 
 def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figure:
@@ -60,8 +63,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
         raise ValueError("no axis of the drives has sway: there is nothing to draw")
     swings = [abs(v) for drive in (raw, shaped) for name in names for v in _sway(drive, name)]
     largest = max(*swings, 0.1)  # a scale of 0.1 degrees where nothing swings
-    fig = Figure(figsize=(SIZE_PX[0] / DPI, SIZE_PX[1] / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(fig)
+    fig = new_figure(*SIZE_PX)
     _head(fig)
     if any(residual_windows(raw, strokes[name]) for name in names):
         _explain_shade(fig)
@@ -79,7 +81,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
         command.set_title(title, loc="left", fontsize=15, weight="bold", color=TEXT_COLOUR, pad=8)
         for panel in (command, sway):
             plain(panel)
-            panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
+            zero_line(panel)
             _shade_windows(panel, raw, strokes[name])
         _draw_command(command, raw, shaped, name, strokes[name])
         _draw_sway(sway, raw, shaped, name)
@@ -160,8 +162,7 @@ def _draw_command(
             drawstyle="steps-post",
             solid_joinstyle="round",
         )
-    panel.set_ylim(-1.2, 1.2)
-    panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
+    command_scale(panel, 1.2)
     panel.set_ylabel("command, %", fontsize=11, color=TEXT_COLOUR)
     if strokes:
         first, last = strokes[0].plateau

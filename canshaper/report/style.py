@@ -1,10 +1,12 @@
-"""What all pictures share: colours and panels."""
+"""What all pictures share: colours, figures and panels."""
 
 from collections.abc import Sequence
-from typing import Final
+from pathlib import Path
+from typing import Any, Final
 
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
@@ -14,6 +16,20 @@ SHAPED_COLOUR: Final = "#0072B2"
 STICK_COLOUR: Final = "#D5D5D5"
 TEXT_COLOUR: Final = "#333333"
 MINUS: Final = "\N{MINUS SIGN}"
+DPI: Final = 100
+
+
+def new_figure(width_px: float, height_px: float, **options: Any) -> Figure:
+    """A white figure that can be drawn without a display."""
+    size = (width_px / DPI, height_px / DPI)
+    fig = Figure(figsize=size, dpi=DPI, facecolor="white", **options)
+    FigureCanvasAgg(fig)
+    return fig
+
+
+def save(fig: Figure, path: Path) -> None:
+    """Write a picture as PNG."""
+    fig.savefig(path, dpi=DPI, format="png")
 
 
 def plain(panel: Axes) -> None:
@@ -23,6 +39,17 @@ def plain(panel: Axes) -> None:
     panel.spines[["top", "right"]].set_visible(False)
     panel.spines[["left", "bottom"]].set_color("#AAAAAA")
     panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
+
+
+def zero_line(panel: Axes) -> None:
+    """A thin grey line at zero, behind the curves."""
+    panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
+
+
+def command_scale(panel: Axes, limit: float) -> None:
+    """An axis of commands: -100 to 100 %, with room up to ``limit`` of full command."""
+    panel.set_ylim(-limit, limit)
+    panel.set_yticks([-1.0, 0.0, 1.0], [f"{MINUS}100", "0", "100"])
 
 
 def coloured_words(

@@ -184,21 +184,10 @@ class JointBoom:
         for joint in (slew, lift, knuckle, extension):
             joint.advance(step_s)
         boom = self._boom
-        middle = (lift.middle_position, knuckle.middle_position, extension.middle_position)
-        jacobian = boom.jacobian(*middle)
-        middle_radius, _ = boom.tip(*middle)
-        middle_radius_rate = (
-            jacobian.r_lift * lift.middle_speed
-            + jacobian.r_knuckle * knuckle.middle_speed
-            + jacobian.r_extension * extension.middle_speed
-        )
+        middle_radius, middle_radius_rate = self._radius_at_middle()
         end = (lift.position, knuckle.position, extension.position)
         rates = (lift.speed, knuckle.speed, extension.speed)
-        accelerations = (
-            lift.end_acceleration,
-            knuckle.end_acceleration,
-            extension.end_acceleration,
-        )
+        accelerations = lift.end_acceleration, knuckle.end_acceleration, extension.end_acceleration
         jacobian = boom.jacobian(*end)
         self._radius_m, self.height_m = boom.tip(*end)
         self._radius_rate_m_s = _dot(jacobian[:3], rates)
@@ -238,6 +227,19 @@ class JointBoom:
                 height_end,
             ),
         )
+
+    def _radius_at_middle(self) -> tuple[float, float]:
+        """Radius and its rate in the middle of the step that was made."""
+        _, lift, knuckle, extension = self.axes.values()
+        middle = (lift.middle_position, knuckle.middle_position, extension.middle_position)
+        jacobian = self._boom.jacobian(*middle)
+        radius, _ = self._boom.tip(*middle)
+        rate = (
+            jacobian.r_lift * lift.middle_speed
+            + jacobian.r_knuckle * knuckle.middle_speed
+            + jacobian.r_extension * extension.middle_speed
+        )
+        return radius, rate
 
 
 def _dot(row: Iterable[float], column: Iterable[float]) -> float:

@@ -10,6 +10,7 @@ from typing import Any, Final
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from canshaper.report.style import new_figure, zero_line
 from canshaper.report.table import axis_title
 from studies.paper.runs import METRICS, TRACE_OF, Plane, Run
 from studies.paper.style import (
@@ -25,7 +26,6 @@ from studies.paper.style import (
     footnote,
     headline,
     key,
-    picture,
     plain,
     poles,
 )
@@ -51,7 +51,7 @@ _TWO_LINES = (0.115, 0.03)
 def pole_figure(pairs: Sequence[tuple[Run, Run]]) -> Figure:
     """Figure 3 or 4: a column for each pair of poles, the linear and the real plant in it."""
     planes = pairs[0][0].planes
-    fig = picture(_size(planes))
+    fig = new_figure(*_size(planes))
     headline(fig, pole_finding(pairs))
     key(
         fig,
@@ -95,7 +95,7 @@ def optimum_figure(runs: tuple[Run, Run], claims: Sequence[tuple[Plane, float]])
         claims: the reductions that the paper prints for the stroke, percent, by plane.
     """
     planes = runs[0].planes
-    fig = picture(_size(planes))
+    fig = new_figure(*_size(planes))
     headline(fig, optimum_finding(runs[0], claims))
     claimed = " and ".join(f"more than {bound:g} % {_ALONG[plane]}" for plane, bound in claims)
     said = f"The paper claims {claimed} the boom; it does not say of what."
@@ -214,7 +214,7 @@ def _commands(panel: Axes, runs: Sequence[Run]) -> None:
     """The stick as a filled step, and what was sent; a command beyond full speed is told."""
     raw = runs[0].raw
     stick = [100.0 * v for v in raw.axes[runs[0].axis].stick]
-    panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
+    zero_line(panel)
     panel.fill_between(raw.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0, zorder=1.5)
     panel.text(2.3, 12.0, "stick", color="#666666", ha="center")
     for run in runs:
@@ -242,7 +242,7 @@ def _commands(panel: Axes, runs: Sequence[Run]) -> None:
 
 
 def _swings(panel: Axes, runs: Sequence[Run], plane: Plane) -> None:
-    panel.axhline(0.0, color="#AAAAAA", linewidth=0.8, zorder=1)
+    zero_line(panel)
     trace = TRACE_OF[plane]
     raw = runs[0].raw
     panel.plot(raw.t_s, _sway(raw.axes[trace].sway_deg), color=NONE_COLOUR, linewidth=1.3)

@@ -6,6 +6,7 @@ from typing import Any, Final, Protocol
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from canshaper.report.style import new_figure
 from studies.paper.style import (
     LEFT,
     PLANT_COLOUR,
@@ -13,7 +14,6 @@ from studies.paper.style import (
     TEXT_COLOUR,
     footnote,
     headline,
-    picture,
     plain,
 )
 
@@ -51,7 +51,7 @@ def bode_figure(curves: Sequence[Curve], slewing_rad_s: tuple[float, float]) -> 
         curves: G11 and G22.
         slewing_rad_s: the two natural frequencies while slewing at full speed.
     """
-    fig = picture((1600, 1000))
+    fig = new_figure(*(1600, 1000))
     headline(fig, bode_finding(curves))
     grid = fig.add_gridspec(
         2, 1, left=LEFT, right=RIGHT, top=0.91, bottom=0.1, hspace=0.1, height_ratios=[1.5, 1]

@@ -1,9 +1,7 @@
 """Colours, panels and coloured headlines shared by the pictures of the paper's figures."""
 
 from collections.abc import Sequence
-from pathlib import Path
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from canshaper.report.style import (
@@ -23,21 +21,9 @@ __all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR"
 NONE_COLOUR = "#8C8C8C"
 PLANT_COLOUR = {"linear": RAW_COLOUR, "real": SHAPED_COLOUR}
 PLANT_WORDS = {"linear": "Eq. 13 on a linear valve", "real": "canshaper on a real valve"}
-SIZE_PX, DPI = (1600, 1000), 100
+SIZE_PX = (1600, 1000)
 LEFT, RIGHT = 0.055, 0.985
 Words = Sequence[tuple[str, str]]
-
-
-def picture(size_px: tuple[int, int] = SIZE_PX) -> Figure:
-    """A white figure that can be drawn without a display."""
-    fig = Figure(figsize=(size_px[0] / DPI, size_px[1] / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(fig)
-    return fig
-
-
-def save(fig: Figure, path: Path) -> None:
-    """Write the picture as PNG."""
-    fig.savefig(path, dpi=DPI, format="png")
 
 
 def headline(fig: Figure, text: str) -> None:

@@ -2,7 +2,7 @@
 
 import json
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -59,25 +59,17 @@ def demo(
     console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     console.print(f"Transport: {way.description if way else LOCKSTEP}")
 
-    recordings: dict[str, Recording] = {}
+    recordings: list[Recording] = []
     missed = 0
     try:
         for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
             with progress_bar(name, played.duration_s) as on_progress:
+                options: Any = {"bypass": bypass, "on_progress": on_progress}
                 if way is None:
-                    recordings[name] = drive(
-                        deployment, played, bypass=bypass, parameters=crane, on_progress=on_progress
-                    )
+                    recordings += [drive(deployment, played, parameters=crane, **options)]
                 else:
-                    run = drive_on_bus(
-                        deployment,
-                        way,
-                        played,
-                        changes or [],
-                        bypass=bypass,
-                        on_progress=on_progress,
-                    )
-                    recordings[name] = run.recording
+                    run = drive_on_bus(deployment, way, played, changes or [], **options)
+                    recordings += [run.recording]
                     missed += run.missed_deadlines
     except DriveError as error:
         raise fail(error, EXIT_NOT_DRIVEN) from None
@@ -85,7 +77,7 @@ def demo(
         echo("interrupted; every process was stopped, valves neutral", err=True)
         raise typer.Exit(130) from None
 
-    raw, shaped = recordings["anti-sway off"], recordings["anti-sway on"]
+    raw, shaped = recordings
     report = report_dict(
         raw,
         shaped,

@@ -48,52 +48,35 @@ def robust(
     """
     from canshaper.config.edit import Value, flow, set_values
     from canshaper.config.filters import filter_of
+    from canshaper.design.swinging import swinging_axis
     from canshaper.design.tuning.evaluate import Machine, evaluate
     from canshaper.design.tuning.robust import least_residual, shortest
     from canshaper.report.console import SafeConsole
     from canshaper.shaping.registry import build_shaper
 
     console = SafeConsole()
+    deployment = loader(file)()
+    if write:
+        refuse_shipped(file)
+    bound, sway = swinging_axis(deployment, axis)
+    mode, rate = sway.mode(), bound.config.limits.slowest_per_s
+    tick_ms = bound.period_ticks * deployment.config.tick_ms
+    tick_s = tick_ms / 1000.0
+    if residual_pct is not None and duration_s is not None:
+        raise UsageError("found both, allowed is one of --duration and --residual")
     try:
-        deployment = loader(file)()
-        if write:
-            refuse_shipped(file)
-        bound = deployment.axes.get(axis)
-        if bound is None or bound.config.sway is None:
-            having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway)
-            raise UsageError(f"axis {axis!r}, allowed are axes with sway data: {having or 'none'}")
-        mode = bound.config.sway.mode()
-        limits = bound.config.limits
-        tick_ms = bound.period_ticks * deployment.config.tick_ms
-        tick_s = tick_ms / 1000.0
-        rate = limits.slowest_per_s
+        asked: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
         if residual_pct is None:
             seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
-            found = least_residual(
-                mode, tick_s=tick_s, duration_s=seconds, range_pct=range_pct, rate_per_s=rate
-            )
-        elif duration_s is not None:
-            raise UsageError("allowed is one of --duration and --residual")
+            found = least_residual(mode, duration_s=seconds, **asked)
         else:
-            found = shortest(
-                mode,
-                tick_s=tick_s,
-                residual_pct=residual_pct,
-                range_pct=range_pct,
-                rate_per_s=rate,
-            )
+            found = shortest(mode, residual_pct=residual_pct, **asked)
         taps = [round(tap, _DIGITS) for tap in found.taps]
-        machine = Machine(
-            limits=limits.output_limits(),
-            neutral_band=bound.config.command.neutral_pct / 100.0,
-            stop_s=limits.stop_s,
-            grid_steps=bound.valve.steps,
-        )
         measured = evaluate(
             mode,
             tick_s,
-            lambda sway: build_shaper("robust", tick_s, sway, valve_rate_per_s=rate, taps=taps),
-            machine,
+            lambda model: build_shaper("robust", tick_s, model, valve_rate_per_s=rate, taps=taps),
+            Machine.of(bound),
         )
         section = _section(found, mode, range_pct, rate, tick_ms)
         if write:

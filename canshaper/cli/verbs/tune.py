@@ -13,6 +13,7 @@ from canshaper.errors import UsageError
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from canshaper.config.sway import Sway
     from canshaper.design.tuning.deploy import Setting
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.formulation import Task
@@ -83,14 +84,15 @@ def tune(
 
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
+    from canshaper.design.swinging import swinging_axis
     from canshaper.report.console import SafeConsole, progress_bar
 
     console = SafeConsole()
+    deployment = loader(file)()
+    if write:
+        refuse_shipped(file)
+    bound, sway = swinging_axis(deployment, axis)
     try:
-        deployment = loader(file)()
-        bound = _axis(deployment, axis)
-        if write:
-            refuse_shipped(file)
         asked: dict[str, Any] = {
             "max_jump": max_jump,
             "max_rate_per_s": max_rate,
@@ -102,6 +104,7 @@ def tune(
         task = _task(
             deployment,
             bound,
+            sway,
             (q, r, s, p),
             asked,
             states=states,
@@ -119,23 +122,10 @@ def tune(
         raise UsageError(f"axis {axis}: {error}") from None
 
 
-def _axis(deployment: "Deployment", name: str) -> "BoundAxis":
-    """The axis, which has sway data."""
-    if name not in deployment.axes:
-        raise UsageError(f"not in {deployment.path}; allowed are {', '.join(deployment.axes)}")
-    bound = deployment.axes[name]
-    if bound.config.sway is None:
-        having = [n for n, a in deployment.axes.items() if a.config.sway is not None]
-        raise UsageError(
-            "found no sway data, without which there is nothing to tune for;"
-            f" allowed are axes with a section sway ({', '.join(having) or 'none here'})"
-        )
-    return bound
-
-
 def _task(
     deployment: "Deployment",
     bound: "BoundAxis",
+    sway: "Sway",
     weights: tuple[float, float, float, float],
     asked: dict[str, Any],
     **options: Any,
@@ -143,7 +133,6 @@ def _task(
     """What the options ask, with what the deployment says of the axis where they say nothing."""
     from canshaper.design.tuning.formulation import Requirements, Task, Weights
 
-    assert bound.config.sway is not None
     limits = bound.config.limits
     if asked["max_rate_per_s"] is None:
         asked["max_rate_per_s"] = limits.slowest_per_s
@@ -155,7 +144,7 @@ def _task(
         asked["max_run_on_s"] = limits.tail_s
     q, r, s, p = weights
     return Task(
-        mode=bound.config.sway.mode(),
+        mode=sway.mode(),
         tick_s=deployment.config.tick_ms / 1000.0 * bound.period_ticks,
         weights=Weights((q, q), r, s, p),
         require=Requirements(**asked),
@@ -200,17 +189,11 @@ def _report(
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.table import table
 
-    config = bound.config
-    machine = Machine(
-        limits=config.limits.output_limits(),
-        neutral_band=config.command.neutral_pct / 100.0,
-        stop_s=config.limits.stop_s,
-        grid_steps=bound.valve.steps,
-    )
+    machine = Machine.of(bound)
     found = deploy.deployed(tuning, task.mode, task.tick_s, machine)
     before = None
-    if config.filter.kind == "gff":
-        parameters = config.filter.parameters()
+    if bound.config.filter.kind == "gff":
+        parameters = bound.config.filter.parameters()
         before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
     tail = deploy.tail_needed(found, task.mode, task.tick_s, machine)
     sentence = deploy.recommendation(bound.name, found, tail)
@@ -232,13 +215,7 @@ def _report(
         return
     console.print(table(found, before, tuning.method))
     if tuning.method == "optimal":
-        held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
-        console.print(f"Held by: {held}")
-        console.print(f"Flat: poles of {deploy.flatness(tuning)}")
-        console.print(
-            f"Solver: {tuning.converged} of {tuning.starts} starts ended here,"
-            f" {tuning.build_s + tuning.solve_s:.2f} s"
-        )
+        console.print("\n".join(deploy.optimum_lines(tuning)))
     stop = consequences(deployment, bound.name, found.filter, tail[0] if tail else None)
     console.print(f"\n{sentence}", style="bold")
     console.print(stop)

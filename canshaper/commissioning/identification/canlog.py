@@ -1,7 +1,7 @@
 """Signals of a CAN log, named by DBC, with the commands that stand beside them in the log."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -16,6 +16,7 @@ from canshaper.commissioning.identification.series import Kind, Series, Unit, or
 from canshaper.errors import CutOffError, IdentificationError, LogError
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
+from canshaper.recording.frames import TimedFrame
 from canshaper.recording.log import LogFile
 
 
@@ -122,33 +123,12 @@ def read_can(
         weight = _Reader("load state", grapple.message, signal, Unit(Kind.OTHER, 1.0, ""))
     commands = Commands(deployment)
     all_readers = [*readers.values(), *([weight] if weight else [])]
-    takers: dict[tuple[int, bool], list[_Reader]] = {}
-    notes: list[str] = []
-    frames, first_ns = 0, None
-    channels: set[str] = set()
-    try:
-        for frame in LogFile(path, on_progress):
-            channels.add(frame.channel)
-            if channel is not None and frame.channel != channel:
-                continue
-            frames += 1
-            first_ns = frame.time_ns if first_ns is None else first_ns
-            time_s = (frame.time_ns - first_ns) / 1e9
-            key = frame.can_id, frame.extended
-            if key not in takers:
-                takers[key] = [r for r in all_readers if r.wants(*key)]
-            for reader in takers[key]:
-                reader.take(time_s, (frame.channel, frame.can_id), frame.data)
-            commands.take(time_s, key, frame.data)
-    except CutOffError as error:
-        notes.append(f"{error}; what stands before it was used")
-    if channel is not None and not frames:
-        raise LogError(f"{path}: found no bus {channel!r}, its frames are of {_listed(channels)}")
+    frames, ids, notes = _read(LogFile(path, on_progress), path, channel, all_readers, commands)
     idle = commands.idle()
     at = float(np.median(weight.samples.arrays()[1])) if weight and weight.samples.value else None
     result = {}
     for axis, reader in readers.items():
-        told = _checked(path, reader, frames, set(takers), messages)
+        told = _checked(path, reader, frames, ids, messages)
         time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
         source = f"{path.name}: {reader.name}"
         command = commands.of(axis)
@@ -156,6 +136,39 @@ def read_can(
             source, label, reader.unit, time, value, command, idle, at, [*notes, *told]
         )
     return result
+
+
+def _read(
+    log: Iterable[TimedFrame],
+    path: Path,
+    channel: str | None,
+    readers: Sequence[_Reader],
+    commands: Commands,
+) -> tuple[int, set[tuple[int, bool]], list[str]]:
+    """Hand every frame to who reads it: how many there were, of which ids, and what to note."""
+    readers_of: dict[tuple[int, bool], list[_Reader]] = {}
+    notes: list[str] = []
+    frames, first_ns = 0, None
+    channels: set[str] = set()
+    try:
+        for frame in log:
+            channels.add(frame.channel)
+            if channel is not None and frame.channel != channel:
+                continue
+            frames += 1
+            first_ns = frame.time_ns if first_ns is None else first_ns
+            time_s = (frame.time_ns - first_ns) / 1e9
+            key = frame.can_id, frame.extended
+            if key not in readers_of:
+                readers_of[key] = [r for r in readers if r.wants(*key)]
+            for reader in readers_of[key]:
+                reader.take(time_s, (frame.channel, frame.can_id), frame.data)
+            commands.take(time_s, key, frame.data)
+    except CutOffError as error:
+        notes.append(f"{error}; what stands before it was used")
+    if channel is not None and not frames:
+        raise LogError(f"{path}: found no bus {channel!r}, its frames are of {_listed(channels)}")
+    return frames, set(readers_of), notes
 
 
 def _listed(names: set[str]) -> str:

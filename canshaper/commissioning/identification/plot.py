@@ -11,8 +11,6 @@ from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 from scipy.signal import find_peaks
 
 from canshaper.commissioning.identification.decay import DecayFit, SegmentFit
@@ -20,9 +18,17 @@ from canshaper.commissioning.identification.driven import DrivenFit
 from canshaper.commissioning.identification.judge import Finding
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
-from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, STICK_COLOUR, TEXT_COLOUR, plain
+from canshaper.report.style import (
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    STICK_COLOUR,
+    TEXT_COLOUR,
+    new_figure,
+    plain,
+    save,
+)
 
-WIDTH_PX, ROW_PX, TITLE_PX, DPI = 1500, 380, 24, 100
+WIDTH_PX, ROW_PX, TITLE_PX = 1500, 380, 24
 TITLE_CHARACTERS = 130
 MOST_ROWS = 6
 _LABEL: dict[str, Any] = {"fontsize": 11, "color": TEXT_COLOUR}
@@ -41,8 +47,7 @@ def draw(path: Path, findings: Sequence[Finding], titles: Sequence[str]) -> None
     wrapped = [line for title in titles for line in textwrap.wrap(title, TITLE_CHARACTERS)]
     top = TITLE_PX * len(wrapped) + 70
     height = top + ROW_PX * len(rows)
-    fig = Figure(figsize=(WIDTH_PX / DPI, height / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(fig)
+    fig = new_figure(WIDTH_PX, height)
     for i, line in enumerate(wrapped):
         at = 1.0 - (32 + TITLE_PX * i) / height
         fig.text(0.052, at, line, fontsize=13, weight="bold", color=TEXT_COLOUR)
@@ -74,7 +79,7 @@ def draw(path: Path, findings: Sequence[Finding], titles: Sequence[str]) -> None
         elif finding.driven is not None:
             _draw_driven(swing, finding.driven)
             decay.set_axis_off()
-    fig.savefig(path, dpi=DPI, format="png")
+    save(fig, path)
 
 
 def _to_shown(kind: Kind) -> tuple[float, str]:

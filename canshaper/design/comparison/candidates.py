@@ -4,8 +4,8 @@ from dataclasses import dataclass, replace
 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.schema import RadialConfig
+from canshaper.design.swinging import swinging_axis
 from canshaper.design.tuning.robust import RobustShaper, least_residual
-from canshaper.errors import DesignError
 from canshaper.machine.bound_axis import BoundRadial
 from canshaper.machine.deployment import Deployment
 from canshaper.shaping.registry import KINDS
@@ -40,13 +40,9 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
     Raises:
         DesignError: there is no such axis, or it has no sway data.
     """
-    bound = deployment.axes.get(axis)
-    if bound is None:
-        raise DesignError(f"axis {axis!r}, allowed {', '.join(deployment.axes)}")
+    bound, sway = swinging_axis(deployment, axis)
     config = bound.config
-    if config.sway is None:
-        raise DesignError(f"axis {axis} has no sway data: nothing to compare")
-    mode = config.sway.mode()
+    mode = sway.mode()
     tick_s = bound.period_ticks * deployment.config.tick_ms / 1000.0
     rate = config.limits.slowest_per_s
     period = mode.period_s

@@ -130,6 +130,17 @@ def recommendation(axis: str, found: Setting, tail: tuple[float, float] | None) 
     return text
 
 
+def optimum_lines(tuning: Tuning) -> list[str]:
+    """What holds an optimum, how flat it is, and how the solver came to it, for people."""
+    held = ", ".join(tuning.active) or "nothing: an optimum between all limits"
+    return [
+        f"Held by: {held}",
+        f"Flat: poles of {flatness(tuning)}",
+        f"Solver: {tuning.converged} of {tuning.starts} starts ended here,"
+        f" {tuning.build_s + tuning.solve_s:.2f} s",
+    ]
+
+
 def flatness(tuning: Tuning) -> str:
     """How far each pole may go for one percent of the cost."""
     ranges = [f"{slow:.2f} to {fast:.2f}" for slow, fast in tuning.ranges_rad_s]

@@ -9,8 +9,10 @@ import cmath
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Self
 
 from canshaper.design.tuning.formulation import SETTLED, at_length
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
@@ -46,6 +48,17 @@ class Machine:
     stop_s: float = 2.0
     grid_steps: int = 125
     lag_s: float = 0.1
+
+    @classmethod
+    def of(cls, bound: BoundAxis) -> Self:
+        """That of an axis, as its deployment has it."""
+        limits = bound.config.limits
+        return cls(
+            limits=limits.output_limits(),
+            neutral_band=bound.config.command.neutral_pct / 100.0,
+            stop_s=limits.stop_s,
+            grid_steps=bound.valve.steps,
+        )
 
 
 @dataclass(frozen=True, slots=True)

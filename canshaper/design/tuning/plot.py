@@ -8,8 +8,6 @@ from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
@@ -19,12 +17,14 @@ from canshaper.report.style import (
     SHAPED_COLOUR,
     STICK_COLOUR,
     TEXT_COLOUR,
+    new_figure,
     plain,
+    save,
 )
 from canshaper.report.table import axis_title
 from canshaper.shaping.sway import SwayMode
 
-SIZE_PX, DPI = (1500, 720), 100
+SIZE_PX = (1500, 720)
 _LABEL: dict[str, Any] = {"fontsize": 11, "color": TEXT_COLOUR}
 
 
@@ -54,8 +54,7 @@ def draw(
     duration_s = max(3.0, 1.5 * found.measures.run_on_s, 1.5 * mode.period_s)
     shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
     traces = press(mode, tick_s, shaper, machine, duration_s)
-    fig = Figure(figsize=(SIZE_PX[0] / DPI, SIZE_PX[1] / DPI), dpi=DPI, facecolor="white")
-    FigureCanvasAgg(fig)
+    fig = new_figure(*SIZE_PX)
     fig.text(0.052, 0.955, finding(axis, found), fontsize=17, weight="bold", color=TEXT_COLOUR)
     fig.text(0.052, 0.912, _poles(found), fontsize=12, color=TEXT_COLOUR)
     halves = fig.add_gridspec(
@@ -71,7 +70,7 @@ def draw(
     to_deg = math.degrees(mode.angle_per_speed_rad * full_speed_m_s)
     _draw_swing(swing, traces, to_deg)
     _draw_length(length, found.measures, before.measures if before else None)
-    fig.savefig(path, dpi=DPI, format="png")
+    save(fig, path)
 
 
 def finding(axis: str, found: Setting) -> str:

@@ -7,11 +7,12 @@ pytest.importorskip("matplotlib")
 
 from matplotlib.figure import Figure
 
+from canshaper.report.style import save
 from studies.paper.draw import optimum_figure, pole_figure
 from studies.paper.draw_bode import bode_figure
 from studies.paper.runs import METRICS
 from studies.paper.study import FIGURES, Study
-from studies.paper.style import MINUS, PLANT_COLOUR, change, poles, save
+from studies.paper.style import MINUS, PLANT_COLOUR, change, poles
 
 
 def drawn(study: Study, number: int) -> Figure:

@@ -161,7 +161,10 @@ def test_a_candidate_gets_time_to_run_on(deployment: Deployment) -> None:
 
 @pytest.mark.parametrize(
     "axis, message",
-    [("lift", "axis lift has no sway data"), ("boom", "axis 'boom', allowed slew, near_far, lift")],
+    [
+        ("lift", "axis lift: found no sway data; allowed are axes with sway data: slew, near_far"),
+        ("boom", "axis boom: found no such axis; allowed are axes with sway data: slew, near_far"),
+    ],
 )
 def test_an_axis_that_cannot_be_compared(axis: str, message: str, tmp_path: Path) -> None:
     done = CliRunner().invoke(app, ["compare", str(FILE), "--axis", axis, "--out", str(tmp_path)])

@@ -112,7 +112,7 @@ def test_length_range_takes_the_tail_as_run_on(file: Path) -> None:
 
 
 BAD = {
-    "no such axis": (["--axis", "crab"], "allowed are slew, near_far, lift"),
+    "no such axis": (["--axis", "crab"], "allowed are axes with sway data: slew, near_far"),
     "no sway": (["--axis", "lift"], "no sway data"),
     "negative weight": (["--axis", "slew", "--p", "-1"], "weight P is -1, allowed is 0 to"),
     "no number": (["--axis", "slew", "--q", "nan"], "weight Q is nan, allowed is 0 to"),
