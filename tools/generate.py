@@ -58,19 +58,8 @@ def diagram() -> Iterator[str]:
     yield "stateDiagram-v2"
     yield "    [*] --> NEUTRAL_WAIT"
     for (old, new), reasons in TRANSITIONS.items():
-        yield f"    {old.name} --> {new.name}: {_names(reasons, ', ')}"
+        yield f"    {old.name} --> {new.name}: {_names(reasons)}"
     yield "```"
-
-
-def transition_rows() -> Iterator[str]:
-    """Table of the transitions."""
-    yield "| from | to | reason |"
-    yield "|---|---|---|"
-    rows: dict[tuple[State, frozenset[Reason]], list[str]] = {}
-    for (old, new), reasons in TRANSITIONS.items():
-        rows.setdefault((new, reasons), []).append(old.name)
-    for (new, reasons), olds in rows.items():
-        yield f"| {', '.join(olds)} | {new.name} | {_names(reasons, '; ')} |"
 
 
 def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iterator[str]:
@@ -82,7 +71,7 @@ def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iter
         yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} |"
 
 
-def _names(reasons: frozenset[Reason], between: str) -> str:
+def _names(reasons: frozenset[Reason]) -> str:
     """Reasons by name; most of a kind as that kind, with those that are missing."""
     words = []
     for reaction in (Reaction.SHAPED_STOP, Reaction.NEUTRAL):
@@ -91,7 +80,7 @@ def _names(reasons: frozenset[Reason], between: str) -> str:
             missing = "".join(f", but {one.name}" for one in sorted(kind - reasons))
             words.append(f"any reason for: {reaction.value}{missing}")
             reasons -= kind
-    return between.join([*words, *(reason.name for reason in sorted(reasons))])
+    return ", ".join([*words, *(reason.name for reason in sorted(reasons))])
 
 
 def generated(root: Path) -> dict[Path, str]:
@@ -104,7 +93,6 @@ def generated(root: Path) -> dict[Path, str]:
     sections = {
         "states": state_rows(),
         "diagram": diagram(),
-        "transitions": transition_rows(),
         "reasons": reason_rows(Reason, REASON_TEXTS),
     }
     return {**files, page: with_sections(page.read_text(encoding="utf-8"), sections)}
