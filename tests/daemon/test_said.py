@@ -9,9 +9,11 @@ from typing import Any
 
 import pytest
 
+from canshaper.bus.port import ListeningPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.ports import open_ports
 from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
 from tests.daemon.test_daemon import answered, control
@@ -352,6 +354,18 @@ def test_a_fault_of_a_bus_that_a_reload_opened_is_counted(
 
     bench.run(script)
     assert log("fault=ERROR_FRAME")
+
+
+def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench: Bench) -> None:
+    """No step more on the way of a frame than there has to be."""
+    deployment = load_deployment(bench.file)
+    (port,) = open_ports(deployment, {}, lambda _fault: None).values()
+    assert port is bench.ports[0]
+    listening = replace(deployment, listen_only=True)
+    (port,) = open_ports(listening, {}, lambda _fault: None).values()
+    assert isinstance(port, ListeningPort)
+    opened = {listening.config.buses["crane"]: port}
+    assert open_ports(listening, opened, lambda _fault: None) == {"crane": port}
 
 
 # -- the control socket ----------------------------------------------------------------------------
