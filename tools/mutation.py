@@ -31,12 +31,13 @@ TESTS = {
     "daemon": DAEMON,
     "bus": ["tests/bus"],
 }
-CORE = ["canshaper.shaping.axis", "canshaper.shaping.limits"]
+CORE = [f"canshaper.shaping.{name}" for name in ("axis", "limits", "state_machine", "transfer")]
 CORE_TESTS = [
     "test_added.py",
     "test_axis*.py",
     "test_limits.py",
     "test_sets.py",
+    "test_state_machine.py",
     "test_valve_curve.py",
 ]
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]

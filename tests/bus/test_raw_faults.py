@@ -224,6 +224,19 @@ def test_another_deployment_begins_without_the_frames_of_the_last(
     assert [f.bus for f in line.heard()] == ["other"]
 
 
+def test_nor_does_it_count_how_long_those_were_under_way(
+    line: Line, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A fast loop sends three frames before the first one is confirmed."""
+    monkeypatch.setattr(raw, "set_filters", lambda _sockets, _ids: None)
+    assert line.unconfirmed(most=2) == 2
+    line.now_ns += PROBE_NS
+    line.port.watch("other", IDS)
+    for _ in range(5):
+        line.now_ns += 1_000_000
+        assert line.port.send(VALVE)
+
+
 # -- the controller --------------------------------------------------------------------------------
 
 

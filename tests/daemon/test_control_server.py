@@ -187,6 +187,7 @@ def test_only_its_owner_may_write(tmp_path: Path) -> None:
         assert not path.exists()
 
 
+@pytest.mark.processes
 def test_the_socket_of_a_daemon_that_was_killed_is_replaced(tmp_path: Path) -> None:
     path = tmp_path / "control.sock"
     code = "import sys, os; from pathlib import Path\n"

@@ -97,3 +97,13 @@ def test_a_change_that_is_not_declared_ends_neutral_and_latched() -> None:
         machine = in_state(state)
         assert machine.step(StickInput(1.0, fault=Reason.RESET), 0.0, False) is State.TRIPPED
         assert machine.reason is Reason.RESET
+
+
+def test_nor_does_a_way_that_no_row_has_lead_anywhere_else() -> None:
+    """Above all not from latched into motion."""
+    ways = [(old, new) for old in State for new in State if (old, new) not in TRANSITIONS]
+    assert (State.TRIPPED, State.ACTIVE) in ways
+    for old, new in ways:
+        machine = in_state(old)
+        machine._go(new, Reason.STICK_MOVED)
+        assert machine.state is State.TRIPPED
