@@ -5,17 +5,17 @@ from dataclasses import asdict, dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.linear import (
+from canshaper.shaping.sway import GRAVITY_M_S2
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import Grapple
+from studies.crane.config import GrappleData
+from studies.crane.linear import (
     LinearSway,
     OperatingPoint,
     closed_form,
     linearise,
     sway_modes,
 )
-from canshaper.shaping.sway import GRAVITY_M_S2
-from canshaper_sim.crane import CraneParameters
-from canshaper_sim.grapple import Grapple
 from studies.paper.printed import RADIUS_M
 
 LOW_RAD_S, HIGH_RAD_S = 0.3, 30.0

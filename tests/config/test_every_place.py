@@ -18,9 +18,9 @@ from canshaper.config.load import load_section
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
 from canshaper.config.source import Place
-from canshaper.design.crane.config import CraneConfig
 from canshaper.errors import ConfigError, Problem
 from canshaper.shaping.registry import KINDS
+from studies.crane.config import CraneConfig
 
 FILES = [(DeploymentConfig, kind) for kind in KINDS] + [(CraneConfig, "")]
 files = pytest.mark.parametrize(

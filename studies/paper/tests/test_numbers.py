@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from canshaper.design.crane.linear import OperatingPoint, closed_form
 from canshaper_sim.axes import NEAR_FAR, SLEW
+from studies.crane.linear import OperatingPoint, closed_form
 from studies.paper.bode import grapple_data
 from studies.paper.plants import linear_run
 from studies.paper.printed import optimal_poles

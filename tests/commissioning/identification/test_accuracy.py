@@ -8,8 +8,9 @@ import pytest
 
 from canshaper.commissioning.identification.judge import Finding, identify
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
-from canshaper.design.crane.config import load_crane
 from canshaper_sim.grapple import Grapple, Sway
+from studies.crane.config import load_crane
+from studies.crane.tests.mujoco_crane import model_of, simulate
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
@@ -19,7 +20,6 @@ from tests.commissioning.identification.machine import (
     driven,
     period_of,
 )
-from tests.design.crane.mujoco_crane import model_of, simulate
 
 DEGREES = Unit(Kind.ANGLE, math.radians(1.0), "deg")
 SLEW, NEAR_FAR = 0, 1
@@ -106,7 +106,7 @@ def test_the_interval_holds_what_the_model_leaves_out() -> None:
 
 @pytest.mark.parametrize("direction", [SLEW, NEAR_FAR])
 def test_a_crane_in_mujoco(direction: int) -> None:
-    crane = load_crane(ROOT / "config" / "crane-forwarder.yaml")[0]
+    crane = load_crane(ROOT / "studies" / "crane" / "forwarder.yaml")[0]
     step_s = 0.01
     rest = np.array([0.0, 0.3, -0.6, 0.5])
     count = round(25.0 / step_s) * 2 + 1

@@ -5,8 +5,8 @@ import math
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import CraneConfig
-from canshaper.design.crane.kinematics import Array, Kinematics, evaluate, link_transform
+from studies.crane.config import CraneConfig
+from studies.crane.kinematics import Array, Kinematics, evaluate, link_transform
 
 
 @pytest.fixture(scope="module")

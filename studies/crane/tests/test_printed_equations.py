@@ -10,11 +10,11 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import SwayDynamics, TipMotion
-from canshaper.design.crane.kinematics import Array
-from tests.design.crane.motion import SwayStates
-from tests.design.crane.printed import (
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import SwayDynamics, TipMotion
+from studies.crane.kinematics import Array
+from studies.crane.tests.motion import SwayStates
+from studies.crane.tests.printed import (
     PRINTED_TURN,
     equation_9,
     equation_a3,

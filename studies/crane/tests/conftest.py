@@ -5,17 +5,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import CraneConfig, GrappleData, load_crane
-from canshaper.design.crane.dynamics import SwayDynamics
-from canshaper.design.crane.kinematics import Kinematics
-from tests.design.crane.motion import SwayStates
+from studies.crane.config import CraneConfig, GrappleData, load_crane
+from studies.crane.dynamics import SwayDynamics
+from studies.crane.kinematics import Kinematics
+from studies.crane.tests.motion import SwayStates
 
 ROOT = Path(__file__).parents[3]
 
 
 @pytest.fixture(scope="session")
 def shipped_path() -> Path:
-    return ROOT / "config" / "crane-forwarder.yaml"
+    return ROOT / "studies" / "crane" / "forwarder.yaml"
 
 
 @pytest.fixture(scope="session")

@@ -16,9 +16,9 @@ from typing import Any, Final, NamedTuple
 
 import casadi as ca
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.kinematics import Array, Kinematics, Vector, evaluate
 from canshaper.shaping.sway import GRAVITY_M_S2
+from studies.crane.config import GrappleData
+from studies.crane.kinematics import Array, Kinematics, Vector, evaluate
 
 PARAMETERS: Final = ("l1_m", "l2_m", "m1_kg", "m2_kg", "c5_n_m_s_rad", "c6_n_m_s_rad")
 

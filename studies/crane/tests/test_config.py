@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.design.crane.config import CraneConfig, load_crane
 from canshaper.errors import ConfigError
 from canshaper_sim.grapple import Grapple
+from studies.crane.config import CraneConfig, load_crane
 
 
 def problems(path: Path, text: str) -> list[str]:

@@ -22,9 +22,9 @@ from contextlib import contextmanager
 import mujoco
 import numpy as np
 
-from canshaper.design.crane.config import CraneConfig
-from canshaper.design.crane.kinematics import Array
-from tests.design.crane.motion import Motion
+from studies.crane.config import CraneConfig
+from studies.crane.kinematics import Array
+from studies.crane.tests.motion import Motion
 
 ROTOR = 1e14
 DRIVEN = 5  # slew, lift, knuckle, extension, level

@@ -18,12 +18,12 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.signal import StateSpace, ss2tf
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import SwayDynamics
-from canshaper.design.crane.kinematics import Array, Kinematics, Vector, evaluate
-from canshaper.design.crane.statespace import SwayStateSpace
 from canshaper.errors import DesignError
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import SwayDynamics
+from studies.crane.kinematics import Array, Kinematics, Vector, evaluate
+from studies.crane.statespace import SwayStateSpace
 
 # States of `SwayStateSpace` that the sway depends on: all but heading and height.
 _KEPT = [0, 1, 2, 3, 5]

@@ -4,11 +4,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import CraneConfig
-from canshaper.design.crane.dynamics import SwayDynamics
-from canshaper.design.crane.kinematics import Kinematics
-from tests.design.crane.motion import random_motion, swing
-from tests.design.crane.mujoco_crane import accelerations, model_of, simulate
+from studies.crane.config import CraneConfig
+from studies.crane.dynamics import SwayDynamics
+from studies.crane.kinematics import Kinematics
+from studies.crane.tests.motion import random_motion, swing
+from studies.crane.tests.mujoco_crane import accelerations, model_of, simulate
 
 STEP_S = 0.005
 TIMES = np.arange(0.0, 20.0 + 1e-9, STEP_S / 2.0)

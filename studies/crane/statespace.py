@@ -17,9 +17,9 @@ from typing import Any, Final
 
 import casadi as ca
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import parameter_values, sway_equations
-from canshaper.design.crane.kinematics import Array, Vector, evaluate
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import parameter_values, sway_equations
+from studies.crane.kinematics import Array, Vector, evaluate
 
 STATES: Final = ("theta5", "w5", "theta6", "w6", "theta1", "x", "z")
 INPUTS: Final = ("theta1_rate", "x_rate", "z_rate")

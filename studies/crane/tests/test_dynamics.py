@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from scipy.integrate import trapezoid
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import SwayDynamics, TipMotion
-from canshaper.design.crane.kinematics import Array, Kinematics
 from canshaper_sim import grapple as simulated
-from tests.design.crane.motion import SwayStates, swing
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import SwayDynamics, TipMotion
+from studies.crane.kinematics import Array, Kinematics
+from studies.crane.tests.motion import SwayStates, swing
 
 
 def test_samples_of_the_reference(dynamics: SwayDynamics, reference: dict[str, Any]) -> None:

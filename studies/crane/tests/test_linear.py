@@ -7,18 +7,18 @@ from typing import Any
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import SwayDynamics
-from canshaper.design.crane.kinematics import Kinematics
-from canshaper.design.crane.linear import (
+from canshaper.shaping.sway import SwayMode
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import SwayDynamics
+from studies.crane.kinematics import Kinematics
+from studies.crane.linear import (
     OperatingPoint,
     closed_form,
     hanging_angle,
     linearise,
     sway_modes,
 )
-from canshaper.shaping.sway import SwayMode
-from tests.design.crane.motion import swing
+from studies.crane.tests.motion import swing
 
 PLACES = list(product(range(2), range(3)))
 POINTS = [OperatingPoint(x, w) for x in (2.0, 3.0, 8.5) for w in (0.0, 0.3, -0.5, 0.8)]

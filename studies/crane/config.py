@@ -1,5 +1,5 @@
 """The crane's data: DH table, joint limits and grapple, read from a file such as
-config/crane-forwarder.yaml with the strictness of the deployment file.
+forwarder.yaml with the strictness of the deployment file.
 """
 
 from pathlib import Path

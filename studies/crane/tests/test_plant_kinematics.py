@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import CraneConfig
-from canshaper.design.crane.kinematics import Kinematics
 from canshaper_sim.kinematics import Boom
+from studies.crane.config import CraneConfig
+from studies.crane.kinematics import Kinematics
 
 
 def test_tip_and_jacobian_agree(crane: CraneConfig, kinematics: Kinematics) -> None:

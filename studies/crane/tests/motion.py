@@ -7,8 +7,8 @@ import casadi as ca
 import numpy as np
 from scipy.interpolate import BPoly
 
-from canshaper.design.crane.dynamics import TipMotion
-from canshaper.design.crane.kinematics import Array, Kinematics
+from studies.crane.dynamics import TipMotion
+from studies.crane.kinematics import Array, Kinematics
 
 # q, q', q''; of one instant, or one row for every instant.
 Motion = tuple[Array, Array, Array]

@@ -9,10 +9,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import TipMotion
-from canshaper.design.crane.kinematics import Array
 from canshaper.shaping.sway import GRAVITY_M_S2
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import TipMotion
+from studies.crane.kinematics import Array
 
 PRINTED_TURN = math.pi / 2.0
 

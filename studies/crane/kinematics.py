@@ -17,7 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from canshaper.design.crane.config import Joints
+from studies.crane.config import Joints
 
 JOINTS: Final = ("slew", "lift", "knuckle", "extension")
 

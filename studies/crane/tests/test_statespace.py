@@ -7,12 +7,12 @@ import casadi as ca
 import numpy as np
 import pytest
 
-from canshaper.design.crane.config import GrappleData
-from canshaper.design.crane.dynamics import SwayDynamics, TipMotion
-from canshaper.design.crane.kinematics import Array
-from canshaper.design.crane.statespace import INPUTS, OUTPUTS, STATES, SwayStateSpace
-from tests.design.crane.motion import SwayStates, integrate, swing
-from tests.design.crane.printed import PRINTED_TURN, appendix_b
+from studies.crane.config import GrappleData
+from studies.crane.dynamics import SwayDynamics, TipMotion
+from studies.crane.kinematics import Array
+from studies.crane.statespace import INPUTS, OUTPUTS, STATES, SwayStateSpace
+from studies.crane.tests.motion import SwayStates, integrate, swing
+from studies.crane.tests.printed import PRINTED_TURN, appendix_b
 
 
 @pytest.fixture(scope="module")
@@ -158,7 +158,7 @@ def test_appendix_b_where_the_paper_linearises(space: SwayStateSpace, grapple: G
 
 def test_the_input_gain_depends_on_positions_only(grapple: GrappleData) -> None:
     """Else the change of state would not take the derivative of the input out."""
-    from canshaper.design.crane.dynamics import sway_equations
+    from studies.crane.dynamics import sway_equations
 
     e = sway_equations()
     gain = ca.jacobian(e.acceleration, e.tip_acceleration)
