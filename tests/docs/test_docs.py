@@ -14,7 +14,7 @@ from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason, State
 
 ROOT = Path(__file__).parents[2]
-EVERY_PAGE = {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md")}
+EVERY_PAGE = {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "studies" / "README.md"}
 # What was once may be named in it.
 PAGES = sorted(EVERY_PAGE - {ROOT / "CHANGELOG.md"})
 COMMANDS: Any = typer.main.get_command(app)

@@ -100,7 +100,7 @@ def test_at_rest_four_of_six_are_zero_and_no_dc_gain_is_left(grapple: GrappleDat
 
 
 def test_while_slewing_the_joints_are_coupled(grapple: GrappleData) -> None:
-    """Figures of docs/paper.md at 3 m and 0.5 rad/s."""
+    """Figures of studies/README.md at 3 m and 0.5 rad/s."""
     point = OperatingPoint(3.0, 0.5)
     linear = linearise(grapple, point)
     formula = closed_form(grapple, point, linear.theta6_rad)

@@ -1,4 +1,4 @@
-"""What docs/paper.md says of Eq. 7 - 9 and A3 as printed: held against the derived equations.
+"""What studies/README.md says of Eq. 7 - 9 and A3 as printed: held against the derived equations.
 
 The expressions are analytic in every argument, so agreement at two hundred random states to 1e-8
 is an identity, and one clear difference refutes one.

@@ -110,7 +110,7 @@ def test_a_jump_of_the_speed_is_allowed(
 
 
 def corrected_b(g: GrappleData, sway: Array, x: float) -> Array:
-    """The rows of W as docs/paper.md gives them."""
+    """The rows of W as studies/README.md gives them."""
     l1, l2, m1, m2 = g.l1_m, g.l2_m, g.m1_kg, g.m2_kg
     s5, c5, s6, c6 = (
         *(f(sway[0]) for f in (math.sin, math.cos)),

@@ -53,7 +53,7 @@ def test_slew_poles_agree_with_an_independent_program() -> None:
 
 
 def test_the_document_has_these_numbers(table: dict[str, Any]) -> None:
-    text = (ROOT / "docs" / "paper.md").read_text(encoding="utf-8")
+    text = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
     for found in table["reductions"]:
         cells = [
             f"**{value:.0f}**" if metric in found["holds_for"][plant] else f"{value:.0f}"
