@@ -9,8 +9,8 @@ from canshaper.errors import ConfigError, UsageError
 from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
-    from canshaper.commissioning.identification.judge import Finding
     from canshaper.commissioning.identification.series import Series
+    from canshaper.commissioning.identification.verdict import Finding
     from canshaper.machine.database import Messages
     from canshaper.machine.deployment import Deployment
 
@@ -25,8 +25,8 @@ UNNAMED = "swing"
 
 def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) -> "Finding":
     """What a stopwatch tells."""
-    from canshaper.commissioning.identification.judge import Finding
     from canshaper.commissioning.identification.stopwatch import stopwatch
+    from canshaper.commissioning.identification.verdict import Finding
 
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
@@ -87,9 +87,9 @@ def logged(
 ) -> list["Finding"]:
     """What logs tell, by axis and label."""
     from canshaper.commissioning.identification.canlog import read_can
-    from canshaper.commissioning.identification.judge import identify as judged
     from canshaper.commissioning.identification.phone import series_of
     from canshaper.commissioning.identification.table import is_table, read_table
+    from canshaper.commissioning.identification.verdict import identify as judged
     from canshaper.report.console import progress_bar
 
     if not logs:

@@ -3,11 +3,11 @@
 from collections.abc import Mapping
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from canshaper.report.console import new_table
 from canshaper.report.metrics import MIN_RAW_DEG
 
 NOTHING = "-"
@@ -50,10 +50,7 @@ def axis_title(name: str) -> str:
 
 def _table(axes: Mapping[str, Any], arrow: str) -> Table:
     """One column an axis, one row a measure: fits a narrow terminal."""
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, show_lines=False)
-    table.add_column("", no_wrap=True)
-    for name in axes:
-        table.add_column(axis_title(name), justify="right", no_wrap=True)
+    table = new_table("", *map(axis_title, axes))
     for title, measure in _SWAY_ROWS:
         table.add_row(title, *(_sway_cell(axis, measure, arrow) for axis in axes.values()))
     for title, key, scale, digits in _PAIR_ROWS:

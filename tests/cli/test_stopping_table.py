@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.cli.stopping import stopping
+from canshaper.commissioning.stopping import stopping
 from tests.controller.test_sets import DBC, YAML
 from tests.rigs.forwarder import Rig
 

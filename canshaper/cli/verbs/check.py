@@ -38,7 +38,7 @@ def check(file: str = FILE) -> None:
       canshaper check config/forwarder.yaml
     """
 
-    from canshaper.cli.stopping import print_stopping
+    from canshaper.commissioning.stopping import print_stopping
     from canshaper.config.source import Source
     from canshaper.machine.filters import unfit
     from canshaper.machine.stopping import unstated

@@ -57,10 +57,10 @@ def doctor(
     """
     from canshaper.commissioning.doctor.finding import fit
     from canshaper.commissioning.doctor.interfaces import bus_findings
-    from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
     from canshaper.commissioning.doctor.machine import machine_findings
     from canshaper.commissioning.doctor.measure import measure
     from canshaper.commissioning.doctor.report import as_dict, print_report
+    from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings
     from canshaper.report.console import SafeConsole, progress_bar
 
     try:

@@ -11,8 +11,8 @@ from canshaper.cli.common import echo, loader, os_errors, picture, picture_line,
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
-    from canshaper.commissioning.identification.judge import Finding
     from canshaper.commissioning.identification.recommend import Advice
+    from canshaper.commissioning.identification.verdict import Finding
     from canshaper.machine.deployment import Deployment
 
 EXIT_TOO_POOR = 1

@@ -124,7 +124,7 @@ def _print_stop(
     deployment: "Deployment", axis: str, chosen: "Filter", duration_s: float, console: "Console"
 ) -> None:
     """Say what tail the filter needs, and how far the tip travels."""
-    from canshaper.cli.stopping import consequences
+    from canshaper.commissioning.stopping import consequences
 
     tail_s = deployment.axes[axis].config.limits.tail_s
     needed_s = round(duration_s + 0.1, 1) if tail_s < duration_s else None

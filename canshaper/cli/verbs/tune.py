@@ -184,7 +184,7 @@ def _report(
     as_json: bool,
 ) -> None:
     """Measure, draw, write, print."""
-    from canshaper.cli.stopping import consequences
+    from canshaper.commissioning.stopping import consequences
     from canshaper.design.tuning import deploy
     from canshaper.design.tuning.evaluate import Machine
     from canshaper.design.tuning.table import table

@@ -5,7 +5,6 @@ from collections.abc import Iterator
 from dataclasses import asdict
 from typing import Any
 
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from rich.text import Text
@@ -14,6 +13,7 @@ from canshaper.commissioning.doctor.figures import Summary, histogram, summary
 from canshaper.commissioning.doctor.finding import Finding, Level, fit
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.machine.deployment import Deployment
+from canshaper.report.console import new_table
 
 STYLES = {Level.OK: "green", Level.NOTE: "dim", Level.WARNING: "yellow", Level.BAD: "bold red"}
 BAR = 22
@@ -73,22 +73,20 @@ def print_report(
     console.print(
         f"{deployment.path}: tick {deployment.config.tick_ms} ms, {len(deployment.axes)} axes;"
         f" {seconds:g} s {names}. Nothing was sent on any bus.\n",
-        highlight=False,
         soft_wrap=True,
     )
     for field in ("late_ns", "joystick_ns"):
         console.print(_histograms(TIMES[field], {n: getattr(r, field) for n, r in runs.items()}))
     console.print(_figures(runs))
     for finding in findings:
-        console.print(_line(finding), highlight=False, soft_wrap=True)
-    console.print(_verdict(findings), highlight=False, soft_wrap=True)
+        console.print(_line(finding), soft_wrap=True)
+    console.print(_verdict(findings), soft_wrap=True)
 
 
 def _histograms(title: str, series: dict[str, list[int]]) -> Table:
     """Bars side by side, one row for each bin."""
     head = f"{title}, us"
-    table = Table(title=head, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    table.add_column("up to", justify="right", no_wrap=True)
+    table = new_table("up to", title=head)
     counts = {name: histogram(times) for name, times in series.items()}
     for name in counts:
         table.add_column("", justify="right", no_wrap=True)
@@ -96,7 +94,7 @@ def _histograms(title: str, series: dict[str, list[int]]) -> Table:
     most = {name: max(bins.values(), default=1) for name, bins in counts.items()}
     ends = sorted({end for bins in counts.values() for end in bins})
     for end in ends:
-        cells = [str(end)]
+        cells = [f"{end:5}"]
         for name, bins in counts.items():
             cells += [str(bins.get(end, 0) or ""), _bar(bins.get(end, 0), most[name])]
         table.add_row(*cells)
@@ -113,10 +111,7 @@ def _bar(count: int, most: int) -> str:
 
 
 def _figures(runs: dict[str, Run]) -> Table:
-    table = Table(box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False)
-    table.add_column("us", no_wrap=True)
-    for head in ("p50", "p99", "p99.9", "max", "of"):
-        table.add_column(head, justify="right", no_wrap=True)
+    table = new_table("us", "p50", "p99", "p99.9", "max", "of")
     for field, title in TIMES.items():
         for name, run in runs.items():
             table.add_row(f"{title}, {name}", *_cells(summary(getattr(run, field))))

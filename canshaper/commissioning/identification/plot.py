@@ -15,9 +15,9 @@ from scipy.signal import find_peaks
 
 from canshaper.commissioning.identification.decay import DecayFit, SegmentFit
 from canshaper.commissioning.identification.driven import DrivenFit
-from canshaper.commissioning.identification.judge import Finding
 from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
+from canshaper.commissioning.identification.verdict import Finding
 from canshaper.report.style import (
     RAW_COLOUR,
     SHAPED_COLOUR,

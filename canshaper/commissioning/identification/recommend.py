@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from canshaper.commissioning.identification.judge import Finding
+from canshaper.commissioning.identification.verdict import Finding
 
 # Difference of pendulum lengths, +- %, up to which one value in the middle is what we recommend
 # without a signal of the grapple; the robust shaper covers it.

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from canshaper.commissioning.identification.decay import Value
-from canshaper.commissioning.identification.judge import Finding
 from canshaper.commissioning.identification.recommend import Advice, flow
 from canshaper.commissioning.identification.series import Kind
+from canshaper.commissioning.identification.verdict import Finding
 from canshaper.report.table import axis_title
 
 

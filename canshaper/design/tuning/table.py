@@ -2,19 +2,16 @@
 
 from collections.abc import Callable
 
-from rich.box import SIMPLE_HEAD
 from rich.table import Table
 
 from canshaper.design.tuning.deploy import Setting
+from canshaper.report.console import new_table
 
 
 def table(found: Setting, before: Setting | None, method: str) -> Table:
     """The setting beside the one in the file; residuals through the machine, filter alone."""
-    result = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False)
     columns = [found] if before is None else [before, found]
-    result.add_column("", no_wrap=True)
-    for title in ([] if before is None else ["in the file"]) + [method]:
-        result.add_column(title, justify="right", no_wrap=True)
+    result = new_table("", *([] if before is None else ["in the file"]), method)
 
     def row(title: str, cell: Callable[[Setting], str]) -> None:
         result.add_row(title, *(cell(column) for column in columns))

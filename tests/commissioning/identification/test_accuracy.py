@@ -6,8 +6,8 @@ import mujoco
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.judge import Finding, identify
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper_sim.grapple import Grapple, Sway
 from studies.crane.config import load_crane
 from studies.crane.tests.mujoco_crane import model_of, simulate

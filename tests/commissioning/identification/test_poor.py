@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from canshaper.commissioning.identification.decay import Value
-from canshaper.commissioning.identification.judge import Finding, identify
 from canshaper.commissioning.identification.series import (
     Array,
     Kind,
@@ -16,6 +15,7 @@ from canshaper.commissioning.identification.series import (
     unit_of,
 )
 from canshaper.commissioning.identification.stopwatch import stopwatch
+from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper.errors import IdentificationError
 from tests.commissioning.identification.machine import Coloured
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.judge import identify
 from canshaper.commissioning.identification.phone import series_of
 from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.identification.table import is_table, read_table
+from canshaper.commissioning.identification.verdict import identify
 from canshaper.errors import IdentificationError
 from canshaper_sim.grapple import Grapple, Sway
 from tests.commissioning.identification.machine import driven, period_of, phone

@@ -6,8 +6,8 @@ from typing import Any
 import pytest
 
 from canshaper.commissioning.doctor.finding import Finding, Level, fit
-from canshaper.commissioning.doctor.judge import IDLE, LOADED, measured_findings
 from canshaper.commissioning.doctor.measure import Run
+from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import SHIPPED, TICK_NS
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from canshaper.commissioning.identification.data_quality import clipped, mixed
 from canshaper.commissioning.identification.decay import (
     LARGEST_RAD,
     DecayFit,
@@ -13,7 +14,6 @@ from canshaper.commissioning.identification.decay import (
     Value,
     fit_decay,
 )
-from canshaper.commissioning.identification.doubts import clipped, mixed
 from canshaper.commissioning.identification.driven import DrivenFit, driven_s, fit_driven
 from canshaper.commissioning.identification.segments import (
     SETTLING_S,
@@ -101,7 +101,7 @@ def identify(
         finding.poor = finding.poor or [_no_swing(good)]
         return finding
     finding.notes += finding.poor
-    _judge(finding)
+    _verdict(finding)
     return finding
 
 
@@ -183,7 +183,7 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
         finding.full_speed_m_s = fit.full_speed_m_s
 
 
-def _judge(finding: Finding) -> None:
+def _verdict(finding: Finding) -> None:
     finding.poor = _faults(finding)
     fit = finding.free
     if fit is None:
