@@ -67,8 +67,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.RESET: ReasonText(
         "reset",
-        "the cause of a trip is gone, the joystick valid and in neutral, and then came a "
-        "rising edge of reset or enable",
+        "cause of a trip gone, joystick in neutral, then a rising edge of reset or enable",
     ),
     Reason.COMPENSATING: ReasonText(
         "moves for slewing, without its own stick",
@@ -127,8 +126,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.STICK_UNTRUSTED: ReasonText(
         "joystick messages are not right",
-        "messages with a wrong checksum, a repeated or jumping alive counter, or too few "
-        "good ones for `qualify`",
+        "wrong checksum, repeated or jumping alive counter, or too few good ones for `qualify`",
         "joystick, a gateway that repeats, two senders of one id",
     ),
     Reason.LOOP_OVERRUN: ReasonText(
@@ -139,8 +137,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.ADDRESS_NOT_CLAIMED: ReasonText(
         "our address is being claimed",
-        "we wait for our address on the bus of the valve: 250 ms after the start, an "
-        "outage, a stall or a reload with another address or bus",
+        "we claim our address on the bus of the valve: 250 ms",
         "nothing; else the bus",
     ),
     Reason.NODE_FAULT: ReasonText(
@@ -193,7 +190,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     ),
     Reason.ADDRESS_LOST: ReasonText(
         "another node has our address",
-        "another node with a lower NAME, or with ours, has claimed our address; we are silent",
+        "another node has claimed our address; we are silent",
         "end it, or change address or NAME; reload",
     ),
     Reason.VALVE_FAULT: ReasonText(
