@@ -34,7 +34,7 @@ class SafeConsole(Console):
 def new_table(first: str, *heads: str, title: str | None = None) -> Table:
     """A table without rows: a column of words, then columns of figures; no cell is wrapped."""
     table = Table(
-        title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False
+        title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
     )
     table.add_column(first, no_wrap=True)
     for head in heads:
