@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from canshaper.report.stroke_metrics import dip, re_rise, rms, run_on_s, run_on_travel, time_to_95_s
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
@@ -12,7 +13,7 @@ from canshaper.report.strokes import (
     find_strokes,
     residual_windows,
 )
-from canshaper_sim.recording import AxisTrace, Recording
+from canshaper_sim.recording import Recording
 
 __all__ = [
     "RESIDUAL_DWELL_S",
@@ -23,9 +24,6 @@ __all__ = [
     "report_dict",
 ]
 
-REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
-LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
-STOPPED = 0.05  # of full speed: the deadband of a common proportional valve
 MIN_RAW_DEG = 0.05  # five steps of the sway signal: a reduction of less is a quotient of noise
 
 _DIGITS = {"_deg": 2, "_s": 2, "_pct": 1}  # resolution of the sway frame, of the sampling, of both
@@ -177,89 +175,23 @@ def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetr
     alone = [stroke for stroke in rests if stroke.alone]
     return AxisMetrics(
         peak_deg=None if sway is None else _largest(map(abs, sway)),
-        rms_deg=None if sway is None else _rms(t_s, sway),
+        rms_deg=None if sway is None else rms(t_s, sway),
         residual_deg=None
         if sway is None
         else _largest(abs(sway[k]) for window in windows for k in window),
         cross_residual_deg=_largest(
             abs(other[k]) for other in crossing for window in windows for k in window
         ),
-        time_to_95_s=_largest(_time_to_95_s(t_s, trace, stroke) for stroke in strokes),
-        run_on_s=_largest(_run_on_s(t_s, trace, stroke) for stroke in alone),
-        run_on_travel=_largest(_run_on_travel(t_s, trace, stroke) for stroke in alone),
-        dip=_largest(_dip(trace, stroke) for stroke in strokes),
-        re_rise=_largest(_re_rise(trace, stroke) for stroke in rests),
+        time_to_95_s=_largest(time_to_95_s(t_s, trace, stroke) for stroke in strokes),
+        run_on_s=_largest(run_on_s(t_s, trace, stroke) for stroke in alone),
+        run_on_travel=_largest(run_on_travel(t_s, trace, stroke) for stroke in alone),
+        dip=_largest(dip(trace, stroke) for stroke in strokes),
+        re_rise=_largest(re_rise(trace, stroke) for stroke in rests),
     )
 
 
 def _largest(values: Iterable[float | None]) -> float | None:
     return max((value for value in values if value is not None), default=None)
-
-
-def _rms(t_s: list[float], values: list[float]) -> float | None:
-    if len(t_s) < 2:
-        return None
-    area = _integral(t_s, [value * value for value in values], range(len(t_s)))
-    return math.sqrt(area / (t_s[-1] - t_s[0]))
-
-
-def _integral(t_s: list[float], values: list[float], window: range) -> float:
-    """Integrate over the samples of the window by trapezoids."""
-    return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
-
-
-def _crossing_s(t_s: list[float], values: Mapping[int, float], k: int, level: float) -> float:
-    """Time at which the straight line from sample k to k + 1 passes the level."""
-    share = (level - values[k]) / (values[k + 1] - values[k])
-    return t_s[k] + share * (t_s[k + 1] - t_s[k])
-
-
-def _time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
-    held = range(stroke.press, stroke.plateau[1] + 1)
-    speed = {k: stroke.direction * trace.speed[k] for k in held}
-    lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
-    start = lost[-1] if lost else stroke.press
-    wanted = REACHED * stroke.level
-    reached = next((k for k in range(start, held.stop) if speed[k] >= wanted), None)
-    if reached is None:
-        return None
-    if reached == stroke.press:
-        return 0.0
-    return _crossing_s(t_s, speed, reached - 1, wanted) - t_s[stroke.press]
-
-
-def _run_on_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    speed = {k: abs(trace.speed[k]) for k in stroke.rest}
-    release, last = stroke.rest[0], stroke.rest[-1]
-    moving = next((k for k in reversed(stroke.rest) if speed[k] >= STOPPED), None)
-    if moving is None:
-        return 0.0
-    stop_s = t_s[last] if moving == last else _crossing_s(t_s, speed, moving, STOPPED)
-    return stop_s - t_s[release]
-
-
-def _run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    return stroke.direction * _integral(t_s, trace.speed, stroke.rest)
-
-
-def _dip(trace: AxisTrace, stroke: Stroke) -> float:
-    first, last = stroke.plateau
-    sent_max, asked_max, dip = -math.inf, 0.0, 0.0
-    for k in range(stroke.press, last + 1):
-        sent, asked = stroke.direction * trace.sent[k], abs(trace.stick[k])
-        sent_max, asked_max = max(sent_max, sent), max(asked_max, asked)
-        if k >= first:
-            dip = max(dip, (sent_max - sent) - (asked_max - asked))
-    return dip
-
-
-def _re_rise(trace: AxisTrace, stroke: Stroke) -> float:
-    lowest, rise = math.inf, 0.0
-    for k in stroke.rest:
-        sent = abs(trace.sent[k])
-        lowest = min(lowest, sent)
-        rise = max(rise, sent - lowest)
-    return rise
 
 
 def _reduction_pct(raw: float | None, shaped: float | None) -> float | None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
-from canshaper.commissioning.identification.driven import STANDS
+from canshaper.commissioning.identification.driven_data import STANDS
 from canshaper.commissioning.identification.series import Array, Command
 from canshaper.controller.finder import InputFinder
 from canshaper.errors import WrongLengthError

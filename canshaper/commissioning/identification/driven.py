@@ -22,28 +22,22 @@ from canshaper.commissioning.identification.decay import (
     CONFIDENCE,
     DecayFit,
     Value,
-    density,
     deviations,
     swing_values,
 )
+from canshaper.commissioning.identification.decay_problem import density
+from canshaper.commissioning.identification.driven_data import Driven, stretches
 from canshaper.commissioning.identification.series import (
     BIN_S,
     Array,
-    Command,
     Kind,
     Series,
-    binned,
 )
 from canshaper.shaping.sway import GRAVITY_M_S2
 
 # Longest delay and lag of a valve that are looked for, s.
 LONGEST_DELAY_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.6
-# A stretch begins so many periods before its first command, to know the swing that is there
-# already, goes on so many after the last, and is at most about so many long.
-BEFORE, AFTER, LONGEST = 1.0, 2.0, 8.0
-# Commands, part of full speed, below which an axis stands.
-STANDS = 0.01
 # What a linear model with a delay and a lag leaves wrong of the full speed of a real valve: on the
 # simulated crane, with a rate limit, it comes out up to 11 % too low.
 MODEL_PART = 0.12
@@ -95,16 +89,6 @@ class DrivenFit:
     stretches: list[Stretch]
 
 
-@dataclass(frozen=True, slots=True)
-class _Data:
-    source: str
-    start_s: float
-    time_s: Array
-    value: Array
-    kind: Kind
-    command: Command
-
-
 def fit_driven(
     series: Sequence[Series], period_s: float, free: DecayFit | None
 ) -> DrivenFit | None:
@@ -118,7 +102,7 @@ def fit_driven(
     Returns:
         None where no axis was driven, or no command is known.
     """
-    data = [part for one in series for part in _stretches(one, period_s)]
+    data = [part for one in series for part in stretches(one, period_s)]
     if not data:
         return None
     if free:
@@ -141,48 +125,16 @@ def fit_driven(
     return problem.result(x)
 
 
-def driven_s(series: Series) -> float:
-    """Seconds in which the axis of a series was told to move."""
-    if series.command is None or not len(series.command.time_s):
-        return 0.0
-    held = np.diff(series.command.time_s, append=series.command.time_s[-1])
-    return float(held[np.abs(series.command.speed) > STANDS].sum())
-
-
 def _pole(period_s: float, ratio: float) -> tuple[float, float]:
     """Frequency and decay of a damped swing."""
     omega = 2.0 * math.pi / period_s
     return omega, omega * ratio / math.sqrt(1.0 - ratio * ratio)
 
 
-def _stretches(series: Series, period: float) -> list[_Data]:
-    command = series.command
-    if command is None or not len(command.time_s):
-        return []
-    moving = np.abs(command.speed) > STANDS
-    ends = np.append(command.time_s[1:], command.time_s[-1])
-    spans: list[list[float]] = []
-    for a, b in zip(command.time_s[moving], ends[moving], strict=True):
-        first, last = float(a) - BEFORE * period, float(b) + AFTER * period
-        if spans and last - spans[-1][0] <= LONGEST * period:
-            spans[-1][1] = last
-        elif not spans or first >= spans[-1][1] - (BEFORE + AFTER) * period:
-            spans.append([max(first, spans[-1][1]) if spans else first, last])
-    time, value = binned(series.time_s, series.value)
-    found = []
-    for first, last in spans:
-        inside = (time >= first) & (time <= last)
-        t, v = time[inside], value[inside]
-        if len(t) > 20 and t[-1] - t[0] > period and np.diff(t).max() < period / 3.0:
-            start = float(t[0])
-            found.append(_Data(series.source, start, t - start, v, series.unit.kind, command))
-    return found
-
-
 class _Problem:
     """Least squares over delay and lag of the valve and, unless known, frequency and decay."""
 
-    def __init__(self, data: Sequence[_Data], known: tuple[float, float] | None) -> None:
+    def __init__(self, data: Sequence[Driven], known: tuple[float, float] | None) -> None:
         self.data = data
         self.known = known
 
@@ -289,7 +241,7 @@ class _Problem:
 
 
 def _response(
-    one: _Data, omega: float, sigma: float, delay: float, lag: float
+    one: Driven, omega: float, sigma: float, delay: float, lag: float
 ) -> tuple[Array, Array]:
     """Swing of a stretch by its commands at a full speed of 1 m/s, and the commanded speed."""
     start = one.start_s - 1.0

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from canshaper.commissioning.identification.decay import Segment
+from canshaper.commissioning.identification.decay_problem import Segment
 from canshaper.commissioning.identification.series import Array, Series, binned, pieces
 from canshaper.commissioning.identification.spectrum import candidates, smoothed
 from canshaper.commissioning.identification.swing import (

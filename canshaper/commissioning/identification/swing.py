@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from canshaper.commissioning.identification.decay import DecayProblem, Segment
+from canshaper.commissioning.identification.decay_problem import DecayProblem, Segment
 from canshaper.commissioning.identification.series import Array
 
 # Least samples a period.

@@ -8,13 +8,14 @@ import numpy as np
 
 from canshaper.commissioning.identification.data_quality import clipped, mixed
 from canshaper.commissioning.identification.decay import (
-    LARGEST_RAD,
     DecayFit,
     SegmentFit,
     Value,
     fit_decay,
 )
-from canshaper.commissioning.identification.driven import DrivenFit, driven_s, fit_driven
+from canshaper.commissioning.identification.decay_problem import LARGEST_RAD
+from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
+from canshaper.commissioning.identification.driven_data import driven_s
 from canshaper.commissioning.identification.segments import (
     SETTLING_S,
     Found,

@@ -1,0 +1,83 @@
+"""What one stroke of the stick shows: rise, run-on, dip, and how the output rose again."""
+
+import math
+from collections.abc import Mapping
+
+from canshaper.report.strokes import Stroke
+from canshaper_sim.recording import AxisTrace
+
+REACHED = 0.95  # of the asked speed: the usual 5 % band of a settling time
+LOST_AGAIN = 0.90  # below this the speed was not reached but only passed through
+STOPPED = 0.05  # of full speed: the deadband of a common proportional valve
+
+
+def rms(t_s: list[float], values: list[float]) -> float | None:
+    """Root of the mean square over the time; None without an interval."""
+    if len(t_s) < 2:
+        return None
+    area = _integral(t_s, [value * value for value in values], range(len(t_s)))
+    return math.sqrt(area / (t_s[-1] - t_s[0]))
+
+
+def _integral(t_s: list[float], values: list[float], window: range) -> float:
+    """Integrate over the samples of the window by trapezoids."""
+    return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
+
+
+def _crossing_s(t_s: list[float], values: Mapping[int, float], k: int, level: float) -> float:
+    """Time at which the straight line from sample k to k + 1 passes the level."""
+    share = (level - values[k]) / (values[k + 1] - values[k])
+    return t_s[k] + share * (t_s[k + 1] - t_s[k])
+
+
+def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | None:
+    """Seconds from the press to the speed that was asked, less 5 %; None where it never comes."""
+    held = range(stroke.press, stroke.plateau[1] + 1)
+    speed = {k: stroke.direction * trace.speed[k] for k in held}
+    lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
+    start = lost[-1] if lost else stroke.press
+    wanted = REACHED * stroke.level
+    reached = next((k for k in range(start, held.stop) if speed[k] >= wanted), None)
+    if reached is None:
+        return None
+    if reached == stroke.press:
+        return 0.0
+    return _crossing_s(t_s, speed, reached - 1, wanted) - t_s[stroke.press]
+
+
+def run_on_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
+    """Seconds from the release until it stands."""
+    speed = {k: abs(trace.speed[k]) for k in stroke.rest}
+    release, last = stroke.rest[0], stroke.rest[-1]
+    moving = next((k for k in reversed(stroke.rest) if speed[k] >= STOPPED), None)
+    if moving is None:
+        return 0.0
+    stop_s = t_s[last] if moving == last else _crossing_s(t_s, speed, moving, STOPPED)
+    return stop_s - t_s[release]
+
+
+def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
+    """Travel after the release, in seconds of full speed."""
+    return stroke.direction * _integral(t_s, trace.speed, stroke.rest)
+
+
+def dip(trace: AxisTrace, stroke: Stroke) -> float:
+    """How far the output fell back while the stick was held, in parts of full command."""
+    first, last = stroke.plateau
+    sent_max, asked_max, dip = -math.inf, 0.0, 0.0
+    for k in range(stroke.press, last + 1):
+        sent, asked = stroke.direction * trace.sent[k], abs(trace.stick[k])
+        sent_max, asked_max = max(sent_max, sent), max(asked_max, asked)
+        if k >= first:
+            dip = max(dip, (sent_max - sent) - (asked_max - asked))
+    return dip
+
+
+def re_rise(trace: AxisTrace, stroke: Stroke) -> float:
+    """How far the output rose again after the release, in parts of full command."""
+    lowest, rise = math.inf, 0.0
+    for k in stroke.rest:
+        sent = abs(trace.sent[k])
+        lowest = min(lowest, sent)
+        rise = max(rise, sent - lowest)
+    return rise
