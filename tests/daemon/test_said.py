@@ -1,7 +1,6 @@
 """What a daemon says of itself: to its service manager, in its log, in one line for people."""
 
 import logging
-import stat
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -16,7 +15,6 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.ports import open_ports
 from canshaper.errors import BusError
 from canshaper.machine.binding import load_deployment
-from tests.daemon.test_daemon import answered, control
 from tests.daemon.test_reload import BUS, SECOND, Bench, FakePort
 from tests.rigs.forwarder import TICK_NS
 
@@ -366,52 +364,3 @@ def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench:
     assert isinstance(port, ListeningPort)
     opened = {listening.config.buses["crane"]: port}
     assert open_ports(listening, opened, lambda _fault: None) == {"crane": port}
-
-
-# -- the control socket ----------------------------------------------------------------------------
-
-
-def test_the_control_socket_has_the_mode_of_the_file(bench: Bench, tmp_path: Path) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    bench.text = bench.text.replace("control:\n", 'control:\n  mode: "0620"\n')
-    bench.file.write_text(bench.text, encoding="utf-8")
-    modes: list[int] = []
-
-    def script(number: int) -> None:
-        modes.append(stat.S_IMODE(path.stat().st_mode))
-        bench.stop()
-
-    bench.run(script)
-    assert modes == [0o620]
-
-
-def test_the_control_socket_is_named_after_the_deployment(
-    bench: Bench, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr("canshaper.config.control.RUNTIME", tmp_path / "run")
-    (tmp_path / "run" / "machine").mkdir(parents=True)
-    control(bench, tmp_path)
-    bench.file.write_text(bench.text.replace(f"  socket: {tmp_path}\n", ""), encoding="utf-8")
-    there: list[bool] = []
-
-    def script(number: int) -> None:
-        there.append((tmp_path / "run/machine/control.sock").exists())
-        bench.stop()
-
-    bench.run(script)
-    assert there == [True]
-
-
-@pytest.mark.parametrize(("value", "said"), [(0.75, "was=0.708"), (2, "0.5 to 1")])
-def test_the_log_says_who_set_what(
-    bench: Bench, tmp_path: Path, log: Callable[[str], list[str]], value: float, said: str
-) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    answered(bench, path, {"set": {"axes.slew.filter.a1": value}})
-    (line,) = log("axes.slew.filter.a1")
-    assert "uid=" in line
-    assert "pid=" in line
-    assert said in line
-    assert line.startswith(("INFO set axes.", "WARNING set=refused uid="))
