@@ -85,11 +85,11 @@ def logged(
     channel: str | None,
     about_s: float | None,
 ) -> list["Finding"]:
-    """What logs tell, by axis and label."""
+    """What logs show, by axis and label."""
     from canshaper.commissioning.identification.canlog import read_can
     from canshaper.commissioning.identification.phone import series_of
     from canshaper.commissioning.identification.table import is_table, read_table
-    from canshaper.commissioning.identification.verdict import identify as judged
+    from canshaper.commissioning.identification.verdict import identify as identified
     from canshaper.report.console import progress_bar
 
     if not logs:
@@ -119,7 +119,7 @@ def logged(
         findings = []
         for (name, label), parts in series.items():
             on_progress(0.5, f"{name} {label}")
-            finding = judged(name, label, parts, about_s)
+            finding = identified(name, label, parts, about_s)
             if finding.at is None:
                 finding.at = _number(label)
             findings.append(finding)
@@ -144,7 +144,7 @@ def _number(label: str) -> float | None:
 def _simulated(
     deployment: "Deployment | None", messages: "Messages", axis: str | None
 ) -> dict[str, str]:
-    """Signals of the simulated crane, where nobody named others."""
+    """Signals of the simulated crane, where no others are named."""
     axes = list(deployment.axes) if deployment else list(SIMULATED)
     there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
     if not there or isinstance(messages.find("GrappleSway"), str):

@@ -13,7 +13,7 @@ from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, new_figure, plain,
 
 LIMIT_COLOUR = "#666666"
 _SIZE_PX = (2000, 950)
-# Of the labels, at 100 dots per inch: width of a character, and heights to try beside a dot.
+# Of the labels, at 100 dots per inch: width of a character, and heights to try next to a dot.
 _CHARACTER_PX = 8.5
 _OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -104.0)
 

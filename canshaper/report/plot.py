@@ -97,11 +97,11 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
 def finding(name: str, axis: Mapping[str, Any]) -> str:
     """Say what the drives show of one axis: "Near-far: residual swing 15.9° → 0.4° (−97 %)".
 
-    Swing in the other plane is added where there is some; without a residual the peak is told.
+    Swing in the other plane is added where there is some; without a residual the peak is shown.
     """
-    told = "residual" if axis["raw"]["residual_deg"] is not None else "peak"
+    measure = "residual" if axis["raw"]["residual_deg"] is not None else "peak"
     words = {"residual": "residual swing", "peak": "largest swing"}
-    text = f"{axis_title(name)}: {words[told]} {_change(axis, told)}"
+    text = f"{axis_title(name)}: {words[measure]} {_change(axis, measure)}"
     if axis["cross_residual_reduction_pct"] is not None:
         text += f",  left in the other plane {_change(axis, 'cross_residual')}"
     return text
@@ -150,7 +150,7 @@ def _shade_windows(panel: Axes, drive: Recording, strokes: list[Stroke]) -> None
 def _draw_command(
     panel: Axes, raw: Recording, shaped: Recording, name: str, strokes: list[Stroke]
 ) -> None:
-    """Draw the stick as a filled step, and what the valve was told without and with filters."""
+    """Draw the stick as a filled step, and the command to the valve without and with filters."""
     stick = raw.axes[name].stick
     panel.fill_between(raw.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0, zorder=1.5)
     for drive, colour in ((raw, RAW_COLOUR), (shaped, SHAPED_COLOUR)):

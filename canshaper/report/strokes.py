@@ -1,4 +1,4 @@
-"""Strokes of the stick in a recorded drive, and the rests after them in which swing is judged."""
+"""Strokes of the stick in a recorded drive, and the rests after them in which swing is measured."""
 
 import math
 import statistics
@@ -77,7 +77,7 @@ def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
     """Cut two drives of the same script to the span both cover, and give them one time base.
 
     The first press of any stick is put at the same time in both (good to one sample); without a
-    press in both, the starts are. A drive that was recorded longer is thus not judged on more rest.
+    press in both, the starts are. A longer recording is thus not measured over more rest.
 
     Raises:
         ValueError: the drives have different axes or no samples, or one is malformed.

@@ -22,7 +22,7 @@ RESET_S = 0.3
 NEUTRAL = 0.02
 """Below it a stick of the page counts as neutral."""
 
-Tell = Callable[[str], None]
+Report = Callable[[str], None]
 
 
 def is_number(value: object) -> TypeGuard[int | float]:
@@ -35,12 +35,12 @@ class Cab:
 
     Args:
         axes: axes that have a stick.
-        tell: called with what is to be told of the driver.
+        report: called with what the driver does.
     """
 
-    def __init__(self, axes: Iterable[str], tell: Tell) -> None:
+    def __init__(self, axes: Iterable[str], report: Report) -> None:
         self._axes = frozenset(axes)
-        self._tell = tell
+        self._report = report
         self.driver: int | None = None
         self.enable = False
         self.anti_sway = True
@@ -56,7 +56,7 @@ class Cab:
         if page == self.driver:
             return
         if self.driver is not None:
-            self._tell(f"page {page} takes the sticks from page {self.driver}")
+            self._report(f"page {page} takes the sticks from page {self.driver}")
             self._let_go(now_s)
         self.driver = page
         self._heard_s = now_s
@@ -65,7 +65,7 @@ class Cab:
     def leave(self, page: int, now_s: float) -> None:
         """A page has gone, or has to let go."""
         if page == self.driver:
-            self._tell(f"page {page} leaves the sticks; they go to neutral")
+            self._report(f"page {page} leaves the sticks; they go to neutral")
             self._let_go(now_s)
             self.driver = None
 
@@ -90,7 +90,7 @@ class Cab:
             self._centred = True
             if self._silent:
                 self._silent, self._release_at_s = False, None
-                self._tell(f"page {page} is back")
+                self._report(f"page {page} is back")
         self._sticks = {n: float(v) for n, v in sticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
@@ -117,7 +117,7 @@ class Cab:
         """Move the anti-sway switch."""
         if page == self.driver and on is not self.anti_sway:
             self.anti_sway = on
-            self._tell(f"anti-sway switched {'on' if on else 'off'}")
+            self._report(f"anti-sway switched {'on' if on else 'off'}")
 
     def held(self, now_s: float) -> Held:
         """What the hand does now."""
@@ -129,7 +129,7 @@ class Cab:
         """Let go when the driver is silent; release enable when it is time."""
         silent = self.driver is not None and now_s - self._heard_s > SILENT_S
         if silent and self.enable and self._release_at_s is None:
-            self._tell(f"page {self.driver} is silent; sticks in neutral")
+            self._report(f"page {self.driver} is silent; sticks in neutral")
             self._let_go(now_s)
             self._silent = True
         elif silent:
@@ -138,7 +138,7 @@ class Cab:
             self._release_at_s, self._silent = None, False
             if self.enable:
                 self.enable = False
-                self._tell("enable released")
+                self._report("enable released")
 
     def _let_go(self, now_s: float) -> None:
         self._sticks, self._centred, self._silent = {}, False, False

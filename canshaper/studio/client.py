@@ -37,7 +37,7 @@ class Client:
         socket: the connection, accepted.
         stage: what it drives and watches.
         number: tells pages apart.
-        hello: what it is told first.
+        hello: the first message to it.
     """
 
     def __init__(self, socket: WebSocket, stage: Stage, number: int, hello: dict[str, Any]) -> None:

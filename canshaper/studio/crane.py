@@ -1,4 +1,4 @@
-"""One simulated crane behind a real daemon: the processes, their bus, and what they tell."""
+"""One simulated crane behind a real daemon: the processes, their bus, and what they report."""
 
 import contextlib
 import json
@@ -17,7 +17,7 @@ from canshaper.design.processes import Transport, end
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.sliders import adjustable, sliders
-from canshaper.studio.view import Tell
+from canshaper.studio.view import Report
 
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
@@ -75,7 +75,7 @@ class Crane:
         file: the deployment file.
         transport: the bus.
         directory: for logs and sockets; it has to outlive this object.
-        tell: called with what happens to the processes.
+        report: called with what happens to the processes.
         changes: parameters of the crane, NAME=VALUE.
         program: how the daemon is started; a benchmark puts its own around it.
 
@@ -91,12 +91,12 @@ class Crane:
         transport: Transport,
         directory: Path,
         *,
-        tell: Tell,
+        report: Report,
         changes: Sequence[str] = (),
         program: Sequence[str] = CANSHAPER,
     ) -> None:
         self.control = directory / f"{name}.sock"
-        self._tell = tell
+        self._report = report
         self._stopping = False
         self.starts = 0
         bus = ["--interface", transport.interface, "--channel", transport.channel]
@@ -114,7 +114,7 @@ class Crane:
         self._status.bind(str(self._status_path))
 
     def check(self, now_s: float) -> None:
-        """Start what does not run and is due; tell of what has ended."""
+        """Start what does not run and is due; report what has ended."""
         for verb, child in self._children.items():
             if child.process is None:
                 if now_s >= child.start_at_s and not self._stopping:
@@ -124,7 +124,7 @@ class Crane:
                 if not self._stopping:
                     last = _last_line(child.log)
                     text = f"canshaper {verb} ended with status {status}; it starts again. {last}"
-                    self._tell(text.strip(), "bad")
+                    self._report(text.strip(), "bad")
 
     def _start(self, verb: str, child: Child, now_s: float) -> None:
         environment = {**os.environ, "NOTIFY_SOCKET": str(self._status_path)}
@@ -137,7 +137,7 @@ class Crane:
                 )
         except OSError as error:
             child.start_at_s = now_s + RESTART_S
-            self._tell(f"canshaper {verb} cannot start: {error.strerror}; tried again", "bad")
+            self._report(f"canshaper {verb} cannot start: {error.strerror}; tried again", "bad")
             return
         self.starts += verb == "run"
         # The daemon as its unit does it, the crane as little delayed as the joysticks: where that
@@ -147,7 +147,7 @@ class Crane:
             os.sched_setscheduler(child.process.pid, os.SCHED_FIFO, os.sched_param(priority))
 
     def late_us(self) -> int | None:
-        """Largest lateness of a tick in the last second, when the daemon has told one."""
+        """Largest lateness of a tick in the last second, when the daemon has reported one."""
         late = None
         with contextlib.suppress(BlockingIOError):
             while True:

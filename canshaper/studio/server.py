@@ -73,7 +73,7 @@ def build_app(stage: Stage, access: Access, parameters: CraneParameters) -> ASGI
 
 
 class Guard:
-    """Lets nobody in who may not, and puts the headers of every answer."""
+    """Lets in only who may, and puts the headers of every answer."""
 
     def __init__(self, app: ASGIApp, access: Access) -> None:
         self._app = app
@@ -119,7 +119,7 @@ def _with_headers(send: Send) -> Send:
 
 
 def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
-    """What a page is told first: what there is, and how long the links are."""
+    """The first message to a page: what there is, and how long the links are."""
     joints, grapple = parameters.joints, parameters.grapple
     return {
         "version": __version__,

@@ -57,7 +57,7 @@ class Stage:
 
     Args:
         deployment: the machine.
-        events: where to tell what happens.
+        events: where to report what happens.
     """
 
     def __init__(self, deployment: Deployment, events: Events) -> None:
@@ -115,7 +115,7 @@ class Stage:
                 self.deployment.path,
                 transport,
                 directory,
-                tell=self._teller(name),
+                report=self._reporter(name),
                 changes=changes,
                 program=program if name == SHAPED else CANSHAPER,
             )
@@ -213,7 +213,7 @@ class Stage:
                 seen.crane.check(now_s)
                 late = seen.crane.late_us()
                 if late is not None:
-                    seen.view.told(late)
+                    seen.view.report_lateness(late)
                 if seen.shaped and seen.crane.starts != self._starts:
                     self._starts = seen.crane.starts
                     self.positions = dict.fromkeys(self.sliders, 1.0)  # it has those of the file
@@ -243,7 +243,7 @@ class Stage:
     # -- parts ---------------------------------------------------------------------------------
 
     def _view(self, name: str) -> CraneView:
-        return CraneView(self.deployment, self._teller(name))
+        return CraneView(self.deployment, self._reporter(name))
 
-    def _teller(self, name: str) -> Callable[[str, str], None]:
+    def _reporter(self, name: str) -> Callable[[str, str], None]:
         return lambda text, level: self.events.add(name, text, level)

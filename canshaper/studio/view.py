@@ -34,7 +34,7 @@ SWAY_OF = {
 }
 """Which swing an axis excites, across the boom or along it."""
 
-Tell = Callable[[str, str], None]
+Report = Callable[[str, str], None]
 """Takes a text and how bad that is: "info", "warn" or "bad"."""
 
 
@@ -54,12 +54,12 @@ class CraneView:
 
     Args:
         deployment: names the messages.
-        tell: called with what is an event.
+        report: called with what is an event.
     """
 
-    def __init__(self, deployment: Deployment, tell: Tell) -> None:
+    def __init__(self, deployment: Deployment, report: Report) -> None:
         self._deployment = deployment
-        self._tell = tell
+        self._report = report
         self.axes = {name: AxisView() for name in deployment.axes}
         self.sway_deg: tuple[float, float] | None = None
         self.pose: tuple[float, float, float] | None = None
@@ -116,25 +116,25 @@ class CraneView:
             except Exception:  # a frame shorter than its message: cantools has no base class
                 continue
 
-    def told(self, late_us: int) -> None:
+    def report_lateness(self, late_us: int) -> None:
         """Take what the daemon tells its service manager: how late it was in the last second."""
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Tell when the daemon or the crane falls silent, and when it is heard again."""
+        """Report when the daemon or the crane falls silent, and when it is heard again."""
         if self.crane_there(now_s) is not self._crane_there:
             self._crane_there = not self._crane_there
             if not self._crane_there:
-                self._tell("the crane is silent; its pose is the last one", "bad")
+                self._report("the crane is silent; its pose is the last one", "bad")
                 self.sway_deg = None
                 self._swings.clear()
         there = self.daemon_there(now_s)
         if there is not self._daemon_there:
             self._daemon_there = there
             if there:
-                self._tell("the daemon is at work", "info")
+                self._report("the daemon is at work", "info")
             else:
-                self._tell("the daemon is silent; valves close by their own timeout", "bad")
+                self._report("the daemon is silent; valves close by their own timeout", "bad")
                 self.late_us = None
                 for axis in self.axes.values():
                     axis.state = axis.reason = axis.valve = None
@@ -180,7 +180,7 @@ class CraneView:
         }
 
     def _predicted(self) -> tuple[float, float] | None:
-        """Sway as the daemon reckons it, where nobody measures it."""
+        """Sway that the daemon predicts, where none is measured."""
         found = {ACROSS: 0.0, ALONG: 0.0}
         known = False
         for name, axis in self.axes.items():
@@ -221,7 +221,7 @@ class CraneView:
             self._swings.append((now_s, math.hypot(*predicted)))
         if view.state is not None and (state, reason) != (view.state, view.reason):
             level = {"bad": "bad", "stop": "warn"}.get(_level(state), "info")
-            self._tell(f"{name}: {state_words(state)} — {reason_words(reason)}", level)
+            self._report(f"{name}: {state_words(state)} — {reason_words(reason)}", level)
         view.state, view.reason = state, reason
         self._daemon_s = now_s
 
@@ -230,7 +230,7 @@ class CraneView:
             return
         fault = int(values["LastFault"])
         if fault not in (self.fault, 0):
-            self._tell(f"fault: {fault_words(fault)}", "warn")
+            self._report(f"fault: {fault_words(fault)}", "warn")
         self.fault, self.missed = fault, int(values["MissedDeadlines"])
         self._daemon_s = now_s
 

@@ -137,7 +137,7 @@ def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -
 
 def test_a_daemon_that_falls_silent_is_told_and_its_states_are_forgotten(watched: Watched) -> None:
     watched.take([watched.status(State.READY, Reason.STICK_NEUTRAL)], 0.0)
-    watched.view.told(120)
+    watched.view.report_lateness(120)
     watched.view.check(0.0)
     watched.view.check(SILENT_S - 0.01)
     assert watched.view.values(0.1)["late_us"] == 120

@@ -96,7 +96,7 @@ def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
         with progress_bar(f"listening, {seconds:g} s", seconds, refresh_hz=REFRESH_HZ) as passed:
             heard = listen(deployment, seconds, passed)
     except (OSError, WrongDeviceError) as error:
-        remedy = "mend the interface first"
+        remedy = "fix the interface first"
         why = error.strerror if isinstance(error, OSError) else error
         return [Finding("joysticks", Level.BAD, f"cannot listen: {why}", remedy)]
     return heard_findings(deployment, heard)

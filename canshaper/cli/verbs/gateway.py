@@ -18,14 +18,14 @@ def gateway(
     state: Literal["running", "away", "down", "show"] = typer.Argument(
         "show",
         help="running: pass what is not ours; away: and the deployment's fallback for joysticks;"
-        " down: nothing; show: tell what is there.",
+        " down: nothing; show: say what is there.",
     ),
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
 ) -> None:
     """Set up, show or remove the rules of can-gw that pass frames between the buses of a gateway.
 
-    Other rules between the two interfaces are removed, and told. The service does this before the
+    Other rules between the two interfaces are removed, and shown. The service does this before the
     daemon starts (running) and after it has ended, however it ended (away).
 
     Exit code 0 when the rules are as asked, with show when they are those of running or away; 1

@@ -40,7 +40,7 @@ def init(
     Looks through the DBC files for joysticks, valves and switches and offers what it finds; Enter
     takes what stands in brackets, "-" leaves a thing out. Written with reduced speed and with a
     filter to begin with. Ctrl-C writes nothing; should the check of the whole file find something
-    after all, the answers stay in a draft beside it. Machines of J1939 and CANopen begin with a
+    after all, the answers stay in a draft next to it. Machines of J1939 and CANopen begin with a
     copy of the shipped j1939-forwarder.yaml or canopen-forwarder.yaml.
 
     Examples:

@@ -62,7 +62,7 @@ class _Stop:
             signal.signal(number, self._on_signal)
 
     def going(self) -> bool:
-        """Whether nobody has asked yet."""
+        """Whether no signal came yet."""
         return not self._asked
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:

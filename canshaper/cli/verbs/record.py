@@ -51,12 +51,12 @@ def record(
     """Record every frame on the buses of a deployment; nothing is sent.
 
     Makes a bundle for a bug report: the log, the deployment file with its DBC files, versions, and
-    what the status messages told. `canshaper replay BUNDLE` replays it.
+    what the status messages said. `canshaper replay BUNDLE` replays it.
 
     What has just happened is in the black box of the daemon: with --last it writes the last minute
     of it, tick by tick, as soon as every axis is neutral. After a trip it does so by itself.
 
-    Ctrl-C or SIGTERM end it. Exit code 0, also when nothing was heard, which is told; 1 when the
+    Ctrl-C or SIGTERM end it. Exit code 0, also when nothing was received, which it says; 1 when the
     bundle or the log cannot be written, or no daemon answers; 2 when the deployment is wrong; 3
     when a bus cannot be opened or read.
 
@@ -128,7 +128,7 @@ def _last(file: str, control: Path | None) -> None:
 
 
 def _beside(out: Path) -> Path:
-    """A new log beside a bundle, such as drive.x2k9.log: drive.log may be another recording.
+    """A new log next to a bundle, such as drive.x2k9.log: drive.log may be another recording.
 
     Raises:
         OSError: it cannot be made.
@@ -163,7 +163,7 @@ def _bundle(
 
 
 class _Stop:
-    """Asked for by SIGTERM or SIGINT; a second time nobody waits any more."""
+    """Asked for by SIGTERM or SIGINT; a second time it ends at once."""
 
     def __init__(self) -> None:
         self.asked = False

@@ -20,7 +20,7 @@ def run(
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
     listen_only: bool = typer.Option(
-        False, "--listen-only", help="Reckon and tell the status; send no valve frame."
+        False, "--listen-only", help="Compute and send the status; send no valve frame."
     ),
     control: str | None = typer.Option(
         None, "--control", metavar="PATH", help="Control socket instead of the file's."
@@ -35,8 +35,8 @@ def run(
     SIGHUP reads the file again; it is applied when it is valid and every axis is in neutral. An
     interface that goes away is used again when it is back.
 
-    With --listen-only it can run beside the controller that drives the machine now: nothing is
-    sent but the status messages, which tell what the valves would be told.
+    With --listen-only it can run next to the controller that drives the machine now: nothing is
+    sent but the status messages, which say what the valves would get.
 
     Limits that let an axis travel on for more than 2 m after release have to be meant: without a
     stop_distance_m in the file it does not start, and a reload is refused.

@@ -68,7 +68,7 @@ def tune(
 ) -> None:
     """Find the best poles of an axis' G_FF, show what they do, write them on request.
 
-    Prints the setting beside the one in the file, how much swing is left when the pendulum is up
+    Prints the setting next to the one in the file, how much swing is left when the pendulum is up
     to 30 % longer or shorter, and what holds the optimum; draws OUT/AXIS.png. Exit code 2 where
     nothing fits, with what conflicts.
 

@@ -17,7 +17,7 @@ class Sample(NamedTuple):
     """One moment of a measurement.
 
     Attributes:
-        command: what the valve was told, part of full command.
+        command: command to the valve, part of full command.
         speed: what the feedback showed, in its own unit.
     """
 

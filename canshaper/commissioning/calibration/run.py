@@ -14,7 +14,7 @@ from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.standstill import Standstill
 from canshaper.machine.deployment import Deployment
 
-# How often the end is told to every valve: a frame may be lost.
+# How often neutral is sent to every valve at the end: a frame may be lost.
 LAST_FRAMES = 3
 # All that can end or hold a program from its terminal: a valve must not stay open behind it.
 STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
@@ -25,7 +25,7 @@ def run_live(
 ) -> None:
     """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
 
-    However it ends, neutral is the last that every valve is told.
+    However it ends, neutral is the last that is sent to every valve.
 
     Args:
         drive: the measurement.

@@ -65,7 +65,7 @@ class SpeedFeedback:
             return False
         source = frame.can_id & 0xFF
         if self._source is None:
-            self._source = source  # the first that is heard, and nobody else any more
+            self._source = source  # the first that is received, and no other any more
         return source == self._source
 
 

@@ -30,7 +30,7 @@ class Link:
     Attributes:
         name: of the interface.
         can: whether it is a CAN interface.
-        kind: of its driver: can (a controller), vcan, vxcan; None where it is not told.
+        kind: of its driver: can (a controller), vcan, vxcan; None where it is not known.
         up: whether it is set up.
         queue: length of its transmit queue, frames.
         data: details of a controller, in the words of ``ip``; empty where there are none.
@@ -197,19 +197,19 @@ def queue(link: Link) -> Finding:
 
 def state(link: Link) -> Finding | None:
     """State of the controller; only while the interface is up, it has one that counts."""
-    told = link.data.get("state")
-    if told is None or not link.up:
+    state = link.data.get("state")
+    if state is None or not link.up:
         return None
     subject = f"{link.name} state"
     wires = "look at wiring, termination (60 ohm between the lines), bit rate of all nodes"
-    if told == "ERROR-ACTIVE":
+    if state == "ERROR-ACTIVE":
         return Finding(subject, Level.OK, "error-active, as it should be")
-    if told == "ERROR-WARNING":
+    if state == "ERROR-WARNING":
         return Finding(subject, Level.WARNING, "error-warning: many errors", wires)
-    if told == "BUS-OFF":
+    if state == "BUS-OFF":
         remedy = f"{wires}; then sudo ip link set {link.name} type can restart"
         return Finding(subject, Level.BAD, "bus-off: the controller has left the bus", remedy)
-    return Finding(subject, Level.BAD, told.lower(), wires)
+    return Finding(subject, Level.BAD, state.lower(), wires)
 
 
 def errors(link: Link) -> Finding | None:
@@ -218,13 +218,13 @@ def errors(link: Link) -> Finding | None:
         return None
     counters = link.data.get("berr_counter", {})
     names = {"bus_off": "bus-off", "error_passive": "passive", "bus_error": "bus errors"}
-    told = [f"{n} {counters[n]}" for n in ("tx", "rx") if counters.get(n)]
-    told += [f"{text} {link.counts[n]}" for n, text in names.items() if link.counts.get(n)]
+    counted = [f"{n} {counters[n]}" for n in ("tx", "rx") if counters.get(n)]
+    counted += [f"{text} {link.counts[n]}" for n, text in names.items() if link.counts.get(n)]
     subject = f"{link.name} errors"
-    if not told:
+    if not counted:
         return Finding(subject, Level.OK, "none counted")
     remedy = "wiring, termination, bit rates; some are counted since the adapter was plugged in"
-    return Finding(subject, Level.WARNING, "counted: " + ", ".join(told), remedy)
+    return Finding(subject, Level.WARNING, "counted: " + ", ".join(counted), remedy)
 
 
 def restart(link: Link) -> Finding:

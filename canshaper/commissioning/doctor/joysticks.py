@@ -60,7 +60,7 @@ class Joysticks:
         self.sent: dict[str, list[tuple[int, int]]] = {name: [] for name in sockets}
 
     def run(self) -> None:
-        """Play until nobody is at the other end."""
+        """Play until the other end is closed."""
         run_at_deadlines(round(self._step_ms * 1_000_000 * SLOWER), self._body)
 
     def _body(self, _now_ns: int, missed: int, _late_ns: int) -> bool:

@@ -67,14 +67,14 @@ def preemption(root: Path, version: str) -> Finding:
         found = "does not let a real-time process interrupt it"
         return Finding("kernel", Level.WARNING, found, f"install a PREEMPT_RT kernel ({real_time})")
     modes = _read(root / "sys/kernel/debug/sched/preempt") or ""
-    told = re.search(r"\((\w+)\)", modes) or re.search(
+    mode = re.search(r"\((\w+)\)", modes) or re.search(
         r"\bpreempt=(\w+)", _read(root / "proc/cmdline") or ""
     )
-    if told is None:
+    if mode is None:
         found = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt tells root which mode it is in"
         return Finding("kernel", Level.NOTE, found, "boot with preempt=full to be sure")
-    found = f"PREEMPT_DYNAMIC in mode {told[1]}"
-    if told[1] in ("full", "lazy"):
+    found = f"PREEMPT_DYNAMIC in mode {mode[1]}"
+    if mode[1] in ("full", "lazy"):
         return Finding("kernel", Level.OK, found)
     remedy = f"boot with preempt=full, or install a PREEMPT_RT kernel ({real_time})"
     return Finding("kernel", Level.WARNING, found, remedy)
@@ -85,7 +85,7 @@ def throttling(root: Path) -> Finding:
     runtime = _read(root / "proc/sys/kernel/sched_rt_runtime_us")
     period = _read(root / "proc/sys/kernel/sched_rt_period_us")
     if runtime is None or period is None:
-        return Finding("real-time share", Level.NOTE, "the kernel does not tell")
+        return Finding("real-time share", Level.NOTE, "the kernel does not say")
     if runtime == "-1":
         return Finding("real-time share", Level.OK, "not limited")
     share = int(runtime) / int(period)
@@ -122,11 +122,11 @@ def huge_pages(root: Path) -> Finding:
     The daemon refuses it for its own memory; that of other programs is joined on any processor.
     """
     modes = _read(root / "sys/kernel/mm/transparent_hugepage/enabled") or ""
-    told = re.search(r"\[(\w+)\]", modes)
-    if told is None:
+    mode = re.search(r"\[(\w+)\]", modes)
+    if mode is None:
         return Finding("huge pages", Level.OK, "none")
-    if told[1] != "always":
-        return Finding("huge pages", Level.OK, told[1])
+    if mode[1] != "always":
+        return Finding("huge pages", Level.OK, mode[1])
     found = "always: the kernel may hold up the loop for 1 ms when it makes one for any program"
     remedy = "boot with transparent_hugepage=madvise"
     return Finding("huge pages", Level.NOTE, found, remedy)
@@ -171,7 +171,7 @@ def clock_source(root: Path) -> Finding:
     directory = root / "sys/devices/system/clocksource/clocksource0"
     name = _read(directory / "current_clocksource")
     if name is None:
-        return Finding("clock source", Level.NOTE, "the kernel does not tell")
+        return Finding("clock source", Level.NOTE, "the kernel does not say")
     if name in QUICK_CLOCKS:
         return Finding("clock source", Level.OK, name)
     others = (_read(directory / "available_clocksource") or "").split()
@@ -198,23 +198,23 @@ def suspend(root: Path) -> Finding:
     return Finding("suspend", Level.WARNING, f"possible ({states}); {set_to}", MASK_SLEEP)
 
 
-def virtual(told: str | None, root: Path) -> Finding:
+def virtual(hypervisor: str | None, root: Path) -> Finding:
     """Whether another system decides when this one runs.
 
     Args:
-        told: output of ``systemd-detect-virt --vm``, None where there is no such program.
+        hypervisor: output of ``systemd-detect-virt --vm``, None where there is no such program.
         root: root of the file system.
     """
-    if told is None and re.search(
+    if hypervisor is None and re.search(
         r"^flags\b.*\bhypervisor\b", _read(root / "proc/cpuinfo") or "", re.MULTILINE
     ):
-        told = "a hypervisor"
-    if told in (None, "none"):
+        hypervisor = "a hypervisor"
+    if hypervisor in (None, "none"):
         return Finding("virtual machine", Level.OK, "none is to be seen")
     return Finding(
         "virtual machine",
         Level.WARNING,
-        f"{told}: its host decides when this system runs",
+        f"{hypervisor}: its host decides when this system runs",
         "run the crane on a PC without one, or give the machine processors of its own",
     )
 

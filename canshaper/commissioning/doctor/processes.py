@@ -111,7 +111,7 @@ def be() -> None:
 
 
 def say_ready() -> None:
-    """Tell the parent that the work can begin."""
+    """Report to the parent that the work can begin."""
     print(READY, flush=True)
 
 

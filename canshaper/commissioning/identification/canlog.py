@@ -1,4 +1,4 @@
-"""Signals of a CAN log, named by DBC, with the commands that stand beside them in the log."""
+"""Signals of a CAN log, named by DBC, with the commands in the same log."""
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -128,12 +128,12 @@ def read_can(
     at = float(np.median(weight.samples.arrays()[1])) if weight and weight.samples.value else None
     result = {}
     for axis, reader in readers.items():
-        told = _checked(path, reader, frames, ids, messages)
+        faults = _checked(path, reader, frames, ids, messages)
         time, value = ordered(f"{path}: {reader.name}", *reader.samples.arrays())
         source = f"{path.name}: {reader.name}"
         command = commands.of(axis)
         result[axis] = Series(
-            source, label, reader.unit, time, value, command, idle, at, [*notes, *told]
+            source, label, reader.unit, time, value, command, idle, at, [*notes, *faults]
         )
     return result
 

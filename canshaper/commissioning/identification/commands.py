@@ -1,4 +1,4 @@
-"""Commands of the axes in a CAN log: when each was told to move, and how fast."""
+"""Commands of the axes in a CAN log: when each was commanded to move, and how fast."""
 
 from array import array
 from dataclasses import dataclass, field
@@ -67,7 +67,7 @@ class Commands:
                         part = steps / bound.valve.steps
                         speed = self._speed(bound, part)
                         self._valves[bound.name].add(time_s, speed)
-        for bus in self._joystick_buses:  # which one a channel of the log is, nobody has said
+        for bus in self._joystick_buses:  # no one has said which channel of the log it is
             if joystick := self._finder.find(Frame(bus, *key, data), round(time_s * 1e9)):
                 self._take_joystick(joystick, time_s, data)
 

@@ -97,7 +97,7 @@ def fit_driven(
     Args:
         series: its signals, of which those count that have commands.
         period_s: period, about.
-        free: period and damping as the free swings tell them; None looks for them here.
+        free: period and damping as the free swings show them; None looks for them here.
 
     Returns:
         None where no axis was driven, or no command is known.
@@ -257,5 +257,5 @@ def _response(
     # From rest at the first command's level; a swing before it is a free one.
     swing = lfilter(b.ravel(), a, speed - speed[0])
     time = one.time_s + 1.0
-    told = np.interp(time, grid, speed)
-    return np.interp(time, grid, swing), told
+    driven = np.interp(time, grid, speed)
+    return np.interp(time, grid, swing), driven

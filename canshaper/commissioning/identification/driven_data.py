@@ -26,7 +26,7 @@ class Driven:
 
 
 def driven_s(series: Series) -> float:
-    """Seconds in which the axis of a series was told to move."""
+    """Seconds in which the axis of a series was commanded to move."""
     if series.command is None or not len(series.command.time_s):
         return 0.0
     held = np.diff(series.command.time_s, append=series.command.time_s[-1])

@@ -10,7 +10,7 @@ from canshaper.commissioning.identification.series import Array, Series, ordered
 from canshaper.commissioning.identification.table import Table
 from canshaper.errors import IdentificationError
 
-# Width of the ellipse that is swung, part of its length, from which on it is told.
+# Width of the ellipse that is swung, part of its length, from which on it is reported.
 ROUND = 0.3
 # Swings from the start of the best free one that are looked at for it.
 SWINGS = 6

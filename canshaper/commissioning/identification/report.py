@@ -14,10 +14,10 @@ from canshaper.report.table import axis_title
 
 def lines(finding: Finding) -> list[str]:
     """A finding for people, one line a fact."""
-    told = [heading(finding), *(f"  {text}" for text in _basis(finding))]
-    told += [f"  note: {note}" for note in finding.notes]
-    told += [f"  too poor: {fault}" for fault in finding.poor]
-    return told
+    text_lines = [heading(finding), *(f"  {text}" for text in _basis(finding))]
+    text_lines += [f"  note: {note}" for note in finding.notes]
+    text_lines += [f"  too poor: {fault}" for fault in finding.poor]
+    return text_lines
 
 
 def heading(finding: Finding) -> str:
@@ -65,13 +65,13 @@ def set_lines(advice: Advice) -> list[str]:
     """The lines of ``gain_schedule`` for the deployment file; each still needs its filter."""
     if not advice.gain_schedule:
         return []
-    told = ["    gain_schedule:"]
+    text_lines = ["    gain_schedule:"]
     for at, label, sway in sorted(advice.gain_schedule, key=lambda s: (s[0] is None, s[0])):
         shown = "?" if at is None else f"{at:g}"
-        told.append(f"      - breakpoint: {shown} # {label or 'value of the grapple signal'}")
-        told.append(f"        sway: {flow(sway)}")
-        told.append("        filter: # design it for this sway data")
-    return told
+        text_lines.append(f"      - breakpoint: {shown} # {label or 'value of the grapple signal'}")
+        text_lines.append(f"        sway: {flow(sway)}")
+        text_lines.append("        filter: # design it for this sway data")
+    return text_lines
 
 
 def as_dict(findings: Sequence[Finding], advice: Sequence[Advice]) -> dict[str, Any]:

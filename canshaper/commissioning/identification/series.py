@@ -1,4 +1,4 @@
-"""A measured signal over time, with its unit, and what is known of the commands beside it."""
+"""A measured signal over time, with its unit, and what is known of the commands with it."""
 
 import math
 import re
@@ -74,7 +74,7 @@ def unit_of(text: str) -> Unit:
 
 @dataclass(frozen=True, slots=True)
 class Command:
-    """What an axis was told, held until the next value.
+    """Commands of an axis, each held until the next value.
 
     Attributes:
         time_s: times of the commands, rising, on the clock of the signal.
@@ -96,7 +96,7 @@ class Series:
         time_s: rising times from the start of the log, s.
         value: in rad, rad/s or its own unit.
         command: commands of the axis, where the log has them.
-        idle: stretches in which no axis was told to move, s; None where that is not known.
+        idle: stretches in which no axis was commanded to move, s; None where that is not known.
         at: value of the deployment's grapple signal, where the log has it.
         notes: what was left out while reading.
     """

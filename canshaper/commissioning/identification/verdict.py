@@ -1,4 +1,4 @@
-"""What the signals of an axis tell of its swing, and whether that is enough to use."""
+"""What the signals of an axis show of its swing, and whether that is enough to use."""
 
 import math
 from collections.abc import Sequence
@@ -24,7 +24,7 @@ from canshaper.commissioning.identification.segments import (
 from canshaper.commissioning.identification.series import Kind, Series
 from canshaper.commissioning.identification.swing import SAMPLES
 
-# Fewer full swings tell no damping.
+# Fewer full swings show no damping.
 LEAST_SWINGS = 3.0
 # Widest intervals of what may be used: of the period, and of the damping ratio as a part of it or
 # as such. 3 % of the period are 6 % of the length, which every filter but ZV forgives.
@@ -157,7 +157,7 @@ def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> 
 
 
 def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
-    """Driven swings: full speed, and what free swings did not tell."""
+    """Driven swings: full speed, and what free swings did not show."""
     if not any(driven_s(s) for s in series):
         return
     trusted = finding.free if finding.free and not _faults(finding) else None
@@ -170,7 +170,7 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
     finding.driven = fit
     if fit.explained < LEAST_EXPLAINED:
         finding.notes.append(
-            f"full speed not told: the commands explain only {100 * max(fit.explained, 0):.0f} % of"
+            f"no full speed: the commands explain only {100 * max(fit.explained, 0):.0f} % of"
             " the driven swing; drive this axis alone, in single strokes"
         )
         return
@@ -179,7 +179,7 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
         finding.period_s, finding.damping_ratio = fit.period_s, fit.damping_ratio
         finding.notes.append("from driven motion, as no free swing was good enough")
     if fit.full_speed_m_s is None:
-        finding.notes.append("full speed not told: the signal is no angle and no rate of one")
+        finding.notes.append("no full speed: the signal is no angle and no rate of one")
     elif fit.full_speed_m_s.relative < 0.3:
         finding.full_speed_m_s = fit.full_speed_m_s
 

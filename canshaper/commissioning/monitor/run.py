@@ -108,8 +108,8 @@ def run_plain(
         while going():
             ear.listen(0.1)
             while monitor.events:
-                told = monitor.events.popleft()
-                write(f"{clock(told.time_ns)} {told.text}")
+                event = monitor.events.popleft()
+                write(f"{clock(event.time_ns)} {event.text}")
             now_ns = time.time_ns()
             if now_ns >= due_ns:
                 due_ns = max(due_ns + SECOND_NS, now_ns)

@@ -1,6 +1,6 @@
 """The monitor's picture: text in 80 columns, and one line for pipes.
 
-Nothing is told by colour alone: what is stale says so, what is late too.
+Nothing is shown by colour alone: what is stale says so, what is late too.
 """
 
 from collections.abc import Iterator, Sequence
@@ -30,7 +30,7 @@ SHORT = {
     "SendFailures": "send failed",
 }
 IN_FIRST_LINE = 4
-# A rate so much below that of the DBC is told.
+# A rate so much below that of the DBC is shown.
 SLOW = 0.8
 
 
@@ -62,7 +62,7 @@ def screen(monitor: Monitor, now_ns: int, width: int, height: int, *, plain: boo
     events = list(monitor.events)[-room:] if room > 0 else []
     if events:
         lines.append(Text("events", DIM))
-        lines += [Text(f"{clock(told.time_ns)} {told.text}") for told in events]
+        lines += [Text(f"{clock(event.time_ns)} {event.text}") for event in events]
     for line in lines:
         line.truncate(width)
     return Text("\n").join(lines[:height])
@@ -124,8 +124,8 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
     """Two lines: state and stick, reason and what is sent."""
     status = monitor.history.axes.get(name)
     if status is None:
-        told = monitor.deployment.axes[name].status is not None
-        missing = "no status heard" if told else "the deployment gives it no status message"
+        has_status = monitor.deployment.axes[name].status is not None
+        missing = "no status heard" if has_status else "the deployment gives it no status message"
         yield Text(f"{name:{NAME}.{NAME}} {missing}", DIM)
         yield Text()
         return
@@ -162,13 +162,13 @@ def _counters(monitor: Monitor, now_ns: int) -> Iterator[Text]:
     stale_s = monitor.counters_stale_s(now_ns)
     if stale_s is not None:
         text.append(f" STALE {stale_s:.1f} s", STALE)
-    told = [f"  {SHORT.get(name, name)} {count}" for name, count in history.counters.items()]
+    shown = [f"  {SHORT.get(name, name)} {count}" for name, count in history.counters.items()]
     counts = list(history.counters.values())
-    for word, count in zip(told[:IN_FIRST_LINE], counts, strict=False):
+    for word, count in zip(shown[:IN_FIRST_LINE], counts, strict=False):
         text.append(word, "bold yellow" if count else "default")
     yield text
     text = Text("        ")
-    for word, count in zip(told[IN_FIRST_LINE:], counts[IN_FIRST_LINE:], strict=True):
+    for word, count in zip(shown[IN_FIRST_LINE:], counts[IN_FIRST_LINE:], strict=True):
         text.append(word, "bold yellow" if count else "default")
     text.append(f"  last fault {history.last_fault}")
     others = "".join(f"  {count} {kind} frames" for kind, count in monitor.others.items())

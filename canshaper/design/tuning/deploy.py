@@ -12,7 +12,7 @@ from canshaper.shaping.shapers.gff import denominator_from_poles, poles_from_den
 from canshaper.shaping.sway import SwayMode
 
 _DIGITS = 6
-# A tail that ends the run-on early is told from so much more residual sway on.
+# A tail that ends the run-on early is reported from so much more residual sway on.
 _TAIL_MATTERS = 0.01
 _LONGEST_TAIL_S = 5.0
 

@@ -1,4 +1,4 @@
-"""A setting as a table for the terminal, beside the one in the file."""
+"""A setting as a table for the terminal, next to the one in the file."""
 
 from collections.abc import Callable
 
@@ -9,7 +9,7 @@ from canshaper.report.console import new_table
 
 
 def table(found: Setting, before: Setting | None, method: str) -> Table:
-    """The setting beside the one in the file; residuals through the machine, filter alone."""
+    """The setting next to the one in the file; residuals through the machine, filter alone."""
     columns = [found] if before is None else [before, found]
     result = new_table("", *([] if before is None else ["in the file"]), method)
 
