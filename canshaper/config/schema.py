@@ -1,6 +1,6 @@
 """Schema of the deployment file. Unknown keys are errors; every number has a range and a unit."""
 
-from typing import Annotated, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -9,6 +9,7 @@ from canshaper.config.control import Control
 from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
+from canshaper.config.motion import Motion
 from canshaper.config.protection import Protected
 from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
@@ -132,43 +133,6 @@ class Status(Protected):
     """A status message for displays and tools."""
 
 
-class Radius(Input):
-    """Radius of the tip, measured."""
-
-    signal: str = Field(description="signal with the radius in m")
-    timeout_ms: Annotated[int, number(10, 5000, "ms", "age at which it counts as lost")]
-
-
-class RadialConfig(Section):
-    """Radial compensation of a slew axis: see ``RadialCompensation``."""
-
-    axis: str = Field(description="the near-far axis, which moves the tip in and out")
-    full_speed_rad_s: Annotated[
-        float, number(0.05, 3, "rad/s", "angular speed at full slew command")
-    ]
-    radius_m: (
-        Annotated[float, number(0.5, 30, "m", "radius of the tip, where it is fixed")] | None
-    ) = None
-    radius: Radius | None = None
-    """Radius of the tip, where it is measured."""
-    max_pct: Annotated[float, number(1, 50, "% of full near-far speed", "fastest compensation")] = (
-        25.0
-    )
-    max_path_m: Annotated[
-        float, number(0.02, 2, "m", "farthest that it moves the tip in or out in one slew")
-    ] = 0.3
-    max_s: Annotated[
-        float, number(0.5, 60, "s", "longest time for which it moves the tip in one slew")
-    ] = 6.0
-
-    @model_validator(mode="after")
-    def _one_radius(self) -> Self:
-        if (self.radius_m is None) == (self.radius is None):
-            found = "neither" if self.radius is None else "both"
-            raise ValueError(f"found {found}; allowed is one of radius_m and radius")
-        return self
-
-
 class Slewing(Section):
     """What full speed of a slewing axis is in angle, and how far out the tip may be meanwhile."""
 
@@ -214,6 +178,11 @@ class Limits(Section):
     ) = None
     allow_faster: bool = Field(False, description="the output may exceed what the operator asks")
     allow_reverse: bool = Field(False, description="the output may go against the joystick")
+    reversal: Literal["stop", "brake_shaped"] = Field(
+        "stop",
+        description="after a reversal of the joystick: stop at the rate limit, or run on along the"
+        " filter within the tail",
+    )
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:
@@ -251,6 +220,7 @@ class Limits(Section):
             tail_s=self.tail_s,
             allow_faster=self.allow_faster,
             allow_reverse=self.allow_reverse,
+            brake_shaped=self.reversal == "brake_shaped",
         )
 
 
@@ -274,8 +244,6 @@ class AxisConfig(Section):
     )
     limits: Limits = Limits()
     """Output limits of the axis."""
-    radial_compensation: RadialConfig | None = None
-    """Of a slew axis: what the near-far axis does meanwhile against the centrifugal force."""
 
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
@@ -285,16 +253,6 @@ class AxisConfig(Section):
             )
         if fault := schedule_fault(self.filter.kind, self.gain_schedule):
             raise ValueError(fault)
-        return self
-
-    @model_validator(mode="after")
-    def _one_speed(self) -> Self:
-        slewing, radial = self.slewing, self.radial_compensation
-        if slewing and radial and slewing.full_speed_rad_s != radial.full_speed_rad_s:
-            raise ValueError(
-                f"full_speed_rad_s is {slewing.full_speed_rad_s:g} in slewing and"
-                f" {radial.full_speed_rad_s:g} in radial_compensation; allowed is the same in both"
-            )
         return self
 
 
@@ -307,6 +265,9 @@ class DeploymentConfig(Section):
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
+    motion: dict[str, Motion] = Field(
+        {}, description="slew and near-far of a crane as one motion, by name"
+    )
     gateway: Gateway | None = None
     """The two buses between which we stand, where the machine's own ECU moves the valves."""
     emergency_stop: EmergencyStop | None = None

@@ -23,6 +23,8 @@ MOVED: Mapping[str, str] = {
     "grapple": "load_state",
     "feel": "profile",
 }
+# What is a section of its own now, of two axes.
+GONE = "radial_compensation"
 
 
 def moved_keys(source: Source) -> list[Problem]:
@@ -42,4 +44,8 @@ def moved_keys(source: Source) -> list[Problem]:
         for place in [*source.places(pattern.split("."))]:
             problems.append(source.problem(place, f"moved to {name}"))
             source.rename(place, name)
+    for place in [*source.places(["axes", "*", GONE])]:
+        text = f"moved to motion, beside axes: {{ slew: {place[1]}, near_far: ..., radius: ... }}"
+        problems.append(source.problem(place, text))
+        source.data["axes"][place[1]].pop(GONE)
     return problems

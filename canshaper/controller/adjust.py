@@ -24,7 +24,7 @@ class Adjuster:
     """
 
     def __init__(self, controller: Controller) -> None:
-        self._axes = controller.axes
+        self._axes, self._motions = controller.axes, controller.motions
         self._deployment = controller.deployment
         control = self._deployment.config.control
         self._ranges = control.adjustable if control else {}
@@ -61,9 +61,8 @@ class Adjuster:
         ]
         for name, config in configs.items():
             self._axes[name].adjust(config)
-        for runner in self._axes.values():
-            if runner.compensator is not None:
-                runner.compensator.adjust()
+        for motion in self._motions:
+            motion.adjust()
         return changes
 
     def _now(self, text: str) -> float:

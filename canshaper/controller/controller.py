@@ -6,10 +6,10 @@ The same object runs in the daemon, in lock-step simulation and in replay of a l
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
-from canshaper.controller.compensator import Compensator
 from canshaper.controller.counters import Counters
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.inputs import MachineInputs, received_by
+from canshaper.controller.motion import MotionRunner
 from canshaper.controller.outputs import ValveOutputs
 from canshaper.controller.overrun import OverrunDetector
 from canshaper.controller.parts import parts
@@ -20,7 +20,7 @@ from canshaper.inputs.feedback import Feedback
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
-from canshaper.shaping.states import Reason
+from canshaper.shaping.states import Reason, State, Transition
 
 NOWHERE: frozenset[str] = frozenset()
 
@@ -33,6 +33,7 @@ class Controller:
         joysticks: the joysticks by name.
         inputs: what receives a message that is known by its identifier.
         events: changes of state since the owner last emptied the list.
+        motions: the two-axis motions.
         moves: whether the frame that was handed out last is one of a valve, and any moves.
     """
 
@@ -47,7 +48,8 @@ class Controller:
             name: AxisRunner(bound, tick_s, inputs.joysticks[bound.config.command.joystick])
             for name, bound in deployment.axes.items()
         }
-        self._connect(inputs)
+        self.motions: list[MotionRunner] = []
+        self._connect(inputs, tick_s)
         bound = inputs.bound + [
             (runner.bound.feedback, runner.feedback)
             for runner in self.axes.values()
@@ -56,8 +58,6 @@ class Controller:
         routing = deployment.routing
         self.inputs = received_by(routing, bound)
         self._sent, self._others = routing.sent, routing.others
-        # An axis that asks something of another one goes first.
-        order = sorted(self.axes.items(), key=lambda item: item[1].compensator is None)
         self._protocols = protocols(deployment, self.axes, inputs.joysticks, bound)
         self._forwarding: dict[MessageKey, ForwardingRule] = {}
         for protocol in self._protocols:
@@ -67,7 +67,7 @@ class Controller:
             key: [self.axes[name] for name in names] for key, names in routing.valves.items()
         }
         self._outputs = ValveOutputs(by_message, self._forwarding)
-        self._turns = self._outputs.turns(order)
+        self._turns = self._outputs.turns(self.axes.items())
         self._last = -1  # number of the last deadline
         self._overrun = OverrunDetector()
         self._stood_still = False
@@ -173,11 +173,11 @@ class Controller:
         overrun = self._overruns(missed) if missed or self._overrun.late else False
         changed = []
         silent = self.silent_buses if self._protocols else NOWHERE
+        if missed or self.motions:
+            self._before_axes(now_ns, last, now)
         for name, runner, message, rule in self._turns:
             period = runner.period_ticks
-            if passed := now // period - last // period:
-                if passed > 1:
-                    runner.axis.hold(passed - 1)
+            if now // period - last // period:
                 transition = runner.tick(now_ns, self._stop, overrun)
                 self.moves |= runner.axis.raw != 0
                 if rule is not None:
@@ -185,11 +185,11 @@ class Controller:
                         yield own
                 elif message is not None and message.bus not in silent:
                     yield message.frame()
-                runner.post_step(now_ns)
+                runner.axis.advance()
                 if runner.feedback is not None:
                     self._compare(name, runner, runner.feedback, now_ns)
                 if transition is not None:
-                    self.events.append(StateEvent(name, transition))
+                    self._changed(name, runner, transition)
                     changed.append(runner)
         self.moves = False
         axes = self.axes.values()
@@ -199,6 +199,13 @@ class Controller:
         if self._protocols:
             yield from self._of_protocols(now_ns)
 
+    def _changed(self, name: str, runner: AxisRunner, transition: Transition) -> None:
+        """An axis has another state; one that trips is no longer moved by another, nor moves it."""
+        self.events.append(StateEvent(name, transition))
+        if transition.new is State.TRIPPED:
+            for motion in self.motions:
+                motion.on_trip(runner)
+
     def _of_protocols(self, now_ns: int) -> Iterator[Frame]:
         """What protocols send besides commands and status, and what they report."""
         for protocol in self._protocols:
@@ -207,16 +214,25 @@ class Controller:
             yield from protocol.frames(now_ns)
             self.events += protocol.changes()
 
-    def _connect(self, inputs: MachineInputs) -> None:
-        """Let load state and operator choose filters, and axes ask something of each other."""
+    def _before_axes(self, now_ns: int, last: int, now: int) -> None:
+        """Axes have held their output for what was missed; what moves as one adds to them."""
+        if now > last + 1:
+            for runner in self.axes.values():
+                runner.hold(last, now)
+        for motion in self.motions:
+            motion.step(now_ns, last, now)
+
+    def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
+        """Let load state and operator choose filters, and axes move as one."""
         profile = self.deployment.config.profile
-        for name, runner in self.axes.items():
+        for runner in self.axes.values():
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
                 codes = profile.codes if profile else {}
                 runner.add_chooser(inputs.load_state, inputs.profile, codes)
-            if (radial := runner.bound.radial) is not None:
-                target, radius = self.axes[radial.config.axis], inputs.radii[name]
-                runner.add_compensator(Compensator(runner.axis, radial.config, target, radius))
+        for name, motion in self.deployment.config.motion.items():
+            near_far = self.axes[motion.near_far] if motion.near_far else None
+            slew, radius = self.axes[motion.slew], inputs.radii.get(name)
+            self.motions.append(MotionRunner(motion, slew, near_far, radius, tick_s))
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
         """Report when the valve no longer follows its command, and when it does again."""

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from canshaper.inputs.input import EmergencyStopInput, MessageInput
 from canshaper.inputs.joystick import JoystickInput
-from canshaper.inputs.radius import RadiusInput
+from canshaper.inputs.radius import radius_input
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundSwitch
@@ -22,7 +22,7 @@ class MachineInputs:
         stop: the emergency stop, where there is one.
         load_state: tells what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
-        radii: radius of the tip for each axis with a radial compensation, by its name.
+        radii: measured radius of the tip, by the name of its two-axis motion.
         bound: all of them that receive frames, with their messages.
     """
 
@@ -37,12 +37,11 @@ class MachineInputs:
             self.bound.append((stop, self.stop))
         self.load_state = self._switch(deployment.load_state)
         self.profile = self._switch(deployment.profile)
-        self.radii: dict[str, RadiusInput] = {}
-        for name, axis in deployment.axes.items():
-            if axis.radial is not None:
-                self.radii[name] = RadiusInput(axis.radial)
-                if axis.radial.radius is not None:
-                    self.bound.append((axis.radial.radius, self.radii[name]))
+        self.radii: dict[str, ValueInput] = {}
+        for name, motion in deployment.motions.items():
+            if motion.radius is not None:
+                self.radii[name] = radius_input(motion.radius)
+                self.bound.append((motion.radius, self.radii[name]))
 
     def _switch(self, bound: BoundSwitch | None) -> ValueInput | None:
         if bound is None:

@@ -3,7 +3,7 @@
 import math
 from collections.abc import Mapping
 from dataclasses import replace
-from typing import TYPE_CHECKING, Protocol, Self
+from typing import Protocol, Self
 
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import AxisConfig
@@ -17,9 +17,6 @@ from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayModel
-
-if TYPE_CHECKING:
-    from canshaper.controller.compensator import Compensator
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
@@ -45,10 +42,9 @@ class AxisRunner:
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
-        added: velocity that another axis asks of this one, fraction of full speed.
+        added: velocity that a two-axis motion adds to this one, fraction of full speed.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
-        compensator: what this axis asks of another one, where it slews.
     """
 
     def __init__(self, bound: BoundAxis, tick_s: float, joystick: StickSource) -> None:
@@ -82,10 +78,10 @@ class AxisRunner:
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added = 0.0
+        self._alone = False  # a measurement is made with it
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
-        self.compensator: Compensator | None = None
 
     @property
     def tripping(self) -> bool:
@@ -111,16 +107,18 @@ class AxisRunner:
         self._foreign_ns = now_ns
 
     def add(self, velocity: float) -> None:
-        """Another axis asks for so much more from the next tick on, fraction of full speed."""
-        self.added = velocity
+        """A two-axis motion adds so much from the next tick on, fraction of full speed."""
+        if not self._alone:
+            self.added = velocity
+
+    def drop_added(self) -> None:
+        """Nothing is added any more, and the next output is not faster for what was."""
+        self.added = 0.0
+        self.axis.drop_added()
 
     def add_interlock(self, interlock: Interlock) -> None:
         """Let something else agree before the axis may move."""
         self._interlocks.append(interlock)
-
-    def add_compensator(self, compensator: "Compensator") -> None:
-        """Let the axis ask something of another one."""
-        self.compensator = compensator
 
     def add_chooser(
         self, load_state: ValueInput | None, profile: ValueInput | None, codes: Mapping[str, int]
@@ -136,7 +134,8 @@ class AxisRunner:
             axis: what drives the valve now; by default the same as before.
         """
         self._joystick = joystick
-        self.compensator = None
+        self._alone = True
+        self.added = 0.0
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -179,12 +178,18 @@ class AxisRunner:
             self._full_speed_m_s = config.sway.full_speed_m_s
         self.bound = replace(self.bound, config=config)
 
+    def hold(self, last: int, now: int) -> None:
+        """Deadlines were missed, from one number to another: the last output was held."""
+        passed = now // self.period_ticks - last // self.period_ticks
+        if passed > 1:
+            self.axis.hold(passed - 1)
+
     def tick(
         self, now_ns: int, emergency: EmergencyStopInput | None, overrun: bool
     ) -> Transition | None:
         """One step of the axis; a trip cause noted since the last one acts now.
 
-        ``post_step`` has to follow, before another axis moves.
+        ``axis.advance`` has to follow.
 
         Args:
             now_ns: monotonic time.
@@ -206,17 +211,9 @@ class AxisRunner:
             stick = StickInput(fault=Reason.LOOP_OVERRUN, reset=stick.reset, trip=stick.trip)
         if self.chooser is not None:
             self.chooser.update(now_ns)
-        if self.compensator is not None:
-            self.added = self.compensator.before_slew()
         transition = axis.act(stick, self.added)
         self._put(axis.raw)
         return transition
-
-    def post_step(self, now_ns: int) -> None:
-        """What can wait until the frame is out: the model, and what another axis is to add."""
-        self.axis.advance()
-        if self.compensator is not None:
-            self.compensator.after_slew(now_ns)
 
     def _objections(self, now_ns: int, emergency: EmergencyStopInput | None) -> Reason | None:
         """Why the axis has to stop or may not begin; why it has to be neutral at once is noted."""

@@ -44,9 +44,6 @@ class GuardedAxis(Asked):
         "_added",
         "_adding",
         "_commands",
-        "_cut",
-        "_cut_ns",
-        "_cut_until_ns",
         "_down",
         "_fall",
         "_fall_least",
@@ -59,7 +56,6 @@ class GuardedAxis(Asked):
         "_maximum",
         "_more",
         "_openings",
-        "_own",
         "_period",
         "_period_ns",
         "_reverse",
@@ -98,8 +94,6 @@ class GuardedAxis(Asked):
         self._joystick, self._stop = joystick, stop
         self._adding: list[GuardedAxis] = []
         self._added = 0.0
-        self._cut, self._cut_ns, self._cut_until_ns = 0.0, 0, 0
-        self._own = [0.0] * 3  # speed at most without what is added, by direction
         if stop is not None:
             stop.stops.append(self)
         self._maximum = _ends(deployment, bound, "max_pct")[1] / 100.0
@@ -163,17 +157,11 @@ class GuardedAxis(Asked):
         before = self._up - last_size if direction + last == BACK + FORTH else last_bound
         periods = number // period - self.at[0] // period
         highest = self._highest(before, periods)
-        cut = own = 0.0
-        if now_ns < self._cut_until_ns:
-            # What was added against the axis' own part may end at once, and leaves that.
-            cut, own = self._cut, self._own[direction]
-            highest = max(highest, min(own, self._highest(before + cut, periods)))
         allowed = reach if reach < highest else highest
         if size > allowed and good_ns and direction == last:
             # On its way back. The rates do not catch up on deadlines that were missed, so for
             # the fall they do not count; and it has to be lower with each frame.
             fallen = last_bound - (tick - self.at[1]) // period * self._fall_least
-            fallen = max(fallen, min(own, fallen + cut))
             if fallen > allowed:
                 allowed, good_ns = fallen, 0
                 bound = min(bound, fallen)
@@ -213,8 +201,7 @@ class GuardedAxis(Asked):
         if sizes and (before := largest(sizes, since_ns)) > reach:
             reach, from_ns = before, sizes[0][1]
         reach, until_ns = min(reach, self._maximum), min(from_ns + self._kept_ns, free_ns)
-        if not self._cut:  # else what is its own part has to be followed
-            self.sure[direction] = min(reach, self._full), until_ns
+        self.sure[direction] = min(reach, self._full), until_ns
         if self._more:  # for this moment
             reach, until_ns = self._reach(reach, now_ns, direction), now_ns
         return reach, until_ns
@@ -257,21 +244,22 @@ class GuardedAxis(Asked):
             reach = max(reach, self._most(now_ns))
         if self._faster and reach:
             reach = 1.0
-        self._own[direction] = max(reach + self._up, self._own[direction] - self._fall_least)
+        # Another operator may move it. Not against a joystick that is held: but which of its frames
+        # count is not known here.
         if any(axis._most(now_ns) for axis in self._adding):
-            self._cut_until_ns = now_ns + self._cut_ns  # when asked for no more, it falls
-            # A step is paid that rounding has left out before, and rounding comes on top.
-            reach += self._added + 1.0 / self.bits.full + self._up
+            reach = max(reach, self._added + self._up)
         return min(reach, self._maximum)
 
-    def compensates(self, slew: "GuardedAxis", most: float) -> None:
-        """The operator of a slewing axis moves this one too, up to a part of full speed."""
+    def moves_with(self, other: "GuardedAxis", most: float) -> None:
+        """In a two-axis motion its other axis moves this one too.
+
+        Args:
+            other: that axis.
+            most: up to this part of full speed, where the operator of this axis asked for nothing.
+        """
         self._more = True
-        self._adding.append(slew)
+        self._adding += [other, self]
         self._added = max(self._added, most)
-        if slew is not self:
-            self._cut = self._added
-            self._cut_ns = math.ceil(1.0 / self._fall_least) * self._period_ns
 
     def _most(self, now_ns: int) -> float:
         """Speed that was asked for in any direction within the tail."""

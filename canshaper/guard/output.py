@@ -112,11 +112,11 @@ def _valves(
         joystick = joysticks[bound.config.command.joystick]
         axes[name] = GuardedAxis(deployment, bound, joystick, stop)
         by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
-    for name, bound in deployment.axes.items():
-        if bound.radial is not None:
-            most = bound.radial.config.max_pct / 100.0
-            for axis in (axes[name], axes[bound.radial.config.axis]):
-                axis.compensates(axes[name], most)
+    for motion in deployment.config.motion.values():
+        if motion.near_far is not None:
+            slew, near_far = axes[motion.slew], axes[motion.near_far]
+            slew.moves_with(near_far, motion.max_pct / 100.0)
+            near_far.moves_with(slew, motion.max_pct / 100.0)
     return {
         key: GuardedAxes(several) if len(several) > 1 else several[0]
         for key, several in by_message.items()

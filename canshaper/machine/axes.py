@@ -3,9 +3,9 @@
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
-from canshaper.machine.bound_axis import BoundAxis, BoundRadial
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.filters import check_filters
-from canshaper.machine.inputs import bind_feedback, bind_radius, bind_status_word
+from canshaper.machine.inputs import bind_feedback, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.statuses import bind_status
 from canshaper.machine.stopping import stated_fault
@@ -15,7 +15,10 @@ from canshaper.machine.valves import SharedValves, bind_valve
 def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     """The axes without any problem, by name."""
     shared_valves: SharedValves = {}
-    axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in lookup.config.axes.items()}
+    # A slewing axis acts first: where it trips, nothing of it is in the other one's next output.
+    slewing = {motion.slew for motion in lookup.config.motion.values()}
+    order = sorted(lookup.config.axes.items(), key=lambda item: item[0] not in slewing)
+    axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
     return {name: axis for name, axis in axes.items() if axis}
 
 
@@ -56,46 +59,6 @@ def _bind_axis(
         codec,
         ticks,
         *status,
-        _bind_radial(lookup, (*place, "radial_compensation"), axis),
         bind_feedback(lookup, (*place, "feedback"), axis.feedback) if axis.feedback else None,
         bind_status_word(lookup, at, cia408.status) if cia408 else None,
     )
-
-
-def _bind_radial(lookup: Lookup, place: Place, axis: AxisConfig) -> BoundRadial | None:
-    config, axes = axis.radial_compensation, lookup.config.axes
-    if config is None:
-        return None
-    target, at, add = axes.get(config.axis), (*place, "axis"), lookup.diagnostics.add
-    if target is None or target is axis:
-        others = ", ".join(n for n, a in axes.items() if a is not axis)
-        add(at, f"found {config.axis!r}, other axes are {others}")
-    elif target.sway is None:
-        add(at, f"found {config.axis!r}, which has no sway data")
-    elif _cycle(lookup, target) != _cycle(lookup, axis):
-        add(at, f"found {config.axis!r}, whose valve has another cycle")
-    else:
-        _check_single(lookup, at, config.axis, axis)
-    if axis.sway is None:
-        add(place, "needs the sway data of its own axis; found no sway")
-    radius = config.radius
-    return BoundRadial(config, bind_radius(lookup, (*place, "radius"), radius) if radius else None)
-
-
-def _check_single(lookup: Lookup, place: Place, name: str, axis: AxisConfig) -> None:
-    """One other axis at most compensates with an axis, and none with one that does so itself."""
-    for other, config in lookup.config.axes.items():
-        radial = config.radial_compensation
-        if radial is None or config is axis:
-            continue
-        if other == name:
-            text = f"found {name!r}, which has a radial compensation itself"
-            lookup.diagnostics.add(place, text)
-        elif radial.axis == name:
-            lookup.diagnostics.add(place, f"found {name!r}, which axis {other} uses already")
-
-
-def _cycle(lookup: Lookup, axis: AxisConfig) -> int | None:
-    """Cycle of the axis' valve message; None where there is no such message."""
-    result = lookup.messages.find(axis.valve.message)
-    return None if isinstance(result, str) else result[1].cycle_time

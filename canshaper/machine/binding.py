@@ -20,6 +20,7 @@ from canshaper.machine.identity import Identity, filter_lines
 from canshaper.machine.inputs import BoundSwitch, bind_emergency_stop, bind_switch
 from canshaper.machine.joysticks import bind_joystick
 from canshaper.machine.lookup import Lookup, load_messages, protected_sections
+from canshaper.machine.motion import bind_motions
 from canshaper.machine.statuses import bind_status
 
 
@@ -42,6 +43,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     lookup = Lookup(diagnostics, config, messages)
     joysticks = {name: bind_joystick(lookup, name, one) for name, one in config.joysticks.items()}
     axes = bind_axes(lookup)
+    motions = bind_motions(lookup)
     stop = bind_emergency_stop(lookup, config.emergency_stop) if config.emergency_stop else None
     load_state = (
         bind_switch(lookup, ("load_state",), config.load_state) if config.load_state else None
@@ -64,6 +66,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         messages,
         {name: joystick for name, joystick in joysticks.items() if joystick},
         axes,
+        motions,
         stop,
         *service,
         Identity(

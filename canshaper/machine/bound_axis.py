@@ -7,21 +7,8 @@ from cantools.database.can import Message
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import ValveCodec
-from canshaper.config.schema import AxisConfig, RadialConfig
-from canshaper.machine.inputs import BoundFeedback, BoundRadius, BoundStatusWord
-
-
-@dataclass(frozen=True)
-class BoundRadial:
-    """Radial compensation with the message of its radius, where that is measured."""
-
-    config: RadialConfig
-    radius: BoundRadius | None
-
-    @property
-    def key(self) -> tuple[str, int, bool] | None:
-        """Where the frames of the radius are found."""
-        return self.radius.key if self.radius else None
+from canshaper.config.schema import AxisConfig
+from canshaper.machine.inputs import BoundFeedback, BoundStatusWord
 
 
 @dataclass(frozen=True)
@@ -35,7 +22,6 @@ class BoundAxis:
     period_ticks: int
     status: StatusCodec[ReportedAxis] | None
     status_ticks: int
-    radial: BoundRadial | None = None
     feedback: BoundFeedback | None = None
     status_word: BoundStatusWord | None = None
 

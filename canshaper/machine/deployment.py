@@ -17,6 +17,7 @@ from canshaper.machine.bus_load import BusLoad, bus_load
 from canshaper.machine.database import Messages
 from canshaper.machine.identity import Identity
 from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop, BoundSwitch
+from canshaper.machine.motion import BoundMotion
 from canshaper.machine.routing import Routing, build_routing
 
 
@@ -29,6 +30,7 @@ class Deployment:
     messages: Messages
     joysticks: dict[str, BoundJoystick]
     axes: dict[str, BoundAxis]
+    motions: dict[str, BoundMotion]
     emergency_stop: BoundStop | None
     status: StatusCodec[dict[str, int]] | None
     status_ticks: int
@@ -50,11 +52,10 @@ class Deployment:
     @cached_property
     def routing(self) -> Routing:
         """What each frame on the buses is, looked up by everybody who receives or sends."""
-        radii = [a.radial.radius for a in self.axes.values() if a.radial and a.radial.radius]
         used = {bus for bus, messages in self.on_bus.items() if any(map(is_j1939, messages))}
         return build_routing(
             self.config,
-            inputs=[*self.inputs(), *radii],
+            inputs=self.inputs(),
             axes=self.axes.values(),
             statuses=[status.sender.key for status in self._statuses()],
             known=self.messages.ids(),
@@ -63,10 +64,11 @@ class Deployment:
         )
 
     def inputs(self) -> list[BoundInput]:
-        """Joysticks, switches, feedback and status words of the valves."""
+        """Joysticks, switches, measured radii, feedback and status words of the valves."""
         axes = self.axes.values()
         told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
-        others = (self.emergency_stop, self.load_state, self.profile, *told)
+        radii = [motion.radius for motion in self.motions.values()]
+        others = (self.emergency_stop, self.load_state, self.profile, *told, *radii)
         return [*self.joysticks.values(), *(i for i in others if i)]
 
     def senders(self) -> list[Sender]:

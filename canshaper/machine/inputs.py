@@ -11,8 +11,9 @@ from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
 from canshaper.config.input import Input
+from canshaper.config.motion import Radius
 from canshaper.config.schedule import LoadState, ProfileSwitch
-from canshaper.config.schema import EmergencyStop, Feedback, Joystick, Radius, StatusWord
+from canshaper.config.schema import EmergencyStop, Feedback, Joystick, StatusWord
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.protections import bind_protection
@@ -159,7 +160,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> BoundStop | No
 
 
 def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundRadius | None:
-    """The measured radius of a radial compensation."""
+    """The measured radius of the tip."""
     result = bind_input(lookup, BoundRadius, place, config, value=config.signal)
     if result is None:
         return None

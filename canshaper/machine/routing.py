@@ -93,8 +93,8 @@ class Routing:
     Attributes:
         routes: what ids are, by bus, id and whether that is extended.
         groups: what groups of J1939 are, by bus and group.
-        valves: names of the axes whose commands a message carries, those that compensate first;
-            also where another controller sends it.
+        valves: names of the axes whose commands a message carries; also where another controller
+            sends it.
         others: messages of the DBC files that are neither received nor sent: other traffic.
         buses: the same by bus.
     """
@@ -147,10 +147,9 @@ def build_routing(
         j1939: buses on which a message of J1939 is used.
         listen_only: nothing is sent but status, and the valves are those of another controller.
     """
-    # An axis that asks something of another one goes first.
-    ordered = sorted(axes, key=lambda axis: axis.radial is None)
+    axes = list(axes)
     valves: dict[Key, tuple[str, ...]] = {}
-    for axis in ordered:
+    for axis in axes:
         key = axis.valve.message.sender.key
         valves[key] = (*valves.get(key, ()), axis.name)
     routes = dict.fromkeys(statuses, Route(Role.SENT))
@@ -159,7 +158,7 @@ def build_routing(
     for name, bus in config.buses.items():
         routes.update(_node_routes(name, bus, listen_only))
     routes |= {key: Route(Role.RECEIVED, bound) for key, bound in exact_inputs(inputs).items()}
-    groups = _group_routes(config, inputs, () if listen_only else ordered)
+    groups = _group_routes(config, inputs, () if listen_only else axes)
     used = {key[1:] for key, route in routes.items() if route.role not in (Role.CLAIM, Role.NODE)}
     ids, in_line = frozenset(known), config.gateway.between if config.gateway else ()
     buses = {

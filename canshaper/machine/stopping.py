@@ -30,14 +30,11 @@ class FullSpeed:
 
 def full_speed(axis: AxisConfig) -> FullSpeed:
     """Full speed of an axis, of one that slews at its largest radius where that is known."""
-    radial, slewing = axis.radial_compensation, axis.slewing
+    slewing = axis.slewing
     speed_m_s = axis.sway.full_speed_m_s if axis.sway else None
     if slewing:
         speed = slewing.full_speed_rad_s
         return FullSpeed(speed * slewing.largest_radius_m, speed)
-    if radial:
-        speed = radial.full_speed_rad_s
-        return FullSpeed(speed * radial.radius_m if radial.radius_m else speed_m_s, speed)
     return FullSpeed(speed_m_s, None)
 
 

@@ -7,7 +7,7 @@ carry.
 import math
 from collections.abc import Callable
 
-from canshaper.shaping.added import AddedBounds, without_opposing
+from canshaper.shaping.added import AddedTime, range_with_added
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
@@ -25,8 +25,7 @@ from canshaper.shaping.transfer import BumplessTransfer
 # Missed ticks that are gone through one by one: after more of them nothing moves any more, and the
 # first neutral frame waits.
 MOST_HELD = 2000
-# Largest quantisation error of an added velocity that is carried, full speed times ticks: a few
-# steps of a coarse grid.
+# Most that rounding may owe of an added velocity, full speed times ticks.
 MOST_CARRY = 0.1
 
 
@@ -45,7 +44,7 @@ class Axis:
     Attributes:
         raw: what the valve frame carries now, in grid steps (deadband included).
         sent: the velocity that gives, [-1, 1].
-        applied: what drives the sway model: ``sent`` without what another axis asked.
+        applied: what the sway model was driven by: ``sent`` without the added part.
         command: the operator's command that was in force at the last tick, [-1, 1].
     """
 
@@ -65,7 +64,8 @@ class Axis:
         self.applied = 0.0
         self.command = 0.0
         self.sway = sway
-        self._bounds: AddedBounds | None = None
+        self._largest_added = 0.0
+        self._added_time = AddedTime(0)
         self._transfer = BumplessTransfer(shaper, tick_s)
         self._tick_s = tick_s
         self._limits = limits
@@ -76,9 +76,9 @@ class Axis:
         self._states = StateMachine(neutral_band, max(1, round(stop_s / tick_s)))
         self._recent = RecentCommand(round(limits.tail_s / tick_s))
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
-        self._own = 0.0  # the same without what another axis adds
-        self._added = 0.0  # what is added, as far as bounds and joystick allow
-        self._carry = 0.0  # of a velocity added by another axis, not yet sent
+        self._own = 0.0  # the same without what is added
+        self._added = 0.0
+        self._carry = 0.0  # of an added velocity, left out by rounding
 
     @property
     def state(self) -> State:
@@ -111,20 +111,18 @@ class Axis:
 
         Args:
             stick: the checked input.
-            added: velocity that another moving axis asks of this one, [-1, 1] of full speed. Its
-                operator answers for it; it is carried out within its bounds, while this axis is
-                enabled, its stick valid, and anti-sway on, and never against a joystick that is
-                held: what would go against it is left out at once. The sway model does not get
-                it: it is there to cause no swing. One that is no velocity trips the axis.
+            added: velocity that the motion of two axes adds to this one, [-1, 1] of full speed.
+                It is carried out while this axis is enabled, its stick valid, and anti-sway on, as
+                ``range_with_added`` says. The sway model is not driven by it: it is there to cause
+                no swing, so the model swings with what is left for the axis itself. One that is no
+                velocity trips the axis.
 
         Returns:
             The change of state of this tick, or None.
         """
-        states, bounds = self._states, self._bounds
-        if stick.bypass:
+        states = self._states
+        if not self._largest_added or stick.bypass or not self._may_add(added):
             added = 0.0
-        elif bounds is not None and abs(added) <= 1.0:
-            added = bounds.wanted(added, self._limits.fall_per_s)
         old = states.state
         state = states.step(stick, added, self.raw == 0 and not self.commanded)
         if state is not old:
@@ -151,8 +149,6 @@ class Axis:
         except Exception:  # a filter of another package may raise anything
             state = self._output_invalid()
         self.applied = self.sent - self._added
-        if bounds is not None:
-            bounds.applied(self.sent - self._own if self._own != self._limited else 0.0)
         return None if state is old else Transition(old, state, states.reason)
 
     def advance(self) -> None:
@@ -168,8 +164,7 @@ class Axis:
         """
         self._recent.age(ticks)
         self._states.hold(ticks)
-        if self._bounds is not None:
-            self._bounds.held(ticks)
+        self._may_add(self._added, ticks)
         maximum = self._limits.maximum
         command = within(self.command, -maximum, maximum, 0.0)
         try:
@@ -197,17 +192,24 @@ class Axis:
         self._transfer.replace(shaper, within(self.command, -maximum, maximum, 0.0))
         self.sway = sway
 
-    def bound_added(self, bounds: AddedBounds) -> None:
-        """Bound what another axis may add to this one; without bounds all of it is added."""
-        self._bounds = bounds
+    def allow_added(self, largest: float, time_s: float) -> None:
+        """Let a motion add velocity where nobody commands this axis.
+
+        Args:
+            largest: largest |velocity|, 0 to 1.
+            time_s: longest time in motion.
+        """
+        self._largest_added = largest
+        self._added_time = AddedTime(round(time_s / self._tick_s))
 
     def restore(self, state: State, reason: Reason) -> None:
         """Continue in a state in which the output is neutral, see ``StateMachine``."""
         self._states.restore(state, reason)
 
     def drop_added(self) -> None:
-        """Who added has lost the right to: nothing of it is in the next output."""
-        self._limited = self._own
+        """Who adds has lost the right to: nothing of it makes the next output faster."""
+        own, limited = self._own, self._limited
+        self._limited = within(own, min(0.0, limited), max(0.0, limited), 0.0)
         self._carry = 0.0
 
     def limit(self, limits: OutputLimits) -> None:
@@ -222,6 +224,11 @@ class Axis:
         self._rise = limits.rise_per_s * self._tick_s
         self._fall = limits.fall_per_s * self._tick_s
 
+    def _may_add(self, added: float, ticks: int = 1) -> bool:
+        return self._added_time.allowed(
+            added, commanded=self.commanded, moved=self.raw != 0, ticks=ticks
+        )
+
     def _drive(self, command: float, unlimited: float, added: float) -> None:
         limits, recent = self._limits, self._recent
         recent.add(command)
@@ -229,10 +236,11 @@ class Axis:
         target = within(unlimited, low, high, limits.minimum)
         self._added = added
         if added or self._own != self._limited:
-            self._drive_both(command, target, low, high)
-            return
-        limited = rate_limited(target, self._limited, self._rise, self._fall)
-        self._limited = self._own = limited
+            low, high, wish = self._drive_both(command, target)
+        else:
+            wish = 0.0
+            self._limited = self._own = rate_limited(target, self._limited, self._rise, self._fall)
+        limited = self._limited
         if limited < low:  # on its way back in
             low = limited
         elif limited > high:
@@ -240,46 +248,35 @@ class Axis:
         self.raw, self.sent = on_grid(
             limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
+        if added:
+            self._carry = within(self._carry + wish - self.sent, -MOST_CARRY, MOST_CARRY, 0.0)
 
-    def _drive_both(self, command: float, target: float, low: float, high: float) -> None:
-        """Send the operator's part and the added one, or what is left of that.
+    def _drive_both(self, command: float, target: float) -> tuple[float, float, float]:
+        """Limit the axis' own part and the added one together.
 
-        The added part is a path to be run, slow and with few steps of the grid: what rounding and
-        rates leave out is carried over and made up for while the axis moves anyway, never by a
-        twitch: by one step of the grid in a tick.
+        The added part is a path to be run, slow and with few steps of the grid: what rounding
+        leaves out is owed and paid while the axis moves anyway, never by a twitch: by one step of
+        the grid in a tick.
+
+        Returns:
+            The range that both have (low, high), and what they are together before the rates.
         """
-        limits, aim = self._limits, target
-        own = self._own = rate_limited(target, self._own, self._rise, self._fall)
-        if adding := self._added != 0.0:
-            low, high = -limits.maximum, limits.maximum
-            self._added = without_opposing(self._added, command, target)
-            aim = self._both(target)
-        limited = rate_limited(aim, self._limited, self._rise, self._fall)
-        # Never against a joystick that is held, but as far as the operator's own part still is.
-        if (command > 0.0 and limited < own and limited < 0.0) or (
-            command < 0.0 and limited > own and limited > 0.0
-        ):
-            limited = own if own * command < 0.0 else 0.0
-        if self._bounds is not None:
-            kept = self._bounds.kept(limited - own)
-            if kept != limited - own:
-                limited = own + kept
-        self._limited = limited
-        low, high = min(low, limited), max(high, limited)
-        self.raw, self.sent = on_grid(
-            limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
-        )
-        if adding:
-            carry = self._carry + own + self._added - self.sent
-            self._carry = within(carry, -MOST_CARRY, MOST_CARRY, 0.0)
-
-    def _both(self, target: float) -> float:
-        """Both parts together, and as much of the carry as one step of the grid."""
-        maximum, step = self._limits.maximum, 1.0 / self._grid_steps
-        least = max(self._limits.minimum, 0.5 * step)
-        wish = within(target + self._added, -maximum, maximum, least)
-        step_of_carry = within(self._carry, -step, step, 0.0) if wish else 0.0
-        return within(wish + step_of_carry, -maximum, maximum, least)
+        if not abs(self._added) <= 1.0:
+            raise ValueError(f"added velocity is {self._added}")
+        limits, recent, maximum = self._limits, self._recent, self._limits.maximum
+        self._own = rate_limited(target, self._own, self._rise, self._fall)
+        largest = self._largest_added if self._added else 0.0
+        low, high = range_with_added(command, recent.low, recent.high, target, largest)
+        low, high = max(low, -maximum), min(high, maximum)
+        aim = wish = target
+        if self._added:
+            step = 1.0 / self._grid_steps
+            wish = within(target + self._added, low, high, 0.0)
+            aim = within(wish, low, high, max(limits.minimum, 0.5 * step))
+            if aim:
+                aim = within(aim + within(self._carry, -step, step, 0.0), low, high, 0.0)
+        self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
+        return low, high, wish
 
     def _rest(self) -> None:
         self._recent.clear()

@@ -29,6 +29,8 @@ class OutputLimits:
         tail_s: how long after the operator asked for a speed the output may still be as fast.
         allow_faster: the output may exceed what the operator asks or asked within the tail.
         allow_reverse: the output may go against the joystick.
+        brake_shaped: after a reversal of the joystick the output may run on in the old direction,
+            never faster than asked there within the tail, instead of stopping at ``fall_per_s``.
     """
 
     maximum: float = 1.0
@@ -40,6 +42,7 @@ class OutputLimits:
     tail_s: float = 2.0
     allow_faster: bool = False
     allow_reverse: bool = False
+    brake_shaped: bool = False
 
 
 class RecentCommand:
@@ -112,10 +115,11 @@ def allowed_range(
         low, high = (-1.0 if low < 0.0 else 0.0), (1.0 if high > 0.0 else 0.0)
     if limits.allow_reverse:
         low, high = min(low, -high), max(high, -low)
-    elif command > 0.0:
-        low = 0.0
-    elif command < 0.0:
-        high = 0.0
+    elif not limits.brake_shaped:
+        if command > 0.0:
+            low = 0.0
+        elif command < 0.0:
+            high = 0.0
     maximum = limits.maximum
     return (-maximum if low < -maximum else low), (maximum if high > maximum else high)
 

@@ -141,10 +141,7 @@ class TwoAxisMotion:
         fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
         weight = self._weight = min(max(self._weight + fade, 0.0), 1.0)
         if not commanded or not weight:
-            self._radius_m = None
-            for axis in (slew, near_far):
-                if axis is not None:
-                    axis.added = axis.reached = 0.0
+            self._rest()
             return
         if near_far is None:
             radius_m = None
@@ -168,6 +165,17 @@ class TwoAxisMotion:
             turn = slew.path(near_far.period_s)
             _, way_m = self._tip(turn, near_far.period_s, near_far, radius_m)
         near_far.add(min(max(way_m, -self._path_m), self._path_m), weight)
+
+    def stop(self) -> None:
+        """One of the axes has tripped: nothing is added any more, at once."""
+        self._weight = 0.0
+        self._rest()
+
+    def _rest(self) -> None:
+        self._radius_m = None
+        for axis in (self._slew, self._near_far):
+            if axis is not None:
+                axis.added = axis.reached = 0.0
 
     def _carried_m(
         self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None

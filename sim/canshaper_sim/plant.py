@@ -121,7 +121,7 @@ class PlantNode:
         self._feedback = FEEDBACK if name == TIP else {**JOINT_FEEDBACK, **FEEDBACK}
         self._senders: dict[str, Sender] = {}
         # A feedback message that is the measured radius of the deployment is protected as it asks.
-        measured = [a.radial.radius for a in deployment.axes.values() if a.radial]
+        measured = [motion.radius for motion in deployment.motions.values()]
         radii = {radius.message.name: radius.protection for radius in measured if radius}
         for message, signals in self._feedback.items():
             found = deployment.messages.find(message)

@@ -98,7 +98,7 @@ def test_check_shows_how_far_every_axis_travels_on() -> None:
 def test_check_says_which_axis_moves_without_its_joystick() -> None:
     note = (
         "  NOTE: while slew moves, near_far moves too without its joystick: by up to 0.25 m/s,"
-        " 0.3 m in or out, 6 s in one slew"
+        " 0.3 m in or out, 6 s"
     )
     assert note in invoke("check", "forwarder-robust.yaml").stdout.splitlines()
     assert "without its joystick" not in invoke("check", str(SHIPPED)).stdout

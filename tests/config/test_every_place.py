@@ -103,7 +103,7 @@ def where(place: Place) -> str:
 def test_a_wrong_key_in_every_section(tmp_path: Path, schema: type[Section], kind: str) -> None:
     data = whole(schema, kind)
     # where every name is good, none is wrong
-    named = {"buses", "joysticks", "axes", "profiles", "codes", "nodes", "adjustable"}
+    named = {"buses", "joysticks", "axes", "motion", "profiles", "codes", "nodes", "adjustable"}
     sections = [p for p, value in places(data) if isinstance(value, dict) and p[-1] not in named]
     assert sections
     for place in sections:

@@ -14,8 +14,8 @@ Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
 TOP = (
-    "version, tick_ms, buses, dbc, joysticks, axes, gateway, emergency_stop, load_state, profile,"
-    " status, identity, control"
+    "version, tick_ms, buses, dbc, joysticks, axes, motion, gateway, emergency_stop, load_state,"
+    " profile, status, identity, control"
 )
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (

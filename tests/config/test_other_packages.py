@@ -33,7 +33,7 @@ own = [c for c in candidates(deployment, "slew") if c.filter.kind == "moving_ave
 outcomes = [measure(deployment, "slew", c, manoeuvres("slew")[0], 0) for c in own]
 print(json.dumps({
     "sent": sent,
-    "rows": [(c.name, c.ours, c.radial) for c in own],
+    "rows": [(c.name, c.ours, c.motion) for c in own],
     "same": pickle.loads(pickle.dumps(own)) == own,
     "residual_deg": [o.residual_deg for o in outcomes],
 }))

@@ -261,7 +261,7 @@ def test_the_sway_shown_follows_full_speed(make: Make) -> None:
     assert shown[0] == pytest.approx(2 * shown[1], rel=0.01)
 
 
-def test_radial_compensation_takes_the_new_sway_of_near_far(tmp_path: Path) -> None:
+def test_a_two_axis_motion_takes_the_new_sway_of_near_far(tmp_path: Path) -> None:
     text = (ROOT / "config" / "forwarder-robust.yaml").read_text(encoding="utf-8")
     text = text.replace("../dbc", str(ROOT / "dbc"))
     assert "full_speed_m_s: 1.0 }" in text

@@ -97,10 +97,9 @@ def test_bypass_does_not_pass_it_by(machine: Machine) -> None:
     assert machine.states() == PRESSED
 
 
-def test_an_axis_that_compensates_for_another_stops_too(changed_rig: Make) -> None:
-    radial = "radial_compensation: { axis: near_far, full_speed_rad_s: 0.5, radius_m: 3.0 }"
-    slew = "    valve: { bus: crane, message: SlewCommand"
-    machine = Machine(changed_rig, yaml={slew: f"    {radial}\n{slew}"})
+def test_an_axis_that_moves_with_another_stops_too(changed_rig: Make) -> None:
+    motion = "motion: { crane: { slew: slew, near_far: near_far, radius_m: 3.0 } }"
+    machine = Machine(changed_rig, yaml={"axes:\n": f"{motion}\naxes:\n"})
     machine.moving()
     moved = False
     for _ in range(100):

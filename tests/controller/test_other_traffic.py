@@ -9,12 +9,10 @@ from canshaper.shaping.states import State
 from tests.rigs.forwarder import Rig
 
 TIP_ID = 0x401  # TipPosition of the shipped DBC: the shipped machine has no use for it
-RADIAL = (
-    "    radial_compensation: { axis: near_far, full_speed_rad_s: 0.5, radius:"
-    " { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 } }\n"
+MOTION = (
+    "motion: { crane: { slew: slew, near_far: near_far, radius:"
+    " { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 } } }\n"
 )
-
-FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
 STATUS = "    status: { bus: crane, message: SlewStatus }\n"
 
 
@@ -53,14 +51,14 @@ def test_an_id_that_no_dbc_has_is_counted_and_moves_nothing(
 
 
 def test_a_radius_of_the_wrong_length_is_counted_as_such(changed_rig: Make) -> None:
-    rig = changed_rig({FILTER: FILTER + RADIAL})
+    rig = changed_rig({"axes:\n": f"{MOTION}axes:\n"})
     rig.receive(Frame("crane", TIP_ID, False, bytes(5)), Frame("crane", TIP_ID, False, bytes(7)))
     assert (rig.count("WrongLength"), last_fault(rig)) == (2, FrameFault.WRONG_LENGTH)
 
 
 def test_without_a_measured_radius_its_message_is_other_traffic(changed_rig: Make) -> None:
-    fixed = RADIAL[: RADIAL.index("radius:")] + "radius_m: 3.0 }\n"
-    rig = changed_rig({FILTER: FILTER + fixed})
+    fixed = MOTION[: MOTION.index("radius:")] + "radius_m: 3.0 } }\n"
+    rig = changed_rig({"axes:\n": f"{fixed}axes:\n"})
     rig.receive(Frame("crane", TIP_ID, False, bytes(5)))
     assert (rig.count("WrongLength"), last_fault(rig)) == (0, FrameFault.NONE)
 

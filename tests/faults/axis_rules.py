@@ -4,7 +4,7 @@ from collections import deque
 
 from canshaper.codec.frame import Frame
 from tests.faults.heard import LONG_AGO, HeardJoystick
-from tests.faults.judge import FOREIGN_NS, OWED, ROUNDING
+from tests.faults.judge import FOREIGN_NS, ROUNDING
 from tests.faults.machine import Axis
 
 # Where the daemon may be a tick, and the wait for it, behind what is on the bus.
@@ -154,13 +154,14 @@ class AxisRules:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
             low, high = min(low, -high), max(high, -low)
-        elif self._command > 0.0:
-            low = 0.0
-        elif self._command < 0.0:
-            high = 0.0
-        if axis.largest_added:
-            most = axis.largest_added + OWED + ROUNDING * axis.step
-            low, high = low - most, high + most
+        elif not axis.brake_shaped:
+            low = low if self._command <= 0.0 else 0.0
+            high = high if self._command >= 0.0 else 0.0
+        # Where its operator asked for nothing and holds nothing against it, another one may.
+        if axis.largest_added and not self._low and self._command <= 0.0:
+            low = -axis.largest_added
+        if axis.largest_added and not self._high and self._command >= 0.0:
+            high = axis.largest_added
         fall = ticks * axis.fall - slack
         low, high = max(low, -axis.maximum), min(high, axis.maximum)
         low, high = min(low - slack, before + fall), max(high + slack, before - fall)
@@ -168,7 +169,7 @@ class AxisRules:
             return f"{now:.4f} after {before:.4f}, allowed is {low:.4f} to {high:.4f}"
         most = ticks * max(axis.rise, axis.fall) + slack
         if axis.largest_added and abs(now) < abs(before):  # an added part may end at once
-            most += axis.largest_added + OWED
+            most += axis.largest_added
         if abs(now - before) > most:
             return f"{now:.4f} after {before:.4f}, a jump: rates allow {most:.4f}"
         return ""

@@ -36,8 +36,6 @@ ALWAYS_LATCHED = {heard.EMERGENCY_STOP, heard.SECOND_SENDER}
 COUNTERS = {"MissedDeadlines": 65535, "WrongLength": 255, "UnknownId": 255}
 COUNTERS |= {"InvalidSignals": 255, "SendFailures": 255}
 
-# What compensation may leave over from rounding and rates, and pay later (full speed).
-OWED = 0.1
 # Steps that rounding to the grid may make between two frames, down by one and up by half of one.
 ROUNDING = 1.5
 # How long another sender of a valve's id must be silent before a trip for it can be reset.
@@ -62,7 +60,7 @@ class AxisJudge:
         self.mode = WAIT
         self.raw = 0
         self.low = self.high = 0.0
-        self.asked = False
+        self.asked = self.was_asked = False
         self.command = 0.0
         self.causes: set[int] = set()  # of neutral at once, since the last frame of the valve
         self.contested_ns = LONG_AGO
@@ -88,7 +86,7 @@ class AxisJudge:
             now_ns: time of the tick.
             index: number of this frame's deadline.
             overrun: so many ticks came late that the axis may stop for it.
-            slewing: another axis may ask this one for compensation.
+            slewing: the other axis of a two-axis motion may move this one.
         """
         joystick, axis = self.joystick, self.axis
         faults = joystick.faults(axis, now_ns)
@@ -155,6 +153,7 @@ class AxisJudge:
     def _bounds(self, index: int, command: float, slewing: bool) -> None:
         axis = self.axis
         before, self.asked = self.asked, False
+        self.was_asked = before
         self.low = self.high = 0.0
         self.command = 0.0
         if self.mode in (WAIT, LATCHED):
@@ -166,15 +165,16 @@ class AxisJudge:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
             low, high = min(low, -high), max(high, -low)
-        elif self.command > 0.0:
-            low = 0.0
-        elif self.command < 0.0:
-            high = 0.0
-        compensates = axis.compensates is not None and (before or self.asked)
-        added = axis.largest_added and (compensates or slewing) and self.mode == FREE
+        elif not axis.brake_shaped:
+            low = low if self.command <= 0.0 else 0.0
+            high = high if self.command >= 0.0 else 0.0
+        added = axis.largest_added and (before or self.asked or slewing) and self.mode == FREE
         if added and not self.joystick.bypasses():
-            most = axis.largest_added + OWED + ROUNDING * axis.step
-            low, high = low - most, high + most
+            # Where its operator asked for nothing and holds nothing against it, another one may.
+            if not self._range[0] and self.command <= 0.0:
+                low = -axis.largest_added
+            if not self._range[1] and self.command >= 0.0:
+                high = axis.largest_added
         self.low, self.high = max(low, -axis.maximum), min(high, axis.maximum)
 
     def _asked_within(self, first: int, index: int) -> tuple[float, float]:
@@ -227,7 +227,7 @@ class AxisJudge:
             before, now, low, high = -before, -now, -high, -low
         grown = before + axis.rise + slack
         # An added velocity may end at once: the rate holds for what is left of the command.
-        most = axis.largest_added + OWED if axis.largest_added else 0.0
+        most = axis.largest_added
         own = max(0.0, before - most)
         if own > 0.0 > now:
             fallen = -axis.rise * max(0.0, 1.0 - own / axis.fall) - slack
@@ -295,8 +295,12 @@ class Judge:
         radius = {machine.radius[0]} if machine.radius else set()
         used = {key[1:] for key in (*self._inputs, *radius, *ours) if key}
         self._others = machine.ids - used
-        self._order = sorted(self.axes.values(), key=lambda a: a.axis.compensates is None)
-        self._asker = {a.axis.compensates.name: a for a in self.axes.values() if a.axis.compensates}
+        self._order = sorted(self.axes.values(), key=lambda a: not a.axis.slews)
+        self._other = {
+            a.axis.name: self.axes[a.axis.moves_with.name]
+            for a in self.axes.values()
+            if a.axis.moves_with
+        }
         self._last = -1
         self._late: deque[int] = deque()
         self.counts: Counter[str] = Counter()
@@ -371,8 +375,9 @@ class Judge:
                 axis.read(frame)
         self._emergency(now_ns, due)
         for judge in due:
-            asker = self._asker.get(judge.axis.name)
-            slewing = asker is not None and asker.mode in (FREE, STOP) and asker.asked
+            other = self._other.get(judge.axis.name)
+            slewing = other is not None and other.mode in (FREE, STOP)
+            slewing = slewing and (other.asked or other.was_asked)  # it follows with the next tick
             index = now // judge.axis.period_ticks
             judge.decide(now_ns, index, overrun, slewing)
             if wrong := judge.check(valves[judge.axis.valve_key]):

@@ -63,7 +63,8 @@ class Axis:
     flags: "tuple[Field, Field, Field] | None"  # neutral, negative, positive
     negative: Field | None = None  # of a rocker: the signal of the other direction
     direction: "tuple[str, dict[int, int]] | None" = None  # of the valve: signal, code to sign
-    compensates: "Axis | None" = None
+    moves_with: "Axis | None" = None
+    slews: bool = False
     largest_added: float = 0.0
     words: Words | None = None
     steps: int = field(init=False)
@@ -80,6 +81,7 @@ class Axis:
         self.stop = max(1, round(limit("stop_s", 2.0) / period_s))
         self.allow_faster = limit("allow_faster", False)
         self.allow_reverse = limit("allow_reverse", False)
+        self.brake_shaped = limit("reversal", "stop") == "brake_shaped"
         self.step = 1.0 / self.steps / (1.0 - self.deadband)  # velocity of one raw step
         self._frames: dict[bytes, tuple[int, int]] = {}
         self._statuses: dict[bytes, Any] = {}
@@ -208,9 +210,8 @@ class Machine:
         }
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
         self.radius: tuple[Key, int, Field] | None = None
-        for axis, section in data["axes"].items():
-            if radial := section.get("radial_compensation"):
-                self._radial(self.axes[axis], radial, messages)
+        for motion in data.get("motion", {}).values():
+            self._motion(motion, messages)
         self.stop: Input | None = None
         if stop := data.get("emergency_stop"):
             self.stop = Input("stop", stop, messages[stop["message"]])
@@ -289,10 +290,13 @@ class Machine:
             status["timeout_ms"] * 1_000_000,
         )
 
-    def _radial(self, axis: Axis, section: dict[str, Any], messages: dict[str, Message]) -> None:
-        axis.compensates = self.axes[section["axis"]]
-        axis.largest_added = section.get("max_pct", 25.0) / 100.0
-        axis.compensates.largest_added = axis.largest_added
+    def _motion(self, section: dict[str, Any], messages: dict[str, Message]) -> None:
+        slew = self.axes[section["slew"]]
+        slew.slews = True
+        if "near_far" in section:
+            slew.moves_with = near_far = self.axes[section["near_far"]]
+            near_far.moves_with = slew
+            slew.largest_added = near_far.largest_added = section.get("max_pct", 25.0) / 100.0
         if radius := section.get("radius"):
             message = messages[radius["message"]]
             signal = next(s for s in message.signals if s.name == radius["signal"])

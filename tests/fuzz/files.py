@@ -68,9 +68,9 @@ def runs(deployment: Deployment) -> None:
     messages = {joystick.key: joystick.message for joystick in deployment.joysticks.values()}
     if stop := deployment.emergency_stop:
         messages[stop.key] = stop.message
-    for axis in deployment.axes.values():
-        if axis.radial and axis.radial.radius:
-            messages[axis.radial.radius.key] = axis.radial.radius.message
+    for motion in deployment.motions.values():
+        if motion.radius:
+            messages[motion.radius.key] = motion.radius.message
     for data in (0x00, 0xFF, 0x55, 0x01):
         for key, message in messages.items():
             controller.receive(Frame(*key, bytes([data]) * message.length), now_ns)

@@ -6,12 +6,13 @@ from typing import Any
 import pytest
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.radius import RadiusInput
+from canshaper.inputs.radius import radius_input
+from canshaper.inputs.value import ValueInput
 from tests.rigs.forwarder import Rig
 
-FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
-RADIAL = "    radial_compensation: {{ axis: near_far, full_speed_rad_s: 0.5, {} }}\n"
+STATUS = "status: { bus: crane, message: ShaperStatus }\n"
 TIP = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 }"
+MOTION = f"motion: {{ crane: {{ slew: slew, near_far: near_far, {TIP} }} }}\n"
 # A radius with an offset, and with codes that lie within its range.
 DBC = {
     "SG_ Radius : 16|16@1+ (0.001,0) [0|60]": "SG_ Radius : 16|16@1+ (0.002,1) [1|60]",
@@ -24,11 +25,11 @@ TIMEOUT_NS = 100_000_000
 Make = Callable[..., Rig]
 
 
-def bound(make: Make, text: str = TIP) -> tuple[RadiusInput, Any]:
-    rig = make({FILTER: FILTER + RADIAL.format(text)}, DBC)
-    radial = rig.deployment.axes["slew"].radial
-    assert radial is not None
-    return RadiusInput(radial), rig.message("TipPosition")
+def bound(make: Make) -> tuple[ValueInput, Any]:
+    rig = make({STATUS: MOTION + STATUS}, DBC)
+    radius = rig.deployment.motions["crane"].radius
+    assert radius is not None
+    return radius_input(radius), rig.message("TipPosition")
 
 
 def frame(message: Any, raw: int) -> bytes:
@@ -42,8 +43,7 @@ def test_a_radius_has_scale_and_offset_and_the_ends_of_its_range(
 ) -> None:
     radius, message = bound(changed_rig)
     assert radius.receive(frame(message, raw), NOW_NS) is FrameFault.NONE
-    assert radius.circle_m(NOW_NS, 1.0) == pytest.approx(radius_m)
-    assert radius.circle_m(NOW_NS, 0.8) == pytest.approx(radius_m / 0.8)  # that of the grapple
+    assert radius.fresh(NOW_NS) == pytest.approx(radius_m)
 
 
 @pytest.mark.parametrize("raw", [5000, 5001, 29501, 65535])
@@ -52,11 +52,11 @@ def test_a_code_or_a_value_out_of_range_is_no_radius_and_no_news(
 ) -> None:
     radius, message = bound(changed_rig)
     assert radius.receive(frame(message, raw), NOW_NS) is FrameFault.INVALID_SIGNAL
-    assert radius.circle_m(NOW_NS, 1.0) is None
+    assert radius.fresh(NOW_NS) is None
     radius.receive(frame(message, 1500), NOW_NS)
     assert radius.receive(frame(message, raw), NOW_NS + TIMEOUT_NS) is FrameFault.INVALID_SIGNAL
-    assert radius.circle_m(NOW_NS + TIMEOUT_NS, 1.0) == pytest.approx(4.0)
-    assert radius.circle_m(NOW_NS + TIMEOUT_NS + 1, 1.0) is None
+    assert radius.fresh(NOW_NS + TIMEOUT_NS) == pytest.approx(4.0)
+    assert radius.fresh(NOW_NS + TIMEOUT_NS + 1) is None
 
 
 @pytest.mark.parametrize("length", [0, 5, 7, 8])
@@ -64,24 +64,16 @@ def test_a_frame_of_another_length_is_no_radius(changed_rig: Make, length: int) 
     radius, message = bound(changed_rig)
     data = (frame(message, 1500) + bytes(2))[:length]
     assert radius.receive(data, NOW_NS) is FrameFault.WRONG_LENGTH
-    assert radius.circle_m(NOW_NS, 1.0) is None
+    assert radius.fresh(NOW_NS) is None
 
 
 def test_it_is_known_until_its_timeout_and_not_a_nanosecond_longer(changed_rig: Make) -> None:
     radius, message = bound(changed_rig)
-    assert radius.circle_m(NOW_NS, 1.0) is None
+    assert radius.fresh(NOW_NS) is None
     radius.receive(frame(message, 1500), NOW_NS)
-    assert radius.circle_m(NOW_NS + TIMEOUT_NS, 1.0) == pytest.approx(4.0)
-    assert radius.circle_m(NOW_NS + TIMEOUT_NS + 1, 1.0) is None
+    assert radius.fresh(NOW_NS + TIMEOUT_NS) == pytest.approx(4.0)
+    assert radius.fresh(NOW_NS + TIMEOUT_NS + 1) is None
     radius.receive(frame(message, 2000), NOW_NS + TIMEOUT_NS + 1)
-    assert radius.circle_m(NOW_NS + 2 * TIMEOUT_NS, 1.0) == pytest.approx(5.0)
+    assert radius.fresh(NOW_NS + 2 * TIMEOUT_NS) == pytest.approx(5.0)
     radius.invalidate()
-    assert radius.circle_m(NOW_NS + 2 * TIMEOUT_NS, 1.0) is None
-
-
-def test_a_fixed_radius_is_that_of_the_grapple_and_never_lost(changed_rig: Make) -> None:
-    radius, message = bound(changed_rig, "radius_m: 3.5")
-    assert radius.receive(frame(message, 1500), NOW_NS) is FrameFault.WRONG_LENGTH
-    radius.invalidate()
-    for share in (1.0, 0.8):
-        assert radius.circle_m(NOW_NS, share) == 3.5
+    assert radius.fresh(NOW_NS + 2 * TIMEOUT_NS) is None

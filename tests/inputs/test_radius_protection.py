@@ -7,7 +7,7 @@ import pytest
 from crccheck.crc import Crc8SaeJ1850
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.radius import RadiusInput
+from canshaper.inputs.radius import radius_input
 from canshaper.machine.deployment import Deployment
 from tests.machine.protected_machine import load
 
@@ -19,9 +19,9 @@ class Tip:
     """A radius that is fresh for 0.1 s, and the sender of its frames."""
 
     def __init__(self, deployment: Deployment) -> None:
-        radial = deployment.axes["slew"].radial
-        assert radial is not None
-        self.radius = RadiusInput(radial)
+        radius = deployment.motions["crane"].radius
+        assert radius is not None
+        self.radius = radius_input(radius)
         self.now_ns = 0
         self.count = 0
 
@@ -39,7 +39,7 @@ class Tip:
 
     @property
     def known_m(self) -> float | None:
-        return self.radius.circle_m(self.now_ns, 1.0)
+        return self.radius.fresh(self.now_ns)
 
 
 @pytest.fixture
@@ -112,8 +112,8 @@ def test_a_radius_out_of_range_does_not_break_the_sequence(tip: Tip) -> None:
 
 
 def test_a_radius_qualifies_too(tmp_path: Path) -> None:
-    old = "        timeout_ms: 100\n        e2e"
-    tip = Tip(load(tmp_path, (old, old.replace("e2e", "qualify: 3\n        e2e"))))
+    old = "      timeout_ms: 100\n      e2e: { profile: p01, data_id: 0x77"
+    tip = Tip(load(tmp_path, (old, old.replace("e2e", "qualify: 3\n      e2e"))))
     for wanted in (None, None, 4.0):
         assert tip.send(4000) is FrameFault.NONE
         assert tip.known_m == wanted

@@ -92,6 +92,16 @@ joysticks:
     enable: Enable
     e2e: {JOYSTICK}
     qualify: 2
+motion:
+  crane:
+    slew: slew
+    near_far: near_far
+    radius:
+      bus: crane
+      message: TipPosition
+      signal: Radius
+      timeout_ms: 100
+      e2e: {RADIUS}
 axes:
   slew:
     command: {{ joystick: hand, signal: Slew }}
@@ -106,16 +116,8 @@ axes:
       message: SlewStatus
       e2e: {STATUS}
     sway: {{ period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }}
+    slewing: {{ full_speed_rad_s: 0.5, largest_radius_m: 9.6 }}
     filter: {{ kind: gff, a1: 0.708, a2: 0.12 }}
-    radial_compensation:
-      axis: near_far
-      full_speed_rad_s: 0.5
-      radius:
-        bus: crane
-        message: TipPosition
-        signal: Radius
-        timeout_ms: 100
-        e2e: {RADIUS}
   near_far:
     command: {{ joystick: hand, signal: NearFar }}
     valve:

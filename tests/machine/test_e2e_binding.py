@@ -33,9 +33,9 @@ def test_every_message_has_its_protection(tmp_path: Path) -> None:
     assert slew.valve.message is near_far.valve.message
     valves = slew.valve.message.sender.protection
     assert (valves.counts, type(valves.check)) == (16, Profile2)
-    assert slew.radial is not None
-    assert slew.radial.radius is not None
-    assert isinstance(slew.radial.radius.protection.check, Profile1)
+    radius = deployment.motions["crane"].radius
+    assert radius is not None
+    assert isinstance(radius.protection.check, Profile1)
     assert deployment.emergency_stop is not None
     assert deployment.emergency_stop.protection.counts == 15
     assert deployment.status is not None
@@ -156,7 +156,7 @@ HEADER = "its header takes the first 12 bits of"
         (
             [("message: TipPosition", "message: Short")],
             f"e2e: {RADIUS}",
-            "axes.slew.radial_compensation.radius.e2e: Short has 1 bytes, allowed are 2 or more",
+            "motion.crane.radius.e2e: Short has 1 bytes, allowed are 2 or more",
         ),
         (
             [(STATUS, STATUS.replace("alternating", "nibble"))],
@@ -236,7 +236,7 @@ def test_one_bit_of_a_signal_in_the_header_is_too_many(
 ) -> None:
     """In either byte order."""
     found = problems(tmp_path, ("message: TipPosition", f"message: {message}"))
-    where = f"machine.yaml:{line_of(f'e2e: {RADIUS}')}: axes.slew.radial_compensation.radius.e2e: "
+    where = f"machine.yaml:{line_of(f'e2e: {RADIUS}')}: motion.crane.radius.e2e: "
     says = f"{HEADER} {message}, where Radius lies, which is signal"
     assert found == ([where + says] if overlaps else [])
 

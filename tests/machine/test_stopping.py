@@ -7,9 +7,6 @@ from canshaper.machine.stopping import FullSpeed, allowed_m, full_speed, unstate
 from tests.rigs.files import Machine
 
 SLEWING = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
-SWAY = "    sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
-RADIAL = "    radial_compensation: { axis: near_far, full_speed_rad_s: 0.4, %s }\n"
-RADIUS = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200 }"
 STATED = ", stop_distance_m: 200"  # as the machine of these tests has it, slew first
 
 
@@ -21,31 +18,12 @@ def test_an_axis_that_slews_has_its_speed_at_the_largest_radius(machine: Machine
     assert full_speed(slew(machine)) == FullSpeed(0.5 * 9.6, 0.5)
 
 
-@pytest.mark.parametrize(
-    ("radius", "speed_m_s"), [("radius_m: 6", 0.4 * 6.0), (RADIUS, 1.5)], ids=["fixed", "measured"]
-)
-def test_without_it_what_the_compensation_says_counts(
-    machine: Machine, radius: str, speed_m_s: float
-) -> None:
-    machine.in_yaml(SLEWING, "")
-    machine.in_yaml(SWAY, SWAY + RADIAL % radius)
-    assert full_speed(slew(machine)) == FullSpeed(pytest.approx(speed_m_s), 0.4)
-
-
 def test_else_the_speed_is_that_of_the_sway(machine: Machine) -> None:
     machine.in_yaml(SLEWING, "")
     axes = machine.load().axes
     assert full_speed(axes["slew"].config) == FullSpeed(1.5, None)
     assert full_speed(axes["lift"].config) == FullSpeed(None, None)
     assert allowed_m(axes["lift"].config, timeout_ms=100, period_s=0.02) is None
-
-
-def test_two_angular_speeds_have_to_be_the_same(machine: Machine) -> None:
-    machine.in_yaml(SWAY, SWAY + RADIAL % "radius_m: 6")
-    assert machine.problems() == [
-        "machine.yaml:30: axes.slew: full_speed_rad_s is 0.5 in slewing and 0.4 in"
-        " radial_compensation; allowed is the same in both"
-    ]
 
 
 def test_allowed_is_the_speed_times_what_the_limits_allow(machine: Machine) -> None:

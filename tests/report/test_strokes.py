@@ -55,7 +55,7 @@ def test_the_plateau_is_where_the_stick_is_held_longest_near_its_largest_deflect
 
 def test_a_rest_ends_when_another_stick_is_released(hand_made: HandMade) -> None:
     near_far, slew = held((1.0, 4.0, 1.0)), held((0.5, 6.0, 1.0))
-    # Letting go of slew makes the radial correction move near-far: not a re-rise of its own stop.
+    # Letting go of slew makes the two-axis motion move near-far: not a re-rise of its own stop.
     sent = held((1.0, 4.0, 1.0), (4.0, 4.5, 0.5), (6.2, 7.0, 0.2))
     recording = hand_made(
         12.0, near_far=(near_far, sent, sent, zero), slew=(slew, slew, slew, zero)

@@ -130,8 +130,9 @@ def test_the_anti_sway_switch_is_named_as_the_reason(drive: Drive) -> None:
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_full_speed_may_be_asked_by_another_axis(drive_with: DriveWith, sign: float) -> None:
+def test_full_speed_may_be_added(drive_with: DriveWith, sign: float) -> None:
     axis = drive_with(limits=OutputLimits(rise_per_s=100.0)).to_ready().axis
+    axis.allow_added(1.0, 1.0)
     axis.tick(CENTRED, sign)
     assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
     assert axis.sent == sign

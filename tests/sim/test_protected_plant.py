@@ -139,12 +139,10 @@ def test_the_joysticks_of_a_machine_with_headers_are_taken(tmp_path: Path) -> No
 def test_a_measured_radius_is_sent_as_the_deployment_asks(tmp_path: Path) -> None:
     text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
     text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
-    sway = "    sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
     radius = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
     e2e = "e2e: { profile: p01, data_id: 0x123, data_id_mode: both }"
-    radial = f"axis: near_far, full_speed_rad_s: 0.5, radius: {{ {radius}, {e2e} }}"
-    assert sway in text
-    text = text.replace(sway, f"{sway}    radial_compensation: {{ {radial} }}\n")
+    motion = f"slew: slew, near_far: near_far, radius: {{ {radius}, {e2e} }}"
+    text += f"motion: {{ crane: {{ {motion} }} }}\n"
     dbc = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="cp1252")
     for old, new in (
         ("TipPosition: 6", "TipPosition: 8"),

@@ -9,7 +9,7 @@ from canshaper.errors import ConfigError
 
 if TYPE_CHECKING:
     from canshaper.config.bus import Bus
-    from canshaper.config.schema import RadialConfig
+    from canshaper.config.motion import Motion
     from canshaper.machine.deployment import Deployment
 
 # What joysticks do while the daemon is away.
@@ -68,8 +68,8 @@ def check(file: str = FILE) -> None:
             f"  axis {name}: {config.joysticks[stick.joystick].message}.{stick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
-        if radial := axis.config.radial_compensation:
-            typer.echo(f"  {_compensation(deployment, name, radial)}")
+    for motion in config.motion.values():
+        echo(_motion(deployment, motion))
     identity = deployment.identity
     echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
@@ -90,14 +90,16 @@ def _match(bus: "Bus") -> str:
     return f"WARNING: {fault}" if fault else "holds now"
 
 
-def _compensation(deployment: "Deployment", slew: str, radial: "RadialConfig") -> str:
-    """How far an axis moves for another one, in words."""
-    sway = deployment.axes[radial.axis].config.sway
+def _motion(deployment: "Deployment", motion: "Motion") -> str:
+    """How far an axis moves without its joystick, in words."""
+    if motion.near_far is None:
+        return f"  motion of {motion.slew} alone: nothing is known of near-far"
+    sway = deployment.axes[motion.near_far].config.sway
     assert sway is not None  # checked with the deployment
-    speed_m_s = radial.max_pct / 100.0 * sway.full_speed_m_s
+    speed_m_s = motion.max_pct / 100.0 * sway.full_speed_m_s
     return (
-        f"NOTE: while {slew} moves, {radial.axis} moves too without its joystick: by up to"
-        f" {speed_m_s:.2g} m/s, {radial.max_path_m:g} m in or out, {radial.max_s:g} s in one slew"
+        f"  NOTE: while {motion.slew} moves, {motion.near_far} moves too without its joystick: by"
+        f" up to {speed_m_s:.2g} m/s, {motion.max_path_m:g} m in or out, {motion.max_s:g} s"
     )
 
 

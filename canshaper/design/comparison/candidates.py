@@ -3,11 +3,12 @@
 from dataclasses import dataclass, replace
 
 from canshaper.config.filters import Filter, filter_of
-from canshaper.config.schema import RadialConfig
+from canshaper.config.motion import Motion
+from canshaper.config.schema import Slewing
 from canshaper.design.swinging import swinging_axis
 from canshaper.design.tuning.robust import RobustShaper, least_residual
-from canshaper.machine.bound_axis import BoundRadial
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.motion import BoundMotion
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 
@@ -25,13 +26,13 @@ class Candidate:
         name: what it is called.
         filter: as it would stand in a deployment file.
         ours: limit-aware, as G_FF and the robust shaper are.
-        radial: with radial compensation (slew axes).
+        motion: with the two-axis motion (slew axes).
     """
 
     name: str
     filter: Filter
     ours: bool = False
-    radial: bool = False
+    motion: bool = False
 
 
 def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
@@ -61,11 +62,11 @@ def candidates(deployment: Deployment, axis: str) -> list[Candidate]:
         )
         name = f"robust {shaper.duration_s:.1f} s ±{range_pct:g} %"
         found.append(Candidate(name, robust_filter(shaper, tick_s), ours=True))
-    if radial_of(deployment, axis) is not None:
+    if motion_of(deployment, axis) is not None:
         robust = [c for c in found if c.name.startswith("robust")]
-        with_radial = [c for c in found if c.name in ("G_FF near-far poles", "G_FF third pole -4")]
-        with_radial += robust[2:]
-        found += [replace(c, name=f"{c.name} +radial", radial=True) for c in with_radial]
+        with_motion = [c for c in found if c.name in ("G_FF near-far poles", "G_FF third pole -4")]
+        with_motion += robust[2:]
+        found += [replace(c, name=f"{c.name} +motion", motion=True) for c in with_motion]
     return found
 
 
@@ -75,26 +76,27 @@ def robust_filter(shaper: RobustShaper, tick_s: float) -> Filter:
     return filter_of("robust", tick_ms=round(1000.0 * tick_s), taps=taps)
 
 
-def radial_of(deployment: Deployment, axis: str) -> BoundRadial | None:
-    """Radial compensation for a slew axis: that of the file, or one for the simulated crane."""
-    bound = deployment.axes[axis]
-    if bound.radial is not None:
-        return bound.radial
-    if axis != "slew" or "near_far" not in deployment.axes:
+def motion_of(deployment: Deployment, axis: str) -> BoundMotion | None:
+    """Two-axis motion of a slew axis: that of the file, or one for the simulated crane."""
+    for motion in deployment.motions.values():
+        if motion.config.slew == axis:
+            return motion
+    near_far = deployment.axes.get("near_far")
+    if axis != "slew" or near_far is None or near_far.config.sway is None:
         return None
-    if deployment.axes["near_far"].config.sway is None:
-        return None
-    return BoundRadial(RadialConfig(axis="near_far", full_speed_rad_s=0.5, radius_m=3.0), None)
+    return BoundMotion(Motion(slew=axis, near_far="near_far", radius_m=3.0))
 
 
 def with_candidate(deployment: Deployment, axis: str, candidate: Candidate) -> Deployment:
     """The deployment with this filter on the axis, and with time enough to run on."""
     bound = deployment.axes[axis]
     limits = bound.config.limits.model_copy(update={"tail_s": TAIL_S})
-    config = bound.config.model_copy(update={"filter": candidate.filter, "limits": limits})
-    radial = radial_of(deployment, axis) if candidate.radial else None
-    axes = {**deployment.axes, axis: replace(bound, config=config, radial=radial)}
-    return replace(deployment, axes=axes)
+    slewing = bound.config.slewing or Slewing(full_speed_rad_s=0.5, largest_radius_m=9.6)
+    changes = {"filter": candidate.filter, "limits": limits, "slewing": slewing}
+    config = bound.config.model_copy(update=changes)
+    motion = motion_of(deployment, axis) if candidate.motion else None
+    axes = {**deployment.axes, axis: replace(bound, config=config)}
+    return replace(deployment, axes=axes, motions={"crane": motion} if motion else {})
 
 
 def nominal_mode(deployment: Deployment, axis: str) -> SwayMode:

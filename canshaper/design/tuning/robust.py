@@ -5,6 +5,9 @@ taps below the valve's rate times the tick keep a press or a release within the 
 the programme finds the one with the least worst residual |H(p)| over the range (``least_residual``)
 or the shortest one below a given residual (``shortest``). No shaper of this kind can beat the
 optimum: it is also the limit that others are measured against.
+
+Without a floor the taps stand in a few heaps, and a tap of the joystick moves the crane once for
+each heap. A least tap makes one movement of it, for a little more residual.
 """
 
 import math
@@ -20,6 +23,8 @@ from canshaper.shaping.sway import SwayMode
 
 # |H| <= r is a disc; a polygon of so many sides around it is at most 0.3 % larger.
 _SIDES = 40
+# Least tap, as a part of the mean one: from about here on a tap of the joystick is one movement.
+LEAST_TAP = 0.3
 # Lengths at which the residual is bounded; between them it rises by far less than a percent of it.
 _LENGTHS = 25
 
@@ -55,6 +60,7 @@ def least_residual(
     range_pct: float,
     rate_per_s: float,
     swing: Sequence[tuple[float, float]] = ((0.0, 1.0),),
+    least_tap: float = LEAST_TAP,
 ) -> RobustShaper:
     """Least worst residual over the range that taps within the duration and the rate can give.
 
@@ -66,6 +72,7 @@ def least_residual(
         rate_per_s: rate of the valve, full speeds per second.
         swing: unshaped swing as (length error in percent, swing), rising in the error, linear
             between; by default the same at every length. The residual then is in its unit.
+        least_tap: least tap, as a part of the mean one, 0 to 1.
 
     Raises:
         DesignError: a value is out of range, or the rate cannot reach full speed in the duration.
@@ -81,7 +88,7 @@ def least_residual(
     # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
     delay = np.arange(count) * tick_s
     objective = np.append(1e-6 * delay, 1.0)
-    bounds = [(0.0, rate_per_s * tick_s)] * count + [(0.0, None)]
+    bounds = [(least_tap / count, rate_per_s * tick_s)] * count + [(0.0, None)]
     solution = linprog(
         objective,
         A_ub=np.hstack([rows, -np.ones((len(rows), 1))]),

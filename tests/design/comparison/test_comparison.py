@@ -30,8 +30,8 @@ def test_every_filter_of_the_registry_takes_part(deployment: Deployment) -> None
     found = candidates(deployment, "near_far")
     assert {c.filter.kind for c in found} == set(KINDS)
     assert len({c.name for c in found}) == len(found)
-    assert not any(c.radial for c in found)
-    assert any(c.radial for c in candidates(deployment, "slew"))
+    assert not any(c.motion for c in found)
+    assert any(c.motion for c in candidates(deployment, "slew"))
 
 
 def test_manoeuvres_end_in_rest_and_cover_what_they_should() -> None:

@@ -1,5 +1,8 @@
-"""Slewing with the robust filter and radial compensation, on the nonlinear crane in lock-step."""
+"""Both axes at once with the robust filter, on the nonlinear crane in lock-step."""
 
+import dataclasses
+import math
+import statistics
 from pathlib import Path
 
 import pytest
@@ -10,6 +13,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.recording import Recording
+from canshaper_sim.strokes import Script, Stroke
 
 FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"
@@ -32,12 +36,12 @@ def taps() -> str:
 def deployment(tmp_path: Path, taps: str, radius: str | None) -> Deployment:
     text = FILE.read_text().replace("../dbc", str(FILE.parent.parent / "dbc"))
     changed = f"    filter: {{ kind: robust, tick_ms: 20, taps: [{taps}] }}\n"
-    if radius is not None:
-        changed += "    radial_compensation:\n"
-        changed += f"      {{ axis: near_far, full_speed_rad_s: 0.5, {radius} }}\n"
     assert SLEW in text
     file = tmp_path / "machine.yaml"
-    file.write_text(text.replace(SLEW, f"{changed}    limits: {{", 1))
+    text = text.replace(SLEW, f"{changed}    limits: {{", 1)
+    if radius is not None:
+        text += f"motion: {{ crane: {{ slew: slew, near_far: near_far, {radius} }} }}\n"
+    file.write_text(text)
     return load_deployment(file)
 
 
@@ -72,3 +76,56 @@ def test_without_compensation_the_plane_of_the_boom_keeps_its_swing(
     print(f"residual: {across:.3f} degrees across the boom, {along:.3f} along it")
     assert along > 1.5
     assert across > 0.5  # the swing along the boom turns with it, and comes over
+
+
+# -- both joysticks at once, with the recommended deployment ---------------------------------------
+
+TIMINGS = [(late, sign) for late in (-2.0, -1.2, -0.6, 0.0, 0.6, 1.2, 2.0) for sign in (1, -1)]
+
+
+def both(late_s: float, sign: int) -> Script:
+    """A slew of 3 s, and a stroke of near-far that begins so much later: out, or a little in."""
+    slew_s, near_far_s = 0.5 - min(0.0, late_s), 0.5 + max(0.0, late_s)
+    out = Stroke("near_far", near_far_s, 3.0, 1.0)
+    little_in = Stroke("near_far", near_far_s, 2.0, -0.4)
+    strokes = (Stroke("slew", slew_s, 3.0, 1.0), out if sign > 0 else little_in)
+    return Script("both", strokes, 13.0)
+
+
+def tilt_deg(recording: Recording) -> list[float]:
+    slew, near_far = recording.axes["slew"].sway_deg, recording.axes["near_far"].sway_deg
+    assert slew is not None
+    assert near_far is not None
+    return [math.hypot(a, b) for a, b in zip(slew, near_far, strict=True)]
+
+
+def test_both_joysticks_at_once_leave_little_swing_whatever_the_timing() -> None:
+    deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
+    apart = dataclasses.replace(deployment, motions={})
+    residuals, alone, peaks = [], [], []
+    for late_s, sign in TIMINGS:
+        tilt = tilt_deg(drive(deployment, both(late_s, sign)))
+        residuals.append(max(tilt[-150:]))
+        peaks.append(max(tilt))
+        alone.append(max(tilt_deg(drive(apart, both(late_s, sign)))[-150:]))
+    mean, without = statistics.mean(residuals), statistics.mean(alone)
+    print(f"{mean:.2f} degrees in the mean, {max(residuals):.2f} at worst, peak {max(peaks):.1f};")
+    print(f"each axis by itself: {without:.2f}, {max(alone):.2f}")
+    assert mean < 0.3
+    assert max(residuals) < 0.8
+    assert max(peaks) < 17.5
+    assert without > 2.0
+
+
+@pytest.mark.parametrize(
+    ("axis", "residual_deg", "peak_deg"), [("slew", 0.3, 15.0), ("near_far", 0.1, 10.0)]
+)
+def test_a_reversal_brakes_along_the_filter(
+    axis: str, residual_deg: float, peak_deg: float
+) -> None:
+    deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
+    strokes = (Stroke(axis, 0.5, 2.5, 1.0), Stroke(axis, 3.12, 2.5, -1.0))
+    tilt = tilt_deg(drive(deployment, Script("reversal", strokes, 12.0)))
+    print(f"{max(tilt[-150:]):.2f} degrees left, peak {max(tilt):.1f}")
+    assert max(tilt[-150:]) < residual_deg
+    assert max(tilt) < peak_deg

@@ -12,21 +12,20 @@ from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import StickInput
 from tests.rigs.forwarder import Rig
 
-FILTER = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n"
-RADIAL = "    radial_compensation: {{ axis: near_far, {}, radius_m: 6.0, max_pct: {} }}\n"
-SPEED = "full_speed_rad_s: 0.5"
+MOTION = "motion: {{ crane: {{ slew: slew, near_far: near_far, radius_m: 6.0, max_pct: {} }} }}\n"
 
 
 @pytest.mark.parametrize("max_pct", [2, 3.5])
 def test_it_is_bounded_as_configured(changed_rig: Callable[..., Rig], max_pct: float) -> None:
-    rig = changed_rig({FILTER: FILTER + RADIAL.format(SPEED, max_pct)})
+    rig = changed_rig({"axes:\n": MOTION.format(max_pct) + "axes:\n"})
     rig.run(3)
-    asked = []
+    sent = []
     for tick in range(300):
         rig.run(1, Slew=1000 if tick < 150 else 0)
-        asked.append(rig.controller.axes["near_far"].added)
-    assert min(asked) == pytest.approx(-max_pct / 100.0, abs=1e-12)  # inwards while it gets going
-    assert max(asked) == pytest.approx(max_pct / 100.0, abs=1e-12)  # and back
+        sent.append(rig.controller.axes["near_far"].axis.sent)
+    step = 1 / 125 / 0.95  # rounding does not pass the bound
+    assert -max_pct / 100.0 <= min(sent) <= -max_pct / 100.0 + step  # inwards
+    assert max_pct / 100.0 - step <= max(sent) <= max_pct / 100.0  # and back
 
 
 @pytest.mark.parametrize("seed", range(40))
@@ -41,6 +40,7 @@ def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
         deadband=chance.choice([0.0, 0.05]),
     )
     axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=steps)
+    axis.allow_added(most, 3600.0)
     axis.tick(StickInput())
     command = added = 0.0
     recent: deque[float] = deque([0.0], maxlen=round(limits.tail_s / 0.02) + 1)

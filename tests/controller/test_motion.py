@@ -1,4 +1,4 @@
-"""Radial compensation on real frames: near-far moves for slew, and only while it may."""
+"""Two-axis motion on real frames: near-far moves for slew, and only while it may."""
 
 import math
 from collections.abc import Callable
@@ -11,19 +11,18 @@ from tests.rigs.forwarder import Rig
 
 TICK_S = 0.02
 FULL_SPEED_RAD_S = 0.5
-SLEW_SWAY = "sway: { period_s: 2.356, damping_ratio: 0.038, full_speed_m_s: 1.5 }\n"
-FIXED = "axis: near_far, full_speed_rad_s: 0.5, radius_m: 3.0, max_pct: 25"
+FIXED = "slew: slew, near_far: near_far, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
-MEASURED = f"axis: near_far, full_speed_rad_s: 0.5, radius: {{ {TIP} }}"
+MEASURED = f"slew: slew, near_far: near_far, radius: {{ {TIP} }}"
 NEAR_STICK = "command: { joystick: left, signal: NearFar, neutral_pct: 2 }"
 
 
 Make = Callable[..., Rig]
 
 
-def compensated(make: Make, text: str = FIXED, **changes: dict[str, str]) -> Rig:
-    section = f"{SLEW_SWAY}    radial_compensation: {{ {text} }}\n"
-    return make({SLEW_SWAY: section, **changes.get("yaml", {})}, changes.get("dbc"))
+def moving_as_one(make: Make, text: str = FIXED, **changes: dict[str, str]) -> Rig:
+    section = f"motion: {{ crane: {{ {text} }} }}\naxes:\n"
+    return make({"axes:\n": section, **changes.get("yaml", {})}, changes.get("dbc"))
 
 
 # Near-far on the joystick that the slew stick is not on, in place of lift.
@@ -35,7 +34,7 @@ LIFT_OF_RIGHT = {
 
 def by_two_joysticks(make: Make) -> Rig:
     """With compensation, and the two sticks on two joysticks."""
-    return compensated(make, yaml=LIFT_OF_RIGHT)
+    return moving_as_one(make, yaml=LIFT_OF_RIGHT)
 
 
 def near_far(rig: Rig, ticks: int, **raw: int) -> list[float]:
@@ -48,7 +47,7 @@ def near_far(rig: Rig, ticks: int, **raw: int) -> list[float]:
 
 
 def test_near_far_moves_in_while_slewing_and_comes_back(changed_rig: Make) -> None:
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     moving = near_far(rig, 200, Slew=1000)
     inwards = sum(moving) * TICK_S  # m, at 1 m/s full speed
@@ -68,7 +67,7 @@ def test_near_far_moves_in_while_slewing_and_comes_back(changed_rig: Make) -> No
 
 def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make) -> None:
     """The tip stands ahead of the grapple by psi, tan psi = L / s5; the filter makes the lead L."""
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     slew = rig.controller.axes["slew"]
     sway = slew.axis.sway
@@ -77,18 +76,19 @@ def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make
     for tick in range(250):
         rig.run(1, Slew=1000 if tick < 125 else 0)
         added += slew.added * TICK_S * FULL_SPEED_RAD_S
-        assert added == pytest.approx(missing, abs=1.2e-4)  # the sum of a rate, tick by tick
         assert slew.axis.sent - slew.axis.applied == pytest.approx(slew.added, abs=1e-12)
         lead = sway.angle * FULL_SPEED_RAD_S
         speed = sway.rate * FULL_SPEED_RAD_S
         missing = math.atan2(lead, 1.0 - (speed / sway.mode.omega_rad_s) ** 2) - lead
+        # At the end of the tick; the filter's own step in it is not known before.
+        assert added == pytest.approx(missing, abs=3e-4)
         most = max(most, abs(missing))
     assert most > 1.5e-3
 
 
 @pytest.mark.parametrize("command", [1000, -1000])
 def test_it_moves_in_whichever_way_the_crane_slews(changed_rig: Make, command: int) -> None:
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     assert sum(near_far(rig, 150, Slew=command)) * TICK_S < -0.08
 
@@ -100,19 +100,19 @@ def test_without_compensation_nothing_moves(changed_rig: Make) -> None:
 
 
 def test_it_adds_to_what_the_operator_asks(changed_rig: Make) -> None:
-    plain, rig = changed_rig(), compensated(changed_rig)
+    """Never faster than asked: while the tip is to move in, a tip that runs out is slower."""
+    plain, rig = changed_rig(), moving_as_one(changed_rig)
     for one in (plain, rig):
         one.run(3)
     asked = near_far(plain, 150, Slew=1000, NearFar=400)
     both = near_far(rig, 150, Slew=1000, NearFar=400)
-    alone = compensated(changed_rig)
-    alone.run(3)
-    added = near_far(alone, 150, Slew=1000)
-    assert sum(both) == pytest.approx(sum(asked) + sum(added), abs=0.5)
+    assert sum(both) * TICK_S < sum(asked) * TICK_S - 0.05
+    assert max(both) <= 0.4
+    assert min(both) >= 0.0
 
 
 def test_bypass_switches_it_off(changed_rig: Make) -> None:
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3, AntiSwayOff=1)
     assert set(near_far(rig, 200, Slew=1000, AntiSwayOff=1)) == {0.0}
     assert rig.state("near_far") is State.READY
@@ -132,7 +132,7 @@ def test_a_swing_left_by_the_bypass_moves_nothing_for_longer_than_the_tail(
     changed_rig: Make,
 ) -> None:
     """Anti-sway comes back while the crane runs out: the grapple swings on, the tip may not."""
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3, AntiSwayOff=1)
     rig.run(100, Slew=1000, AntiSwayOff=1)
     rig.run(3, AntiSwayOff=1)
@@ -145,7 +145,7 @@ def test_a_swing_left_by_the_bypass_moves_nothing_for_longer_than_the_tail(
 
 def test_anti_sway_on_in_full_slew_does_not_twitch(changed_rig: Make) -> None:
     """What the tip would have done under compensation is not made up for at a stroke."""
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3, AntiSwayOff=1)
     rig.run(2000, Slew=1000, AntiSwayOff=1)  # until the swing of the start has died away
     assert max(map(abs, near_far(rig, 5, Slew=1000))) <= 0.02
@@ -182,7 +182,7 @@ def test_a_lost_joystick_of_near_far_stops_the_compensation(changed_rig: Make) -
 
 
 def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make) -> None:
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     sent = rig.run(1, Slew=1000, Enable=0)
@@ -194,7 +194,7 @@ def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make)
 
 def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: Make) -> None:
     slow = LIFT_OF_RIGHT | {"fall_per_s: 5": "fall_per_s: 1"}  # by the rate it would take longer
-    rig = compensated(changed_rig, yaml=slow)
+    rig = moving_as_one(changed_rig, yaml=slow)
     rig.run(3)
     assert near_far(rig, 40, Slew=1000)[-1] < -0.05
     for _ in range(20):
@@ -222,7 +222,7 @@ def test_a_released_enable_of_slew_leaves_the_operators_own_part(changed_rig: Ma
     assert sent[1] > 0.2
 
 
-def test_a_lost_joystick_of_slew_ends_it_by_the_rate(changed_rig: Make) -> None:
+def test_a_lost_joystick_of_slew_ends_it_in_the_fade(changed_rig: Make) -> None:
     """The shaped stop of slew goes on; near-far has an operator who did not ask for it."""
     rig = by_two_joysticks(changed_rig)
     rig.run(3)
@@ -233,14 +233,14 @@ def test_a_lost_joystick_of_slew_ends_it_by_the_rate(changed_rig: Make) -> None:
         rig.tick()
         after.append(rig.controller.axes["near_far"].axis.sent)
     assert rig.state() is State.STOPPING
-    assert not any(after[5 + math.ceil(0.25 / 0.1) :])
+    assert not any(after[5 + 15 :])
     assert rig.state("near_far") is State.READY
 
 
 @pytest.mark.parametrize("sign", [1, -1])
 def test_it_never_runs_against_a_joystick_that_is_held(changed_rig: Make, sign: int) -> None:
     """Slewing to and fro; the near-far joystick is held out a little, then pulled in."""
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     for tick in range(400):
         held = sign * (40 if tick < 200 else -40)
@@ -254,17 +254,16 @@ def test_it_never_runs_against_a_joystick_that_is_held(changed_rig: Make, sign: 
 
 @pytest.mark.parametrize("path_m", [0.03, 0.06])
 def test_its_way_is_bounded_as_configured(changed_rig: Make, path_m: float) -> None:
-    rig = compensated(changed_rig, FIXED + f", max_path_m: {path_m}")
+    rig = moving_as_one(changed_rig, FIXED + f", max_path_m: {path_m}")
     rig.run(3)
     way_m, ways_m = 0.0, []
     for sent in near_far(rig, 260, Slew=1000) + near_far(rig, 260):
         way_m += sent * TICK_S
         ways_m.append(way_m)
-    assert min(ways_m) == pytest.approx(-path_m, abs=0.008)
-    assert min(ways_m) >= -path_m - 0.002  # what rounding owes
-    assert abs(ways_m[-1]) <= 0.02  # and back: of the way that was refused nothing comes out
+    assert min(ways_m) == pytest.approx(-path_m, abs=0.004)
+    assert abs(ways_m[-1]) <= 0.01
     # In metres, whatever the full speed is: half of it, and the way is as long.
-    slower = compensated(
+    slower = moving_as_one(
         changed_rig,
         FIXED + f", max_path_m: {path_m}",
         yaml={"full_speed_m_s: 1.0": "full_speed_m_s: 0.5"},
@@ -273,23 +272,23 @@ def test_its_way_is_bounded_as_configured(changed_rig: Make, path_m: float) -> N
     assert sum(near_far(slower, 200, Slew=1000)) * TICK_S * 0.5 == pytest.approx(-path_m, abs=0.01)
 
 
-def test_its_time_is_bounded_and_counted_anew_after_the_run_on(changed_rig: Make) -> None:
-    rig = compensated(changed_rig, FIXED + ", max_s: 0.8")
+def test_its_time_is_bounded_and_counted_again_after_the_run_on(changed_rig: Make) -> None:
+    rig = moving_as_one(changed_rig, FIXED + ", max_s: 0.8")
 
     def moving_s() -> float:
-        # to and fro: something is to be compensated all the time
+        # to and fro: something is to be added all the time
         moved = [near_far(rig, 1, Slew=1000 if i // 50 % 2 else -1000)[0] for i in range(250)]
         return sum(map(bool, moved)) * TICK_S
 
     rig.run(3)
-    assert moving_s() == pytest.approx(0.8, abs=0.05)
+    assert moving_s() == pytest.approx(0.8, abs=0.1)
     near_far(rig, 150)
     assert rig.state() is State.READY
-    assert moving_s() == pytest.approx(0.8, abs=0.05)
+    assert moving_s() == pytest.approx(0.8, abs=0.1)
 
 
 def test_a_stalled_loop_trips_both(changed_rig: Make) -> None:
-    rig = compensated(changed_rig)
+    rig = moving_as_one(changed_rig)
     rig.run(3)
     near_far(rig, 40, Slew=1000)
     rig.controller.stalled()
@@ -316,7 +315,7 @@ def slewing(rig: Rig, ticks: int, radius_raw: int | None) -> list[float]:
 def test_a_measured_radius_compensates_in_proportion(changed_rig: Make) -> None:
     inwards = []
     for radius_raw in (2000, 4000):
-        rig = compensated(changed_rig, MEASURED)
+        rig = moving_as_one(changed_rig, MEASURED)
         rig.run(3)
         inwards.append(sum(slewing(rig, 200, radius_raw)))
         assert rig.count("UnknownId") == rig.count("InvalidSignals") == 0
@@ -324,26 +323,30 @@ def test_a_measured_radius_compensates_in_proportion(changed_rig: Make) -> None:
     assert inwards[1] / inwards[0] == pytest.approx(2.0, rel=0.15)  # limited by max_pct
 
 
-def test_without_a_fresh_radius_there_is_no_compensation(changed_rig: Make) -> None:
-    rig = compensated(changed_rig, MEASURED)
+def test_near_far_waits_for_the_first_radius_and_goes_on_without_the_next(
+    changed_rig: Make,
+) -> None:
+    rig = moving_as_one(changed_rig, MEASURED)
     rig.run(3)
     assert set(slewing(rig, 30, None)) == {0.0}
     assert any(slewing(rig, 10, 3000))
-    # 100 ms after the last frame, and the fall to zero
-    assert set(slewing(rig, 60, None)[5 + math.ceil(0.25 / 0.1) :]) == {0.0}
+    # carried on by the model, as long as the motion lasts
+    assert any(slewing(rig, 60, None)[10:])
+    assert (rig.state(), rig.state("near_far")) == (State.ACTIVE, State.ACTIVE)
+    near_far(rig, 200)
+    assert set(slewing(rig, 60, None)) == {0.0}
     assert rig.state("near_far") is State.READY
-    assert rig.state() is State.ACTIVE
 
 
 def test_a_radius_out_of_range_is_counted_and_compensates_nothing(changed_rig: Make) -> None:
-    rig = compensated(changed_rig, MEASURED)
+    rig = moving_as_one(changed_rig, MEASURED)
     rig.run(3)
     assert set(slewing(rig, 50, 60_001)) == {0.0}
     assert rig.count("InvalidSignals") == 50
 
 
 def test_after_a_stall_a_radius_counts_no_more(changed_rig: Make) -> None:
-    rig = compensated(changed_rig, MEASURED)
+    rig = moving_as_one(changed_rig, MEASURED)
     rig.run(3)
     message = rig.message("TipPosition")
     data = message.encode({"SlewAngle": 0, "Radius": 3000, "Height": 0}, scaling=False)

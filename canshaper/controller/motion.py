@@ -1,0 +1,100 @@
+"""The two-axis motion of a crane at work: it adds to both axes before either of them moves."""
+
+from canshaper.config.motion import Motion
+from canshaper.controller.runner import AxisRunner
+from canshaper.inputs.value import ValueInput
+from canshaper.shaping.motion import MovingAxis, TwoAxisMotion
+from canshaper.shaping.states import State
+
+# An axis at rest in READY may be moved by the other one.
+ABLE = (State.READY, State.ACTIVE)
+
+
+class _Member:
+    """One axis of the motion."""
+
+    __slots__ = ("moving", "runner")
+
+    def __init__(self, runner: AxisRunner, full_speed: float) -> None:
+        assert runner.axis.sway is not None  # checked with the deployment
+        self.runner = runner
+        self.moving = MovingAxis(full_speed, runner.period_s, runner.axis.sway)
+
+    def take(self, tick_s: float, last: int, now: int) -> None:
+        """Take the state of the axis; see ``MotionRunner.step``."""
+        moving, runner = self.moving, self.runner
+        axis, period = runner.axis, runner.period_ticks
+        passed = now // period - last // period
+        if passed > 1:
+            moving.held((passed - 1) * moving.period_s)
+        moving.ahead_s = 0.0 if passed else (period - now % period) * tick_s
+        assert axis.sway is not None
+        moving.sway, moving.applied = axis.sway, axis.applied
+        moving.commanded, moving.able = axis.commanded, axis.state in ABLE
+
+
+class MotionRunner:
+    """Slew and near-far of one crane.
+
+    Args:
+        config: the motion.
+        slew: the axis that turns.
+        near_far: the axis that moves the tip in and out, or None.
+        radius: measured radius of the tip, or None.
+        tick_s: time between two ticks of the controller.
+    """
+
+    def __init__(
+        self,
+        config: Motion,
+        slew: AxisRunner,
+        near_far: AxisRunner | None,
+        radius: ValueInput | None,
+        tick_s: float,
+    ) -> None:
+        self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
+        slewing = slew.bound.config.slewing
+        assert slewing is not None  # checked with the deployment
+        self._slew = _Member(slew, slewing.full_speed_rad_s)
+        self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
+        self._members = [one for one in (self._slew, self._near_far) if one]
+        for member in self._members:
+            member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
+        self._motion = TwoAxisMotion(
+            self._slew.moving,
+            self._near_far.moving if self._near_far else None,
+            config.max_path_m,
+        )
+
+    def adjust(self) -> None:
+        """Take the full speed of near-far as it is now."""
+        if self._near_far:
+            self._near_far.moving.full_speed = _full_speed_m_s(self._near_far.runner)
+
+    def step(self, now_ns: int, last: int, now: int) -> None:
+        """Tell both axes what to add in this tick.
+
+        Args:
+            now_ns: monotonic time.
+            last: number of the deadline before; axes have held their output since then.
+            now: number of this deadline.
+        """
+        for member in self._members:
+            member.take(self._tick_s, last, now)
+        tip_m = self._radius.fresh(now_ns) if self._radius else None
+        self._motion.step((now - last) * self._tick_s, tip_m, self._circle_m)
+        for member in self._members:
+            member.runner.add(member.moving.added)
+
+    def on_trip(self, tripped: AxisRunner) -> None:
+        """An axis has tripped: where it is one of these, nothing is added any more, at once."""
+        if any(member.runner is tripped for member in self._members):
+            self._motion.stop()
+            for member in self._members:
+                member.runner.drop_added()
+
+
+def _full_speed_m_s(near_far: AxisRunner) -> float:
+    sway = near_far.bound.config.sway
+    assert sway is not None  # checked with the deployment
+    return sway.full_speed_m_s

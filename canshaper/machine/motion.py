@@ -1,0 +1,47 @@
+"""Slew and near-far of a crane as one motion, bound to the DBC."""
+
+from dataclasses import dataclass
+
+from canshaper.config.motion import Motion
+from canshaper.config.source import Place
+from canshaper.machine.inputs import BoundRadius, bind_radius
+from canshaper.machine.lookup import Lookup
+
+
+@dataclass(frozen=True)
+class BoundMotion:
+    """A motion with the message of its radius, where that is measured."""
+
+    config: Motion
+    radius: BoundRadius | None = None
+
+
+def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
+    """Every motion, by name; an axis is part of one at most."""
+    taken: dict[str, str] = {}
+    motions = {}
+    for name, motion in lookup.config.motion.items():
+        place: Place = ("motion", name)
+        for key in ("slew", "near_far"):
+            _check_axis(lookup, (*place, key), getattr(motion, key), taken, turns=key == "slew")
+        radius = bind_radius(lookup, (*place, "radius"), motion.radius) if motion.radius else None
+        motions[name] = BoundMotion(motion, radius)
+    return motions
+
+
+def _check_axis(
+    lookup: Lookup, place: Place, name: str | None, taken: dict[str, str], *, turns: bool
+) -> None:
+    if name is None:
+        return
+    add, axes = lookup.diagnostics.add, lookup.config.axes
+    at = ".".join(str(part) for part in place)
+    if name not in axes:
+        add(place, f"expected one of the axes {', '.join(axes)}, got {name!r}")
+        return
+    if name in taken:
+        add(place, f"expected an axis that is in no other motion, got {name!r} of {taken[name]}")
+    taken.setdefault(name, at)
+    for key in ("sway", "slewing") if turns else ("sway",):
+        if getattr(axes[name], key) is None:
+            add(place, f"expected an axis with {key}, got {name!r} without")

@@ -1,0 +1,220 @@
+"""Two-axis motion of a deployment against its axes and the DBC; the radius on CAN."""
+
+import math
+import struct
+from typing import Any
+
+import pytest
+
+from canshaper.codec.frame import FrameFault
+from canshaper.inputs.radius import radius_input
+from canshaper.inputs.value import ValueInput
+from tests.rigs.files import Machine
+
+FIXED = "slew: slew, near_far: near_far, radius_m: 3"
+TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
+MEASURED = f"slew: slew, near_far: near_far, radius: {{ {TIP} }}"
+RADIUS = 'Radius : 16|16@1+ (0.001,0) [0|60] "m"'
+MS = 1_000_000
+
+
+def moving(machine: Machine, text: str) -> int:
+    """Let axes move as one; return the line."""
+    return machine.in_yaml("axes:\n", f"motion: {{ crane: {{ {text} }} }}\naxes:\n")
+
+
+def test_a_fixed_radius_binds(machine: Machine) -> None:
+    moving(machine, FIXED)
+    motion = machine.load().motions["crane"]
+    assert motion.radius is None
+    config = motion.config
+    assert (config.slew, config.near_far, config.radius_m) == ("slew", "near_far", 3.0)
+    assert (config.max_pct, config.max_path_m, config.max_s) == (25.0, 0.3, 6.0)
+
+
+def test_a_measured_radius_binds_to_its_message(machine: Machine) -> None:
+    moving(machine, MEASURED)
+    radius = machine.load().motions["crane"].radius
+    assert radius is not None
+    assert radius.key == ("crane", 0x401, False)
+
+
+@pytest.mark.parametrize("text", ["slew: slew", "slew: slew, near_far: near_far"])
+def test_radius_and_near_far_may_be_missing(machine: Machine, text: str) -> None:
+    moving(machine, text)
+    assert machine.load().motions["crane"].radius is None
+
+
+def measured(**changes: str) -> str:
+    text = MEASURED
+    for old, new in changes.items():
+        place = text.index(f" {old}: ") + 1
+        end = min(i for i in (text.find(",", place), text.find(" }", place)) if i > 0)
+        text = f"{text[:place]}{old}: {new}{text[end:]}"
+    return text
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (
+            FIXED.replace("near_far: near_far", "near_far: telescope"),
+            ".near_far: expected one of the axes slew, near_far, lift, got 'telescope'",
+        ),
+        (
+            FIXED.replace("near_far: near_far", "near_far: slew"),
+            ".near_far: expected an axis that is in no other motion, got 'slew' of motion.crane.sl",
+        ),
+        (
+            FIXED.replace("near_far: near_far", "near_far: lift"),
+            ".near_far: expected an axis with sway, got 'lift' without",
+        ),
+        (
+            FIXED.replace("slew: slew, near_far: near_far", "slew: near_far, near_far: slew"),
+            ".slew: expected an axis with slewing, got 'near_far' without",
+        ),
+        (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
+        ("slew: slew, radius_m: 3", ": expected near_far beside a radius, got none"),
+        (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "found 0.4, allowed is 0.5 to 30 m"),
+        (f"{FIXED}, max_pct: 51", ".max_pct: found 51, allowed is 1 to 50 % of full speed"),
+        (f"{FIXED}, speed: 1", ".speed: unknown key; allowed are slew, near_far, radius"),
+        (measured(signal="Reach"), ".radius.signal: found 'Reach', signals of TipPosition are"),
+        (measured(message="Tip"), ".radius.message: found 'Tip', messages of the DBC files are"),
+        (measured(bus="boom"), ".radius.bus: found 'boom', buses are crane"),
+        (measured(timeout_ms="30"), ".radius.timeout_ms: found 30, allowed is 40 ms or more"),
+        (measured(timeout_ms="5"), ".radius.timeout_ms: found 5, allowed is a whole number, 10 to"),
+    ],
+)
+def test_what_does_not_fit_is_told_with_its_line(machine: Machine, text: str, says: str) -> None:
+    line = moving(machine, text)
+    (problem,) = machine.problems()
+    assert says in problem
+    assert problem.startswith(f"machine.yaml:{line}: motion.crane")
+
+
+def test_a_radius_in_the_joysticks_message_is_refused(machine: Machine) -> None:
+    moving(machine, measured(message="JoystickLeft", signal="Slew"))
+    assert any("which is used already by joysticks.left" in p for p in machine.problems())
+
+
+def test_an_axis_is_in_one_motion_only(machine: Machine) -> None:
+    both = f"{{ a: {{ {FIXED} }}, b: {{ {FIXED} }} }}"
+    line = machine.in_yaml("axes:\n", f"motion: {both}\naxes:\n")
+    text = "expected an axis that is in no other motion, got"
+    assert machine.problems() == [
+        f"machine.yaml:{line}: motion.b.slew: {text} 'slew' of motion.a.slew",
+        f"machine.yaml:{line}: motion.b.near_far: {text} 'near_far' of motion.a.near_far",
+    ]
+
+
+def test_slew_without_its_speed_is_refused(machine: Machine) -> None:
+    moving(machine, FIXED)
+    machine.in_yaml("    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n", "")
+    (problem,) = machine.problems()
+    assert "motion.crane.slew: expected an axis with slewing, got 'slew' without" in problem
+
+
+def test_a_full_speed_of_zero_is_refused(machine: Machine) -> None:
+    moving(machine, FIXED)
+    machine.in_yaml("slewing: { full_speed_rad_s: 0.5", "slewing: { full_speed_rad_s: 0")
+    assert any("full_speed_rad_s: found 0, allowed is 0.05 to 3" in p for p in machine.problems())
+
+
+def test_a_slewing_axis_acts_first(machine: Machine) -> None:
+    """Where it trips, nothing of it is in the other one's output of the same tick."""
+    text = machine.yaml
+    slew, near_far, lift = (
+        text.index("  slew:\n"),
+        text.index("  near_far:\n"),
+        text.index("  lift:"),
+    )
+    machine.yaml = text[:slew] + text[near_far:lift] + text[slew:near_far] + text[lift:]
+    assert [*machine.load().axes] == ["near_far", "slew", "lift"]
+    moving(machine, FIXED)
+    assert [*machine.load().axes] == ["slew", "near_far", "lift"]
+
+
+@pytest.mark.parametrize(
+    ("limits", "says"),
+    [
+        ("[0|0]", "Radius has no range in the DBC; what lies outside is no radius"),
+        ("[-1|60]", "Radius has the range [-1|60]; allowed is one from 0 m or more"),
+    ],
+)
+def test_a_radius_needs_a_range(machine: Machine, limits: str, says: str) -> None:
+    moving(machine, MEASURED)
+    machine.in_dbc(RADIUS, RADIUS.replace("[0|60]", limits))
+    (found,) = machine.problems()
+    assert found.startswith("machine.dbc:")
+    assert says in found
+
+
+# -- the radius as it arrives ----------------------------------------------------------------------
+
+
+def radius_of(machine: Machine) -> ValueInput:
+    moving(machine, MEASURED)
+    radius = machine.load().motions["crane"].radius
+    assert radius is not None
+    return radius_input(radius)
+
+
+def tip(raw: int) -> bytes:
+    return struct.pack("<hHh", 0, raw, 0)
+
+
+def test_it_counts_as_long_as_it_is_fresh(machine: Machine) -> None:
+    radius = radius_of(machine)
+    radius.receive(tip(3000), 5 * MS)
+    assert radius.fresh(105 * MS) == pytest.approx(3.0)
+    assert radius.fresh(105 * MS + 1) is None
+    radius.receive(tip(3100), 200 * MS)
+    assert radius.fresh(200 * MS) == pytest.approx(3.1)
+    radius.invalidate()
+    assert radius.fresh(200 * MS) is None
+
+
+@pytest.mark.parametrize(
+    ("data", "fault"),
+    [
+        (b"", FrameFault.WRONG_LENGTH),
+        (tip(3000)[:5], FrameFault.WRONG_LENGTH),
+        (tip(3000) + b"\0", FrameFault.WRONG_LENGTH),
+        (tip(60_001), FrameFault.INVALID_SIGNAL),
+        (tip(0xFFFF), FrameFault.INVALID_SIGNAL),
+    ],
+)
+def test_a_frame_that_is_no_radius_neither_counts_nor_refreshes(
+    machine: Machine, data: bytes, fault: FrameFault
+) -> None:
+    radius = radius_of(machine)
+    assert radius.receive(data, 0) is fault
+    assert radius.fresh(0) is None
+    radius.receive(tip(3000), 0)
+    assert radius.receive(data, 90 * MS) is fault
+    assert radius.fresh(100 * MS) == pytest.approx(3.0)
+    assert radius.fresh(101 * MS) is None
+
+
+def test_an_error_code_within_the_range_is_no_radius(machine: Machine) -> None:
+    machine.in_dbc(RADIUS, RADIUS.replace("[0|60]", "[0|65.535]"))
+    machine.in_dbc(
+        "VAL_ 272 Slew", 'VAL_ 1025 Radius 65534 "Error" 65535 "NotAvailable" ;\nVAL_ 272 Slew'
+    )
+    radius = radius_of(machine)
+    for raw in (65534, 65535):
+        assert radius.receive(tip(raw), 0) is FrameFault.INVALID_SIGNAL
+    assert radius.fresh(0) is None
+    assert radius.receive(tip(65533), 0) is FrameFault.NONE
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.1, 60.1])
+def test_a_float_that_is_no_radius(machine: Machine, value: Any) -> None:
+    machine.in_dbc(RADIUS, 'Radius : 16|32@1- (1,0) [0|60] "m"')
+    machine.in_dbc(' SG_ Height : 32|16@1- (0.001,0) [-30|30] "m" SHAPER\n', "")
+    machine.in_dbc("VAL_ 272 Slew", "SIG_VALTYPE_ 1025 Radius : 1;\nVAL_ 272 Slew")
+    radius = radius_of(machine)
+    assert radius.receive(struct.pack("<hf", 0, value), 0) is FrameFault.INVALID_SIGNAL
+    assert radius.fresh(0) is None
+    assert radius.receive(struct.pack("<hf", 0, 3.5), 0) is FrameFault.NONE
+    assert radius.fresh(0) == pytest.approx(3.5)
