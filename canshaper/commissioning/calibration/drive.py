@@ -53,8 +53,8 @@ class _RampJoystick:
         self.moved = usable and abs(found.command) > neutral_band
         if not usable:
             return found
-        if self.moved:
-            return StickInput(fault=Reason.STICK_NOT_NEUTRAL, trip=found.trip)
+        if self.moved:  # contradicts the ramp: a fault that stops the axis through its filter
+            return StickInput(fault=Reason.STICK_CONTRADICTORY, trip=found.trip)
         return found._replace(command=self.command, bypass=False)
 
 
@@ -110,6 +110,8 @@ class CalibrationDrive:
         if self._begun_ns is not None:
             return ""
         axis = self._runner.axis
+        if self._joystick.moved:
+            return Reason.STICK_NOT_NEUTRAL.name
         if axis.state is not State.READY:
             return axis.reason.name
         return f"the stick of {moved}" if (moved := self._moved) else "feedback"
