@@ -23,8 +23,8 @@ CRANES = ("front", "rear")
 class Rig:
     """Both cranes; ``silent`` and ``released`` name buses whose joysticks are so."""
 
-    def __init__(self) -> None:
-        self.controller = Controller(load_deployment(ROOT / "config" / "two-cranes.yaml"))
+    def __init__(self, file: Path = ROOT / "config" / "two-cranes.yaml") -> None:
+        self.controller = Controller(load_deployment(file))
         self.dbc: Any = cantools.database.Database()
         for name in ("forwarder", "rotator"):
             self.dbc.add_dbc_file(ROOT / "dbc" / f"{name}.dbc")
@@ -105,3 +105,26 @@ def test_a_rocker_pressed_both_ways_stops_its_axis(rig: Rig) -> None:
     assert rig.run(60, RotateLeft=250, RotateRight=250)["front", "RotatorCommand"] == 0
     axis = rig.controller.axes["front_rotator"].axis
     assert (axis.state.name, axis.reason.name) == ("NEUTRAL_WAIT", "STICK_CONTRADICTORY")
+
+
+def test_each_crane_is_a_motion_of_its_own(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    motions = "".join(
+        f"  {crane}: {{ slew: {crane}_slew, near_far: {crane}_near_far, radius_m: 3 }}\n"
+        for crane in CRANES
+    )
+    text = (ROOT / "config" / "two-cranes.yaml").read_text(encoding="utf-8")
+    file.write_text(f"{text.replace('../dbc', str(ROOT / 'dbc'))}motion:\n{motions}")
+    rig = Rig(file)
+    rig.run(5)
+    rig.silent = {"rear"}
+    rig.run(10)  # its stop is over: nothing was moving
+    moved = [rig.run(1, Slew=1000) for _ in range(60)]
+    assert any(sent["front", "NearFarCommand"] for sent in moved)
+    assert not any(sent["rear", "NearFarCommand"] for sent in moved)
+    rig.silent = set()
+    rig.released = {"front"}
+    rig.run(10)  # a trip of the front crane is none of the rear one
+    moved = [rig.run(1, Slew=1000) for _ in range(60)]
+    assert not any(sent["front", "NearFarCommand"] for sent in moved)
+    assert any(sent["rear", "NearFarCommand"] for sent in moved)
