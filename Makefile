@@ -69,12 +69,12 @@ drawing:
 
 # J1939, CANopen, a valve being measured, a gateway: foreign counterparts on real SocketCAN.
 test-machines: .venv/test-ready
-	.venv/bin/python -m tests.lane.hil tests/hil/test_j1939.py tests/hil/test_canopen.py \
+	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_j1939.py tests/hil/test_canopen.py \
 		tests/hil/test_calibrate.py tests/hil/test_gateway.py
 
 # Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
 test-faults: .venv/test-ready
-	.venv/bin/python -m tests.lane.hil tests/hil/test_faults.py tests/hil/test_process_faults.py
+	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_faults.py tests/hil/test_process_faults.py
 
 # The package and its units under a real systemd.
 test-service: .venv/test-ready

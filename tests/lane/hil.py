@@ -1,6 +1,8 @@
-"""``python -m tests.lane.hil [pytest arguments]``: the tests of tests/hil where SocketCAN exists.
+"""``python -m tests.lane.hil [--steady] [pytest arguments]``: tests/hil where SocketCAN exists.
 
-Ends with pytest's status; where no lane can be had, it says why and ends with 0.
+With --steady in a machine whose time does not run while the host is busy: tests that measure time
+hold there whatever else runs. Ends with pytest's status; where no lane can be had, it says why and
+ends with 0.
 """
 
 import sys
@@ -8,10 +10,13 @@ from collections.abc import Sequence
 
 from . import suite
 
+STEADY = "--steady"
+
 
 def main(arguments: Sequence[str]) -> int:
     """Run pytest on tests/hil, or on the paths among ``arguments``."""
-    return suite.run("tests/hil", arguments)
+    rest = [word for word in arguments if word != STEADY]
+    return suite.run("tests/hil", rest, [STEADY] if STEADY in arguments else ())
 
 
 if __name__ == "__main__":
