@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.port import ListeningPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import daemon as module
@@ -63,6 +64,19 @@ class Diary:
         monkeypatch.setattr(module, "Collector", Collector)
         monkeypatch.setattr(module, "refuse_huge_pages", lambda: diary.note("no huge pages"))
         monkeypatch.setattr(module, "lock_memory", lambda: diary.note("memory locked"))
+        begin, close = BlackBox.begin, BlackBox.close
+
+        def begins(box: BlackBox, now_ns: int) -> None:
+            assert now_ns == bench.now_ns
+            diary.note("black box begins")
+            begin(box, now_ns)
+
+        def closes(box: BlackBox) -> None:
+            diary.note("black box closes")
+            close(box)
+
+        monkeypatch.setattr(BlackBox, "begin", begins)
+        monkeypatch.setattr(BlackBox, "close", closes)
         send = FakePort.send
 
         def sends(port: FakePort, frame: Any) -> bool:
@@ -123,15 +137,16 @@ def test_neutral_goes_out_before_the_service_is_ready_and_after_its_last_tick(
     diary: Diary,
 ) -> None:
     diary.run(3)
-    assert diary.all()[:8] == [
+    assert diary.all()[:9] == [
         "open vcan0",
         "no huge pages",
         "memory locked",
         "freeze",
         *VALVES,
+        "black box begins",
         f"ready: started, axes {AXES}",
     ]
-    assert diary.all()[-4:] == ["stopping", *VALVES]
+    assert diary.all()[-5:] == ["stopping", *VALVES, "black box closes"]
 
 
 def test_every_tick_has_its_time_and_pings_the_watchdog(diary: Diary) -> None:
@@ -235,7 +250,8 @@ def test_a_reload_is_put_to_work_behind_neutral_and_at_once(
     diary.run(80, {9: bench.reload})
     (tick,) = {tick for tick, line in diary.lines if line == "reloading"}
     during = [line for at, line in diary.lines if at == tick]
-    assert during == [*VALVES, "reloading", *VALVES, "ready: reload applied", "freeze"]
+    done = ["black box begins", "ready: reload applied", "freeze"]
+    assert during == [*VALVES, "reloading", *VALVES, *done]
     assert diary.starts[tick + 1] == diary.starts[tick]
     assert log("reload=") == [f"INFO reload=applied file={bench.file}"]
     assert [at for at, _ in diary.statuses()] == [0, tick + 1 + SECOND_TICKS]
