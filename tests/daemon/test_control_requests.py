@@ -9,6 +9,8 @@ import pytest
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.blackbox.recorder import Recorder
+from canshaper.daemon.daemon import Daemon
+from canshaper.machine.binding import load_deployment
 from tests.daemon.test_daemon import answered, control
 from tests.daemon.test_reload import Bench
 
@@ -118,6 +120,11 @@ def test_the_log_says_who_asked_for_a_black_box(
     answered(bench, path, {"black_box": "write"})
     (line,) = log("lack-box=asked")
     assert line.startswith("INFO black-box=asked uid=")
+
+
+def test_black_boxes_are_written_where_the_daemon_was_told(bench: Bench, tmp_path: Path) -> None:
+    daemon = Daemon(lambda: load_deployment(bench.file), tmp_path)
+    assert daemon._black_box.report()["folder"] == str(tmp_path)
 
 
 def test_a_request_that_is_none_is_told_what_is_one(bench: Bench, path: Path) -> None:

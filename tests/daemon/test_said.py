@@ -1,7 +1,7 @@
 """What a daemon says of itself: to its service manager, in its log, in one line for people."""
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -32,6 +32,7 @@ class Diary:
         self.starts: list[int] = []  # times of the ticks, from the first one
         self.pings: list[int] = []
         self.pauses: list[int] = []
+        self.boxed: list[tuple[int, bool]] = []
         self._bench = bench
         self._at: dict[int, Callable[[], object]] = {}
         self._last = 0
@@ -64,7 +65,7 @@ class Diary:
         monkeypatch.setattr(module, "Collector", Collector)
         monkeypatch.setattr(module, "refuse_huge_pages", lambda: diary.note("no huge pages"))
         monkeypatch.setattr(module, "lock_memory", lambda: diary.note("memory locked"))
-        begin, close = BlackBox.begin, BlackBox.close
+        begin, close, after_tick = BlackBox.begin, BlackBox.close, BlackBox.after_tick
 
         def begins(box: BlackBox, now_ns: int) -> None:
             assert now_ns == bench.now_ns
@@ -75,6 +76,11 @@ class Diary:
             diary.note("black box closes")
             close(box)
 
+        def follows(box: BlackBox, now_ns: int, events: Iterable[object], *, neutral: bool) -> None:
+            diary.boxed.append((now_ns, neutral))
+            after_tick(box, now_ns, events, neutral=neutral)
+
+        monkeypatch.setattr(BlackBox, "after_tick", follows)
         monkeypatch.setattr(BlackBox, "begin", begins)
         monkeypatch.setattr(BlackBox, "close", closes)
         send = FakePort.send
@@ -154,6 +160,7 @@ def test_every_tick_has_its_time_and_pings_the_watchdog(diary: Diary) -> None:
     diary.run(100)
     assert diary.starts == [n * TICK_NS for n in range(101)]
     assert diary.pings == diary.pauses == [10**12 + start for start in diary.starts]
+    assert diary.boxed == [(start, True) for start in diary.pings]
 
 
 def test_the_log_says_what_runs(bench: Bench, diary: Diary, log: Callable[[str], Any]) -> None:
