@@ -206,6 +206,9 @@ def test_once_a_second_the_log_is_flushed(diary: Diary) -> None:
     class Counts(logging.Handler):
         flushed = 0
 
+        def emit(self, record: logging.LogRecord) -> None:
+            pass
+
         def flush(self) -> None:
             self.flushed += 1
 

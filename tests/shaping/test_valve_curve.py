@@ -148,7 +148,10 @@ def test_an_axis_sends_the_command_of_its_curve_and_knows_the_speed(
 
 
 def test_an_added_velocity_goes_through_the_curve_too() -> None:
-    axis = driven(0.3, 0.05)
+    axis = driven(0.5)
+    axis.allow_added(0.25, 1.0)
+    for _ in range(5):
+        axis.tick(StickInput(0.3), 0.05)
     assert axis.raw == pytest.approx(400, abs=1)
     assert axis.sent == pytest.approx(0.35, abs=2e-3)
 
