@@ -1,4 +1,6 @@
-"""Names of mutants that outlive a refactoring: the operator, never the source that it changed.
+"""Names of mutants that outlive a refactoring, and the list of those that survive.
+
+They say the operator, never the source that it changed:
 
     comparison < -> <= #2       the second `<` of the function that became `<=`
 
@@ -10,6 +12,7 @@ import io
 import tokenize
 from collections import Counter
 from collections.abc import Iterable
+from pathlib import Path
 
 KINDS = {
     "comparison": ("<", "<=", ">", ">=", "==", "!="),
@@ -17,6 +20,22 @@ KINDS = {
     "boolean": ("and", "or", "True", "False"),
 }
 Place = tuple[int, int]  # line and column
+
+
+def explained(survivors: Path) -> dict[str, str]:
+    """Survivors with their reasons: names, a line each, and under them, indented, the reason."""
+    entries: dict[str, str] = {}
+    for block in survivors.read_text().split("\n\n"):
+        lines = [line for line in block.splitlines() if not line.startswith("#")]
+        names = [line for line in lines if not line[:1].isspace()]
+        reason = " ".join(line.strip() for line in lines[len(names) :])
+        if lines and not (names and reason):
+            raise SystemExit(f"{survivors.name}: no name or no reason:\n{block}")
+        for name in names:
+            if name in entries:
+                raise SystemExit(f"{survivors.name}: stands there twice: {name}")
+            entries[name] = reason
+    return entries
 
 
 def numbered(changes: Iterable[tuple[str, str]]) -> list[str]:

@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import libcst as cst
-from mutant_names import numbered
+from mutant_names import explained, numbered
 from mutmut import __main__ as mutmut
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import read_functions_from_index
@@ -154,22 +154,6 @@ def function_of(mutant: str) -> str:
     """Name a function as Python does: canshaper.shaping.axis.xǁAxisǁ_go__mutmut_3 is Axis._go."""
     name = re.sub(r"__mutmut_\d+$", "", mutant)
     return re.sub(r"xǁ(\w+)ǁ", r"\1.", name).replace(".x_", ".")
-
-
-def explained(survivors: Path) -> dict[str, str]:
-    """Survivors with their reasons: names, a line each, and under them, indented, the reason."""
-    entries: dict[str, str] = {}
-    for block in survivors.read_text().split("\n\n"):
-        lines = [line for line in block.splitlines() if not line.startswith("#")]
-        names = [line for line in lines if not line[:1].isspace()]
-        reason = " ".join(line.strip() for line in lines[len(names) :])
-        if lines and not (names and reason):
-            raise SystemExit(f"{survivors.name}: no name or no reason:\n{block}")
-        for name in names:
-            if name in entries:
-                raise SystemExit(f"{survivors.name}: stands there twice: {name}")
-            entries[name] = reason
-    return entries
 
 
 def judge(known: dict[str, str], patterns: list[str]) -> int:

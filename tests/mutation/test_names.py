@@ -7,9 +7,9 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-numbered: Callable[[Sequence[tuple[str, str]]], list[str]] = runpy.run_path(
-    str(ROOT / "tools/mutant_names.py")
-)["numbered"]
+TOOL = runpy.run_path(str(ROOT / "tools/mutant_names.py"))
+numbered: Callable[[Sequence[tuple[str, str]]], list[str]] = TOOL["numbered"]
+explained: Callable[[Path], dict[str, str]] = TOOL["explained"]
 
 
 @pytest.mark.parametrize(
@@ -75,3 +75,19 @@ def test_names_comments_and_layout_leave_a_name_as_it_is() -> None:
         "if (\n    self.offset >= least  # at rest\n):\n    drive(least)\n",
     )
     assert numbered([one]) == numbered([other]) == ["comparison > -> >= #1"]
+
+
+def test_every_survivor_is_of_a_module_that_is_there_and_has_a_reason() -> None:
+    for name in explained(ROOT / "tests/mutation/survivors.txt"):
+        parts = name.partition(":")[0].split(".")
+        assert any(ROOT.joinpath(*parts[:n]).with_suffix(".py").exists() for n in (3, 4, 5)), name
+
+
+@pytest.mark.parametrize("text", ["    a reason of nothing\n", "a.b: call left out #1\n"])
+def test_a_name_without_a_reason_is_no_entry_nor_is_a_reason_without_a_name(
+    tmp_path: Path, text: str
+) -> None:
+    file = tmp_path / "survivors.txt"
+    file.write_text(f"# Mutants.\n\n{text}", encoding="utf-8")
+    with pytest.raises(SystemExit, match="no name or no reason"):
+        explained(file)
