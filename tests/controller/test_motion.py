@@ -354,3 +354,42 @@ def test_after_a_stall_a_radius_counts_no_more(changed_rig: Make) -> None:
     rig.controller.stalled()
     rig.run(2)
     assert set(slewing(rig, 4, None)) == {0.0}
+
+
+# -- slew alone, missed ticks, a measurement -------------------------------------------------------
+
+
+def test_without_near_far_slew_keeps_its_part(changed_rig: Make) -> None:
+    rig = moving_as_one(changed_rig, "slew: slew")
+    rig.run(3)
+    assert set(near_far(rig, 60, Slew=1000)) == {0.0}
+    slew = rig.controller.axes["slew"]
+    assert slew.axis.sent - slew.axis.applied == pytest.approx(slew.added, abs=1e-12)
+    assert slew.added != 0.0
+    rig.controller.motions[0].adjust()
+    rig.run(1, Slew=1000)
+    assert slew.added != 0.0
+
+
+def test_missed_ticks_are_no_way_that_is_lost(changed_rig: Make) -> None:
+    """What was held in them is taken back: the tip is where it would be without."""
+    ways = []
+    for missed in (0, 3):
+        rig = moving_as_one(changed_rig)
+        rig.run(3)
+        way = sum(near_far(rig, 40, Slew=1000))
+        sent = rig.controller.axes["near_far"].axis.sent
+        rig.tick(missed=missed)
+        way += missed * sent
+        way += sum(near_far(rig, 200, Slew=1000))
+        ways.append(way * TICK_S)
+    assert ways[1] == pytest.approx(ways[0], abs=0.01)
+
+
+def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:
+    rig = moving_as_one(changed_rig)
+    rig.run(3)
+    runner = rig.controller.axes["near_far"]
+    runner.isolate(rig.controller.joysticks["left"])
+    assert set(near_far(rig, 60, Slew=1000)) == {0.0}
+    assert runner.added == 0.0

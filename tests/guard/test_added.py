@@ -1,5 +1,7 @@
 """What the other axis of a two-axis motion may ask of an axis."""
 
+from pathlib import Path
+
 import pytest
 
 from canshaper.machine.binding import load_deployment
@@ -47,3 +49,13 @@ def test_what_was_added_gives_the_own_part_no_longer_tail() -> None:
     refused = [bool(bench.sends(119, slew=1.0)) for _ in range(200)]
     # tail_s, timeout_ms, the longest standstill and three periods
     assert refused.index(True) == (2200 + 100 + 100 + 60) // 20
+
+
+def test_a_motion_of_slew_alone_moves_nothing_else(tmp_path: Path) -> None:
+    text = (shipped.CONFIG / "forwarder.yaml").read_text(encoding="utf-8")
+    file = tmp_path / "machine.yaml"
+    motion = "motion: { crane: { slew: slew } }\n"
+    file.write_text(text.replace("../dbc", str(shipped.CONFIG.parent / "dbc")) + motion)
+    bench = Bench(load_deployment(file), "near_far")
+    bench.ramp(0, slew=1.0)
+    assert "limit=asked" in bench.sends(10, slew=1.0)

@@ -220,3 +220,30 @@ def test_a_senseless_model_adds_nothing_or_no_more_than_a_step(value: float) -> 
         after = drive.slew.moving.added, drive.near_far.moving.added
         for was, now in zip(before, after, strict=True):
             assert now == 0.0 or abs(now - was) <= MOST_STEP
+
+
+@pytest.mark.parametrize("tip_m", [3.0, None])
+def test_an_axis_in_the_middle_of_its_period_keeps_what_it_adds(tip_m: float | None) -> None:
+    drive = Drive()
+    drive.run(stroke(0.2, 3.0), stroke(0.2, 3.0), until_s=1.0, motion=True)
+    slew = drive.slew.moving
+    before = slew.added
+    assert before != 0.0
+    slew.ahead_s = TICK_S
+    drive.motion.step(TICK_S, tip_m)
+    assert slew.added == before
+    slew.ahead_s = 0.0
+    drive.motion.step(TICK_S, tip_m)
+    assert slew.added != before
+
+
+def test_slew_alone_has_nothing_added_at_rest() -> None:
+    drive = Drive()
+    drive.run(stroke(0.2, 3.0), STILL, until_s=0.8, motion=True)
+    slew = drive.slew.moving
+    motion = TwoAxisMotion(slew, None, path_m=1.0)
+    motion.step(TICK_S, None)
+    assert slew.added != 0.0
+    slew.commanded = False
+    motion.step(TICK_S, None)
+    assert slew.added == 0.0 == slew.reached
