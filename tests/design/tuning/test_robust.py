@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from canshaper.design.tuning.robust import (
+    LEAST_TAP,
     least_residual,
     modes_over_range,
     shortest,
@@ -23,13 +24,23 @@ VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}
 def test_designs_of_the_literature_values(
     duration_s: float, range_pct: float, residual_pct: float
 ) -> None:
-    found = least_residual(MODE, duration_s=duration_s, range_pct=range_pct, **VALVE)
+    found = least_residual(MODE, duration_s=duration_s, range_pct=range_pct, least_tap=0.0, **VALVE)
     assert 100.0 * found.residual == pytest.approx(residual_pct, abs=0.4)
     assert min(found.taps) >= 0.0
     assert math.fsum(found.taps) == pytest.approx(1.0)
     assert max(found.taps) <= 5.0 * 0.02 * (1.0 + 1e-9)
     judged = max(residual_left(found.taps, m, 0.02) for m in modes_over_range(MODE, range_pct, 301))
     assert judged == pytest.approx(found.residual, rel=0.01)
+
+
+def test_a_least_tap_makes_one_movement_of_a_tap_for_a_little_more_residual() -> None:
+    free, floor = (
+        least_residual(MODE, duration_s=1.8, range_pct=15.0, least_tap=least, **VALVE)
+        for least in (0.0, LEAST_TAP)
+    )
+    assert min(free.taps) == pytest.approx(0.0, abs=1e-9)
+    assert min(floor.taps) == pytest.approx(LEAST_TAP / len(floor.taps))
+    assert 0.0 < floor.residual - free.residual < 0.012
 
 
 def test_no_other_taps_of_that_kind_do_better() -> None:
