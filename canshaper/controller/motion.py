@@ -79,6 +79,9 @@ class MotionRunner:
             last: number of the deadline before; axes have held their output since then.
             now: number of this deadline.
         """
+        if any(member.runner.alone for member in self._members):
+            self._end()
+            return
         for member in self._members:
             member.take(self._tick_s, last, now)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
@@ -89,8 +92,12 @@ class MotionRunner:
     def on_trip(self, tripped: AxisRunner) -> None:
         """An axis has tripped: where it is one of these, nothing is added any more, at once."""
         if any(member.runner is tripped for member in self._members):
-            self._motion.stop()
-            for member in self._members:
+            self._end()
+
+    def _end(self) -> None:
+        self._motion.stop()
+        for member in self._members:
+            if not member.runner.alone:
                 member.runner.drop_added()
 
 

@@ -43,6 +43,7 @@ class AxisRunner:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
         added: velocity that a two-axis motion adds to this one, fraction of full speed.
+        alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
     """
@@ -78,7 +79,7 @@ class AxisRunner:
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added = 0.0
-        self._alone = False  # a measurement is made with it
+        self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
@@ -108,8 +109,7 @@ class AxisRunner:
 
     def add(self, velocity: float) -> None:
         """A two-axis motion adds so much from the next tick on, fraction of full speed."""
-        if not self._alone:
-            self.added = velocity
+        self.added = velocity
 
     def drop_added(self) -> None:
         """Nothing is added any more, and the next output is not faster for what was."""
@@ -134,7 +134,7 @@ class AxisRunner:
             axis: what drives the valve now; by default the same as before.
         """
         self._joystick = joystick
-        self._alone = True
+        self.alone = True
         self.added = 0.0
         if axis is not None:
             self.axis, self.chooser = axis, None

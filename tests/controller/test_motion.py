@@ -6,6 +6,9 @@ from collections.abc import Callable
 import pytest
 
 from canshaper.codec.frame import Frame
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.states import Reason, State
 from tests.rigs.forwarder import Rig
 
@@ -393,3 +396,8 @@ def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:
     runner.isolate(rig.controller.joysticks["left"])
     assert set(near_far(rig, 60, Slew=1000)) == {0.0}
     assert runner.added == 0.0
+    other = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
+    runner.isolate(rig.controller.joysticks["left"], other)
+    rig.run(60, Slew=1000)
+    assert runner.axis is other
+    assert other.state is State.READY

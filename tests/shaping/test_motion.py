@@ -243,7 +243,11 @@ def test_slew_alone_has_nothing_added_at_rest() -> None:
     slew = drive.slew.moving
     motion = TwoAxisMotion(slew, None, path_m=1.0)
     motion.step(TICK_S, None)
-    assert slew.added != 0.0
+    added = slew.added
+    assert added != 0.0
+    slew.ahead_s = TICK_S
+    motion.step(TICK_S, None)
+    assert slew.added == added
     slew.commanded = False
     motion.step(TICK_S, None)
     assert slew.added == 0.0 == slew.reached

@@ -102,9 +102,8 @@ class Gateway(BusProtocol):
         assert gateway is not None  # only such deployments have one
         self._buses = gateway.between
         by_message: dict[MessageKey, list[DrivenAxis]] = {}
-        for runner in axes.values():
-            if runner.bound.rewrites:
-                by_message.setdefault(runner.bound.valve.message.sender.key, []).append(runner)
+        for runner in (runner for runner in axes.values() if runner.bound.rewrites):
+            by_message.setdefault(runner.bound.valve.message.sender.key, []).append(runner)
         self.forwarding: dict[MessageKey, ForwardedJoystick] = {}
         for key, runners in by_message.items():
             bound = runners[0].bound
