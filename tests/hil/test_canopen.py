@@ -5,6 +5,7 @@ import signal
 import subprocess
 import time
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from itertools import groupby
 from pathlib import Path
 
@@ -72,11 +73,13 @@ def until(accept: Callable[[], bool], what: str) -> None:
         time.sleep(0.01)
 
 
-def wait_state(state: str, reason: str | None = None, status: int = SLEW_STATUS) -> None:
+def wait_state(
+    state: str, reason: str | None = None, status: int = SLEW_STATUS, within_s: float = ANSWER_S
+) -> None:
     """Until the status of an axis says so."""
     with open_bus("vcan0") as bus:
         last = None
-        end = time.monotonic() + ANSWER_S
+        end = time.monotonic() + within_s
         while time.monotonic() < end:
             message = bus.recv(1.0)
             if message is None or message.arbitration_id != status:
@@ -95,13 +98,23 @@ def drive(machine: Machine) -> None:
 
 
 def reset(machine: Machine) -> None:
-    """The operator lets go and presses reset."""
+    """The operator lets go and presses reset: again where it was no rising edge.
+
+    After a standstill it is none while the first frames of the joystick do not count yet.
+    """
     machine.joysticks["left"].x = 0
     wait_state("TRIPPED")
     until(lambda: machine.valves["slew"].state == ACTIVE, "the valve works again")
-    machine.joysticks["left"].switches = 0b11
-    wait_state("READY")
-    machine.joysticks["left"].switches = 0b01
+    left = machine.joysticks["left"]
+    for _ in range(5):
+        left.switches = 0b11
+        with suppress(AssertionError):
+            wait_state("READY", within_s=2.0)
+        left.switches = 0b01
+        with suppress(AssertionError):
+            wait_state("READY", within_s=1.0)
+            return
+    raise AssertionError("five times reset, and not READY")
 
 
 def commands(log: Path, can_id: int = SLEW_COMMAND) -> list[tuple[float, int, int]]:
