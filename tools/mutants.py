@@ -1,6 +1,6 @@
 """mutmut with more operators, and what its result says; for tools/mutation.py.
 
-    mutants.py run PROCESSES SURVIVORS|- [PATTERN ...]
+    mutants.py run PROCESSES [PATTERN ...]         all; run-typed: without what mypy refuses
     mutants.py judge SURVIVORS [PATTERN ...]
 
 In the working directory, where mutmut finds its settings as soon as it is imported.
@@ -103,27 +103,24 @@ def run_tests(runner: PytestRunner, *, mutant_name: str | None, tests: Iterable[
         return int(runner.execute_pytest(runner._pytest_args_regular_run(tests), plugins=plugins))
 
 
-def run(processes: int, patterns: list[str], survivors: dict[str, str] | None = None) -> None:
+def run(processes: int, patterns: list[str], *, none: bool) -> None:
     """Run mutmut.
 
     Args:
         processes: how many at a time.
         patterns: names of mutants; none for all.
-        survivors: where time is short, what is known to survive; it is not run again, and neither
-            is what puts None into the code, which the type checker refuses.
+        none: whether what puts None into the code is run too, which the type checker refuses.
     """
     mutation_operators.extend(MORE)  # type: ignore[attr-defined]
     isolation.register_timeout = patient
     PytestRunner.run_tests = run_tests  # type: ignore[method-assign]
-    if survivors is not None:
+    if not none:
         Path("mutants").mkdir()
         mutmut.copy_src_dir()
         mutmut.create_mutants(processes)
         for mutant in mutants():
-            of_types = re.search(r"-> None #\d+$", mutant.name)
-            if mutant.name in survivors or of_types:
-                code = SURVIVED if mutant.name in survivors else TYPES
-                mutant.data.exit_code_by_key[mutant.key] = code
+            if re.search(r"-> None #\d+$", mutant.name):
+                mutant.data.exit_code_by_key[mutant.key] = TYPES
                 mutant.data.save()
     mutmut._run(patterns, processes)
 
@@ -193,9 +190,7 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["run", processes, "-", *patterns]:
-            run(int(processes), patterns)
-        case ["run", processes, survivors, *patterns]:
-            run(int(processes), patterns, explained(Path(survivors)))
+        case ["run" | "run-typed" as how, processes, *patterns]:
+            run(int(processes), patterns, none=how == "run")
         case ["judge", survivors, *patterns]:
             sys.exit(judge(explained(Path(survivors)), patterns))

@@ -238,3 +238,56 @@ def test_what_was_added_falls_by_the_rate_when_the_joystick_is_lost(fault: Reaso
         assert axis.sent == pytest.approx(left, abs=SLACK)
     axis.tick(StickInput(fault=fault), 0.2)
     assert axis.state is State.NEUTRAL_WAIT
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_it_leaves_nothing_at_once_however_slowly_the_valve_may_fall(sign: float) -> None:
+    axis, _ = pair(OutputLimits(rise_per_s=5.0, fall_per_s=0.2))
+    axis.tick(StickInput(sign))
+    for _ in range(5):
+        axis.tick(StickInput(sign * 0.3), sign * 0.2)
+    assert sign * axis.sent > 0.4
+    axis.drop_added()
+    axis.tick(StickInput(sign * 0.3))
+    assert sign * axis.sent == pytest.approx(0.3, abs=SLACK)
+
+
+def test_nor_while_it_falls_already() -> None:
+    axis, _ = pair(OutputLimits(fall_per_s=0.2))
+    for _ in range(10):
+        axis.tick(StickInput(), 0.2)
+    axis.tick(StickInput())
+    assert axis.sent == pytest.approx(0.19, abs=SLACK)
+    axis.drop_added()
+    axis.tick(StickInput())
+    assert axis.sent == 0.0
+
+
+def test_nor_what_rounding_has_left_out() -> None:
+    axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
+    axis.allow_added(LARGEST, TIME_S)
+    axis.tick(StickInput())
+    axis.tick(StickInput(1.0))
+    for _ in range(10):
+        axis.tick(StickInput(0.3))
+    axis.drop_added()
+    axis.tick(StickInput(0.3), 0.001)
+    assert axis.sent == pytest.approx(0.3)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
+    axis = Axis(TICK_S, OutputLimits(fall_per_s=0.07), sway=None, shaper=Off(), grid_steps=50)
+    axis.allow_added(LARGEST, TIME_S)
+    axis.tick(StickInput())
+    for _ in range(10):
+        axis.tick(StickInput(), sign * 0.2)
+    for _ in range(40):
+        axis.tick(StickInput())
+        assert 0.0 <= sign * axis.sent <= sign * axis._limited + 1e-12
+
+
+def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:
+    axis, _ = pair(OutputLimits())
+    axis.tick(StickInput(bypass=True), 0.2)
+    assert (axis.state, axis.raw) == (State.READY, 0)
