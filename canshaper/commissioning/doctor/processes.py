@@ -63,16 +63,21 @@ class Children:
         path = [str(Path(entry).resolve()) for entry in sys.path]
         flags = ["-I", *(["-B"] if sys.dont_write_bytecode else [])]
         code = _CODE.format(path=path)
-        process = subprocess.Popen(
-            [sys.executable, *flags, "-c", code, json.dumps(options)],
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-            pass_fds=tuple(sockets.values()),
-            process_group=0,  # Ctrl-C is for the parent, which ends them
-        )
-        self._processes.append(process)
+        # A Ctrl-C between start and note would leave a child that no one ends.
+        signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+        try:
+            process = subprocess.Popen(
+                [sys.executable, *flags, "-c", code, json.dumps(options)],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.PIPE,
+                stderr=subprocess.PIPE,
+                text=True,
+                pass_fds=tuple(sockets.values()),
+                process_group=0,  # Ctrl-C is for the parent, which ends them
+            )
+            self._processes.append(process)
+        finally:
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
         return process
 
 
