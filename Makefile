@@ -52,7 +52,7 @@ test-others: .venv/test-ready
 	$(NICE) .venv/bin/python -m pytest -q $(GATE:%=--ignore=%)
 
 test-socketcan: .venv/test-ready
-	.venv/bin/python -m tests.lane.hil tests/hil/test_socketcan.py tests/hil/test_daemon.py \
+	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_socketcan.py tests/hil/test_daemon.py \
 		tests/hil/test_closed_loop.py tests/hil/test_doctor.py
 
 # What a change needs first: the rooms that differ from main, and the golden drives.
