@@ -32,6 +32,8 @@ MOST_STEP = 0.1
 _NOTHING = 1e-6
 # Least part of gravity that is left across the boom; beyond it the small angles are none.
 _LEAST = 0.5
+# Least radius of the grapple that the map takes: a sensor may say 0.
+_LEAST_RADIUS_M = 0.5
 
 
 @dataclass(slots=True)
@@ -93,7 +95,7 @@ class MovingAxis:
             self.added = 0.0
             return
         self.added = min(max(velocity, -1.0), 1.0)
-        # What a fading part leaves out is owed to nobody.
+        # What a fading part leaves out is not made up for.
         self.reached = target if weight < 1.0 else self.reached + self.added * way
 
 
@@ -207,7 +209,7 @@ class TwoAxisMotion:
         out, _, out_rate, out_acceleration = near_far.path(after_s) if near_far.commanded else _REST
         mode_5, mode_6 = self._slew.sway.mode, near_far.sway.mode
         across_2, along_2 = mode_5.omega_rad_s**2, mode_6.omega_rad_s**2
-        radius_m += after_s * out_rate
+        radius_m = max(radius_m + after_s * out_rate, _LEAST_RADIUS_M)
         # Coriolis and centripetal acceleration, and their rates for the dampers.
         turning = 2.0 * out_rate * speed / radius_m
         turning_rate = (

@@ -251,3 +251,19 @@ def test_slew_alone_has_nothing_added_at_rest() -> None:
     slew.commanded = False
     motion.step(TICK_S, None)
     assert slew.added == 0.0 == slew.reached
+
+
+@pytest.mark.parametrize("tip_m", [0.0, 1e-9, -5.0])
+def test_a_radius_of_nothing_is_no_reason_to_stop(tip_m: float) -> None:
+    """A sensor says what it says; the map takes no less than half a metre."""
+    drive = Drive()
+    last = 0.0
+    for _ in range(100):
+        for axis in (drive.slew, drive.near_far):
+            axis.moving.commanded = axis.moving.able = True
+        drive.motion.step(TICK_S, tip_m)
+        drive.slew.run(1.0)
+        drive.near_far.run(-1.0)
+        now = drive.near_far.moving.added
+        assert abs(now - last) <= MOST_STEP + 1e-12
+        last = now
