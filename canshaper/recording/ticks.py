@@ -1,7 +1,7 @@
 """A tick of a replay, what it made, and the ticks of a clock for a log that has none."""
 
 import math
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Container, Iterable, Iterator
 from dataclasses import dataclass, field
 from typing import NamedTuple
 
@@ -9,6 +9,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.controller.runner import AxisRunner
+from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.recording.channels import Key, Kind
 from canshaper.shaping.states import Reason
@@ -135,8 +136,51 @@ def clocked(frames: Iterable[Sorted], tick_ns: int) -> Iterator[Tick]:
         yield tick
 
 
+class LogPort:
+    """All buses of a log at once.
+
+    Args:
+        stamped: names of the buses whose frames have the time of their arrival.
+
+    Attributes:
+        arrived_ns: arrival of the frame that ``frames`` has just handed out.
+        sent: frames that were sent since the tick began.
+    """
+
+    def __init__(self, stamped: Container[str]) -> None:
+        self.arrived_ns = 0
+        self.sent: list[Frame] = []
+        self._stamped = stamped
+        self._received: list[Timed] = []
+        self._others: list[Frame] = []
+        self._before_ns = 0
+
+    def begin(self, tick: Tick, before_ns: int) -> None:
+        """A tick begins; the one before it was at another time."""
+        self.sent, self._before_ns = [], before_ns
+        self._received, self._others = tick.received, tick.others
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits."""
+        waiting, self._received = self._received, []
+        for time_ns, frame in waiting:
+            # Without stamps a port knows only when it was read before.
+            self.arrived_ns = time_ns if frame.bus in self._stamped else self._before_ns
+            yield frame
+
+    def background(self) -> Iterator[Frame]:
+        """What is read after the valves have their frames."""
+        waiting, self._others = self._others, []
+        return iter(waiting)
+
+    def send(self, frame: Frame) -> bool:
+        """Keep what was sent."""
+        self.sent.append(frame)
+        return True
+
+
 class Stepper:
-    """A deployment driven by the ticks of a clock.
+    """A deployment driven by the ticks of a clock, through the I/O cycle of the daemon.
 
     Args:
         controller: a fresh one.
@@ -145,27 +189,20 @@ class Stepper:
     def __init__(self, controller: Controller) -> None:
         self._controller = controller
         buses = controller.deployment.config.buses
-        self._stamped = {name for name, bus in buses.items() if bus.interface == "socketcan"}
+        stamped = {name for name, bus in buses.items() if bus.interface == "socketcan"}
+        self._port = LogPort(stamped)
+        self._ports = dict.fromkeys(buses, self._port)
         self._standstill = Standstill(controller.deployment)
+        self._standstill.clock = lambda: 0  # nothing is ever late here
         self._guarded = Guarded(controller)
         self._rows = Rows(controller)
 
     def step(self, tick: Tick) -> Result:
         """One tick, as the daemon makes it."""
-        controller, guarded, now_ns = self._controller, self._guarded, tick.now_ns
-        sent = guarded.neutral_frames() if tick.number == 0 else []
-        before_ns = self._standstill.last_ns
-        if self._standstill.over(now_ns):
-            guarded.stalled()
-        self._standstill.last_ns = now_ns
-        for time_ns, frame in tick.received:
-            # Without stamps a port knows only when it was read before.
-            arrived_ns = min(time_ns if frame.bus in self._stamped else before_ns, now_ns)
-            if (passed := guarded.receive(frame, arrived_ns)) is not None:
-                sent.append(passed)
-        sent += guarded.tick(now_ns)
-        for frame in tick.others:
-            guarded.receive(frame, now_ns)
+        controller, port = self._controller, self._port
+        first = self._guarded.neutral_frames() if tick.number == 0 else []
+        port.begin(tick, self._standstill.last_ns)
+        io_cycle(self._guarded, self._ports, tick.now_ns, 0, self._standstill)
         events = [event.text for event in controller.events]
         controller.events.clear()
-        return Result(sent, self._rows(), events)
+        return Result(first + port.sent, self._rows(), events)
