@@ -3,7 +3,7 @@
 import errno
 import socket
 import struct
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import can
@@ -15,26 +15,6 @@ from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
-
-
-@pytest.fixture
-def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
-    made: list[Line] = []
-
-    def make(*arguments: Any, **options: Any) -> Line:
-        made.append(Line(*arguments, **options))
-        monkeypatch.setattr(raw, "time", made[-1])
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.end()
-
-
-@pytest.fixture
-def line(make_line: Callable[..., Line]) -> Line:
-    return make_line()
-
 
 # -- frames ----------------------------------------------------------------------------------------
 

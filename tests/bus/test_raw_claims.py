@@ -1,8 +1,7 @@
 """Claims of our own node of J1939 that come back to the socket of what is taken."""
 
 import errno
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 import can
 import pytest
@@ -11,21 +10,6 @@ from canshaper.bus import raw
 from canshaper.codec.frame import BusState, Frame
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, TAKEN, Line, message
-
-
-@pytest.fixture
-def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
-    made: list[Line] = []
-
-    def make(*arguments: Any, **options: Any) -> Line:
-        made.append(Line(*arguments, **options))
-        monkeypatch.setattr(raw, "time", made[-1])
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.end()
-
 
 CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
 NODE = BusRoutes(

@@ -1,8 +1,5 @@
 """The port on raw sockets when frames do not get onto the bus."""
 
-from collections.abc import Callable, Iterator
-from typing import Any
-
 import pytest
 
 from canshaper.bus import raw
@@ -24,25 +21,6 @@ from tests.bus.raw_line import (
 BUS_OFF, RESTARTED, CONTROLLER = 0x40, 0x100, 0x4
 RX_OVERFLOW, TX_OVERFLOW, TX_WARNING = 0x01, 0x02, 0x08
 RX_PASSIVE, TX_PASSIVE, ACTIVE = 0x10, 0x20, 0x40
-
-
-@pytest.fixture
-def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
-    made: list[Line] = []
-
-    def make(*arguments: Any, **options: Any) -> Line:
-        made.append(Line(*arguments, **options))
-        monkeypatch.setattr(raw, "time", made[-1])
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.end()
-
-
-@pytest.fixture
-def line(make_line: Callable[..., Line]) -> Line:
-    return make_line()
 
 
 # -- confirmations ---------------------------------------------------------------------------------

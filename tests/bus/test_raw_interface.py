@@ -2,12 +2,10 @@
 
 import errno
 import socket
-from collections.abc import Callable, Iterator
-from typing import Any
+from collections.abc import Callable
 
 import pytest
 
-from canshaper.bus import raw
 from canshaper.bus.raw import PROBE_NS, REOPEN_NS, RawPort
 from canshaper.codec.frame import BusState, FrameFault
 from canshaper.errors import WrongDeviceError
@@ -22,25 +20,6 @@ from tests.bus.raw_line import (
     Line,
     message,
 )
-
-
-@pytest.fixture
-def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
-    made: list[Line] = []
-
-    def make(*arguments: Any, **options: Any) -> Line:
-        made.append(Line(*arguments, **options))
-        monkeypatch.setattr(raw, "time", made[-1])
-        return made[-1]
-
-    yield make
-    for one in made:
-        one.end()
-
-
-@pytest.fixture
-def line(make_line: Callable[..., Line]) -> Line:
-    return make_line()
 
 
 def down(line: Line) -> None:

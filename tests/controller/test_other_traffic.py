@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Rig, last_fault
 
 TIP_ID = 0x401  # TipPosition of the shipped DBC: the shipped machine has no use for it
 MOTION = (
@@ -17,10 +17,6 @@ STATUS = "    status: { bus: crane, message: SlewStatus }\n"
 
 
 Make = Callable[..., Rig]
-
-
-def last_fault(rig: Rig) -> FrameFault:
-    return rig.controller.counters.last_fault
 
 
 # -- frames of others ------------------------------------------------------------------------------

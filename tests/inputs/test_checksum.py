@@ -9,7 +9,7 @@ from canshaper.checksums import CHECKSUMS
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.codec.checksum_reference import PLACES, with_checksum
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Rig, command, last_fault, velocity
 
 # timeout_ms of the shipped joysticks, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
@@ -18,18 +18,6 @@ RESET = ' SG_ Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n'
 
 
 Make = Callable[..., Rig]
-
-
-def command(rig: Rig) -> float:
-    return rig.controller.axes["slew"].axis.command
-
-
-def velocity(sent: dict[str, dict[str, Any]]) -> float:
-    return float(sent["SlewCommand"]["Velocity"])
-
-
-def last_fault(rig: Rig) -> FrameFault:
-    return rig.controller.counters.last_fault
 
 
 class Protected:

@@ -1,12 +1,11 @@
 """A stick with direction flags at the controller: what moves, and what a contradiction stops."""
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Rig, velocity
 
 Make = Callable[..., Rig]
 
@@ -47,10 +46,6 @@ def flagged(changed_rig: Make) -> Rig:
     rig.run(3, **CENTRE)
     assert rig.state() is State.READY
     return rig
-
-
-def velocity(sent: dict[str, dict[str, Any]]) -> float:
-    return float(sent["SlewCommand"]["Velocity"])
 
 
 def test_the_flags_tell_the_way(flagged: Rig) -> None:

@@ -1,22 +1,17 @@
 """A stick that stands still: in neutral for ever, deflected for ``stuck_s`` at most."""
 
 from collections.abc import Callable
-from typing import Any
 
 import pytest
 
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.shaping.states import Reason, State
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import Rig, velocity
 
 LEFT = "    alive_counter: AliveCounter\n  right:"
 
 
 Make = Callable[..., Rig]
-
-
-def velocity(sent: dict[str, dict[str, Any]]) -> float:
-    return float(sent["SlewCommand"]["Velocity"])
 
 
 def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make) -> None:

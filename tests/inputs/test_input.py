@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
-from tests.rigs.forwarder import SLOW_VALVE, Rig
+from tests.rigs.forwarder import SLOW_VALVE, Rig, command, last_fault, velocity
 
 # timeout_ms of the shipped joysticks, 100 ms: the last frame counts in so many ticks after its own.
 FRESH_TICKS = 5
@@ -15,18 +15,6 @@ LEFT = "    alive_counter: AliveCounter\n  right:"
 
 
 Make = Callable[..., Rig]
-
-
-def command(rig: Rig) -> float:
-    return rig.controller.axes["slew"].axis.command
-
-
-def velocity(sent: dict[str, dict[str, Any]]) -> float:
-    return float(sent["SlewCommand"]["Velocity"])
-
-
-def last_fault(rig: Rig) -> FrameFault:
-    return rig.controller.counters.last_fault
 
 
 def feed(rig: Rig, *frames: Frame) -> dict[str, dict[str, Any]]:

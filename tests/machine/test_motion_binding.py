@@ -74,7 +74,7 @@ def measured(**changes: str) -> str:
             ".slew: expected an axis with slewing, got 'near_far' without",
         ),
         (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
-        ("slew: slew, radius_m: 3", ": expected near_far beside a radius, got none"),
+        ("slew: slew, radius_m: 3", ": expected near_far with a radius, got none"),
         (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "found 0.4, allowed is 0.5 to 30 m"),
         (f"{FIXED}, max_pct: 51", ".max_pct: found 51, allowed is 1 to 50 % of full speed"),
         (f"{FIXED}, speed: 1", ".speed: unknown key; allowed are slew, near_far, radius"),

@@ -7,7 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.states import State
@@ -96,6 +96,20 @@ class Rig:
 
     def count(self, name: str) -> int:
         return self.controller.counters.values[name]
+
+
+def command(rig: Rig) -> float:
+    """What the operator commands of slew."""
+    return rig.controller.axes["slew"].axis.command
+
+
+def velocity(sent: dict[str, dict[str, Any]]) -> float:
+    """What the slew valve gets, in raw steps."""
+    return float(sent["SlewCommand"]["Velocity"])
+
+
+def last_fault(rig: Rig) -> FrameFault:
+    return rig.controller.counters.last_fault
 
 
 @pytest.fixture
