@@ -60,7 +60,7 @@ class Controller:
         machine: what ``load_machine`` gave.
 
     Examples:
-        Without a joystick every valve is told neutral, and the axes wait:
+        Without a joystick every valve gets neutral, and the axes wait:
 
         >>> from canshaper import Controller, load_machine
         >>> controller = Controller(load_machine("forwarder.yaml"))

@@ -41,7 +41,7 @@ class Problem:
 
     Attributes:
         file: its name.
-        line: in it; None where no line can be told.
+        line: in it; None where there is none.
         where: key, message or option.
         message: what was found and what is allowed.
     """
@@ -150,7 +150,7 @@ class MeasurementError(CanshaperError):
 
 
 class IdentificationError(MeasurementError, ValueError):
-    """Data from which no swing can be told; says why and what to do."""
+    """Data that show no swing; says why and what to do."""
 
 
 class CalibrationError(MeasurementError):

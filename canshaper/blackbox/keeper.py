@@ -204,5 +204,5 @@ class BlackBox:
 
 
 def _exit_status(number: int) -> int:
-    """As waitpid tells of a process that ended with this number."""
+    """The status that waitpid gives for a process that ended with this number."""
     return number << 8

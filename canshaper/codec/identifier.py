@@ -23,7 +23,7 @@ def has_destination(can_id: int) -> bool:
 
 
 def group_mask(can_id: int) -> int:
-    """Bits of an identifier that tell its group."""
+    """Bits of an identifier that give its group."""
     return _PAGES_AND_FORMAT if has_destination(can_id) else _GROUP_OF_PDU2
 
 

@@ -56,7 +56,7 @@ class RewrittenMessage(ValveMessage):
         return int.from_bytes(self._layout.encode(self.raw), "little") & self.ours_mask
 
     def onto(self, data: bytes) -> Frame:
-        """The next frame: this one of the joystick with our velocities, protected anew."""
+        """The next frame: this one of the joystick with our velocities, protected again."""
         ours = int.from_bytes(self._protector.without_check(self.raw), "little") & self._mask_of_all
         word = int.from_bytes(data, "little") & ~self._mask_of_all | ours
         protected = self._protector.add_check(word.to_bytes(self._length, "little"))

@@ -45,5 +45,5 @@ class Motion(Section):
         if self.radius and self.radius_m:
             raise ValueError("expected one of radius and radius_m, got both")
         if self.near_far is None and (self.radius or self.radius_m):
-            raise ValueError("expected near_far beside a radius, got none")
+            raise ValueError("expected near_far with a radius, got none")
         return self

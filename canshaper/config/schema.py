@@ -271,7 +271,7 @@ class DeploymentConfig(Section):
     gateway: Gateway | None = None
     """The two buses between which we stand, where the machine's own ECU moves the valves."""
     emergency_stop: EmergencyStop | None = None
-    """An emergency stop that is told on the bus."""
+    """An emergency stop that is reported on the bus."""
     load_state: LoadState | None = None
     """What hangs on the crane; it chooses in the gain schedules of the axes."""
     profile: ProfileSwitch | None = None

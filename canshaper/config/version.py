@@ -45,7 +45,7 @@ def moved_keys(source: Source) -> list[Problem]:
             problems.append(source.problem(place, f"moved to {name}"))
             source.rename(place, name)
     for place in [*source.places(["axes", "*", GONE])]:
-        text = f"moved to motion, beside axes: {{ slew: {place[1]}, near_far: ..., radius: ... }}"
+        text = f"moved to motion, next to axes: {{ slew: {place[1]}, near_far: ..., radius: ... }}"
         problems.append(source.problem(place, text))
         source.data["axes"][place[1]].pop(GONE)
     return problems

@@ -20,7 +20,7 @@ class MachineInputs:
     Attributes:
         joysticks: the joysticks by name.
         stop: the emergency stop, where there is one.
-        load_state: tells what hangs on the crane, where there is a signal for it.
+        load_state: says what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
         radii: measured radius of the tip, by the name of its two-axis motion.
         bound: all of them that receive frames, with their messages.

@@ -55,13 +55,13 @@ class MotionRunner:
         self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
         slewing = slew.bound.config.slewing
         assert slewing is not None  # checked with the deployment
-        self._slew = _Member(slew, slewing.full_speed_rad_s)
+        turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
-        self._members = [one for one in (self._slew, self._near_far) if one]
+        self._members = [one for one in (turning, self._near_far) if one]
         for member in self._members:
             member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
         self._motion = TwoAxisMotion(
-            self._slew.moving,
+            turning.moving,
             self._near_far.moving if self._near_far else None,
             config.max_path_m,
         )
@@ -72,7 +72,7 @@ class MotionRunner:
             self._near_far.moving.full_speed = _full_speed_m_s(self._near_far.runner)
 
     def step(self, now_ns: int, last: int, now: int) -> None:
-        """Tell both axes what to add in this tick.
+        """Give both axes what they add in this tick.
 
         Args:
             now_ns: monotonic time.

@@ -3,7 +3,7 @@
 from typing import Self
 
 # A late tick weighs five, a punctual one takes one away. Ten late ones soon after another, or more
-# than one in six for long, are an overrun; it ends when all is paid back, after 50 punctual ticks.
+# than one in six for long, are an overrun; it ends with the count at 0, after 50 punctual ticks.
 LATE_WEIGHT = 5
 LATE_LIMIT = 50
 
@@ -12,7 +12,7 @@ class OverrunDetector:
     """Counts late ticks against punctual ones.
 
     Attributes:
-        late: what is not paid back yet; with 0 a punctual tick changes nothing.
+        late: the count; with 0 a punctual tick changes nothing.
     """
 
     __slots__ = ("_overrun", "late")

@@ -23,7 +23,7 @@ class SetChooser:
     Args:
         bound: the axis.
         axis: its state machine, which is retuned.
-        load_state: tells what hangs on the crane, where there is a signal for it.
+        load_state: says what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
         codes: its codes by name.
 

@@ -45,7 +45,7 @@ class FramePort(Protocol):
         """Every frame that waits, in order."""
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valves have been told."""
+        """What can wait until the valves have their commands."""
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; whether the frame went out."""

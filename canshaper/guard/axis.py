@@ -127,7 +127,7 @@ class GuardedAxis(Asked):
 
         Args:
             data: the frame.
-            part: the bytes of it that tell the command.
+            part: the bytes of it with the command.
             now_ns: monotonic time.
             at: number of this deadline, and of this tick, which does not count those missed.
         """

@@ -85,7 +85,7 @@ class Input(ABC):
             raw: its raw values, by signal.
             commands: its velocities, or why there is none, by signal.
             arrived_ns: when it arrived.
-            accepted: whether it may be used. A switch may tell something without that.
+            accepted: whether it may be used. A switch may say something without that.
 
         Returns:
             What is wrong with its content.

@@ -11,7 +11,7 @@ from canshaper.machine.lookup import Lookup
 
 
 def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """Channels, devices, our node on J1939 and the nodes of CANopen are told from each other."""
+    """Channels, devices, our node on J1939 and the nodes of CANopen are distinct."""
     add = diagnostics.add
     channels: dict[tuple[str, str], str] = {}
     names: dict[J1939Name, str] = {}

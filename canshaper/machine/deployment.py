@@ -66,9 +66,9 @@ class Deployment:
     def inputs(self) -> list[BoundInput]:
         """Joysticks, switches, measured radii, feedback and status words of the valves."""
         axes = self.axes.values()
-        told = [i for axis in axes for i in (axis.feedback, axis.status_word)]
+        reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         radii = [motion.radius for motion in self.motions.values()]
-        others = (self.emergency_stop, self.load_state, self.profile, *told, *radii)
+        others = (self.emergency_stop, self.load_state, self.profile, *reports, *radii)
         return [*self.joysticks.values(), *(i for i in others if i)]
 
     def senders(self) -> list[Sender]:
@@ -84,9 +84,9 @@ class Deployment:
         with ours. A node of ours on J1939 stays where a status message needs its address, which it
         gives up to whoever has it.
         """
-        told = {s.sender.key[0] for s in self._statuses()}
+        reporting = {s.sender.key[0] for s in self._statuses()}
         buses = {
-            name: bus if name in told else bus.model_copy(update={"j1939": None})
+            name: bus if name in reporting else bus.model_copy(update={"j1939": None})
             for name, bus in self.config.buses.items()
         }
         axes = {n: replace(a, feedback=None, status_word=None) for n, a in self.axes.items()}

@@ -143,7 +143,7 @@ def bind_input(
         used.uses[value] = "signal"
     protection = bind_protection(used, config)
     most = protection.counts // 2
-    # Beyond half of its range a step back could not be told from a step forward.
+    # Beyond half of its range a step back would look like a step forward.
     if protection.counts and (config.alive_max_step or 0) > most:
         text = f"is {config.alive_max_step}, allowed is up to {most}: its counter has"
         used.add("alive_max_step", f"{text} {protection.counts} values")
@@ -195,7 +195,7 @@ def bind_switch(
 
 
 def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundFeedback | None:
-    """What a valve tells of itself."""
+    """What a valve reports of itself."""
     if (result := bind_input(lookup, BoundFeedback, place, config, value=config.signal)) is None:
         return None
     used, bound = result

@@ -87,7 +87,7 @@ class _Played:
         self._guarded, self._controller, self._buses = guarded, controller, buses
         self._adjuster = Adjuster(controller)
         self._rows = Rows(controller)
-        controller.events.clear()  # told before
+        controller.events.clear()  # the daemon has logged them
         self._records: list[Record] = []
         self._at = 0
         self._text = b""

@@ -70,7 +70,7 @@ def draw(replays: Sequence[Replayed], path: Path) -> None:
 def _draw_command(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw what the valve was told, over the stick as a filled step."""
+    """Draw the command of the valve, over the stick as a filled step."""
     panel.set_title(axis_title(name), loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
     if name in straight.axes:
         stick = straight.axes[name].stick

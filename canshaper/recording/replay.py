@@ -26,7 +26,7 @@ MOST_NAMED = 8
 
 @dataclass
 class Verdict:
-    """A replay of a black box beside what the daemon sent.
+    """A replay of a black box compared with what the daemon sent.
 
     Attributes:
         compared: frames that were compared.
@@ -104,7 +104,7 @@ class Replay:
         exact: whether every call of the daemon is played, and every frame compared.
         log: for what it has left out.
         received: frames of each message that is received.
-        verdict: beside a black box.
+        verdict: of a black box.
         cut_off: the log is cut off, and why; else empty.
     """
 

@@ -11,15 +11,15 @@ def range_with_added(
     """Range of the axis' own velocity and the added one together.
 
     Never against a joystick that is held, but as far as the own part may run on; never faster than
-    asked within the tail in that direction. In a direction in which nobody asked within the tail
-    and no joystick is held against, at most ``largest``.
+    commanded within the tail in that direction. In a direction that no one commanded within the
+    tail and no joystick is held against, at most ``largest``.
 
     Args:
         command: the operator's command now, [-1, 1].
         recent_low: smallest command within the tail, 0 or negative.
         recent_high: largest command within the tail, 0 or positive.
         target: the axis' own velocity before the rates.
-        largest: largest velocity that may be added where nobody asked.
+        largest: largest velocity that may be added where no one commanded.
 
     Returns:
         (low, high) with low <= 0 <= high and low <= target <= high.
@@ -38,7 +38,7 @@ def range_with_added(
 
 
 class AddedTime:
-    """How long an axis that nobody commands may be moved by what is added.
+    """How long an axis that no one commands may be moved by what is added.
 
     Args:
         ticks: longest time in motion, in ticks of the axis.
@@ -54,7 +54,7 @@ class AddedTime:
 
         Args:
             added: the velocity to add; with 0 the next motion begins.
-            commanded: the operator of this axis asked within the tail.
+            commanded: the operator commanded this axis within the tail.
             moved: the axis was moved in the last tick.
             ticks: for how many ticks that was.
         """

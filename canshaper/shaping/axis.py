@@ -25,7 +25,7 @@ from canshaper.shaping.transfer import BumplessTransfer
 # Missed ticks that are gone through one by one: after more of them nothing moves any more, and the
 # first neutral frame waits.
 MOST_HELD = 2000
-# Most that rounding may owe of an added velocity, full speed times ticks.
+# Largest quantisation error of an added velocity that is carried, full speed times ticks.
 MOST_CARRY = 0.1
 
 
@@ -78,7 +78,7 @@ class Axis:
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
         self._own = 0.0  # the same without what is added
         self._added = 0.0
-        self._carry = 0.0  # of an added velocity, left out by rounding
+        self._carry = 0.0  # quantisation error of an added velocity
 
     @property
     def state(self) -> State:
@@ -193,7 +193,7 @@ class Axis:
         self.sway = sway
 
     def allow_added(self, largest: float, time_s: float) -> None:
-        """Let a motion add velocity where nobody commands this axis.
+        """Let a motion add velocity where no one commands this axis.
 
         Args:
             largest: largest |velocity|, 0 to 1.
@@ -254,9 +254,9 @@ class Axis:
     def _drive_both(self, command: float, target: float) -> tuple[float, float, float]:
         """Limit the axis' own part and the added one together.
 
-        The added part is a path to be run, slow and with few steps of the grid: what rounding
-        leaves out is owed and paid while the axis moves anyway, never by a twitch: by one step of
-        the grid in a tick.
+        The added part is a path to be run, slow and with few steps of the grid: the quantisation
+        error is carried and made up for while the axis moves anyway, never by a twitch: by one step
+        of the grid in a tick.
 
         Returns:
             The range that both have (low, high), and what they are together before the rates.

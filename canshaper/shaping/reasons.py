@@ -90,7 +90,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "bus, joystick",
     ),
     Reason.STICK_ERROR: ReasonText(
-        "the joystick tells an error",
+        "the joystick reports an error",
         "the signal carries its error code",
         "joystick",
     ),
@@ -178,7 +178,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "release it; reset",
     ),
     Reason.EMERGENCY_STOP_LOST: ReasonText(
-        "emergency stop not heard",
+        "emergency stop silent",
         "no accepted message of the emergency stop within its `timeout_ms`. In motion "
         "latched; at rest the axis waits for it",
         "its sender, bus; reset",
@@ -194,7 +194,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "end it, or change address or NAME; reload",
     ),
     Reason.VALVE_FAULT: ReasonText(
-        "the valve tells a fault",
+        "the valve reports a fault",
         "a valve of CANopen in motion left its state active, sent an emergency, "
         "restarted, or was silent",
         "the valve, see [canopen.md](canopen.md); reset",

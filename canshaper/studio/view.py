@@ -121,7 +121,7 @@ class CraneView:
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Report when the daemon or the crane falls silent, and when it is heard again."""
+        """Report when the daemon or the crane falls silent, and when it is back."""
         if self.crane_there(now_s) is not self._crane_there:
             self._crane_there = not self._crane_there
             if not self._crane_there:

@@ -54,7 +54,7 @@ class ForwardedJoystick:
         Args:
             data: the frame.
             arrived_ns: when it arrived.
-            stopped: the emergency stop is pressed, or not heard.
+            stopped: the emergency stop is pressed, or missing.
         """
         self._passed_ns = arrived_ns
         stopped = stopped or self._joystick.released  # the axes trip with the next tick only
