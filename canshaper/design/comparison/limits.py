@@ -40,6 +40,7 @@ def limits_for(deployment: Deployment, axis: str, outcomes: Sequence[Outcome]) -
             range_pct=_RANGE_PCT,
             rate_per_s=rate,
             swing=sorted(swing.items()),
+            least_tap=0.0,  # a floor would be a bound of our own
         )
         curve.append((found.duration_s + lag_s, found.residual))
     return Limits(curve, time_optimal_s(mode, tick_s=tick_s, rate_per_s=rate) + lag_s)

@@ -3,11 +3,11 @@
 Taps h_k >= 0 with sum 1 keep the output within the range of the commands, so it is never clipped;
 taps below the valve's rate times the tick keep a press or a release within the rate. Among these
 the programme finds the one with the least worst residual |H(p)| over the range (``least_residual``)
-or the shortest one below a given residual (``shortest``). No shaper of this kind can beat the
-optimum: it is also the limit that others are measured against.
+or the shortest one below a given residual (``shortest``).
 
-Without a floor the taps stand in a few heaps, and a tap of the joystick moves the crane once for
-each heap. A least tap makes one movement of it, for a little more residual.
+Without a floor no shaper of this kind can beat the optimum: that is also the limit that others are
+measured against. But its taps stand in a few heaps, and a tap of the joystick moves the crane once
+for each heap. A least tap makes one movement of it, for a little more residual.
 """
 
 import math

@@ -13,6 +13,7 @@ from canshaper.design.comparison.limits import limits_for
 from canshaper.design.comparison.manoeuvres import RANDOM_SEEDS, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure, measure_all
 from canshaper.design.comparison.summary import beaten_by, recommendations, rows
+from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.pareto import Limits, Point, draw, figure
@@ -135,6 +136,13 @@ def test_limits_lie_below_what_was_measured(deployment: Deployment) -> None:
     zv = next(o for o in outcomes if o.candidate == "ZV" and o.length_pct == 0)
     assert zv.stop_s is not None
     assert zv.stop_s > limits.time_optimal_s
+    # A limit of every shaper has no floor of ours: the one with a floor leaves more. The lag of the
+    # valve is 0.15 s of the duration.
+    swing = sorted({o.length_pct: o.residual_deg for o in outcomes if o.candidate == "off"}.items())
+    task = {"tick_s": 0.02, "range_pct": 30.0, "rate_per_s": 5.0, "swing": swing}
+    mode = nominal_mode(deployment, "near_far")
+    floor = [least_residual(mode, duration_s=d - 0.15, **task).residual for d in durations[1:4]]
+    assert all(limit < 0.99 * one for limit, one in zip(left[1:4], floor, strict=True))
 
 
 def test_picture_has_every_name_once_in_each_panel(tmp_path: Path) -> None:
