@@ -35,8 +35,9 @@ def robust(
 ) -> None:
     """Design the shaper that leaves least swing over a range of pendulum lengths.
 
-    A non-negative impulse response within the valve's rate, by linear programming: no shaper of
-    this kind leaves less. Prints what it does and, without --write, the lines for the file.
+    A non-negative impulse response within the valve's rate, by linear programming, with a least tap
+    that makes one movement of a tap of the joystick. Prints what it does and, without --write, the
+    lines for the file.
 
     Examples:
 
