@@ -1,6 +1,7 @@
 """Operator, daemon and plant as processes on real SocketCAN."""
 
 import json
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -8,7 +9,21 @@ from pathlib import Path
 import can
 import pytest
 
-from tests.hil.machine import DBC, FILE, VALVES, candump, logged, message_name, service
+from tests.hil.machine import (
+    DBC,
+    FILE,
+    VALVES,
+    Service,
+    candump,
+    logged,
+    message_name,
+    open_bus,
+    service,
+    wait_for,
+)
+
+# What an emulated processor that is late makes the daemon say, rightly.
+LATE = re.compile(r"from=ACTIVE reason=(LOOP_\w+|\w*STICK_TIMEOUT|ENABLE_LOST)")
 
 
 def test_demo_on_vcan0_and_its_candump_log_decodes(tmp_path: Path) -> None:
@@ -65,9 +80,9 @@ def test_joystick_and_valves_on_different_buses(
         service(tmp_path / "run.log", "run", str(file), *ours) as daemon,
     ):
         daemon.wait_log("started file=")
-        script = ["--script", "pulse-near_far", *theirs]
-        with service(tmp_path / "operator.log", "operator", str(file), *script) as operator:
-            assert operator.process.wait() == 0, operator.text()
+        with open_bus(valve_far) as bus:  # a plant that comes late has not seen the press
+            wait_for(bus, "TipVelocity", lambda _: True)
+        operate(tmp_path / "operator.log", daemon, "--script", "pulse-near_far", *theirs)
         assert sim.process.poll() is None, sim.text()
         assert daemon.end() == 0, daemon.text()
     names_joy = {message_name(m) for m in logged(tmp_path / "joy.log")}
@@ -76,8 +91,20 @@ def test_joystick_and_valves_on_different_buses(
     assert names_joy == {"JoystickLeft", "JoystickRight"}
     assert names_valve >= VALVES | {"GrappleSway", "ShaperStatus"}
     assert not names_valve & names_joy
-    assert max(speed(m) for m in on_valves) == pytest.approx(1.0, abs=0.03)
+    assert max(speed(m) for m in on_valves) == pytest.approx(1.0, abs=0.03), daemon.text()
     assert "state=ACTIVE" in daemon.text()
+
+
+def operate(log: Path, daemon: Service, *script: str) -> None:
+    """Play the script to its end; again where this machine was late and the daemon said so."""
+    for _ in range(3):
+        before = len(daemon.text())
+        file = str(log.parent / "two.yaml")
+        with service(log, "operator", file, *script) as operator:
+            assert operator.process.wait() == 0, operator.text()
+        if not LATE.search(daemon.text()[before:]):
+            return
+    raise AssertionError(f"late three times:\n{daemon.text()}")
 
 
 def speed(message: can.Message) -> float:
