@@ -63,6 +63,9 @@ def adjusted(config: AxisConfig, values: Mapping[Key, float], file: AxisConfig) 
     stretch = KINDS[file.filter.kind].stretched
     if stretch and "sway" in parts and result.sway and file.sway:
         factor = result.sway.mode().period_s / file.sway.mode().period_s
+        design = file.filter.design()
+        if design and (fault := design.stretch_fault(factor)):
+            raise ValueError(f"filter.designed_for.second.period_s: {fault}")
         new = stretch(file.filter.parameters(), factor) if factor != 1.0 else {}
         result = result.model_copy(update={"filter": _with(file.filter, "filter", new)})
     return result

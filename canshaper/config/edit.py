@@ -22,9 +22,9 @@ from canshaper.config.runs import RUN
 from canshaper.config.source import MOST_BYTES, Place, Source
 from canshaper.errors import ConfigError, Problem
 
-Value = float | str | Sequence[float | str] | Mapping[str, float] | None
+Value = float | str | Sequence[float | str] | Mapping[str, Any] | None
 """A value to write: a number, a plain word, a list of numbers and of runs of them (``39 x 0``), or
-numbers by their keys; None takes the key away."""
+such values by their keys; None takes the key away."""
 
 
 def set_values(path: Path, place: Place, values: Mapping[str, Value]) -> None:

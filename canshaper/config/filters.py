@@ -22,6 +22,16 @@ _LENGTH_PCT = 5.0
 _DAMPING = 0.03
 
 
+class SecondMode(Section):
+    """A second mode that a filter was designed for, such as that of long logs."""
+
+    period_s: Annotated[float, number(0.15, 12, "s", "time of one full swing")]
+    damping_ratio: Annotated[float, number(0, 0.95, "", "damping ratio")]
+    length_range_pct: Annotated[
+        float, number(0, 60, "%", "error of the pendulum length that it covers, +-")
+    ]
+
+
 class DesignedFor(Section):
     """What a filter was designed for; written with it, and held against what the file says now."""
 
@@ -31,22 +41,27 @@ class DesignedFor(Section):
         Annotated[float, number(0, 60, "%", "error of the pendulum length that it covers, +-")]
         | None
     ) = None
-    duration_s: Annotated[float, number(0, 60, "s", "length of its impulse response")] | None = None
+    duration_s: (
+        Annotated[float, number(0, 60, "s", "length of its response, which the tail has to let be")]
+        | None
+    ) = None
+    second: SecondMode | None = Field(None, description="second mode that it covers")
     valve_rate_per_s: (
         Annotated[float, number(0, 100, "full speeds per s", "rate of the valve that it keeps to")]
         | None
     ) = None
 
-    def faults(self, mode: SwayMode, valve_rate_per_s: float) -> Iterator[tuple[str, str]]:
+    def faults(
+        self, mode: SwayMode, valve_rate_per_s: float, tail_s: float
+    ) -> Iterator[tuple[str, str]]:
         """Keys of what does not fit, and why.
 
         Args:
             mode: sway mode of the axis.
             valve_rate_per_s: rate of its valve, full speeds per second.
+            tail_s: how long its limits let the output run on.
         """
-        # The period grows with the root of the length.
-        share = max(self.length_range_pct or 0.0, _LENGTH_PCT) / 100.0
-        low, high = (self.period_s * math.sqrt(1.0 + sign * share) for sign in (-1, 1))
+        low, high = _periods(self.period_s, self.length_range_pct or 0.0)
         if not low <= mode.period_s <= high:
             yield (
                 "period_s",
@@ -62,6 +77,30 @@ class DesignedFor(Section):
                 f"expected a valve of {rate:g} full speeds per s or more, got {valve_rate_per_s:g}"
             )
             yield "valve_rate_per_s", text
+        if tail_s < (self.duration_s or 0.0):
+            text = f"expected limits.tail_s of {self.duration_s:g} s or more, got {tail_s:g} s"
+            yield "duration_s", text
+
+    def stretch_fault(self, factor: float) -> str | None:
+        """Why its response cannot be drawn out in time by a factor, or None.
+
+        The second mode stays where it is, and has to stay within the range that is covered.
+        """
+        if self.second is None:
+            return None
+        low, high = _periods(self.second.period_s * factor, self.second.length_range_pct)
+        if low <= self.second.period_s <= high:
+            return None
+        return (
+            f"expected {low:.2f} to {high:.2f} s for the second mode that the filter would cover"
+            f" then, got {self.second.period_s:g} s; design it again"
+        )
+
+
+def _periods(period_s: float, length_range_pct: float) -> tuple[float, float]:
+    """Shortest and longest period of a range of lengths: it grows with the root of the length."""
+    share = max(length_range_pct, _LENGTH_PCT) / 100.0
+    return period_s * math.sqrt(1.0 - share), period_s * math.sqrt(1.0 + share)
 
 
 class FilterSection(Section):

@@ -62,7 +62,7 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
             design = chosen.design()
             if design and sway:
                 rate = axis.limits.slowest_per_s
-                for key, fault in design.faults(sway.mode(), rate):
+                for key, fault in design.faults(sway.mode(), rate, axis.limits.tail_s):
                     again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
                     yield (*place, "designed_for", key), f"{fault}; {again}"
 

@@ -5,7 +5,8 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import FILE, echo, loader, refuse_shipped
-from canshaper.errors import UsageError
+from canshaper.cli.filter_file import write_filter
+from canshaper.errors import DesignError, UsageError
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -13,6 +14,7 @@ if TYPE_CHECKING:
 
     from canshaper.config.filters import Filter
     from canshaper.design.tuning.evaluate import Evaluation
+    from canshaper.design.tuning.modes import SecondMode
     from canshaper.design.tuning.robust import RobustShaper
     from canshaper.machine.deployment import Deployment
     from canshaper.shaping.sway import SwayMode
@@ -31,13 +33,22 @@ def robust(
     residual_pct: float | None = typer.Option(
         None, "--residual", help="Instead: the shortest that leaves at most this % of the swing."
     ),
-    write: bool = typer.Option(False, "--write", help="Write the filter into the file."),
+    second: str | None = typer.Option(
+        None,
+        "--second",
+        metavar="PERIOD,DAMPING,RANGE",
+        help="A second mode too: s, damping ratio, +- % of its length.",
+    ),
+    write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
 ) -> None:
     """Design the shaper that leaves least swing over a range of pendulum lengths.
 
     A non-negative impulse response within the valve's rate, by linear programming, with a least tap
     that makes one movement of a tap of the joystick. Prints what it does and, without --write, the
     lines for the file.
+
+    With --second it leaves a second mode in peace too, such as that of grapple and rotator with
+    long logs, and prints what that costs and gains.
 
     Examples:
 
@@ -46,12 +57,13 @@ def robust(
       canshaper robust config/forwarder.yaml --axis slew --range 30 --duration 2.4 --write
 
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
+
+      canshaper robust config/forwarder.yaml --axis near_far --second 0.6,0.1,20
     """
-    from canshaper.config.edit import Value, flow, set_values
+    from canshaper.config.edit import flow
     from canshaper.config.filters import filter_of
     from canshaper.design.swinging import swinging_axis
     from canshaper.design.tuning.evaluate import Machine, evaluate
-    from canshaper.design.tuning.robust import least_residual, shortest
     from canshaper.report.console import SafeConsole
     from canshaper.shaping.registry import build_shaper
 
@@ -65,13 +77,11 @@ def robust(
     tick_s = tick_ms / 1000.0
     if residual_pct is not None and duration_s is not None:
         raise UsageError("found both, allowed is one of --duration and --residual")
+    asked: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
+    two = _second(second, mode, tick_s, rate)
     try:
-        asked: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
-        if residual_pct is None:
-            seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
-            found = least_residual(mode, duration_s=seconds, **asked)
-        else:
-            found = shortest(mode, residual_pct=residual_pct, **asked)
+        without = _designed(mode, None, duration_s, residual_pct, asked)
+        found = _designed(mode, two, duration_s, residual_pct, asked) if two else without
         taps = [round(tap, _DIGITS) for tap in found.taps]
         measured = evaluate(
             mode,
@@ -79,12 +89,6 @@ def robust(
             lambda model: build_shaper("robust", tick_s, model, valve_rate_per_s=rate, taps=taps),
             Machine.of(bound),
         )
-        section = _section(found, mode, range_pct, rate, tick_ms)
-        if write:
-            gone = bound.config.filter.model_dump(exclude_none=True).keys()
-            values: dict[str, Value] = dict.fromkeys(gone)
-            values |= section
-            set_values(deployment.path, ("axes", axis, "filter"), values)
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
     console.print(
@@ -93,38 +97,86 @@ def robust(
         f" lengths within ±{range_pct:g} %."
     )
     console.print(_table(measured))
-    chosen = filter_of("robust", tick_ms=tick_ms, taps=taps)
-    _print_stop(deployment, axis, chosen, found.duration_s, console)
+    if two:
+        console.print(_second_table(without, found, two, tick_s))
+    section = _section(found, mode, asked, tick_ms, two)
+    chosen = filter_of("robust", **{k: v for k, v in section.items() if k != "kind"})
+    needed_s = _print_stop(deployment, axis, chosen, found.duration_s, console)
     if write:
-        console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+        gone = dict.fromkeys(bound.config.filter.model_dump(exclude_none=True))
+        echo("\n".join(write_filter(deployment, axis, gone | section, needed_s)))
     else:
         echo(f"filter: {flow(section)}")
 
 
+def _second(
+    text: str | None, first: "SwayMode", tick_s: float, rate_per_s: float
+) -> "SecondMode | None":
+    """What --second asks for."""
+    from canshaper.design.tuning.modes import second_mode
+
+    if text is None:
+        return None
+    try:
+        period_s, damping_ratio, range_pct = (float(word) for word in text.split(","))
+    except ValueError:
+        wanted = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20"
+        raise UsageError(f"--second: expected {wanted}, got {text!r}") from None
+    try:
+        values = (period_s, damping_ratio, range_pct)
+        return second_mode(first, *values, tick_s=tick_s, rate_per_s=rate_per_s)
+    except DesignError as error:
+        raise UsageError(f"--second: {error}") from None
+
+
+def _designed(
+    mode: "SwayMode",
+    second: "SecondMode | None",
+    duration_s: float | None,
+    residual_pct: float | None,
+    asked: dict[str, Any],
+) -> "RobustShaper":
+    from canshaper.design.tuning.robust import least_residual, shortest
+
+    if residual_pct is not None:
+        return shortest(mode, residual_pct=residual_pct, second=second, **asked)
+    tick_s = asked["tick_s"]
+    seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
+    return least_residual(mode, duration_s=seconds, second=second, **asked)
+
+
 def _section(
-    found: "RobustShaper", mode: "SwayMode", range_pct: float, rate_per_s: float, tick_ms: int
+    found: "RobustShaper",
+    mode: "SwayMode",
+    asked: dict[str, Any],
+    tick_ms: int,
+    second: "SecondMode | None",
 ) -> dict[str, Any]:
     """The filter section of the file."""
     from canshaper.config.filters import designed
     from canshaper.config.runs import shortened
 
+    designed_for: dict[str, Any] = {
+        **designed(mode),
+        "length_range_pct": asked["range_pct"],
+        "duration_s": round(found.duration_s, 4),
+        "valve_rate_per_s": asked["rate_per_s"],
+    }
+    if second:
+        covers = {"length_range_pct": second.range_pct}
+        designed_for["second"] = {**designed(second.mode), **covers}
     return {
         "kind": "robust",
         "tick_ms": tick_ms,
         "taps": shortened([round(tap, _DIGITS) for tap in found.taps]),
-        "designed_for": {
-            **designed(mode),
-            "length_range_pct": range_pct,
-            "duration_s": round(found.duration_s, 4),
-            "valve_rate_per_s": rate_per_s,
-        },
+        "designed_for": designed_for,
     }
 
 
 def _print_stop(
     deployment: "Deployment", axis: str, chosen: "Filter", duration_s: float, console: "Console"
-) -> None:
-    """Say what tail the filter needs, and how far the tip travels."""
+) -> float | None:
+    """Say how far the tip travels, and what tail the filter needs: that, where it is longer."""
     from canshaper.commissioning.stopping import consequences
 
     tail_s = deployment.axes[axis].config.limits.tail_s
@@ -135,6 +187,22 @@ def _print_stop(
             f" tail_s: {needed_s:.1f}"
         )
     console.print(consequences(deployment, axis, chosen, needed_s))
+    return needed_s
+
+
+def _second_table(
+    without: "RobustShaper", found: "RobustShaper", second: "SecondMode", tick_s: float
+) -> "Table":
+    """What a second mode costs and gains."""
+    from canshaper.design.tuning.modes import second_residual
+    from canshaper.report.console import new_table
+
+    table = new_table("", "run-on, s", "mean delay, s", "first mode, %", "second mode, %")
+    for name, one in (("without --second", without), ("with it", found)):
+        left = second_residual(one.taps, second, tick_s)
+        numbers = (f"{one.duration_s:.2f}", f"{one.mean_delay_s:.2f}")
+        table.add_row(name, *numbers, f"{100.0 * one.residual:.1f}", f"{100.0 * left:.1f}")
+    return table
 
 
 def _table(measured: "Evaluation") -> "Table":

@@ -8,6 +8,8 @@ or the shortest one below a given residual (``shortest``).
 Without a floor no shaper of this kind can beat the optimum: that is also the limit that others are
 measured against. But its taps stand in a few heaps, and a tap of the joystick moves the crane once
 for each heap. A least tap makes one movement of it, for a little more residual.
+
+A second mode (grapple and rotator with long logs) adds rows.
 """
 
 import math
@@ -18,6 +20,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linprog
 
+from canshaper.design.tuning.modes import (
+    FINE,
+    LENGTHS,
+    MOST_RANGE_PCT,
+    Responses,
+    SecondMode,
+    responses_of,
+    second_residual,
+    second_responses,
+)
 from canshaper.errors import DesignError
 from canshaper.shaping.sway import SwayMode
 
@@ -25,8 +37,9 @@ from canshaper.shaping.sway import SwayMode
 _SIDES = 40
 # Least tap, as a part of the mean one: from about here on a tap of the joystick is one movement.
 LEAST_TAP = 0.3
-# Lengths at which the residual is bounded; between them it rises by far less than a percent of it.
-_LENGTHS = 25
+# That of a second mode comes on top, whatever the length of the first: at twice its weight the
+# first one pays a percent, at five times 1.5 and more.
+_SECOND_COUNTS = 2.0
 
 
 @dataclass(frozen=True)
@@ -36,20 +49,16 @@ class RobustShaper:
     Attributes:
         taps: impulse response at the tick, sum 1.
         residual: largest |H(p)| over the range of lengths, fraction of the unshaped swing.
+        second_residual: that of the second mode; 0 without one.
         duration_s: from the first to the last tap.
         mean_delay_s: centre of the taps: how far the crane lags behind the stick.
     """
 
     taps: tuple[float, ...]
     residual: float
+    second_residual: float
     duration_s: float
     mean_delay_s: float
-
-
-def modes_over_range(mode: SwayMode, range_pct: float, count: int = _LENGTHS) -> list[SwayMode]:
-    """Modes for pendulum lengths of -range ... +range percent, with the damping ratio kept."""
-    lengths = np.linspace(1.0 - range_pct / 100.0, 1.0 + range_pct / 100.0, count)
-    return [SwayMode(mode.omega_rad_s / math.sqrt(x), mode.damping_ratio) for x in lengths]
 
 
 def least_residual(
@@ -61,6 +70,7 @@ def least_residual(
     rate_per_s: float,
     swing: Sequence[tuple[float, float]] = ((0.0, 1.0),),
     least_tap: float = LEAST_TAP,
+    second: SecondMode | None = None,
 ) -> RobustShaper:
     """Least worst residual over the range that taps within the duration and the rate can give.
 
@@ -73,6 +83,7 @@ def least_residual(
         swing: unshaped swing as (length error in percent, swing), rising in the error, linear
             between; by default the same at every length. The residual then is in its unit.
         least_tap: least tap, as a part of the mean one, 0 to 1.
+        second: second mode, whose residual counts twice.
 
     Raises:
         DesignError: a value is out of range, or the rate cannot reach full speed in the duration.
@@ -84,7 +95,12 @@ def least_residual(
             f"duration is {duration_s:g} s, allowed is {1.0 / rate_per_s:g} s or more:"
             f" the valve takes that long to full speed at {rate_per_s:g} /s"
         )
-    rows = _residual_rows(mode, tick_s, count, range_pct, swing)
+    weights = _weights(swing, range_pct, LENGTHS)
+    rows = _disc_rows(responses_of(mode, range_pct, tick_s, count), weights)
+    if second is not None:
+        rows = np.vstack(
+            [rows, _disc_rows(second_responses(second, tick_s, count), _SECOND_COUNTS)]
+        )
     # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
     delay = np.arange(count) * tick_s
     objective = np.append(1e-6 * delay, 1.0)
@@ -101,11 +117,26 @@ def least_residual(
     if not solution.success:
         raise DesignError(f"no impulse response found: {solution.message}")
     taps = np.clip(solution.x[:count], 0.0, None)
-    return _shaper(taps, mode, tick_s, range_pct, swing)
+    taps /= taps.sum()
+    left = np.abs(responses_of(mode, range_pct, tick_s, count, FINE) @ taps)
+    used = np.flatnonzero(taps > 1e-9)
+    return RobustShaper(
+        tuple(float(t) for t in taps[: used[-1] + 1]),
+        float(np.max(left * _weights(swing, range_pct, FINE))),
+        second_residual(taps, second, tick_s) if second else 0.0,
+        float((used[-1] - used[0]) * tick_s),
+        float(np.sum(np.arange(count) * taps) * tick_s),
+    )
 
 
 def shortest(
-    mode: SwayMode, *, tick_s: float, residual_pct: float, range_pct: float, rate_per_s: float
+    mode: SwayMode,
+    *,
+    tick_s: float,
+    residual_pct: float,
+    range_pct: float,
+    rate_per_s: float,
+    second: SecondMode | None = None,
 ) -> RobustShaper:
     """Shortest impulse response with at most this residual over the range (bisection).
 
@@ -124,18 +155,22 @@ def shortest(
             duration_s=ticks * tick_s,
             range_pct=range_pct,
             rate_per_s=rate_per_s,
+            second=second,
         )
 
+    def left_pct(found: RobustShaper) -> float:
+        return 100.0 * max(found.residual, found.second_residual)
+
     best = design(high)
-    if best.residual > residual_pct / 100.0:
+    if left_pct(best) > residual_pct:
         raise DesignError(
-            f"residual is {residual_pct:g} %, allowed is {100.0 * best.residual:.2g} % or more"
+            f"residual is {residual_pct:g} %, allowed is {left_pct(best):.2g} % or more"
             f" for +-{range_pct:g} % length with a valve rate of {rate_per_s:g} /s"
         )
     while low < high:
         middle = (low + high) // 2
         found = design(middle)
-        if found.residual <= residual_pct / 100.0:
+        if left_pct(found) <= residual_pct:
             high, best = middle, found
         else:
             low = middle + 1
@@ -187,42 +222,21 @@ def _weights(swing: Swing, range_pct: float, count: int) -> NDArray[np.float64]:
     return weights
 
 
-def _residual_rows(
-    mode: SwayMode, tick_s: float, count: int, range_pct: float, swing: Swing
+def _disc_rows(
+    responses: Responses, weights: float | NDArray[np.float64] = 1.0
 ) -> NDArray[np.float64]:
     """Rows whose product with the taps is Re(H e^(-i phi)) for every length and direction."""
-    k = np.arange(count)
     turns = np.exp(-2j * np.pi * np.arange(_SIDES) / _SIDES)
-    rows = []
-    weights = _weights(swing, range_pct, _LENGTHS)
-    for one, weight in zip(modes_over_range(mode, range_pct), weights, strict=True):
-        response = weight * np.exp(-one.pole * tick_s * k)
-        rows.append((turns[:, None] * response[None, :]).real)
-    return np.vstack(rows)
-
-
-def _shaper(
-    taps: NDArray[np.float64], mode: SwayMode, tick_s: float, range_pct: float, swing: Swing
-) -> RobustShaper:
-    taps = taps / taps.sum()
-    k = np.arange(len(taps))
-    fine = modes_over_range(mode, range_pct, 4 * _LENGTHS + 1)
-    weights = _weights(swing, range_pct, len(fine))
-    left = [abs(np.sum(taps * np.exp(-m.pole * tick_s * k))) for m in fine]
-    used = np.flatnonzero(taps > 1e-9)
-    return RobustShaper(
-        tuple(float(t) for t in taps[: used[-1] + 1]),
-        float(np.max(np.array(left) * weights)),
-        float((used[-1] - used[0]) * tick_s),
-        float(np.sum(k * taps) * tick_s),
-    )
+    weighted = responses * np.reshape(weights, (-1, 1))
+    rows: NDArray[np.float64] = (turns[None, :, None] * weighted[:, None, :]).real
+    return rows.reshape(-1, responses.shape[1])
 
 
 def _check(tick_s: float, duration_s: float, range_pct: float, rate_per_s: float) -> None:
     for name, value, low, high, unit in (
         ("tick", tick_s, 1e-3, 0.2, "s"),
         ("duration", duration_s, 0.02, 60.0, "s"),
-        ("range of length", range_pct, 0.0, 60.0, "%"),
+        ("range of length", range_pct, 0.0, MOST_RANGE_PCT, "%"),
         ("valve rate", rate_per_s, 0.2, 1000.0, "1/s"),
     ):
         if not low <= value <= high:

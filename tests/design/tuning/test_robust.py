@@ -3,10 +3,10 @@ import math
 import numpy as np
 import pytest
 
+from canshaper.design.tuning.modes import modes_over_range
 from canshaper.design.tuning.robust import (
     LEAST_TAP,
     least_residual,
-    modes_over_range,
     shortest,
     time_optimal_s,
 )
