@@ -229,7 +229,8 @@ class Controller:
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
                 codes = profile.codes if profile else {}
                 runner.add_chooser(inputs.load_state, inputs.profile, codes)
-        for name, motion in self.deployment.config.motion.items():
+        for name, bound in self.deployment.motions.items():
+            motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None
             slew, radius = self.axes[motion.slew], inputs.radii.get(name)
             self.motions.append(MotionRunner(motion, slew, near_far, radius, tick_s))

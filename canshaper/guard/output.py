@@ -112,7 +112,7 @@ def _valves(
         joystick = joysticks[bound.config.command.joystick]
         axes[name] = GuardedAxis(deployment, bound, joystick, stop)
         by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
-    for motion in deployment.config.motion.values():
+    for motion in (bound.config for bound in deployment.motions.values()):
         if motion.near_far is not None:
             slew, near_far = axes[motion.slew], axes[motion.near_far]
             slew.moves_with(near_far, motion.max_pct / 100.0)

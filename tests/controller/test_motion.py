@@ -2,10 +2,12 @@
 
 import math
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
@@ -401,3 +403,9 @@ def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:
     rig.run(60, Slew=1000)
     assert runner.axis is other
     assert other.state is State.READY
+
+
+def test_the_controller_has_the_motions_that_are_bound(changed_rig: Make) -> None:
+    deployment = moving_as_one(changed_rig).controller.deployment
+    assert len(Controller(deployment).motions) == 1
+    assert Controller(replace(deployment, motions={})).motions == []
