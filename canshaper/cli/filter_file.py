@@ -19,10 +19,10 @@ def write_filter(
         deployment: the machine, as its file says.
         axis: the axis.
         filter_values: keys of its section filter; see ``set_values``.
-        tail_s: tail that the filter needs; None where that of the file is long enough.
+        tail_s: tail that the filter needs; None or less than that of the file changes nothing.
 
     Returns:
-        What to print: the lines that have changed, and why the tail has not.
+        Lines that have changed, and why the tail has not.
 
     Raises:
         ConfigError: the file cannot be changed.
@@ -34,7 +34,7 @@ def write_filter(
     before = path.read_text(encoding="utf-8")
     set_values(path, ("axes", axis, "filter"), filter_values)
     kept = None
-    if tail_s is not None:
+    if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})
         kept = stop_fault(deployment, axis, config.model_copy(update={"limits": limits}))
         if not kept:
@@ -43,8 +43,12 @@ def write_filter(
     if kept:
         text = f"expected {tail_s:g} s, got {config.limits.tail_s:g} s, which stays"
         lines.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")
-    lines.append(f"Written to {path}; a running daemon takes it with SIGHUP.")
     return lines
+
+
+def written_line(path: Path) -> str:
+    """What to do next."""
+    return f"Written to {path}; a running daemon takes it with SIGHUP."
 
 
 def _write_tail(path: Path, axis: str, tail_s: float, *, section: bool) -> None:

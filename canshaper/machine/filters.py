@@ -64,7 +64,8 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
                 rate = axis.limits.slowest_per_s
                 for key, fault in design.faults(sway.mode(), rate, axis.limits.tail_s):
                     again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
-                    yield (*place, "designed_for", key), f"{fault}; {again}"
+                    cure = "lengthen it" if key == "duration_s" else again
+                    yield (*place, "designed_for", key), f"{fault}; {cure}"
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:

@@ -31,7 +31,8 @@ def check(file: str = FILE) -> None:
     signal. A bus that is loaded above 50 % at its bit rate
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
-    not start; and a filter that was designed for another swing or valve than the file has now.
+    not start; and a filter that was designed for another swing, valve or tail than the file has
+    now.
 
     Examples:
 

@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import FILE, echo, loader, refuse_shipped
-from canshaper.cli.filter_file import write_filter
+from canshaper.cli.filter_file import write_filter, written_line
 from canshaper.errors import DesignError, UsageError
 
 if TYPE_CHECKING:
@@ -105,6 +105,7 @@ def robust(
     if write:
         gone = dict.fromkeys(bound.config.filter.model_dump(exclude_none=True))
         echo("\n".join(write_filter(deployment, axis, gone | section, needed_s)))
+        echo(written_line(deployment.path))
     else:
         echo(f"filter: {flow(section)}")
 

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import typer
 
 from canshaper.cli.common import FILE, echo, loader, picture, picture_line, refuse_shipped
+from canshaper.cli.filter_file import write_filter, written_line
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
@@ -63,7 +64,7 @@ def tune(
     ),
     starts: int = typer.Option(3, "--starts", help="Starts of the solver."),
     out: Path = typer.Option(Path("out/tune"), "--out", help="Directory for the picture."),
-    write: bool = typer.Option(False, "--write", help="Write the result into the file."),
+    write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
 ) -> None:
     """Find the best poles of an axis' G_FF, show what they do, write them on request.
@@ -195,13 +196,13 @@ def _report(
     if bound.config.filter.kind == "gff":
         parameters = bound.config.filter.parameters()
         before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
-    tail = deploy.tail_needed(found, task.mode, task.tick_s, machine)
+    best_tail = deploy.tail_for(found, task.mode, task.tick_s, machine)
+    tail = best_tail if best_tail and best_tail[0] > bound.config.limits.tail_s else None
     sentence = deploy.recommendation(bound.name, found, tail)
     drawn = picture(
         out / f"{bound.name}.png", lambda path: _draw(path, bound, task, found, before, machine)
     )
-    if write:
-        _write(deployment.path, bound, task, found)
+    changed = _write(deployment, bound, task, found, best_tail) if write else []
     if as_json:
         result = deploy.as_dict(tuning, found) | {
             "axis": bound.name,
@@ -210,6 +211,7 @@ def _report(
             "tail_needed_s": tail[0] if tail else None,
             "picture": str(drawn) if drawn else None,
             "written": str(deployment.path) if write else None,
+            "changed": changed,
         }
         echo(json.dumps(result, indent=2))
         return
@@ -221,7 +223,7 @@ def _report(
     console.print(stop)
     console.print(picture_line(drawn))
     if write:
-        console.print(f"Written to {deployment.path}; a running daemon takes it with SIGHUP.")
+        echo("\n".join([*changed, written_line(deployment.path)]))
 
 
 def _draw(
@@ -248,17 +250,26 @@ def _draw(
     )
 
 
-def _write(path: Path, bound: "BoundAxis", task: "Task", found: "Setting") -> None:
-    from canshaper.config.edit import Value, set_values
+def _write(
+    deployment: "Deployment",
+    bound: "BoundAxis",
+    task: "Task",
+    found: "Setting",
+    tail: tuple[float, float] | None,
+) -> list[str]:
+    from canshaper.config.edit import Value
     from canshaper.config.filters import designed
 
     designed_for = designed(task.mode)
     if task.length_range_pct is not None:
         designed_for["length_range_pct"] = task.length_range_pct
+    tail_s = tail[0] if tail else None
+    if tail_s is not None:
+        designed_for["duration_s"] = tail_s
     if task.require.max_rate_per_s is not None:
         designed_for["valve_rate_per_s"] = task.require.max_rate_per_s
     values: dict[str, Value] = {**found.values(), "designed_for": designed_for}
     if bound.config.filter.kind != "gff":
         gone = bound.config.filter.model_dump(exclude_none=True).keys()
         values = {"kind": "gff", **dict.fromkeys(gone - {"kind"}), **values}
-    set_values(path, ("axes", bound.name, "filter"), values)
+    return write_filter(deployment, bound.name, values, tail_s)

@@ -93,24 +93,22 @@ def from_parameters(
     return setting(a1=a1, a2=a2, third_pole_rad_s=third, mode=mode, tick_s=tick_s, machine=machine)
 
 
-def tail_needed(
+def tail_for(
     found: Setting, mode: SwayMode, tick_s: float, machine: Machine
 ) -> tuple[float, float] | None:
-    """Shortest ``tail_s`` that no longer adds to the residual sway, and the residual it leaves.
+    """Shortest ``tail_s`` from which on none adds to the residual sway, and what it leaves.
 
-    None where the tail of the deployment is fine.
+    None where not even the longest tail that a file may have is enough.
     """
     shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
     best = _left(mode, tick_s, shaper, machine, _LONGEST_TAIL_S)
-    if found.measures.worst(0.0) - best < _TAIL_MATTERS:
-        return None
-    tail_s = machine.limits.tail_s
-    while tail_s < _LONGEST_TAIL_S:
-        tail_s = round(tail_s + 0.1, 1)
-        left = _left(mode, tick_s, shaper, machine, tail_s)
-        if left - best < _TAIL_MATTERS:
-            return tail_s, left
-    return None
+    result = None
+    for tenths in range(round(10.0 * _LONGEST_TAIL_S) - 1, -1, -1):
+        left = _left(mode, tick_s, shaper, machine, tenths / 10.0)
+        if left - best >= _TAIL_MATTERS:
+            break
+        result = tenths / 10.0, left
+    return result
 
 
 def recommendation(axis: str, found: Setting, tail: tuple[float, float] | None) -> str:

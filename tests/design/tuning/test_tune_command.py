@@ -20,7 +20,11 @@ from canshaper.shaping.sway import SwayMode
 
 ROOT = Path(__file__).resolve().parents[3]
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
-DESIGNED = "designed_for: { period_s: 2.356, damping_ratio: 0.038, valve_rate_per_s: 5.0 }"
+DESIGNED = (
+    "designed_for: { period_s: 2.356, damping_ratio: 0.038, duration_s: 2.8,"
+    " valve_rate_per_s: 5.0 }"
+)
+ROOM = ("stop_distance_m: 2.2 }", "stop_distance_m: 2.8 }")
 
 
 @pytest.fixture
@@ -91,6 +95,69 @@ def test_write_and_write_back(file: Path) -> None:
         "a1: 0.708, a2: 0.12 }\n", f"a1: {found['a1']}, a2: {found['a2']}, {DESIGNED} }}\n"
     )
     assert file.read_text() == expected
+
+
+def test_the_tail_is_written_where_the_stopping_distance_allows_it(file: Path) -> None:
+    file.write_text(file.read_text().replace(*ROOM))
+    before = file.read_text().splitlines()
+    result = run(file, "--axis", "near_far", "--write")
+    assert result.exit_code == 0, result.output
+    after = file.read_text().splitlines()
+    changed = [pair for pair in zip(before, after, strict=True) if pair[0] != pair[1]]
+    assert len(changed) == 2
+    assert changed[1][1] == changed[1][0].replace("tail_s: 2.0", "tail_s: 2.6")
+    diff = [line for line in result.output.splitlines() if line[:5] in ("-    ", "+    ")]
+    assert sorted(diff) == sorted(
+        s + one for pair in changed for s, one in zip("-+", pair, strict=True)
+    )
+    assert "WARNING" not in result.output
+    assert "designed_for" not in CliRunner().invoke(app, ["check", str(file)]).output
+    result = run(file, "--axis", "near_far", "--json", "--write")
+    assert json.loads(result.stdout)["tail_needed_s"] is None
+    assert json.loads(result.stdout)["changed"] == []
+    assert file.read_text().splitlines() == after
+
+
+def test_the_longer_tail_leaves_less_swing_at_the_same_stop(file: Path) -> None:
+    measured = {}
+    for room in (False, True):
+        if room:
+            file.write_text(file.read_text().replace(*ROOM))
+        assert run(file, "--axis", "near_far", "--write").exit_code == 0
+        found = json.loads(run(file, "--axis", "near_far", "--json").stdout)["in_file"]
+        left = next(r["machine"] for r in found["residuals"] if r["length_pct"] == 0)
+        measured[room] = (left, found["run_on_s"])
+    assert measured[False] == pytest.approx((0.044, 1.86), abs=0.001)
+    assert measured[True] == pytest.approx((0.012, 1.86), abs=0.001)
+
+
+def test_a_tail_that_the_stopping_distance_forbids_stays_and_check_warns(file: Path) -> None:
+    result = run(file, "--axis", "near_far", "--write", "--json")
+    (minus, plus, warning) = json.loads(result.stdout)["changed"]
+    assert (minus[0], plus[0]) == ("-", "+")
+    assert warning.startswith(
+        "WARNING: axes.near_far.limits.tail_s: expected 2.6 s, got 2 s, which stays:"
+        " stop_distance_m: found 2.2 m;"
+    )
+    assert load_config(file)[0].axes["near_far"].limits.tail_s == 2.0
+    checked = CliRunner().invoke(app, ["check", str(file)])
+    assert checked.exit_code == 0
+    says = "expected limits.tail_s of 2.6 s or more, got 2 s; lengthen it"
+    line = file.read_text().splitlines().index(plus[1:]) + 1
+    assert f"{file}:{line}: axes.near_far.filter.designed_for.duration_s: {says}" in checked.output
+
+
+def test_limits_that_the_file_leaves_out_get_a_section(file: Path) -> None:
+    text = file.read_text()
+    block = next(row for row in text.splitlines(keepends=True) if "stop_distance_m: 2.2" in row)
+    file.write_text(text.replace(block, ""))
+    result = run(file, "--axis", "near_far", "--write")
+    assert "tail_s: expected 2.6 s, got 2 s, which stays: stop_distance_m: missing" in result.output
+    near = "full_speed_m_s: 1.0 }"
+    file.write_text(file.read_text().replace(near, near.replace("1.0", "0.7")))
+    result = run(file, "--axis", "near_far", "--write")
+    assert "+    limits: { tail_s: 2.6 }" in result.output.splitlines()
+    assert load_config(file)[0].axes["near_far"].limits.tail_s == 2.6
 
 
 def test_another_filter_is_replaced_on_write(file: Path) -> None:
