@@ -13,6 +13,7 @@ from pathlib import Path
 from canshaper.bus.port import Port
 from canshaper.errors import BusError, DriveError
 from canshaper.machine.deployment import Deployment
+from canshaper_sim.cranes import cranes
 from canshaper_sim.operator import Script
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.realtime import open_ports
@@ -49,10 +50,11 @@ def choose_transport(wish: str, deployment: Deployment) -> Transport:
     """SocketCAN where its channel opens, otherwise multicast; ``wish`` may name one.
 
     Raises:
-        DriveError: the deployment has several buses, or the wished transport does not open.
+        DriveError: the deployment has several buses or cranes, or the wished transport does not
+            open.
     """
-    if len(deployment.config.buses) > 1:
-        raise DriveError("this deployment has several buses; drive it with --lockstep")
+    if len(deployment.config.buses) > 1 or cranes(deployment):
+        raise DriveError("this deployment has several buses or cranes; drive it with --lockstep")
     # A group of this process alone: two demos on one machine must not hear each other.
     group = f"239.{1 + os.getpid() // 65536 % 250}.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
     multicast = Transport("udp_multicast", group, "udp_multicast (python-can)")

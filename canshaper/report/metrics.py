@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import asdict, dataclass
 from typing import Any
 
+from canshaper.report.crane_metrics import crane_metrics
 from canshaper.report.stroke_metrics import dip, re_rise, rms, run_on_s, run_on_travel, time_to_95_s
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
@@ -27,7 +28,8 @@ __all__ = [
 MIN_RAW_DEG = 0.05  # five steps of the sway signal: a reduction of less is a quotient of noise
 
 _DIGITS = {"_deg": 2, "_s": 2, "_pct": 1}  # resolution of the sway frame, of the sampling, of both
-_DIGITS_FRACTION = 3  # fractions of full command and speed: a step of the command frame is 0.004
+# Fractions of full command and speed, where a step of the command frame is 0.004; metres.
+_DIGITS_FRACTION = 3
 
 
 @dataclass(frozen=True)
@@ -115,9 +117,10 @@ def report_dict(
 ) -> dict[str, Any]:
     """Return the comparison as a dictionary ready for JSON.
 
-    Per axis: the reductions, ``time_to_95_s`` and ``run_on_s`` of the shaped drive, and all
-    measures of both under ``raw`` and ``shaped``. Degrees and seconds are rounded to 0.01, percent
-    to 0.1, fractions to 0.001. What does not exist or is not finite is None.
+    Of the crane (None where nothing says where the tip is) and per axis: the reductions, and all
+    measures of both drives under ``raw`` and ``shaped``; per axis ``time_to_95_s`` and ``run_on_s``
+    of the shaped drive too. Degrees and seconds are rounded to 0.01, percent to 0.1, metres and
+    fractions to 0.001. What does not exist or is not finite is None.
 
     Args:
         raw: drive with the filters off.
@@ -134,6 +137,7 @@ def report_dict(
         "transport": transport,
         "missed_deadlines": missed_deadlines,
         "duration_s": round(min(raw.t_s[-1], shaped.t_s[-1]), 2),
+        "crane": _crane_dict(raw, shaped),
         "axes": {name: _axis_dict(axis) for name, axis in _compare(raw, shaped).items()},
     }
     taken = report.keys() & (facts or {}).keys()
@@ -183,7 +187,7 @@ def _measure(recording: Recording, strokes: list[Stroke], axis: str) -> AxisMetr
             abs(other[k]) for other in crossing for window in windows for k in window
         ),
         time_to_95_s=_largest(time_to_95_s(t_s, trace, stroke) for stroke in strokes),
-        run_on_s=_largest(run_on_s(t_s, trace, stroke) for stroke in alone),
+        run_on_s=_largest(run_on_s(t_s, trace.speed, stroke.rest) for stroke in alone),
         run_on_travel=_largest(run_on_travel(t_s, trace, stroke) for stroke in alone),
         dip=_largest(dip(trace, stroke) for stroke in strokes),
         re_rise=_largest(re_rise(trace, stroke) for stroke in rests),
@@ -200,19 +204,31 @@ def _reduction_pct(raw: float | None, shaped: float | None) -> float | None:
     return 100.0 * (1.0 - shaped / raw)
 
 
-def _axis_dict(axis: AxisComparison) -> dict[str, Any]:
-    def rounded(values: Mapping[str, float | None]) -> dict[str, float | None]:
-        return {name: _round(name, value) for name, value in values.items()}
+def _crane_dict(raw: Recording, shaped: Recording) -> dict[str, Any] | None:
+    if raw.crane is None or shaped.crane is None:
+        return None
+    off, on = (asdict(crane_metrics(r, c)) for r, c in ((raw, raw.crane), (shaped, shaped.crane)))
+    reductions = {
+        f"{name}_reduction_pct": _reduction_pct(off[f"{name}_deg"], on[f"{name}_deg"])
+        for name in ("peak", "rms", "residual")
+    }
+    return {**_rounded(reductions), "raw": _rounded(off), "shaped": _rounded(on)}
 
-    raw, shaped = rounded(asdict(axis.raw)), rounded(asdict(axis.shaped))
+
+def _axis_dict(axis: AxisComparison) -> dict[str, Any]:
+    raw, shaped = _rounded(asdict(axis.raw)), _rounded(asdict(axis.shaped))
     reductions = {name: value for name, value in vars(axis).items() if name.endswith("_pct")}
     return {
-        **rounded(reductions),
+        **_rounded(reductions),
         "time_to_95_s": shaped["time_to_95_s"],
         "run_on_s": shaped["run_on_s"],
         "raw": raw,
         "shaped": shaped,
     }
+
+
+def _rounded(values: Mapping[str, float | None]) -> dict[str, float | None]:
+    return {name: _round(name, value) for name, value in values.items()}
 
 
 def _round(name: str, value: float | None) -> float | None:

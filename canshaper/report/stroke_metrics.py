@@ -1,7 +1,7 @@
 """What one stroke of the stick shows: rise, run-on, dip, and how the output rose again."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from canshaper.report.strokes import Stroke
 from canshaper_sim.recording import AxisTrace
@@ -45,15 +45,16 @@ def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | 
     return _crossing_s(t_s, speed, reached - 1, wanted) - t_s[stroke.press]
 
 
-def run_on_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
-    """Seconds from the release until it stands."""
-    speed = {k: abs(trace.speed[k]) for k in stroke.rest}
-    release, last = stroke.rest[0], stroke.rest[-1]
-    moving = next((k for k in reversed(stroke.rest) if speed[k] >= STOPPED), None)
+def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:
+    """Seconds from the first sample of a rest until what moves at this |speed| stands."""
+    release, last = rest[0], rest[-1]
+    moving = next((k for k in reversed(rest) if abs(speed[k]) >= STOPPED), None)
     if moving is None:
         return 0.0
-    stop_s = t_s[last] if moving == last else _crossing_s(t_s, speed, moving, STOPPED)
-    return stop_s - t_s[release]
+    if moving == last:
+        return t_s[last] - t_s[release]
+    around = {k: abs(speed[k]) for k in (moving, moving + 1)}
+    return _crossing_s(t_s, around, moving, STOPPED) - t_s[release]
 
 
 def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:

@@ -4,7 +4,7 @@ import math
 import statistics
 from dataclasses import dataclass
 
-from canshaper_sim.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
 NEUTRAL_BAND = 0.02  # stick: two steps of a joystick frame of 1/125 and a little, never a command
 PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far
@@ -60,17 +60,30 @@ def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]
     Strokes during which another axis was moved have none, nor have rests that leave less than
     ``RESIDUAL_WINDOW_MIN_S``.
     """
-    windows = []
-    t_s = recording.t_s
-    for stroke in strokes:
-        if not stroke.alone or not stroke.rest:
-            continue
-        begin_s = t_s[stroke.rest.start] + RESIDUAL_DWELL_S - _ROUNDING_S
-        start = next((k for k in stroke.rest if t_s[k] >= begin_s), stroke.rest.stop)
-        window = range(start, stroke.rest.stop)
-        if window and t_s[window[-1]] - t_s[start] >= RESIDUAL_WINDOW_MIN_S - _ROUNDING_S:
-            windows.append(window)
-    return windows
+    alone = (residual_window(recording.t_s, s.rest) for s in strokes if s.alone and s.rest)
+    return [window for window in alone if window]
+
+
+def residual_window(t_s: list[float], rest: range) -> range:
+    """The part of a rest in which residual swing shows; empty where too little is left of it."""
+    begin_s = t_s[rest.start] + RESIDUAL_DWELL_S - _ROUNDING_S
+    start = next((k for k in rest if t_s[k] >= begin_s), rest.stop)
+    window = range(start, rest.stop)
+    if window and t_s[window[-1]] - t_s[start] >= RESIDUAL_WINDOW_MIN_S - _ROUNDING_S:
+        return window
+    return range(0)
+
+
+def rests(recording: Recording) -> list[range]:
+    """Samples from the release of the last stick until any is pressed, or to the end."""
+    strokes = [one for own in find_strokes(recording).values() for one in own]
+
+    def moved(k: int) -> bool:
+        return any(s.press <= k and (s.release is None or k < s.release) for s in strokes)
+
+    # Two that are released in one sample begin the same rest.
+    found = {s.rest for s in strokes if s.rest and not moved(s.rest[0])}
+    return sorted(found, key=lambda rest: rest.start)
 
 
 def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
@@ -190,4 +203,7 @@ def _cut(recording: Recording, begin_s: float, end_s: float) -> Recording:
         )
         for name, trace in recording.axes.items()
     }
-    return Recording(t_s=[t - begin_s for t in recording.t_s[part]], axes=axes)
+    crane = recording.crane
+    if crane:
+        crane = CraneTrace(crane.tip_m[part], crane.grapple_m[part], crane.sway_deg[part])
+    return Recording([t - begin_s for t in recording.t_s[part]], axes, crane)

@@ -1,6 +1,6 @@
 """The comparison of a raw and a shaped drive as a table for the terminal."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 from rich.console import Console
@@ -10,6 +10,8 @@ from rich.text import Text
 from canshaper.report.console import new_table
 from canshaper.report.metrics import MIN_RAW_DEG
 
+PairRow = tuple[str, str, float, int]  # words, name of the measure, scale, digits
+
 NOTHING = "-"
 _AXES_A_TABLE = 3  # as many as fit 80 columns
 _SWAY_ROWS = (
@@ -17,7 +19,11 @@ _SWAY_ROWS = (
     ("RMS sway, deg", "rms"),
     ("residual sway, deg", "residual"),
 )
-_PAIR_ROWS = (
+_CRANE_ROWS: Sequence[PairRow] = (
+    ("run-on, s", "run_on_s", 1.0, 2),
+    ("run-on, m", "run_on_m", 1.0, 2),
+)
+_PAIR_ROWS: Sequence[PairRow] = (
     ("time to 95 %, s", "time_to_95_s", 1.0, 2),
     ("run-on, s", "run_on_s", 1.0, 2),
     ("dip after press, %", "dip", 100.0, 0),
@@ -28,13 +34,17 @@ _PAIR_ROWS = (
 def print_report(report: Mapping[str, Any], console: Console) -> None:
     """Print a report of ``metrics.report_dict``; it fits in 80 columns.
 
-    Sway is given in degrees, raw then shaped, the reduction below; dip and re-rise in percent of
-    full command. Where an axis has no such measure there is a "-".
+    Sway is given in degrees, raw then shaped, and the reduction; dip and re-rise in percent of
+    full command. A row is what the drive has at least one measure of; "-" where an axis has none.
     """
     arrow = "→" if (console.encoding or "").lower().startswith("utf") else "->"
+    if crane := report["crane"]:
+        console.print(_table({"whole crane": crane}, _CRANE_ROWS, arrow))
     axes = list(report["axes"].items())
     for first in range(0, len(axes), _AXES_A_TABLE):
-        console.print(_table(dict(axes[first : first + _AXES_A_TABLE]), arrow))
+        table = _table(dict(axes[first : first + _AXES_A_TABLE]), _PAIR_ROWS, arrow)
+        if table.row_count:
+            console.print(table)
     console.print(Text(f"raw {arrow} shaped: the same script with filters off, then on", "dim"))
     for name, axis in report["axes"].items():
         line = _cross_line(name, axis, arrow)
@@ -48,14 +58,19 @@ def axis_title(name: str) -> str:
     return name.replace("_", "-").capitalize()
 
 
-def _table(axes: Mapping[str, Any], arrow: str) -> Table:
+def _table(axes: Mapping[str, Any], pairs: Sequence[PairRow], arrow: str) -> Table:
     """One column an axis, one row a measure: fits a narrow terminal."""
     table = new_table("", *map(axis_title, axes))
-    for title, measure in _SWAY_ROWS:
-        table.add_row(title, *(_sway_cell(axis, measure, arrow) for axis in axes.values()))
-    for title, key, scale, digits in _PAIR_ROWS:
-        cells = (_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values())
-        table.add_row(title, *cells)
+    rows = [
+        (title, [_sway_cell(axis, measure, arrow) for axis in axes.values()])
+        for title, measure in _SWAY_ROWS
+    ] + [
+        (title, [_pair_cell(axis, key, scale, digits, arrow) for axis in axes.values()])
+        for title, key, scale, digits in pairs
+    ]
+    for title, cells in rows:
+        if any(cell.plain != NOTHING for cell in cells):
+            table.add_row(title, *cells)
     return table
 
 

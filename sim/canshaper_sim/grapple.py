@@ -100,6 +100,11 @@ class Grapple:
         inertia = self.m2_kg * self.l2_m**2
         return SwayMode(omega, self.c6_n_m_s_rad / (2.0 * omega * inertia), 1.0 / self.l2_m)
 
+    def offset_m(self, theta5_rad: float, theta6_rad: float) -> tuple[float, float]:
+        """How far from the tip it hangs, seen from above: outwards, and in slew direction, m."""
+        l3_m = self.l1_m + self.l2_m * math.cos(theta6_rad)
+        return -self.l2_m * math.sin(theta6_rad), l3_m * math.sin(theta5_rad)
+
 
 def accelerations(
     grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion

@@ -5,7 +5,16 @@ import random
 from collections.abc import Sequence
 
 from canshaper.errors import DesignError
-from canshaper_sim.axes import ALL_AXES, EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
+from canshaper_sim.axes import (
+    ALL_AXES,
+    EXTENSION,
+    JOINT_AXES,
+    KNUCKLE,
+    LIFT,
+    LIFT_CYLINDER,
+    NEAR_FAR,
+    SLEW,
+)
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.scripts import SCRIPTS
 from canshaper_sim.strokes import Script, Stroke
@@ -85,10 +94,13 @@ def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stro
 def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     """A built-in script, or `random-<seed>` of 30 s on these axes.
 
+    Where they are joints of the boom, `demo` and `loading` are the same work joint by joint.
+
     Raises:
         DesignError: no script of that name; lists the names.
     """
-    script = SCRIPTS.get(name)
+    joints = {*JOINT_AXES} - {SLEW}
+    script = (joints & {*axes} and SCRIPTS.get(f"{name}-joints")) or SCRIPTS.get(name)
     if script is not None:
         return script
     kind, _, seed = name.partition("-")

@@ -5,6 +5,7 @@ lift_cylinder, knuckle and extension swing it along the boom (parallel), lift by
 none. With joint commands the three boom joints thus show the same sway, each with its own strokes.
 """
 
+import math
 from typing import Any
 
 from canshaper.codec.frame import Frame
@@ -15,7 +16,7 @@ from canshaper.shaping.limits import without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.crane import CraneParameters
-from canshaper_sim.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, CraneTrace, Point, Recording
 
 # Slewing is told by both; a machine moved by its tip need not send JointVelocity.
 _SPEED_SIGNALS = {
@@ -48,6 +49,8 @@ class Recorder:
             KNUCKLE: crane.joints.knuckle_full_speed_rad_s,
             EXTENSION: crane.joints.extension_full_speed_m_s,
         }
+        self._grapple = crane.grapple
+        self._tip = (0.0, 0.0)  # slew angle in rad, radius in m
         self._axes = deployment.axes
         self._handlers: dict[tuple[str, int, bool], Any] = {}
         self._joysticks: dict[str, BoundJoystick] = {}
@@ -62,6 +65,7 @@ class Recorder:
         for message_name, handler in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
+            ("TipPosition", self._position),
             ("GrappleSway", self._sway),
             ("ShaperStatus", self._status),
         ):
@@ -75,6 +79,7 @@ class Recorder:
         self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in self._axes}
         self._t_s: list[float] = []
         self._rows: dict[str, list[list[float]]] = {name: [] for name in self._axes}
+        self._crane: list[tuple[Point, Point, float]] = []  # tip, grapple, total swing
         self.missed_deadlines = 0
         self.seen: set[str] = set()
 
@@ -96,7 +101,10 @@ class Recorder:
             columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
             stick, sent, speed, sway = columns
             traces[name] = AxisTrace(stick, sent, speed, sway if name in _SWAY_SIGNAL else None)
-        return Recording(list(self._t_s), traces)
+        tip, grapple, sway = (
+            map(list, zip(*self._crane, strict=True)) if self._crane else ([], [], [])
+        )
+        return Recording(list(self._t_s), traces, CraneTrace(tip, grapple, sway))
 
     @staticmethod
     def _raw(message: Any, data: bytes) -> Any:
@@ -130,14 +138,30 @@ class Recorder:
             if name in self._now:
                 self._now[name][2] = values[signal] / self._full[name]
 
+    def _position(self, message: Any, data: bytes, _time_s: float) -> None:
+        values = message.decode(data)
+        self._tip = (math.radians(values["SlewAngle"]), values["Radius"])
+
     def _sway(self, message: Any, data: bytes, time_s: float) -> None:
         if self._start_s is None:
             return
         values = message.decode(data)
         self._t_s.append(time_s - self._start_s)
+        across, along = values["SwayPerpendicular"], values["SwayParallel"]
+        heading, radius_m = self._tip
+        offset = self._grapple.offset_m(math.radians(across), math.radians(along))
+        tip = _from_above(heading, radius_m, 0.0)
+        grapple = _from_above(heading, radius_m + offset[0], offset[1])
+        self._crane.append((tip, grapple, math.hypot(across, along)))
         for name, now in self._now.items():
             now[3] = values.get(_SWAY_SIGNAL.get(name), 0.0)
             self._rows[name].append(list(now))
 
     def _status(self, message: Any, data: bytes, _time_s: float) -> None:
         self.missed_deadlines = int(self._raw(message, data)["MissedDeadlines"])
+
+
+def _from_above(heading: float, out_m: float, across_m: float) -> Point:
+    """(x, y) about the pillar of a point that far out along the boom, and in slew direction."""
+    cosine, sine = math.cos(heading), math.sin(heading)
+    return out_m * cosine - across_m * sine, out_m * sine + across_m * cosine

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+Point = tuple[float, float]  # from above, (x, y) about the pillar, m
+
 
 @dataclass(frozen=True)
 class AxisTrace:
@@ -22,8 +24,27 @@ class AxisTrace:
 
 
 @dataclass(frozen=True)
+class CraneTrace:
+    """Tip and grapple over a drive; every list is as long as the recording's ``t_s``.
+
+    Attributes:
+        tip_m: tip of the boom from above, m; x points along the boom that has not slewed.
+        grapple_m: grapple from above, m.
+        sway_deg: total swing: both planes together, root of the sum of squares, degrees.
+    """
+
+    tip_m: list[Point]
+    grapple_m: list[Point]
+    sway_deg: list[float]
+
+
+@dataclass(frozen=True)
 class Recording:
-    """A drive on a common time base (seconds from its start, increasing)."""
+    """A drive on a common time base (seconds from its start, increasing).
+
+    ``crane`` is None where nothing says where the tip is.
+    """
 
     t_s: list[float]
     axes: dict[str, AxisTrace]
+    crane: CraneTrace | None = None

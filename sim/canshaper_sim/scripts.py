@@ -11,8 +11,25 @@ def _pulse(axis: str, level: float = 1.0) -> Script:
     return Script(f"pulse-{axis}", (Stroke(axis, 0.5, 3.0, level, _PULSE_RAMP_S),), 8.5)
 
 
+# Both joysticks at once, as a person drives: out to the pile, and back over the bunk with a
+# correction to the other side. Slewing comes close to the pillar: swing grows with the radius.
 _DEMO = Script(
     "demo",
+    (
+        Stroke(SLEW, 0.5, 2.6, 0.8),
+        Stroke(NEAR_FAR, 0.9, 2.6, 0.8),
+        Stroke(LIFT, 1.4, 1.2, -0.5),
+        Stroke(LIFT, 8.4, 1.6, 0.8),
+        Stroke(SLEW, 9.0, 2.2, -0.8),
+        Stroke(SLEW, 11.2, 0.5, 0.4),
+        Stroke(NEAR_FAR, 9.3, 2.2, -0.7),
+        Stroke(NEAR_FAR, 11.5, 0.4, 0.4),
+    ),
+    17.5,
+)
+
+_ONE_BY_ONE = Script(
+    "one-by-one",
     (
         # Slewing comes first, close to the pillar: swing grows with the radius.
         Stroke(SLEW, 0.5, 3.0, 1.0),
@@ -71,6 +88,23 @@ _LOADING = Script(
     40.0,
 )
 
+_DEMO_JOINTS = Script(
+    "demo-joints",
+    (
+        Stroke(SLEW, 0.5, 2.6, 0.6),
+        Stroke(KNUCKLE, 0.8, 2.0, 0.6),
+        Stroke(LIFT_CYLINDER, 1.1, 2.0, -0.5),
+        Stroke(EXTENSION, 1.6, 1.5, 0.7),
+        Stroke(SLEW, 9.0, 2.2, -0.6),
+        Stroke(SLEW, 11.2, 0.5, 0.3),
+        Stroke(KNUCKLE, 9.2, 2.0, -0.5),
+        Stroke(LIFT_CYLINDER, 9.4, 1.4, 0.5),
+        Stroke(EXTENSION, 9.6, 1.6, -0.6),
+        Stroke(EXTENSION, 11.2, 0.4, 0.4),
+    ),
+    17.5,
+)
+
 # The same work with a joystick for each joint: three of them make what near_far and lift do above.
 _LOADING_JOINTS = Script(
     "loading-joints",
@@ -107,8 +141,10 @@ SCRIPTS: dict[str, Script] = {
         _pulse(NEAR_FAR),
         _pulse(SLEW),
         _DEMO,
+        _ONE_BY_ONE,
         _LOADING,
         *(_pulse(axis, level) for axis, level in _JOINT_PULSES),
+        _DEMO_JOINTS,
         _LOADING_JOINTS,
     )
 }

@@ -14,7 +14,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 
 def residual_reduction_pct(file: str) -> dict[str, float]:
     deployment = load_deployment(CONFIG / file)
-    script = SCRIPTS["demo"]
+    script = SCRIPTS["one-by-one"]
     report = compare(drive(deployment, script, bypass=True), drive(deployment, script))
     found = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
     return {name: value for name, value in found.items() if value is not None}

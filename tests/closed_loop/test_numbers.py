@@ -49,9 +49,9 @@ def variant(tmp_path: Path, *changes: tuple[str, str]) -> Deployment:
     return load_deployment(file)
 
 
-def test_demo_drive_reaches_its_numbers() -> None:
+def test_one_axis_after_the_other_reaches_its_numbers() -> None:
     deployment = load_deployment(FILE)
-    script = SCRIPTS["demo"]
+    script = SCRIPTS["one-by-one"]
     raw = drive(deployment, script, bypass=True)
     report = compare(raw, drive(deployment, script))
     near_far, slew = report["near_far"], report["slew"]
@@ -62,7 +62,7 @@ def test_demo_drive_reaches_its_numbers() -> None:
 
 def test_recommended_deployment_leaves_next_to_nothing_in_both_planes() -> None:
     deployment = load_deployment(FILE.with_name("forwarder-robust.yaml"))
-    script = SCRIPTS["demo"]
+    script = SCRIPTS["one-by-one"]
     raw = drive(deployment, script, bypass=True)
     report = compare(raw, drive(deployment, script))
     for name in ("near_far", "slew"):

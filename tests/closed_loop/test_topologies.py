@@ -18,7 +18,7 @@ CONFIG = Path(__file__).resolve().parents[2] / "config"
 @cache
 def residual_reduction_pct(file: str, crane: str | None = None) -> dict[str, float]:
     deployment = load_deployment(CONFIG / file)
-    script = SCRIPTS["demo"]
+    script = SCRIPTS["one-by-one"]
     raw = drive(deployment, script, bypass=True, crane=crane)
     report = compare(raw, drive(deployment, script, crane=crane))
     found = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
@@ -54,4 +54,4 @@ def test_the_axes_of_one_crane_are_no_names_of_several(file: str) -> None:
     deployment = load_deployment(CONFIG / file)
     assert cranes(deployment) == []
     with pytest.raises(DriveError, match="none: there is one"):
-        drive(deployment, SCRIPTS["demo"], crane="front")
+        drive(deployment, SCRIPTS["one-by-one"], crane="front")

@@ -83,7 +83,7 @@ def test_drives_are_bit_identical() -> None:
 
 @pytest.mark.parametrize(
     "name",
-    ["pulse-lift_cylinder", "pulse-knuckle", "pulse-extension", "loading-joints"]
+    ["pulse-lift_cylinder", "pulse-knuckle", "pulse-extension", "demo-joints", "loading-joints"]
     + [f"random-{seed}" for seed in range(12)],
 )
 def test_joint_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
@@ -96,7 +96,9 @@ def test_joint_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
     assert not machine.crane.swung_over
 
 
-@pytest.mark.parametrize("name", ["demo", "loading", *(f"random-{seed}" for seed in range(6))])
+@pytest.mark.parametrize(
+    "name", ["demo", "one-by-one", "loading", *(f"random-{seed}" for seed in range(6))]
+)
 def test_tip_scripts_keep_the_joints_off_their_stops(name: str) -> None:
     script = script_named(name)
     machine = build_machine("tip-controller")

@@ -166,7 +166,10 @@ def test_shipped_deployments_are_good(file: Path) -> None:
     [
         (["sim", str(JOINT_FILE), "--machine", "tip"], "axes.knuckle: machine tip has slew"),
         (["sim", str(TIP_FILE), "--machine", "crab"], "machine 'crab', allowed tip, tip-contr"),
-        (["operator", str(JOINT_FILE), "--script", "loading"], "script loading moves slew, near"),
+        (
+            ["operator", str(JOINT_FILE), "--script", "pulse-near_far"],
+            "script pulse-near_far moves",
+        ),
     ],
 )
 def test_commands_tell_what_does_not_fit(arguments: list[str], text: str) -> None:

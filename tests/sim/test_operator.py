@@ -5,6 +5,7 @@ from itertools import pairwise
 
 import pytest
 
+from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.crane import AXES, Crane
 from canshaper_sim.operator import SCRIPTS, Script, Stroke, random_script, script_named
 
@@ -92,14 +93,35 @@ def test_pulses_are_three_seconds_of_full_stick_and_five_of_rest() -> None:
         assert script.duration_s - 3.5 == 5.0
 
 
-def test_demo_shows_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
-    demo = SCRIPTS["demo"]
-    assert demo.duration_s == pytest.approx(19.0, abs=0.5)
-    assert demo.axes == AXES
+@pytest.mark.parametrize(
+    ("name", "boom"),
+    [("demo", ("near_far",)), ("demo-joints", ("knuckle", "lift_cylinder", "extension"))],
+)
+def test_demo_moves_slew_and_boom_at_once_reverses_and_rests(
+    name: str, boom: tuple[str, ...]
+) -> None:
+    script = SCRIPTS[name]
+    rows = [{a: script.stick(a, k * TICK_S) for a in script.axes} for k in range(875)]
+    both = [row for row in rows if row["slew"] and any(row[axis] for axis in boom)]
+    assert len(both) * TICK_S > 4.0
+    for axis in ("slew", boom[-1]):
+        values = [row[axis] for row in rows if row[axis]]
+        assert min(values) < -0.5 < 0.5 < max(values)
+        signs = [math.copysign(1.0, value) for value in values]
+        assert sum(a != b for a, b in pairwise(signs)) == 2  # back, and a correction
+    # Twice nothing is touched for as long as a residual takes to be measured.
+    still = "".join("x" if any(row.values()) else " " for row in rows)
+    assert [len(rest) * TICK_S > 3.5 for rest in still[26:].split("x") if rest] == [True, True]
+
+
+def test_one_by_one_is_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
+    script = SCRIPTS["one-by-one"]
+    assert script.duration_s == pytest.approx(19.0, abs=0.5)
+    assert script.axes == AXES
 
     def stick_is(axis: str, low: float, high: float, value: float) -> bool:
         times = [low + i * TICK_S for i in range(int((high - low) / TICK_S))]
-        return all(demo.stick(axis, t) == value for t in times)
+        return all(script.stick(axis, t) == value for t in times)
 
     assert all(stick_is(axis, 0.0, 0.5, 0.0) for axis in AXES)
     assert stick_is("slew", 0.62, 3.5, 1.0)
@@ -107,7 +129,7 @@ def test_demo_shows_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
     assert stick_is("near_far", 8.14, 11.0, 1.0)
     assert all(stick_is(axis, 11.14, 15.0, 0.0) for axis in AXES)
     assert all(stick_is(axis, 18.5, 19.5, 0.0) for axis in AXES)
-    work = {a: [demo.stick(a, 15.0 + i * TICK_S) for i in range(175)] for a in AXES}
+    work = {a: [script.stick(a, 15.0 + i * TICK_S) for i in range(175)] for a in AXES}
     assert min(work["near_far"]) < -0.5
     overlap = sum(sum(abs(work[a][i]) > 0.05 for a in AXES) >= 2 for i in range(175)) * TICK_S
     assert overlap > 1.0
@@ -189,6 +211,11 @@ def test_random_script_of_an_unknown_axis_is_refused() -> None:
 def test_scripts_by_name() -> None:
     assert script_named("demo") is SCRIPTS["demo"]
     assert script_named("random-12") == random_script(12)
+    # A crane without tip control does the same work joint by joint.
+    for name in ("demo", "loading"):
+        assert script_named(name, JOINT_AXES) is SCRIPTS[f"{name}-joints"]
+        assert script_named(f"{name}-joints", JOINT_AXES) is SCRIPTS[f"{name}-joints"]
+    assert script_named("pulse-slew", JOINT_AXES) is SCRIPTS["pulse-slew"]
     for name in ("demos", "random", "random-", "random-x", "random--1"):
         with pytest.raises(ValueError, match=r"pulse-near_far, .*loading.*, random-<seed>"):
             script_named(name)

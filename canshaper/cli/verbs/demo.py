@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import SET, echo, fail, loader, picture, picture_line
+from canshaper.cli.common import CRANE, SET, echo, fail, loader, picture, picture_line
 from canshaper.errors import DriveError
 
 if TYPE_CHECKING:
@@ -18,7 +18,9 @@ LOCKSTEP = "lock-step, no bus"
 
 
 def demo(
-    file: str = typer.Argument("forwarder.yaml", help="Deployment file; by default a shipped one."),
+    file: str = typer.Argument(
+        "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
+    ),
     script: str = typer.Option("demo", "--script", help="What the operator does."),
     out: Path = typer.Option(Path("out/demo"), "--out", help="Directory for picture and report."),
     lockstep: bool = typer.Option(
@@ -27,9 +29,13 @@ def demo(
     transport: str = typer.Option(
         "auto", "--transport", help="auto, vcan0 (or another SocketCAN channel), udp_multicast."
     ),
+    crane: str | None = CRANE,
     changes: list[str] | None = SET,
 ) -> None:
     """Drive the simulated crane twice, anti-sway off and on, and show the difference.
+
+    Without FILE it is the recommended deployment, forwarder-robust.yaml. The script "demo" moves
+    slew and near-far (or the joints) together. Of several cranes it is the first one.
 
     Operator, daemon and plant run as three processes and exchange frames on vcan0 where the
     kernel has it, otherwise on python-can's udp_multicast. Prints a table and writes demo.png
@@ -41,6 +47,8 @@ def demo(
 
       canshaper demo --lockstep --script loading
 
+      canshaper demo forwarder.yaml --lockstep     (the paper's filter)
+
       canshaper demo --set grapple.l2_m=1.5
     """
     from canshaper.design.lockstep import drive
@@ -48,15 +56,22 @@ def demo(
     from canshaper.report.console import SafeConsole, progress_bar
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
+    from canshaper_sim.axes import ALL_AXES
+    from canshaper_sim.cranes import cranes, one_crane
     from canshaper_sim.operator import script_named
     from canshaper_sim.parameters import changed_parameters
 
     console = SafeConsole()
-    played = script_named(script)
-    crane = changed_parameters(changes or [])
+    parameters = changed_parameters(changes or [])
     deployment = loader(file)()
     way = None if lockstep else choose_transport(transport, deployment)
+    several = cranes(deployment)
+    crane = crane or next(iter(several), None)
+    axes = (one_crane(deployment, crane) if crane else deployment).axes
+    played = script_named(script, [axis for axis in ALL_AXES if axis in axes])
     console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
+    if crane:
+        console.print(f"Crane: {crane} (of {', '.join(several)})")
     console.print(f"Transport: {way.description if way else LOCKSTEP}")
 
     recordings: list[Recording] = []
@@ -66,7 +81,8 @@ def demo(
             with progress_bar(name, played.duration_s) as on_progress:
                 options: Any = {"bypass": bypass, "on_progress": on_progress}
                 if way is None:
-                    recordings += [drive(deployment, played, parameters=crane, **options)]
+                    options |= {"parameters": parameters, "crane": crane}
+                    recordings += [drive(deployment, played, **options)]
                 else:
                     run = drive_on_bus(deployment, way, played, changes or [], **options)
                     recordings += [run.recording]

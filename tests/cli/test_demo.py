@@ -1,0 +1,66 @@
+"""``canshaper demo`` in lock-step: every shipped deployment, by the axes that it has."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = sorted((ROOT / "config").glob("*.yaml"))
+JOINTS = {"slew", "lift_cylinder", "knuckle", "extension"}
+
+
+def demo(out: Path, *arguments: str, code: int = 0) -> tuple[str, Any]:
+    result = CliRunner().invoke(app, ["demo", "--lockstep", "--out", str(out), *arguments])
+    assert result.exit_code == code, result.output
+    report = out / "report.json"
+    return result.output, json.loads(report.read_text()) if report.exists() else None
+
+
+@pytest.mark.parametrize("file", SHIPPED, ids=[file.stem for file in SHIPPED])
+def test_every_shipped_deployment_drives_its_own_axes_together(file: Path, tmp_path: Path) -> None:
+    text, report = demo(tmp_path, str(file))
+    assert "residual sway" in text
+    names = JOINTS if "joints" in file.stem else {"slew", "near_far", "lift"}
+    assert {name for name, axis in report["axes"].items() if axis["raw"]["time_to_95_s"]} == names
+    crane = report["crane"]
+    assert crane["raw"]["residual_deg"] > 15.0
+    assert crane["residual_reduction_pct"] > 75.0
+    assert (tmp_path / "demo.png").stat().st_size > 50_000
+
+
+def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path: Path) -> None:
+    text, report = demo(tmp_path)
+    assert report["deployment"] == "forwarder-robust.yaml"
+    raw, shaped = report["crane"]["raw"], report["crane"]["shaped"]
+    assert raw["residual_deg"] > 20.0
+    assert shaped["residual_deg"] < 1.5
+    assert shaped["peak_deg"] < 0.5 * raw["peak_deg"]
+    assert 1.5 < shaped["run_on_s"] < 2.2
+    assert 0.8 < shaped["run_on_m"] < 1.6
+    for unit, digits in (("s", 2), ("m", 2)):
+        pair = (drive[f"run_on_{unit}"] for drive in (raw, shaped))
+        cell = " → ".join(f"{value:.{digits}f}" for value in pair)
+        assert any(
+            line.split()[:2] == ["run-on,", unit] and cell in line for line in text.splitlines()
+        )
+
+
+def test_one_of_several_cranes_is_driven(tmp_path: Path) -> None:
+    first, _ = demo(tmp_path, "two-cranes.yaml", "--script", "pulse-slew")
+    assert "Crane: front (of front, rear)" in first
+    rear, report = demo(tmp_path, "two-cranes.yaml", "--crane", "rear", "--script", "random-3")
+    assert "Crane: rear (of front, rear)" in rear
+    assert set(report["axes"]) == {"slew", "near_far", "lift", "rotator"}
+    wrong, _ = demo(tmp_path, "two-cranes.yaml", "--crane", "middle", code=2)
+    assert "crane 'middle', allowed front, rear" in wrong
+
+
+def test_several_cranes_are_driven_in_lock_step_only() -> None:
+    result = CliRunner().invoke(app, ["demo", "two-cranes.yaml"])
+    assert result.exit_code == 2
+    assert "several buses or cranes; drive it with --lockstep" in result.output

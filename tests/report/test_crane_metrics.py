@@ -1,0 +1,100 @@
+import math
+from collections.abc import Callable
+from dataclasses import replace
+
+import pytest
+
+from canshaper.report.crane_metrics import CraneMetrics, crane_metrics
+from canshaper.report.metrics import report_dict
+from canshaper.report.strokes import aligned, rests
+from canshaper_sim.recording import CraneTrace, Recording
+
+Signal = Callable[[float], float]
+HandMade = Callable[..., Recording]
+SLEW, NEAR_FAR = (1.0, 3.0), (2.0, 4.0)  # press and release
+END_S = 12.0
+
+
+def held(press: float, release: float) -> Signal:
+    return lambda t: 1.0 if press - 1e-9 <= t < release - 1e-9 else 0.0
+
+
+def still(_t: float) -> float:
+    return 0.0
+
+
+def both(hand_made: HandMade, sway: Signal, run_on_s: float = 0.5) -> Recording:
+    """Slew and near-far overlap; the tip goes on along x at 1 m/s for so long."""
+    slew, near_far = held(*SLEW), held(*NEAR_FAR)
+    speed = held(NEAR_FAR[0], NEAR_FAR[1] + run_on_s)
+    recording = hand_made(
+        END_S, slew=(slew, slew, slew, still), near_far=(near_far, near_far, speed, still)
+    )
+    way = [(min(max(t - NEAR_FAR[0], 0.0), 2.0 + run_on_s), 7.0) for t in recording.t_s]
+    return replace(recording, crane=CraneTrace(way, way, [sway(t) for t in recording.t_s]))
+
+
+def measured(recording: Recording) -> CraneMetrics:
+    assert recording.crane is not None
+    return crane_metrics(recording, recording.crane)
+
+
+def test_a_rest_is_from_the_last_release_to_the_next_press(hand_made: HandMade) -> None:
+    recording = both(hand_made, still)
+    (rest,) = rests(recording)
+    times = recording.t_s[rest[0]], recording.t_s[rest[-1]]
+    assert times == pytest.approx((NEAR_FAR[1], END_S))
+
+
+@pytest.mark.parametrize("late_s", [0.0, 0.02])
+def test_two_that_are_released_together_begin_one_rest(hand_made: HandMade, late_s: float) -> None:
+    a, b, again = held(1.0, 3.0), held(1.0, 3.0 + late_s), held(5.0, 6.0)
+    recording = hand_made(
+        8.0, slew=(lambda t: a(t) + again(t), still, still, still), lift=(b, still, still, None)
+    )
+    starts = [recording.t_s[rest[0]] for rest in rests(recording)]
+    assert starts == pytest.approx([3.0 + late_s, 6.0])
+
+
+def test_residual_and_run_on_after_both_joysticks(hand_made: HandMade) -> None:
+    def sway(t: float) -> float:
+        return 3.0 if t >= NEAR_FAR[1] + 2.5 else 9.0 if t >= SLEW[1] else 4.0
+
+    found = measured(both(hand_made, sway))
+    assert found.peak_deg == 9.0
+    assert found.residual_deg == 3.0
+    # From the release of the last joystick; 0.01 s of the sample before it stands.
+    assert found.run_on_s == pytest.approx(0.5, abs=0.021)
+    assert found.run_on_m == pytest.approx(0.5, abs=0.021)
+    assert found.rms_deg == pytest.approx(math.sqrt((16 * 3 + 81 * 3.5 + 9 * 5.5) / 12), rel=0.01)
+
+
+def test_a_drive_that_is_never_let_go_has_no_residual_and_no_run_on(hand_made: HandMade) -> None:
+    stick = held(1.0, END_S + 1.0)
+    recording = hand_made(END_S, slew=(stick, stick, stick, still))
+    here = [(3.0, 0.0)] * len(recording.t_s)
+    crane = CraneTrace(here, here, [5.0] * len(here))
+    found = crane_metrics(recording, crane)
+    assert found == CraneMetrics(5.0, pytest.approx(5.0), None, None, None)
+
+
+def test_report_has_the_crane_where_the_drives_know_the_tip(hand_made: HandMade) -> None:
+    raw = both(hand_made, lambda _t: 8.0, run_on_s=0.2)
+    shaped = both(hand_made, lambda _t: 2.0, run_on_s=1.2)
+    report = report_dict(raw, shaped, transport="", missed_deadlines=None)
+    crane = report["crane"]
+    assert (crane["raw"]["residual_deg"], crane["shaped"]["residual_deg"]) == (8.0, 2.0)
+    assert crane["residual_reduction_pct"] == 75.0
+    assert crane["raw"]["run_on_m"] == pytest.approx(0.2, abs=0.021)
+    assert crane["shaped"]["run_on_m"] == pytest.approx(1.2, abs=0.021)
+    unknown = report_dict(replace(raw, crane=None), shaped, transport="", missed_deadlines=None)
+    assert unknown["crane"] is None
+
+
+def test_aligned_drives_keep_the_crane_with_its_time(hand_made: HandMade) -> None:
+    raw = both(hand_made, lambda t: t)
+    later = replace(raw, t_s=[t + 1.0 for t in raw.t_s])
+    early, late = aligned(raw, later)
+    assert early.crane is not None
+    assert early.crane == late.crane
+    assert len(early.crane.tip_m) == len(early.crane.sway_deg) == len(early.t_s)
