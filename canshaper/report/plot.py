@@ -1,22 +1,25 @@
 """The picture of a raw and a shaped drive: what was asked, what was sent, how the grapple swung.
 
-The only module of the report that needs matplotlib; it draws through the object API, so no
-display and no global state is involved.
+The only modules of the report that need matplotlib are this one and what it draws with; it draws
+through the object API, so no display and no global state is involved.
 """
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.gridspec import GridSpec
 
 from canshaper.report.strokes import (
     RESIDUAL_DWELL_S,
     Stroke,
     aligned,
     find_strokes,
+    residual_window,
     residual_windows,
+    rests,
 )
 from canshaper.report.style import (
     MINUS,
@@ -29,18 +32,26 @@ from canshaper.report.style import (
     new_figure,
     plain,
     save,
+    titled,
     zero_line,
 )
 from canshaper.report.table import NOTHING, axis_title, change_text
+from canshaper.report.top_view import draw_top_views
 from canshaper_sim.recording import Recording
 
-WINDOW_COLOUR = "#FFF1BF"
-SIZE_PX = (1600, 1000)
-_LEFT, _RIGHT = 0.052, 0.988  # of the figure: room for the units at the left
+WINDOW_COLOUR = "#FBE5A6"
+# In print 170 mm wide, with letters of 8 points and more; colours differ in width and dash too.
+WIDTH_PX = 1600
+_DPI = WIDTH_PX / (170.0 / 25.4)
+_BLOCK_PX, _HEAD_PX, _FOOT_PX = 590, 230, 150
+_TEXT, _TITLE, _HEAD = 8.0, 8.5, 10.5
+_EDGE, _LEFT, _RIGHT = 0.012, 0.1, 0.988  # of the figure: room for the units at the left
+_TIME_RIGHT, _VIEW_LEFT = 0.612, 0.668  # where there are views from above
+_DASHED = (0, (3.5, 1.5))
 
 
 def draw(raw: Recording, shaped: Recording, report: Mapping[str, Any], path: Path) -> None:
-    """Draw the two drives and write the picture to ``path`` (PNG of ``SIZE_PX``).
+    """Draw the two drives and write the picture to ``path`` (PNG, ``WIDTH_PX`` wide).
 
     Args:
         raw: drive with the filters off.
@@ -55,34 +66,55 @@ def draw(raw: Recording, shaped: Recording, report: Mapping[str, Any], path: Pat
 
 
 def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figure:
-    """Return the picture: per axis with sway a block of command above sway, all on one time."""
+    """Return the picture.
+
+    Per axis with sway a block of command above sway, all on one time; next to them the paths of
+    tip and grapple from above, where the drives know them.
+    """
     raw, shaped = aligned(raw, shaped)
-    strokes = find_strokes(raw)
     names = [name for name, trace in raw.axes.items() if trace.sway_deg is not None]
     if not names:
         raise ValueError("no axis of the drives has sway: there is nothing to draw")
-    swings = [abs(v) for drive in (raw, shaped) for name in names for v in _sway(drive, name)]
-    largest = max(*swings, 0.1)  # a scale of 0.1 degrees where nothing swings
-    fig = new_figure(*SIZE_PX)
-    _head(fig)
-    if any(residual_windows(raw, strokes[name]) for name in names):
+    views = [(drive.crane, rests(drive)) for drive in (raw, shaped) if drive.crane]
+    blocks = max(len(names), 2 if views else 1)
+    height = _HEAD_PX + blocks * _BLOCK_PX + _FOOT_PX
+    fig = new_figure(WIDTH_PX, height, dpi=_DPI)
+    _head(fig, report["crane"], height)
+    if _windows(raw):
         _explain_shade(fig)
-    blocks = fig.add_gridspec(
-        len(names), 1, left=_LEFT, right=_RIGHT, top=0.905, bottom=0.058, hspace=0.22
+    top, bottom = 1.0 - _HEAD_PX / height, _FOOT_PX / height
+    right = _TIME_RIGHT if views else _RIGHT
+    grid = fig.add_gridspec(
+        len(names), 1, left=_LEFT, right=right, top=top, bottom=bottom, hspace=0.24
     )
+    titles = {name: finding(name, report["axes"][name]) for name in names}
+    _draw_blocks(fig, grid, raw, shaped, titles)
+    if views:
+        low = 1.0 - (_HEAD_PX + 2 * _BLOCK_PX) / height
+        box = (_VIEW_LEFT, low, _RIGHT, top)
+        draw_top_views(fig, views, box, sizes=(_TEXT, _TITLE))
+    return fig
+
+
+def _draw_blocks(
+    fig: Figure, grid: GridSpec, raw: Recording, shaped: Recording, titles: Mapping[str, str]
+) -> None:
+    """Draw command above sway of each axis that has a title."""
+    strokes, windows = find_strokes(raw), _windows(raw)
+    swings = [abs(v) for drive in (raw, shaped) for name in titles for v in _sway(drive, name)]
+    largest = max(*swings, 0.1)  # a scale of 0.1 degrees where nothing swings
     panels: list[Axes] = []
-    for row, name in enumerate(names):
-        block = blocks[row].subgridspec(2, 1, height_ratios=[1.0, 1.9], hspace=0.08)
+    for row, (name, title) in enumerate(titles.items()):
+        block = grid[row].subgridspec(2, 1, height_ratios=[1.0, 1.9], hspace=0.1)
         time = panels[0] if panels else None
         command = fig.add_subplot(block[0], sharex=time)
         sway = fig.add_subplot(block[1], sharex=command, sharey=panels[1] if panels else None)
         panels += [command, sway]
-        title = finding(name, report["axes"][name])
-        command.set_title(title, loc="left", fontsize=15, weight="bold", color=TEXT_COLOUR, pad=8)
+        titled(command, title, _TITLE)
         for panel in (command, sway):
-            plain(panel)
+            plain(panel, size=_TEXT)
             zero_line(panel)
-            _shade_windows(panel, raw, strokes[name])
+            _shade(panel, raw, windows)
         _draw_command(command, raw, shaped, name, strokes[name])
         _draw_sway(sway, raw, shaped, name)
         _mark_residual(sway, raw, shaped, name, 1.25 * largest)
@@ -90,8 +122,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
         panel.tick_params(labelbottom=False)
     panels[0].set_xlim(0.0, min(raw.t_s[-1], shaped.t_s[-1]))
     panels[1].set_ylim(-1.45 * largest, 1.45 * largest)
-    panels[-1].set_xlabel("time, s", fontsize=11, color=TEXT_COLOUR)
-    return fig
+    panels[-1].set_xlabel("time, s", fontsize=_TEXT, color=TEXT_COLOUR)
 
 
 def finding(name: str, axis: Mapping[str, Any]) -> str:
@@ -103,45 +134,68 @@ def finding(name: str, axis: Mapping[str, Any]) -> str:
     words = {"residual": "residual swing", "peak": "largest swing"}
     text = f"{axis_title(name)}: {words[measure]} {_change(axis, measure)}"
     if axis["cross_residual_reduction_pct"] is not None:
-        text += f",  left in the other plane {_change(axis, 'cross_residual')}"
+        text += f"\nleft in the other plane {_change(axis, 'cross_residual')}"
     return text
 
 
-def _change(axis: Mapping[str, Any], measure: str) -> str:
-    raw, shaped = axis["raw"][f"{measure}_deg"], axis["shaped"][f"{measure}_deg"]
+def _change(measures: Mapping[str, Any], measure: str) -> str:
+    raw, shaped = measures["raw"][f"{measure}_deg"], measures["shaped"][f"{measure}_deg"]
     values = " → ".join(NOTHING if value is None else f"{value:.1f}°" for value in (raw, shaped))
-    reduction = axis[f"{measure}_reduction_pct"]
+    reduction = measures[f"{measure}_reduction_pct"]
     if reduction is None:
         return values
     return f"{values} ({change_text(reduction).replace('-', MINUS)})"
 
 
-def _head(fig: Figure) -> None:
-    """Write the headline, which is at the same time the key to the colours."""
+def _windows(drive: Recording) -> list[range]:
+    """Where residual swing shows, whatever axes were moved before."""
+    found = (residual_window(drive.t_s, rest) for rest in rests(drive))
+    return [window for window in found if window]
+
+
+def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
+    """Write the headline, which is at the same time the key to the curves, and gain and price."""
     words = (
         ("The same operator script with", TEXT_COLOUR),
-        ("filters off", RAW_COLOUR),
+        ("filters off (dashed)", RAW_COLOUR),
         ("and", TEXT_COLOUR),
-        ("filters on", SHAPED_COLOUR),
+        ("filters on (solid)", SHAPED_COLOUR),
     )
-    coloured_words(fig, words, (_LEFT, 0.988), size=18, sep=7)
+    coloured_words(fig, words, (_EDGE, 1.0 - 14 / height), size=_HEAD, sep=4)
+    if crane and crane["raw"]["run_on_m"] is not None:
+        text = gain_and_price(crane)
+        fig.text(_EDGE, 1.0 - 70 / height, text, fontsize=_TITLE, color=TEXT_COLOUR, va="top")
+
+
+def gain_and_price(crane: Mapping[str, Any]) -> str:
+    """What the filters give and take, whatever axes were moved: swing left, and run-on."""
+    off, on = crane["raw"], crane["shaped"]
+    measure, words = "residual", "residual swing"
+    if off["residual_deg"] is None:
+        measure, words = "peak", "largest swing"
+    seconds, metres = (
+        " → ".join(f"{drive[key]:.2f}" for drive in (off, on)) for key in ("run_on_s", "run_on_m")
+    )
+    return (
+        f"Gain: {words} {_change(crane, measure)}\n"
+        f"Price: after the last joystick is let go, the tip runs on {seconds} s, {metres} m"
+    )
 
 
 def _explain_shade(fig: Figure) -> None:
     fig.text(
-        _RIGHT,
-        0.985,
+        _LEFT,
+        0.008,
         f"shaded: residual swing, from {RESIDUAL_DWELL_S:g} s after release to the next move",
-        ha="right",
-        va="top",
-        fontsize=11,
+        va="bottom",
+        fontsize=_TEXT,
         color=TEXT_COLOUR,
-        bbox={"facecolor": WINDOW_COLOUR, "edgecolor": "none", "pad": 4.0},
+        bbox={"facecolor": WINDOW_COLOUR, "edgecolor": "none", "pad": 3.0},
     )
 
 
-def _shade_windows(panel: Axes, drive: Recording, strokes: list[Stroke]) -> None:
-    for window in residual_windows(drive, strokes):
+def _shade(panel: Axes, drive: Recording, windows: list[range]) -> None:
+    for window in windows:
         panel.axvspan(
             drive.t_s[window[0]], drive.t_s[window[-1]], color=WINDOW_COLOUR, linewidth=0, zorder=0
         )
@@ -153,28 +207,34 @@ def _draw_command(
     """Draw the stick as a filled step, and the command to the valve without and with filters."""
     stick = raw.axes[name].stick
     panel.fill_between(raw.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0, zorder=1.5)
-    for drive, colour in ((raw, RAW_COLOUR), (shaped, SHAPED_COLOUR)):
-        panel.plot(
-            drive.t_s,
-            drive.axes[name].sent,
-            color=colour,
-            linewidth=1.6,
-            drawstyle="steps-post",
-            solid_joinstyle="round",
-        )
+    _draw_pair(panel, raw, shaped, lambda drive: drive.axes[name].sent, drawstyle="steps-post")
     command_scale(panel, 1.2)
-    panel.set_ylabel("command, %", fontsize=11, color=TEXT_COLOUR)
+    panel.set_ylabel("command, %", fontsize=_TEXT, color=TEXT_COLOUR)
     if strokes:
         first, last = strokes[0].plateau
         middle_s = 0.5 * (raw.t_s[first] + raw.t_s[last])
-        level = 0.5 * strokes[0].direction * strokes[0].level
-        panel.text(middle_s, level, "stick", ha="center", va="center", color="#666666")
+        level = -0.5 * strokes[0].direction
+        panel.text(middle_s, level, "stick", ha="center", va="center", fontsize=_TEXT)
 
 
 def _draw_sway(panel: Axes, raw: Recording, shaped: Recording, name: str) -> None:
-    for drive, colour, width in ((raw, RAW_COLOUR, 1.4), (shaped, SHAPED_COLOUR, 2.2)):
-        panel.plot(drive.t_s, _sway(drive, name), color=colour, linewidth=width)
-    panel.set_ylabel("sway, degrees", fontsize=11, color=TEXT_COLOUR)
+    _draw_pair(panel, raw, shaped, lambda drive: _sway(drive, name))
+    panel.set_ylabel("sway, degrees", fontsize=_TEXT, color=TEXT_COLOUR)
+
+
+def _draw_pair(
+    panel: Axes,
+    raw: Recording,
+    shaped: Recording,
+    values: Callable[[Recording], list[float]],
+    **options: Any,
+) -> None:
+    """Draw a curve of both drives: raw thin and dashed, shaped solid, so that grey is enough."""
+    looks = ((raw, RAW_COLOUR, 1.0, _DASHED), (shaped, SHAPED_COLOUR, 1.7, "solid"))
+    for drive, colour, width, style in looks:
+        panel.plot(
+            drive.t_s, values(drive), color=colour, linewidth=width, linestyle=style, **options
+        )
 
 
 def _mark_residual(
@@ -192,23 +252,23 @@ def _mark_residual(
         (shaped, _worst(shaped, name), "filters on", SHAPED_COLOUR, -side * height_deg),
     ):
         t, sway = drive.t_s[at], _sway(drive, name)[at]
-        edge = 0.1 * drive.t_s[-1]  # a name centred nearer to the end would leave the panel
+        edge = 0.15 * drive.t_s[-1]  # a name centred nearer to the end would leave the panel
         align = "left" if t < edge else "right" if t > drive.t_s[-1] - edge else "center"
-        panel.plot([t], [sway], "o", color=colour, markersize=7, markeredgecolor="white", zorder=4)
+        panel.plot([t], [sway], "o", color=colour, markersize=4, markeredgecolor="white", zorder=4)
         panel.annotate(
             f"{text}: {round(abs(sway), 2):.1f}°",
             xy=(t, sway),
             xytext=(t, height),
             ha=align,
             va="center",
-            fontsize=13,
+            fontsize=_TEXT,
             weight="bold",
             color=colour,
             arrowprops={
                 "arrowstyle": "-",
                 "color": colour,
-                "linewidth": 1.0,
-                "shrinkB": 4,
+                "linewidth": 0.7,
+                "shrinkB": 3,
                 "relpos": ({"left": 0.0, "right": 1.0}.get(align, 0.5), 0.5),
             },
         )

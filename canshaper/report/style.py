@@ -19,26 +19,31 @@ MINUS: Final = "\N{MINUS SIGN}"
 DPI: Final = 100
 
 
-def new_figure(width_px: float, height_px: float, **options: Any) -> Figure:
+def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options: Any) -> Figure:
     """A white figure that can be drawn without a display."""
-    size = (width_px / DPI, height_px / DPI)
-    fig = Figure(figsize=size, dpi=DPI, facecolor="white", **options)
+    size = (width_px / dpi, height_px / dpi)
+    fig = Figure(figsize=size, dpi=dpi, facecolor="white", **options)
     FigureCanvasAgg(fig)
     return fig
 
 
 def save(fig: Figure, path: Path) -> None:
     """Write a picture as PNG."""
-    fig.savefig(path, dpi=DPI, format="png")
+    fig.savefig(path, dpi=fig.dpi, format="png")
 
 
-def plain(panel: Axes) -> None:
-    """Light grid, two spines, grey ticks."""
+def plain(panel: Axes, *, size: float = 10) -> None:
+    """Light grid, two spines, grey ticks with figures of this size."""
     panel.grid(visible=True, which="both", color="#E6E6E6", linewidth=0.8)
     panel.set_axisbelow(True)
     panel.spines[["top", "right"]].set_visible(False)
     panel.spines[["left", "bottom"]].set_color("#AAAAAA")
-    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=10)
+    panel.tick_params(color="#AAAAAA", labelcolor=TEXT_COLOUR, labelsize=size)
+
+
+def titled(panel: Axes, text: str, size: float) -> None:
+    """A bold title at the left."""
+    panel.set_title(text, loc="left", fontsize=size, weight="bold", color=TEXT_COLOUR, pad=5)
 
 
 def zero_line(panel: Axes) -> None:
@@ -53,7 +58,7 @@ def command_scale(panel: Axes, limit: float) -> None:
 
 
 def coloured_words(
-    fig: Figure, words: Sequence[tuple[str, str]], at: tuple[float, float], *, size: int, sep: int
+    fig: Figure, words: Sequence[tuple[str, str]], at: tuple[float, float], *, size: float, sep: int
 ) -> None:
     """A line of (text, colour), its upper left corner at a place of the figure: names curves."""
     parts: list[Artist] = [

@@ -11,19 +11,19 @@ def _pulse(axis: str, level: float = 1.0) -> Script:
     return Script(f"pulse-{axis}", (Stroke(axis, 0.5, 3.0, level, _PULSE_RAMP_S),), 8.5)
 
 
-# Both joysticks at once, as a person drives: out to the pile, and back over the bunk with a
-# correction to the other side. Slewing comes close to the pillar: swing grows with the radius.
+# Both joysticks at once, as a person drives: out to the pile, and in over the bunk with a
+# correction to the other side.
 _DEMO = Script(
     "demo",
     (
-        Stroke(SLEW, 0.5, 2.6, 0.8),
-        Stroke(NEAR_FAR, 0.9, 2.6, 0.8),
+        Stroke(NEAR_FAR, 0.5, 2.4, 0.8),
+        Stroke(SLEW, 0.9, 2.0, 0.9),
         Stroke(LIFT, 1.4, 1.2, -0.5),
         Stroke(LIFT, 8.4, 1.6, 0.8),
-        Stroke(SLEW, 9.0, 2.2, -0.8),
-        Stroke(SLEW, 11.2, 0.5, 0.4),
-        Stroke(NEAR_FAR, 9.3, 2.2, -0.7),
-        Stroke(NEAR_FAR, 11.5, 0.4, 0.4),
+        Stroke(NEAR_FAR, 9.0, 2.2, -0.7),
+        Stroke(NEAR_FAR, 11.2, 0.4, 0.4),
+        Stroke(SLEW, 9.3, 2.2, -0.8),
+        Stroke(SLEW, 11.5, 0.5, 0.4),
     ),
     17.5,
 )
