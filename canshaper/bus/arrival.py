@@ -13,7 +13,7 @@ from canshaper.bus.clock import boottime_ns
 
 SO_TIMESTAMPNS = 35  # asm/socket.h; Python has no name for it
 _STAMP = struct.Struct("@ll")  # struct timespec of this machine
-ANCILLARY_BYTES = socket.CMSG_SPACE(_STAMP.size)
+ANCILLARY_BYTES = 64  # room for one stamp with its header: CMSG_SPACE, which only POSIX has, is 32
 
 
 def stamp_ns(ancillary: Iterable[tuple[int, int, bytes]]) -> int | None:

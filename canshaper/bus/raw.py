@@ -15,6 +15,7 @@ from typing import Any
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
 from canshaper.bus.socketcan import dropped_frames, set_filters
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
 from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
@@ -163,15 +164,15 @@ class RawPort:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
         word, length, payload = CAN_FRAME.unpack(data)
-        if word <= socket.CAN_SFF_MASK and length <= 8:  # the most frequent kind first
+        if word <= SFF_MASK and length <= 8:  # the most frequent kind first
             return new_frame(Frame, (self.name, word, False, payload[:length]))
-        if word & socket.CAN_ERR_FLAG:  # first: its id is an error class, and could match
+        if word & ERR_FLAG:  # first: its id is an error class, and could match
             self._error_frame(word, payload)
             return None
-        if word & socket.CAN_RTR_FLAG or length > 8:
+        if word & RTR_FLAG or length > 8:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
-        return Frame(self.name, word & socket.CAN_EFF_MASK, True, payload[:length])
+        return Frame(self.name, word & EFF_MASK, True, payload[:length])
 
     def _error_frame(self, word: int, payload: bytes) -> None:
         fault = FrameFault.ERROR_FRAME
@@ -197,7 +198,7 @@ class RawPort:
             return False
         _bus, word, extended, data = frame
         if extended:
-            word |= socket.CAN_EFF_FLAG
+            word |= EFF_FLAG
         under_way = self._unconfirmed.get(word, 0)
         if under_way and self._stuck(word, under_way):
             return False
@@ -353,4 +354,4 @@ def _poll(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
 
 def _words(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
     """The kernel's ids of messages."""
-    return frozenset(i | socket.CAN_EFF_FLAG if extended else i for i, extended in messages)
+    return frozenset(i | EFF_FLAG if extended else i for i, extended in messages)

@@ -8,6 +8,7 @@ import struct
 from collections.abc import Iterable
 
 from canshaper.bus.device import check_device
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
@@ -23,7 +24,6 @@ ERROR_CLASSES = 0x1FFFFFFD
 # Room for the backlog of a long stall; the default holds about 300 frames.
 RECEIVE_BUFFER_BYTES = 1 << 20
 
-EFF = socket.CAN_EFF_FLAG
 _FILTER = struct.Struct("=II")
 _MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DROPS
 
@@ -77,11 +77,11 @@ def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
         sockets, (ids.received, ids.sent, others), groups, (0, 0, CAN_INV_FILTER), strict=True
     ):
         words = [_word_and_mask(message) for message in messages]
-        words += [(group | EFF, group_mask(group) | EFF) for group in some]
+        words += [(group | EFF_FLAG, group_mask(group) | EFF_FLAG) for group in some]
         if flag and ids.j1939:
-            words.append((EFF, EFF))
+            words.append((EFF_FLAG, EFF_FLAG))
         if flag and ids.canopen:
-            words += [(base, mask | EFF) for base, mask, _ in SERVICES]
+            words += [(base, mask | EFF_FLAG) for base, mask, _ in SERVICES]
         if flag and ids.in_line:
             words = []  # no filter at all: nothing is heard
         filters = filter_words((word | flag, mask) for word, mask in words)
@@ -105,5 +105,5 @@ def _word_and_mask(message: tuple[int, bool]) -> tuple[int, int]:
     """Filter for one message: its id in its own width; a mask without the flags fits both."""
     can_id, extended = message
     if extended:
-        return can_id | socket.CAN_EFF_FLAG, socket.CAN_EFF_MASK | socket.CAN_EFF_FLAG
-    return can_id, socket.CAN_SFF_MASK | socket.CAN_EFF_FLAG
+        return can_id | EFF_FLAG, EFF_MASK | EFF_FLAG
+    return can_id, SFF_MASK | EFF_FLAG

@@ -1,6 +1,8 @@
 """The ``canshaper`` command: a module of ``canshaper.cli.verbs`` is a verb, loaded when used."""
 
 import sys
+from collections.abc import Callable
+from functools import wraps
 from importlib import import_module
 from pkgutil import iter_modules
 from typing import Any, cast
@@ -10,7 +12,10 @@ from typer.core import TyperGroup
 
 from canshaper.cli import verbs
 from canshaper.cli.common import EXIT_WRONG, EXTRAS, echo, fail, install_line
-from canshaper.errors import CanshaperError
+from canshaper.errors import CanshaperError, UsageError
+
+# They need a scheduler, sockets and signals that only Linux has.
+LINUX_ONLY = {"doctor", "gateway", "run", "set", "studio"}
 
 
 class Verbs(TyperGroup):
@@ -38,7 +43,8 @@ class Verbs(TyperGroup):
             rich_markup_mode=None,
             context_settings={"help_option_names": ["-h", "--help"]},
         )
-        one.command(name)(getattr(import_module(f"{verbs.__name__}.{word}"), word))
+        verb = getattr(import_module(f"{verbs.__name__}.{word}"), word)
+        one.command(name)(_linux_only(verb) if name in LINUX_ONLY else verb)
         self.commands[name] = typer.main.get_command(one)
         return self.commands[name]
 
@@ -48,6 +54,16 @@ class Verbs(TyperGroup):
             return super().invoke(ctx)
         except CanshaperError as error:
             raise fail(error) from None
+
+
+def _linux_only(verb: Callable[..., None]) -> Callable[..., None]:
+    @wraps(verb)
+    def checked(*arguments: Any, **options: Any) -> None:
+        if sys.platform != "linux":
+            raise UsageError(f"canshaper {verb.__name__}: expected Linux, got {sys.platform}")
+        verb(*arguments, **options)
+
+    return checked
 
 
 app = typer.Typer(

@@ -8,12 +8,12 @@ from pathlib import Path
 
 from cantools.database.can import Message
 
+from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.bounded import read_bounded
 from canshaper.errors import MOST_LETTERS, MOST_PROBLEMS, Problem
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
-    EXTENDED,
     MOST_MESSAGES,
     MOST_STATEMENTS,
     WIDE_ID,
@@ -51,7 +51,7 @@ class DbcFile:
 
     def problem(self, message: Message, text: str) -> Problem:
         """A problem of this file at the line where the message is defined."""
-        number = message.frame_id | (EXTENDED if message.is_extended_frame else 0)
+        number = message.frame_id | (EFF_FLAG if message.is_extended_frame else 0)
         lines = (e.line for e in self.entries if (e.number, e.name) == (number, message.name))
         return Problem(str(self.path), next(lines, None), message.name, text)
 
@@ -188,7 +188,7 @@ def _entries(messages: list[Message], text: str) -> list[Entry]:
     for line, row in enumerate(text.split("\n"), 1):
         if found := _DEFINITION.match(row):
             lines.setdefault((int(found[1]), found[2]), line)
-    numbers = [m.frame_id | (EXTENDED if m.is_extended_frame else 0) for m in messages]
+    numbers = [m.frame_id | (EFF_FLAG if m.is_extended_frame else 0) for m in messages]
     return [
         Entry(m.name, number, lines.get((number, m.name)))
         for m, number in zip(messages, numbers, strict=True)

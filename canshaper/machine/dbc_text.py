@@ -10,10 +10,9 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.machine.dbc_signals import signals_fault
 
-EXTENDED = 0x80000000
-LAST_ID, LAST_EXTENDED = 0x7FF, 0x1FFFFFFF
 # Of all DBC files of a deployment: several times those of a machine.
 MOST_MESSAGES = 20_000
 MOST_STATEMENTS = 300_000
@@ -101,7 +100,7 @@ class Entry(NamedTuple):
     @property
     def key(self) -> tuple[int, bool]:
         """(id, extended)."""
-        return self.number & ~EXTENDED, self.number >= EXTENDED
+        return self.number & ~EFF_FLAG, self.number >= EFF_FLAG
 
 
 @dataclass(frozen=True)
@@ -212,9 +211,11 @@ def dbc_text(data: bytes) -> DbcText:
 
 def _id_fault(number: int) -> str | None:
     """Why no frame has this id, or None."""
-    if number < EXTENDED:
+    if number < EFF_FLAG:
         return (
-            None if number <= LAST_ID else f"has the id {number:#x} of more than 11 bits; {WIDE_ID}"
+            None
+            if number <= SFF_MASK
+            else f"has the id {number:#x} of more than 11 bits; {WIDE_ID}"
         )
-    can_id = number - EXTENDED
-    return None if can_id <= LAST_EXTENDED else f"has the id {can_id:#x} of more than 29 bits"
+    can_id = number - EFF_FLAG
+    return None if can_id <= EFF_MASK else f"has the id {can_id:#x} of more than 29 bits"

@@ -13,9 +13,9 @@ from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
 from canshaper.bus.port import open_python_can
 from canshaper.bus.raw import CAN_FRAME
 from canshaper.bus.socketcan import dropped_frames, open_sockets
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
-from canshaper.recording.text import ERROR_FLAG
 
 # Frames taken from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
@@ -143,12 +143,12 @@ def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
     time_ns = time.time_ns() if stamp is None else stamp
     word, length, payload = CAN_FRAME.unpack(data)
     payload = payload[: min(length, 8)]
-    if word & socket.CAN_ERR_FLAG:
-        can_id = ERROR_FLAG | word & socket.CAN_EFF_MASK
+    if word & ERR_FLAG:
+        can_id = ERR_FLAG | word & EFF_MASK
         return Heard(time_ns, bus, channel, can_id, True, payload, "error")
-    extended = bool(word & socket.CAN_EFF_FLAG)
-    can_id = word & (socket.CAN_EFF_MASK if extended else socket.CAN_SFF_MASK)
-    remote = "remote" if word & socket.CAN_RTR_FLAG else ""
+    extended = bool(word & EFF_FLAG)
+    can_id = word & (EFF_MASK if extended else SFF_MASK)
+    remote = "remote" if word & RTR_FLAG else ""
     return Heard(time_ns, bus, channel, can_id, extended, payload, remote)
 
 
@@ -160,7 +160,7 @@ def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
     time_ns = round(message.timestamp * 1e6) * 1000
     can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
     if message.is_error_frame:
-        can_id, extended, kind = ERROR_FLAG | can_id, True, "error"
+        can_id, extended, kind = ERR_FLAG | can_id, True, "error"
     elif message.is_remote_frame:
         kind = "remote"
     elif message.is_fd:

@@ -12,13 +12,13 @@ from decimal import Decimal
 from functools import partial
 from typing import BinaryIO
 
+from canshaper.codec.can_id import ERR_FLAG
 from canshaper.recording.frames import LATEST_S, Place, TimedFrame, fits
 
 SECOND_NS = 1_000_000_000
 # Far longer than any line of a log; a file without line ends must not fill the memory.
 LONGEST_LINE = 65_536
 SHOWN = 60
-ERROR_FLAG = 0x20000000  # linux/can.h, CAN_ERR_FLAG
 EDL = 0x1000  # a frame of CAN FD, in the flags of an ASC line
 
 _new = tuple.__new__  # TimedFrame(...) in half the time
@@ -85,7 +85,7 @@ def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] |
     can_id, extended = int(word, 16), len(word) == 8
     if len(word) not in (3, 8):
         raise place.error(_shown(line), CANDUMP_ALLOWED)
-    if extended and can_id & ERROR_FLAG:
+    if extended and can_id & ERR_FLAG:
         return None
     if not fits(can_id, extended=extended):
         raise place.error(_id(can_id), "an id of 11 bits in 3 digits, or of 29 in 8")

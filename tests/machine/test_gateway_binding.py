@@ -6,6 +6,7 @@ import cantools
 import pytest
 
 from canshaper.checksums import Checksum
+from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.protection import Protection
 from canshaper.codec.rewrite import RewrittenMessage
@@ -13,7 +14,6 @@ from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
-from canshaper.protocols.gateway.passing import EFF
 from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
 
 ROOT = Path(__file__).parents[2]
@@ -181,8 +181,8 @@ axes:
     assert sent.sender.key[1] & 0xFF == 51
     assert sent.ours == {axis.command.signal, flags.neutral, flags.positive, flags.negative}
     group = next(p for p in excluded(deployment) if p.mask != 0x9FFFFFFF)
-    assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF
-    assert group.mask == 0x03FFFFFF | EFF
+    assert group.value == (message.frame_id & 0x03FFFF00) | 51 | EFF_FLAG
+    assert group.mask == 0x03FFFFFF | EFF_FLAG
     assert deployment.routing.buses["far"].sent_groups == set()
     neutral = sent.onto(bytes(8))
     network = cantools.database.load_file((ROOT / "config" / found.config.dbc[0]).resolve())
@@ -202,8 +202,8 @@ def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path:
     """A joystick and a valve of J1939 with a destination: what is theirs once is theirs at all."""
     dbc = (ROOT / "dbc" / "j1939-bjm-avc.dbc").read_text("cp1252")
     joystick, valve = 0x0CEF2733, 0x0CEF3000
-    dbc = dbc.replace("2365445886", str(joystick | EFF)).replace(
-        "2365468926", str(valve | 0xFE | EFF)
+    dbc = dbc.replace("2365445886", str(joystick | EFF_FLAG)).replace(
+        "2365468926", str(valve | 0xFE | EFF_FLAG)
     )
     (tmp_path / "machine.dbc").write_text(dbc, "cp1252")
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
@@ -219,9 +219,9 @@ def test_what_one_node_sends_to_another_is_held_back_at_every_priority(tmp_path:
     rules = passing_rules(deployment)
     for priority in range(8):
         for can_id in (joystick, valve | own.address):
-            word = can_id & 0x03FFFFFF | priority << 26 | EFF
+            word = can_id & 0x03FFFFFF | priority << 26 | EFF_FLAG
             assert not [rule for rule in rules if rule.pattern.fits(word)], hex(word)
-        other = 0x00EF2744 | priority << 26 | EFF
+        other = 0x00EF2744 | priority << 26 | EFF_FLAG
         assert len([rule for rule in rules if rule.pattern.fits(other)]) == 2
 
 

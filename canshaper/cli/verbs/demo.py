@@ -1,6 +1,7 @@
 """``canshaper demo``: the same drive with anti-sway off and on, measured and drawn."""
 
 import json
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,7 +25,9 @@ def demo(
     script: str = typer.Option("demo", "--script", help="What the operator does."),
     out: Path = typer.Option(Path("out/demo"), "--out", help="Directory for picture and report."),
     lockstep: bool = typer.Option(
-        False, "--lockstep", help="Without bus and clock, in a second or two."
+        False,
+        "--lockstep",
+        help="Without bus and clock, in a second or two; always so outside Linux.",
     ),
     transport: str = typer.Option(
         "auto", "--transport", help="auto, vcan0 (or another SocketCAN channel), udp_multicast."
@@ -64,7 +67,8 @@ def demo(
     console = SafeConsole()
     parameters = changed_parameters(changes or [])
     deployment = loader(file)()
-    way = None if lockstep else choose_transport(transport, deployment)
+    # A drive on a bus needs Linux' scheduler and sockets.
+    way = None if lockstep or sys.platform != "linux" else choose_transport(transport, deployment)
     several = cranes(deployment)
     crane = crane or next(iter(several), None)
     axes = (one_crane(deployment, crane) if crane else deployment).axes

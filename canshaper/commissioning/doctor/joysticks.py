@@ -10,6 +10,7 @@ from typing import Any
 
 from canshaper.bus.clock import boottime_ns
 from canshaper.bus.raw import CAN_FRAME
+from canshaper.codec.can_id import EFF_FLAG
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.machine.binding import load_deployment
@@ -77,7 +78,7 @@ class Joysticks:
 
     def _send(self, now: bool) -> None:
         for frame in self._node.frames(self._time_ms) if now else ():
-            word = frame.can_id | socket.CAN_EFF_FLAG if frame.extended else frame.can_id
+            word = frame.can_id | EFF_FLAG if frame.extended else frame.can_id
             data = CAN_FRAME.pack(word, len(frame.data), frame.data)
             at_ns = boottime_ns()
             try:

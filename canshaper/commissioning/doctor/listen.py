@@ -9,6 +9,7 @@ from itertools import pairwise
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
 from canshaper.bus.raw import CAN_FRAME
 from canshaper.bus.socketcan import open_sockets
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.figures import summary
 from canshaper.commissioning.doctor.finding import Finding, Level
@@ -68,10 +69,10 @@ def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
     """The next data frame of a socket and when the kernel received it, ns; None for another one."""
     packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
     word, length, data = CAN_FRAME.unpack(packet)
-    if word & (socket.CAN_ERR_FLAG | socket.CAN_RTR_FLAG):
+    if word & (ERR_FLAG | RTR_FLAG):
         return None
-    extended = bool(word & socket.CAN_EFF_FLAG)
-    frame = Frame(bus, word & socket.CAN_EFF_MASK, extended, data[:length])
+    extended = bool(word & EFF_FLAG)
+    frame = Frame(bus, word & EFF_MASK, extended, data[:length])
     time_ns = stamp_ns(ancillary)
     return None if time_ns is None else (frame, time_ns)
 

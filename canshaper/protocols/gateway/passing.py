@@ -4,12 +4,10 @@ A filter of can-gw, and each of those of a socket, tells the frames that it want
 few are the union of patterns that cover the rest; no two of them meet, so no frame passes twice.
 """
 
-import socket
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-EFF = socket.CAN_EFF_FLAG
-WIDE, NARROW = socket.CAN_EFF_MASK, socket.CAN_SFF_MASK
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
 
 
 @dataclass(frozen=True, slots=True, order=True)
@@ -27,13 +25,17 @@ class Pattern:
         return word & self.mask == self.value
 
 
-EVERYTHING = (Pattern(0, EFF), Pattern(EFF, EFF))
+EVERYTHING = (Pattern(0, EFF_FLAG), Pattern(EFF_FLAG, EFF_FLAG))
 """Ids of 11 bits, and ids of 29 bits."""
 
 
 def exactly(can_id: int, extended: bool) -> Pattern:
     """The one id."""
-    return Pattern(can_id | EFF, WIDE | EFF) if extended else Pattern(can_id, NARROW | EFF)
+    return (
+        Pattern(can_id | EFF_FLAG, EFF_MASK | EFF_FLAG)
+        if extended
+        else Pattern(can_id, SFF_MASK | EFF_FLAG)
+    )
 
 
 def all_but(excluded: Iterable[Pattern]) -> list[Pattern]:
@@ -50,7 +52,7 @@ def _without(whole: Pattern, hole: Pattern) -> list[Pattern]:
         return [whole]  # they do not meet
     left = []
     value, mask = whole.value, whole.mask
-    for bit in (1 << n for n in reversed(range(WIDE.bit_length()))):
+    for bit in (1 << n for n in reversed(range(EFF_MASK.bit_length()))):
         if hole.mask & ~mask & bit:
             mask |= bit
             left.append(Pattern(value | ~hole.value & bit, mask))

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 
+from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.identifier import NULL, WITHOUT_PRIORITY, group_mask, group_of
 from canshaper.codec.kernel_check import kernel_check
 from canshaper.codec.layout import is_j1939
@@ -9,7 +10,7 @@ from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.protocols.gateway.cangw import Rule, changed_bytes
-from canshaper.protocols.gateway.passing import EFF, Pattern, all_but, exactly
+from canshaper.protocols.gateway.passing import Pattern, all_but, exactly
 
 
 def excluded(deployment: Deployment) -> frozenset[Pattern]:
@@ -88,12 +89,12 @@ def _of(joystick: BoundJoystick) -> Pattern:
 
 def _whatever_priority(can_id: int) -> Pattern:
     """A message of J1939 from one node, to one where it has a destination."""
-    return Pattern(can_id & WITHOUT_PRIORITY | EFF, WITHOUT_PRIORITY | EFF)
+    return Pattern(can_id & WITHOUT_PRIORITY | EFF_FLAG, WITHOUT_PRIORITY | EFF_FLAG)
 
 
 def _group(can_id: int, source: int | None) -> Pattern:
     """A group of J1939, from one address or from all."""
-    mask, value = group_mask(can_id) | EFF, group_of(can_id) | EFF
+    mask, value = group_mask(can_id) | EFF_FLAG, group_of(can_id) | EFF_FLAG
     return Pattern(value, mask) if source is None else Pattern(value | source, mask | 0xFF)
 
 

@@ -5,10 +5,11 @@ import socket
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.protocols.gateway.passing import EFF, EVERYTHING, Pattern, all_but, exactly
+from canshaper.codec.can_id import EFF_FLAG
+from canshaper.protocols.gateway.passing import EVERYTHING, Pattern, all_but, exactly
 
 narrow = st.integers(0, 0x7FF)
-wide = st.integers(0, 0x1FFFFFFF).map(lambda i: i | EFF)
+wide = st.integers(0, 0x1FFFFFFF).map(lambda i: i | EFF_FLAG)
 words = narrow | wide
 
 
@@ -16,7 +17,7 @@ words = narrow | wide
 def holes(draw: st.DrawFn) -> Pattern:
     """A pattern with any bits that do not matter."""
     word = draw(words)
-    mask = draw(st.integers(0, 0x1FFFFFFF if word & EFF else 0x7FF)) | EFF
+    mask = draw(st.integers(0, 0x1FFFFFFF if word & EFF_FLAG else 0x7FF)) | EFF_FLAG
     return Pattern(word & mask, mask)
 
 
@@ -28,7 +29,7 @@ def test_a_frame_passes_once_unless_it_is_excluded(excluded: list[Pattern], word
 
 @given(st.sets(words, max_size=6), words)
 def test_ids_of_both_widths_are_told_apart(excluded: set[int], word: int) -> None:
-    hidden = [exactly(i & ~EFF, bool(i & EFF)) for i in excluded]
+    hidden = [exactly(i & ~EFF_FLAG, bool(i & EFF_FLAG)) for i in excluded]
     passes = any(pattern.fits(word) for pattern in all_but(hidden))
     assert passes == (word not in excluded)
 

@@ -1,0 +1,9 @@
+"""The id of a frame as SocketCAN carries it: linux/can.h.
+
+Python's ``socket`` has these names on Linux only; logs are read and machines simulated anywhere.
+"""
+
+EFF_FLAG = 0x80000000  # an id of 29 bits
+RTR_FLAG = 0x40000000  # a remote frame
+ERR_FLAG = 0x20000000  # the kernel tells of an error
+SFF_MASK, EFF_MASK = 0x7FF, 0x1FFFFFFF
