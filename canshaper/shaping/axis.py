@@ -16,7 +16,8 @@ from canshaper.shaping.limits import (
     rate_limited,
     within,
 )
-from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.kind import Shaper, spreads
+from canshaper.shaping.small_strokes import SmallStrokes
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, TRIPPED, StateMachine
 from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
@@ -67,6 +68,8 @@ class Axis:
         self._largest_added = 0.0
         self._added_time = AddedTime(0)
         self._transfer = BumplessTransfer(shaper, tick_s)
+        self._small = SmallStrokes(limits, grid_steps, tick_s)
+        self._spreads = spreads(shaper)
         self._tick_s = tick_s
         self._limits = limits
         self._neutral_band = neutral_band
@@ -127,6 +130,8 @@ class Axis:
         state = states.step(stick, added, self.raw == 0 and not self.commanded)
         if state is not old:
             self._transfer.entered(state, old)
+            if state is not ACTIVE:
+                self._small.lose()
         if state is not ACTIVE:
             added = 0.0
         command = 0.0
@@ -167,6 +172,7 @@ class Axis:
         self._may_add(self._added, ticks)
         maximum = self._limits.maximum
         command = within(self.command, -maximum, maximum, 0.0)
+        self._small.hold(command, self.applied, ticks)
         try:
             for _ in range(min(ticks, MOST_HELD)):
                 self._transfer.hold(command)
@@ -190,6 +196,8 @@ class Axis:
         shaper = shaper_for(sway)
         maximum = self._limits.maximum
         self._transfer.replace(shaper, within(self.command, -maximum, maximum, 0.0))
+        self._spreads = spreads(shaper)
+        self._small.lose()
         self.sway = sway
 
     def allow_added(self, largest: float, time_s: float) -> None:
@@ -221,6 +229,7 @@ class Axis:
         if not self.neutral:
             raise ValueError("limits change in neutral only")
         self._limits = limits
+        self._small = SmallStrokes(limits, self._grid_steps, self._tick_s)
         self._rise = limits.rise_per_s * self._tick_s
         self._fall = limits.fall_per_s * self._tick_s
 
@@ -234,6 +243,8 @@ class Axis:
         recent.add(command)
         low, high = allowed_range(command, recent.low, recent.high, limits)
         target = within(unlimited, low, high, limits.minimum)
+        if self._spreads:
+            target = self._small.output(command, self.applied, target, low, high)
         self._added = added
         if added or self._own != self._limited:
             low, high, wish = self._drive_both(command, target)
@@ -280,6 +291,7 @@ class Axis:
 
     def _rest(self) -> None:
         self._recent.clear()
+        self._small.clear()
         self._transfer.rest()
         self._limited = self._own = self._added = self._carry = self.sent = 0.0
         self.raw = 0

@@ -23,7 +23,8 @@ class Shaper(Protocol):
     """What the axis asks of a filter.
 
     A filter with a memory also has ``begin_at(command)``: as if the command had long been there;
-    and, where it can go on from another one of its class, ``inherit(old)``.
+    and, where it can go on from another one of its class, ``inherit(old)``. One whose output is the
+    command spread over time, with the same travel, has ``spreads = True``.
     """
 
     def wanted(self, command: float) -> float:
@@ -146,3 +147,8 @@ def carry_over(old: Shaper, new: Shaper, command: float) -> None:
         new.inherit(old)
     elif hasattr(new, "begin_at"):
         new.begin_at(command)
+
+
+def spreads(shaper: Shaper) -> bool:
+    """Whether a shaper's output is the command spread over time, with the same travel."""
+    return bool(getattr(shaper, "spreads", False))

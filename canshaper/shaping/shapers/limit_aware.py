@@ -37,6 +37,7 @@ class LimitAware:
         ValueError: the tick is too long for the feedback.
     """
 
+    spreads = True
     __slots__ = ("_asked", "_gff", "_shaper", "_sway", "_twin")
 
     def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:

@@ -1,0 +1,252 @@
+"""Taps and small strokes: one movement, as long as the joystick asked for."""
+
+import math
+import random
+from itertools import pairwise
+
+import pytest
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.fir import Fir, zv_taps
+from canshaper.shaping.shapers.gff import Gff
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.limit_aware import LimitAware
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.small_strokes import SmallStrokes, least_velocity
+from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.valve_curve import ValveCurve
+
+TICK_S = 0.02
+MODE = SwayMode.from_period(2.356, 0.038)
+LIMITS = OutputLimits(deadband=0.05, tail_s=2.2, brake_shaped=True)
+# Three heaps and a floor between them, as ``canshaper robust`` makes them: 1.8 s.
+TAPS = [0.1, 0.1, 0.1, *[0.0044] * 40, 0.1, 0.1, 0.048, *[0.0044] * 40, 0.1]
+
+
+class Ruleless:
+    """A shaper of which an axis does not know that it spreads."""
+
+    def __init__(self, shaper: Shaper) -> None:
+        self.wanted = shaper.wanted
+
+
+LEVELS = (0.1, 0.13, 0.2, 0.34, 0.55, 0.79, 1.0)
+DURATIONS = (0.06, 0.1, 0.14, 0.2, 0.3, 0.36, 0.46, 1.0)
+
+
+def axis_with(
+    limits: OutputLimits = LIMITS, steps: int = 125, shaper: str = "robust", **changes: float
+) -> Axis:
+    """An axis in READY."""
+    sway = SwayModel(MODE, TICK_S)
+    total = math.fsum(TAPS)
+    fir = Fir([tap / total for tap in TAPS])
+    robust = LimitAware(sway, fir, 5.0)
+    shapers: dict[str, Shaper] = {
+        "robust": robust,
+        "ruleless": Ruleless(robust),
+        "gff": Gff(sway, (-5.655, -4.112)),
+        "off": Off(),
+    }
+    axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[shaper], grid_steps=steps, **changes)
+    axis.tick(StickInput())
+    axis.tick(StickInput())
+    assert axis.state is State.READY
+    return axis
+
+
+def tapped(axis: Axis, level: float, duration_s: float, rest_s: float = 3.5) -> list[float]:
+    """What is sent at a tap."""
+    held = round(duration_s / TICK_S)
+    sent = []
+    for tick in range(held + round(rest_s / TICK_S)):
+        axis.tick(StickInput(level if tick < held else 0.0))
+        sent.append(axis.sent)
+    return sent
+
+
+def movements(sent: list[float]) -> int:
+    return sum(before == 0.0 != after for before, after in pairwise([0.0, *sent]))
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("level", LEVELS)
+def test_a_tap_is_one_movement_of_its_length(level: float, sign: float) -> None:
+    for duration_s in DURATIONS:
+        sent = tapped(axis_with(), sign * level, duration_s)
+        asked_s = sign * level * round(duration_s / TICK_S) * TICK_S
+        assert movements(sent) == 1, duration_s
+        assert sum(sent) * TICK_S == pytest.approx(asked_s, rel=0.05), duration_s
+        assert all(velocity * sign >= 0.0 for velocity in sent)
+        assert max(map(abs, sent)) <= level
+
+
+@pytest.mark.parametrize(
+    ("limits", "steps"),
+    [
+        (LIMITS, 1000),
+        (OutputLimits(tail_s=2.2), 125),
+        (OutputLimits(deadband=0.054, tail_s=2.2), 125),  # its first step is next to nothing
+        (OutputLimits(deadband=0.05, minimum=0.03, tail_s=2.2), 125),
+        (OutputLimits(deadband=0.05, tail_s=2.2, rise_per_s=0.5, fall_per_s=0.5), 125),
+        (
+            OutputLimits(tail_s=2.2, curve=ValveCurve((-1, -0.1, 0.1, 1), (-1, 0, 0, 0.8))),
+            125,
+        ),
+    ],
+    ids=["fine grid", "no deadband", "odd deadband", "minimum", "slow valve", "curve"],
+)
+@pytest.mark.parametrize("level", [0.1, 0.3])
+@pytest.mark.parametrize("duration_s", [0.1, 0.3])
+def test_so_it_is_on_other_valves(
+    limits: OutputLimits, steps: int, level: float, duration_s: float
+) -> None:
+    sent = tapped(axis_with(limits, steps), level, duration_s)
+    least = least_velocity(limits, steps) * TICK_S
+    asked_s = level * round(duration_s / TICK_S) * TICK_S
+    assert movements(sent) == 1
+    assert sum(sent) * TICK_S == pytest.approx(asked_s, rel=0.05, abs=least)
+
+
+def test_the_valve_rests_between_taps_and_each_is_a_movement_of_its_own() -> None:
+    axis = axis_with()
+    sent = [*tapped(axis, 0.1, 0.1), *tapped(axis, 0.1, 0.1), *tapped(axis, -0.1, 0.1)]
+    assert movements(sent) == 3
+    assert sum(sent) * TICK_S == pytest.approx(0.01, rel=0.05)
+
+
+def test_taps_one_after_another_are_as_long_as_all_of_them() -> None:
+    axis = axis_with()
+    sent = [v for _ in range(5) for v in tapped(axis, 0.1, 0.1, rest_s=0.3)]
+    sent += tapped(axis, 0.0, 0.0)
+    assert movements(sent) == 1
+    assert sum(sent) * TICK_S == pytest.approx(0.05, rel=0.05)
+
+
+def test_a_large_stroke_is_what_the_filter_makes_of_it() -> None:
+    """Of the same numbers, whether there is a rule for small ones or not."""
+    with_rule, without = axis_with(), axis_with(shaper="ruleless")
+    for level, duration_s in ((1.0, 2.0), (0.7, 1.6), (-0.6, 3.0)):
+        assert tapped(with_rule, level, duration_s) == tapped(without, level, duration_s)
+    assert tapped(with_rule, 0.1, 0.1) != tapped(without, 0.1, 0.1)
+
+
+def test_after_a_reversal_there_is_travel_both_ways() -> None:
+    """They cancel out in what is due: the filter goes its way."""
+    with_rule, without = axis_with(), axis_with(shaper="ruleless")
+    for axis in (with_rule, without):
+        tapped(axis, 0.8, 0.3, rest_s=0.0)
+    assert tapped(with_rule, -0.8, 0.3, 1.6) == tapped(without, -0.8, 0.3, 1.6)
+
+
+def test_a_filter_that_goes_further_is_left_alone() -> None:
+    """G_FF catches its own first movement by a second one: travel that no one asked for."""
+    sent = tapped(axis_with(shaper="gff"), 0.3, 0.1)
+    assert movements(sent) > 1
+    assert sum(sent) * TICK_S > 0.05
+
+
+def test_without_a_filter_the_axis_stops_at_once() -> None:
+    assert not any(tapped(axis_with(shaper="off"), 0.3, 0.1)[8:])
+
+
+@pytest.mark.parametrize("ticks", [1, 7])
+def test_missed_ticks_are_travelled_too(ticks: int) -> None:
+    axis = axis_with()
+    way = 0.0
+    for tick in range(160):
+        axis.tick(StickInput(0.1 if tick < 10 else 0.0))
+        way += axis.sent
+        if tick == 30:
+            assert axis.sent
+            axis.hold(ticks)
+            way += ticks * axis.sent
+    assert way == pytest.approx(1.0, rel=0.05)
+
+
+def test_of_what_was_commanded_in_bypass_nothing_is_known() -> None:
+    """The filter has seen it, and goes on with it."""
+    with_rule, without = axis_with(), axis_with(shaper="ruleless")
+    for axis in (with_rule, without):
+        for _ in range(100):
+            axis.tick(StickInput(0.3, bypass=True))
+        axis.tick(StickInput(0.3))
+    assert tapped(with_rule, 0.0, 0.0) == tapped(without, 0.0, 0.0)
+    assert movements(tapped(with_rule, 0.1, 0.1)) == 1  # from rest it is known again
+
+
+@pytest.mark.parametrize("command", [0.1, 0.0])
+def test_after_a_retune_nothing_is_known_until_it_rests(command: float) -> None:
+    """A step is not held to the end of the tail for what another filter would have made."""
+    axis = axis_with()
+    tapped(axis, 0.1, 0.1, rest_s=0.2)
+    axis.command = command
+    axis.retune(MODE, lambda sway: LimitAware(sway, Fir(zv_taps(MODE, TICK_S)), 5.0))
+    sent = tapped(axis, 0.0, 0.0)
+    assert not any(sent[80:])
+    assert movements(tapped(axis, 0.1, 0.1)) == 1
+
+
+def test_what_another_axis_wants_in_vain_is_not_due() -> None:
+    """Of an added velocity that is cut, the axis' own part takes the rest."""
+    small = SmallStrokes(LIMITS, 125, TICK_S)
+    for _ in range(100):
+        assert small.output(0.0, 0.35, 0.0, 0.0, 0.0) == 0.0
+    small.output(0.1, 0.0, 0.0, 0.0, 0.1)
+    assert small.output(0.0, 0.0, 0.0, 0.0, 0.1) == least_velocity(LIMITS, 125)
+
+
+@pytest.mark.parametrize(
+    "stick",
+    [StickInput(enabled=False), StickInput(trip=Reason.EMERGENCY_STOP)],
+    ids=["enable", "trip"],
+)
+def test_a_step_that_is_held_ends_at_once(stick: StickInput) -> None:
+    axis = axis_with()
+    assert tapped(axis, 0.1, 0.1, rest_s=0.4)[-1]
+    axis.tick(stick)
+    assert axis.raw == 0
+
+
+def test_a_step_that_is_held_ends_with_the_tail() -> None:
+    """Whatever is due: a valve's rate has kept the axis from it."""
+    limits = OutputLimits(deadband=0.05, tail_s=0.4, rise_per_s=0.1)
+    sent = tapped(axis_with(limits), 1.0, 0.1)
+    assert sum(sent) * TICK_S < 0.05
+    assert any(sent[20:])
+    assert not any(sent[26:])
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_it_is_never_faster_than_asked_nor_against_the_joystick(seed: int) -> None:
+    hand = random.Random(seed)
+    axis = axis_with(OutputLimits(deadband=0.05, tail_s=0.5), steps=hand.choice([20, 125]))
+    tail, before, moved = [0.0], 0.0, 0
+    for _ in range(60):
+        command = hand.choice([0.0, 0.0, hand.uniform(-0.3, 0.3)])
+        for _ in range(hand.randint(1, 12)):
+            axis.tick(StickInput(command))
+            tail = [*tail[-25:], axis.command]
+            low = 0.0 if axis.command > 0.0 else min(0.0, *tail)
+            high = 0.0 if axis.command < 0.0 else max(0.0, *tail)
+            if not low <= axis.sent <= high:  # on its way back by the rate
+                assert abs(axis.sent) < abs(before)
+            before = axis.sent
+            moved += before != 0.0
+    assert moved > 50
+
+
+@pytest.mark.parametrize(
+    ("limits", "steps", "velocity"),
+    [
+        (OutputLimits(), 125, 1 / 125),
+        (OutputLimits(deadband=0.05), 125, (7 / 125 - 0.05) / 0.95),
+        (OutputLimits(deadband=0.0559), 125, (8 / 125 - 0.0559) / 0.9441),
+        (OutputLimits(minimum=0.021), 125, 3 / 125),
+        (OutputLimits(deadband=0.5), 1, 1.0),
+    ],
+)
+def test_the_least_velocity_of_a_frame(limits: OutputLimits, steps: int, velocity: float) -> None:
+    assert least_velocity(limits, steps) == pytest.approx(velocity)
