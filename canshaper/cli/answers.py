@@ -9,6 +9,7 @@ from canshaper.cli.common import echo
 
 _T = TypeVar("_T")
 NONE = "-"
+MOST_OFFERED = 6
 
 
 def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:

@@ -12,6 +12,8 @@ from canshaper.config.sway import Sway
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.stopping import allowed_s
 
+# Of the measured radius of the tip.
+RADIUS_TIMEOUT_MS = 200
 # Of full speed, for the first motion; raised step by step while it works.
 FIRST_MAX_PCT = 40
 # Tail and longest stop: what the run-on of a filter for a swing of two to three seconds takes.
@@ -72,8 +74,30 @@ class Stopwatch:
 
 
 @dataclass(frozen=True)
+class FirstSlewing:
+    """An axis that turns the crane: its speed at full stick, and how far out the tip may be."""
+
+    full_speed_rad_s: float
+    largest_radius_m: float
+
+    @property
+    def full_speed_m_s(self) -> float:
+        """Of the tip, farthest out."""
+        return self.full_speed_rad_s * self.largest_radius_m
+
+
+@dataclass(frozen=True)
+class FirstMotion:
+    """Slew and near-far as one motion, and MESSAGE.SIGNAL of the radius where it is measured."""
+
+    slew: str
+    near_far: str
+    radius: str | None = None
+
+
+@dataclass(frozen=True)
 class FirstAxis:
-    """An axis: its stick, its valve, and its swing where it has one."""
+    """An axis: its stick, its valve, its swing where it has one, and how it turns the crane."""
 
     name: str
     joystick: str
@@ -84,6 +108,7 @@ class FirstAxis:
     alive_counter: str | None = None
     status: str | None = None
     swing: Stopwatch | None = None
+    slewing: FirstSlewing | None = None
 
 
 @dataclass(frozen=True)
@@ -97,6 +122,7 @@ class FirstMachine:
     axes: Sequence[FirstAxis]
     status: str | None = None
     identity: str | None = None
+    motion: FirstMotion | None = None
 
 
 def ten_swings_s() -> tuple[float, float]:
@@ -165,6 +191,9 @@ def _lines(machine: FirstMachine) -> Iterator[str]:
     for axis in machine.axes:
         yield from _axis(axis, timeouts_ms[axis.joystick])
         yield ""
+    if machine.motion:
+        yield from _motion(machine.motion)
+        yield ""
     for key in ("status", "identity"):
         if (message := getattr(machine, key)) is not None:
             yield f"{key}: {{ bus: crane, message: {message} }}"
@@ -193,21 +222,35 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
         yield f"    limits: {{ {limits}, tail_s: 0.5, stop_s: 0.5 }}"
         return
     swing = axis.swing
+    if slewing := axis.slewing:
+        speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
+        yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
     yield f"    # Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
     sway = swing.sway
     shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
     yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
     poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
-    yield "    # To begin with; better is `canshaper robust FILE --axis NAME --write`."
+    yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
     yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
     yield "    # First motion at reduced speed: raise max_pct when all is well."
-    distance = stop_distance_m(swing.full_speed_m_s, joystick_timeout_ms, axis.timeout_ms)
+    speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
+    distance = stop_distance_m(speed, joystick_timeout_ms, axis.timeout_ms)
     yield "    # stop_distance_m: farthest that the tip may travel when it stops from max_pct: 100."
     yield "    # `canshaper check` shows what the filter needs; make tail_s, stop_s and it smaller."
-    yield "    # Of an axis that turns check shows degrees, at the largest radius, with a line like"
-    yield "    #   slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9 }"
-    tail = f"tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
+    tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
     yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
+
+
+def _motion(motion: FirstMotion) -> Iterator[str]:
+    yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
+    yield "motion:"
+    yield "  crane:"
+    yield f"    slew: {motion.slew}"
+    yield f"    near_far: {motion.near_far}"
+    if motion.radius:
+        message, _, signal = motion.radius.partition(".")
+        where = f"bus: crane, message: {message}, signal: {signal}"
+        yield f"    radius: {{ {where}, timeout_ms: {RADIUS_TIMEOUT_MS} }}"
 
 
 def _rounded(number: float) -> str:

@@ -12,6 +12,7 @@ from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, requir
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
 ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
+RADIUS = re.compile(r"radius|reach", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
 _JOYSTICK = re.compile(r"lever|joy|stick", re.IGNORECASE)
 # A switch has two bits at most: off, on, error, not available.
@@ -56,6 +57,17 @@ def valves(messages: Sequence[Message], stick: str) -> list[Message]:
     """Messages that can command a valve; those whose names are like that of its stick first."""
     found = [m for m in messages if m.cycle_time and commands(m) and not is_status(m)]
     return sorted(found, key=lambda m: -likeness(m.name, stick))
+
+
+def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
+    """MESSAGE.SIGNAL of what can be a radius in m, by name, at least twice within a timeout."""
+    return [
+        f"{message.name}.{signal.name}"
+        for message in messages
+        if message.cycle_time and 2 * message.cycle_time <= timeout_ms
+        for signal in message.signals
+        if signal.unit == "m" and RADIUS.search(signal.name)
+    ]
 
 
 def is_status(message: Message) -> bool:

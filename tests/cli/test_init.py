@@ -31,6 +31,9 @@ QUESTIONS = (
     "slew first",
     "slew last",
     "slew speed",
+    "slew turns",
+    "slew turn speed",
+    "slew radius",
     "Axis of JoystickLeft.NearFar",
     "near_far valve",
     "near_far timeout",
@@ -39,12 +42,15 @@ QUESTIONS = (
     "near_far first",
     "near_far last",
     "near_far speed",
+    "near_far turns",
     "Axis of JoystickRight.Lift",
     "lift valve",
     "lift timeout",
     "lift swings",
     "Axis of JoystickRight.Rotate",
     "rotate valve",
+    "Axis that moves the tip",
+    "Measured radius",
 )
 
 
@@ -102,10 +108,50 @@ def test_the_stopwatch_becomes_sway_data_and_a_filter(tmp_path: Path) -> None:
     assert sway.period_s == pytest.approx(3.0)
     assert (1 - sway.decay_per_swing) ** 10 == pytest.approx(0.25, rel=0.01)
     assert sway.full_speed_m_s == 2.5
+    assert axis(file, "slew").filter.kind == "robust"
+    assert load_deployment(file).config.control is not None
+
+
+def test_without_the_tools_the_filter_is_one_to_begin_with(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def missing(*_arguments: object, **_options: object) -> None:
+        raise ModuleNotFoundError("No module named 'scipy.optimize'", name="scipy.optimize")
+
+    monkeypatch.setattr("canshaper.cli.verbs.robust.design", missing)
+    file = tmp_path / "machine.yaml"
+    result = init(file, {"slew ten": "30"})
+    assert result.exit_code == 0, result.output
+    assert "no robust shaper yet, scipy is missing: pip install" in result.output
+    assert f"canshaper robust {file} --axis near_far --write" in result.output
     poles = axis(file, "slew").filter.parameters()["poles_rad_s"]
     # The first step of the filter, 1 / (a2 w^2), is no more than what was asked.
     assert poles[0] * poles[1] / (2 * 3.14159265 / 3.0) ** 2 <= 1.0
     assert load_deployment(file).config.control is not None
+
+
+def test_a_first_deployment_is_of_the_kind_that_is_recommended(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    assert init(file).exit_code == 0
+    config = load_deployment(file).config
+    shipped = load_deployment(ROOT / "config" / "forwarder-robust.yaml").config
+    for name in ("slew", "near_far", "lift"):
+        ours, theirs = config.axes[name], shipped.axes[name]
+        assert ours.filter.kind == theirs.filter.kind
+        assert ours.limits.reversal == theirs.limits.reversal
+        assert (ours.slewing is None) == (theirs.slewing is None)
+    assert config.motion == shipped.motion
+
+
+def test_a_crane_that_no_axis_turns_has_no_motion(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    lines = answers({"slew turns": "n"}).splitlines()
+    turned = QUESTIONS.index("slew turn speed")
+    given = "\n".join(lines[:turned] + lines[turned + 2 : -2]) + "\n"
+    result = CliRunner().invoke(app, ["init", str(file), "--dbc", str(DBC)], input=given)
+    assert result.exit_code == 0, result.output
+    config = load_deployment(file).config
+    assert (config.axes["slew"].slewing, config.motion) == (None, {})
 
 
 def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
@@ -121,6 +167,11 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
         "slew valve": "Valve\nSlewCommand.Velocity",
         "slew timeout": "50\n300",
         "slew swings": "y",
+        "slew turns": "y",
+        "slew turn speed": "90\n2",
+        "slew radius": "30\n10",
+        "Axis that moves the tip": "turn\nnear_far",
+        "Measured radius": "Radius\n-",
         "slew ten": "0\n2.1\n86\n20",
         "slew last": "21\n10",
     }
@@ -141,11 +192,17 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
         "found '50', allowed is a whole number, 60 to 5000",
         "found '0', allowed is a number, 2.2 to 85.7",
         "found '21', allowed is a number, 0.02 to 20",
+        "found '90', allowed is a number, 0.05 to 3",
+        "found '30', allowed is a number, 0.5 to 20",
+        "found 'turn', allowed is one of near_far, -",
+        "found 'Radius', allowed is one of TipPosition.Radius, -",
     ):
         assert told in result.output
     config = load_deployment(file).config
     assert config.buses["crane"].bitrate == 500_000
     assert config.axes["turn"].valve.timeout_ms == 300
+    motion = config.motion["crane"]
+    assert (motion.slew, motion.near_far, motion.radius) == ("turn", "near_far", None)
 
 
 @pytest.mark.parametrize("seconds", ["2.2", "85.7"])
@@ -155,6 +212,7 @@ def test_every_answer_that_is_taken_makes_a_good_file(
 ) -> None:
     file = tmp_path / "machine.yaml"
     given = {"CAN interface": channel, "slew ten": seconds, "near_far ten": seconds}
+    given |= {"slew turn speed": "3", "slew radius": "13.3"}
     result = init(file, given | {"near_far last": "20", "slew last": "0.02"})
     assert result.exit_code == 0, result.output
     assert load_deployment(file).config.buses["crane"].channel == channel
@@ -201,12 +259,13 @@ def test_axes_and_switches_can_be_left_out(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     text = answers({"JoystickLeft: r": "-", "Axis of JoystickLeft.NearFar": "-"}).splitlines()
     dropped = QUESTIONS.index("near_far valve")
-    lines = text[:dropped] + text[dropped + 7 :]
+    lines = text[:dropped] + text[dropped + 8 :]
     arguments = ["init", str(file), "--dbc", str(DBC)]
     result = CliRunner().invoke(app, arguments, input="\n".join(lines) + "\n")
     assert result.exit_code == 0, result.output
     config = load_deployment(file).config
     assert list(config.axes) == ["slew", "lift"]
+    assert not config.motion  # of one axis there is none
     assert config.joysticks["joystick_left"].reset is None
 
 

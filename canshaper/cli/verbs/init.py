@@ -8,23 +8,17 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.answers import NONE, asked, channel, name, number, one, several, whole
-from canshaper.cli.common import (
-    echo,
-    os_errors,
-    print_warnings,
-)
-from canshaper.errors import ConfigError, UsageError
+from canshaper.cli.answers import MOST_OFFERED, NONE, asked, channel, name, one, several, whole
+from canshaper.cli.common import EXTRAS, echo, install_line, os_errors, print_warnings
+from canshaper.cli.swing_questions import motion_of, slewing_of, swing_of
+from canshaper.errors import CanshaperError, ConfigError, UsageError
 from canshaper.shipped import data_directory
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
-    from canshaper.config.first import FirstAxis, FirstJoystick, FirstMachine, Stopwatch
+    from canshaper.config.first import FirstAxis, FirstJoystick, FirstMachine
 
-MOST_OFFERED = 6
-# Axes that make nothing swing, by their names.
-CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
 FEWEST_CYCLES = 5  # of a joystick's message in its timeout
 
 
@@ -38,10 +32,11 @@ def init(
     """Ask a few questions about a machine and write its first deployment.
 
     Looks through the DBC files for joysticks, valves and switches and offers what it finds; Enter
-    takes what stands in brackets, "-" leaves a thing out. Written with reduced speed and with a
-    filter to begin with. Ctrl-C writes nothing; should the check of the whole file find something
-    after all, the answers stay in a draft next to it. Machines of J1939 and CANopen begin with a
-    copy of the shipped j1939-forwarder.yaml or canopen-forwarder.yaml.
+    takes what stands in brackets, "-" leaves a thing out. Written with reduced speed, and as we
+    recommend: a robust shaper for each axis that swings (without SciPy a G_FF to begin with), slew
+    and near-far as one motion. Ctrl-C writes nothing; should the check of the whole file find
+    something after all, the answers stay in a draft next to it. Machines of J1939 and CANopen begin
+    with a copy of the shipped j1939-forwarder.yaml or canopen-forwarder.yaml.
 
     Examples:
 
@@ -59,12 +54,31 @@ def init(
         messages = _messages(files := dbc or [data_directory() / "dbc" / "forwarder.dbc"])
         machine = _machine(messages, files, file.resolve().parent)
         _write(file, draft, first_deployment(machine))
-    echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed. What comes next:")
-    swinging = next((axis.name for axis in machine.axes if axis.swing), machine.axes[0].name)
+    echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed.")
+    left = [axis.name for axis in machine.axes if axis.swing and not _designed(file, axis.name)]
+    echo("What comes next:")
     echo(f"  canshaper check {file}")
-    if any(axis.swing for axis in machine.axes):
-        echo(f"  canshaper robust {file} --axis {swinging} --write   (each axis that swings)")
+    for axis in left:
+        echo(f"  canshaper robust {file} --axis {axis} --write")
     echo(f"  canshaper run {file} --listen-only")
+
+
+def _designed(file: Path, axis: str) -> bool:
+    """Whether a robust shaper was designed for an axis and written; otherwise says why not."""
+    from canshaper.cli.verbs.robust import design
+
+    try:
+        design(str(file), axis, write=True)
+    except ModuleNotFoundError as error:
+        missing = (error.name or "").partition(".")[0]
+        if missing not in EXTRAS:
+            raise
+        echo(f"axis {axis}: no robust shaper yet, {missing} is missing: {install_line(missing)}")
+    except CanshaperError as error:
+        echo(f"axis {axis}: no robust shaper yet: {error}")
+    else:
+        return True
+    return False
 
 
 def _messages(files: Sequence[Path]) -> "list[Message]":
@@ -109,6 +123,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
         axes += _axes(joystick, message, others, [axis.name for axis in axes])
     if not axes:
         raise UsageError("no axis was named; nothing is written")
+    motion = motion_of(axes, others)
     status, identity = suggest.service_status(messages), suggest.identity(messages)
     return FirstMachine(
         interface,
@@ -118,6 +133,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
         axes,
         status.name if status else None,
         identity.name if identity else None,
+        motion,
     )
 
 
@@ -196,6 +212,7 @@ def _axes(
         text = f"  {axis}: silence after which the valve closes by itself, ms (its manual)"
         timeout = asked(text, whole(shortest, most), str(max(200, shortest)))
         status = suggest.status_of(others, axis)
+        swing = swing_of(axis, cycle / 1000.0)
         found.append(
             FirstAxis(
                 axis,
@@ -206,42 +223,11 @@ def _axes(
                 timeout,
                 suggest.counter(sender),
                 status.name if status else None,
-                _swing(axis, cycle / 1000.0),
+                swing,
+                slewing_of(axis) if swing else None,
             )
         )
     return found
-
-
-def _swing(axis: str, period_s: float) -> "Stopwatch | None":
-    """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
-    from canshaper.config.first import Stopwatch
-    from canshaper.config.load import limits
-    from canshaper.config.sway import Sway
-
-    question = f"  {axis}: does it make the grapple swing"
-    if not typer.confirm(question, default=not CALM.search(axis)):
-        return None
-    seconds = asked("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
-    first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
-    last = asked("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
-    allowed = number(*limits(Sway, "full_speed_m_s"))
-    speed = asked("    speed of the tip at full stick, m/s", allowed, "1")
-    return Stopwatch(seconds, first, last, speed)
-
-
-def _ten_swings_s(period_s: float) -> tuple[float, float]:
-    """Shortest and longest time of ten swings with which the filter can run at a valve's period."""
-    from canshaper.config.first import Stopwatch, ten_swings_s
-    from canshaper.config.schema import Limits
-    from canshaper.machine.filters import filter_fault
-
-    low, high = ten_swings_s()
-    rate = Limits().slowest_per_s
-    for tenth in range(round(10.0 * low), round(10.0 * high)):
-        watch = Stopwatch(tenth / 10.0, 1.0, 1.0, 1.0)
-        if filter_fault(watch.filter, watch.sway, period_s, rate) is None:
-            return watch.ten_swings_s, high
-    return low, high  # with none at all: the check of the whole file tells why
 
 
 def _write(file: Path, draft: Path, text: str) -> None:

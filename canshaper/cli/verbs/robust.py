@@ -60,6 +60,28 @@ def robust(
 
       canshaper robust config/forwarder.yaml --axis near_far --second 0.6,0.1,20
     """
+    design(
+        file,
+        axis,
+        range_pct=range_pct,
+        duration_s=duration_s,
+        residual_pct=residual_pct,
+        second=second,
+        write=write,
+    )
+
+
+def design(
+    file: str,
+    axis: str,
+    *,
+    range_pct: float = 15.0,
+    duration_s: float | None = None,
+    residual_pct: float | None = None,
+    second: str | None = None,
+    write: bool = False,
+) -> None:
+    """Design, print and write; arguments as the options of the verb."""
     from canshaper.config.edit import flow
     from canshaper.config.filters import filter_of
     from canshaper.design.swinging import swinging_axis

@@ -1,0 +1,90 @@
+"""Questions of ``canshaper init`` on what swings: each axis, and slew and near-far together."""
+
+import re
+from typing import TYPE_CHECKING
+
+import typer
+
+from canshaper.cli.answers import MOST_OFFERED, NONE, asked, number, one
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message
+
+    from canshaper.config.first import FirstAxis, FirstMotion, FirstSlewing, Stopwatch
+
+# By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
+CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
+SLEW = re.compile(r"slew|swing|swivel", re.IGNORECASE)
+NEAR_FAR = re.compile(r"near|far|radial|reach|crowd", re.IGNORECASE)
+# Of a tip; what it travels when it stops is then a distance that the file may have.
+_FASTEST_M_S = 40.0
+
+
+def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
+    """Swing of an axis whose valve is commanded every ``period_s``; None where it has none."""
+    from canshaper.config.first import Stopwatch
+    from canshaper.config.load import limits
+    from canshaper.config.sway import Sway
+
+    question = f"  {axis}: does it make the grapple swing"
+    if not typer.confirm(question, default=not CALM.search(axis)):
+        return None
+    seconds = asked("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
+    first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
+    last = asked("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
+    allowed = number(*limits(Sway, "full_speed_m_s"))
+    speed = asked("    speed of the tip at full stick, m/s", allowed, "1")
+    return Stopwatch(seconds, first, last, speed)
+
+
+def slewing_of(axis: str) -> "FirstSlewing | None":
+    """How an axis turns the crane; None where it does not."""
+    from canshaper.config.first import FirstSlewing
+    from canshaper.config.load import limits
+    from canshaper.config.schema import Slewing
+
+    if not typer.confirm(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
+        return None
+    allowed = number(*limits(Slewing, "full_speed_rad_s"))
+    speed = asked("    speed at full stick, rad/s (a turn is 6.28)", allowed, "0.5")
+    least, most = limits(Slewing, "largest_radius_m")
+    allowed = number(least, min(most, _FASTEST_M_S / speed))
+    return FirstSlewing(speed, asked("    largest radius of the tip, m", allowed, "9"))
+
+
+def _ten_swings_s(period_s: float) -> tuple[float, float]:
+    """Shortest and longest time of ten swings with which the filter can run at a valve's period."""
+    from canshaper.config.first import Stopwatch, ten_swings_s
+    from canshaper.config.schema import Limits
+    from canshaper.machine.filters import filter_fault
+
+    low, high = ten_swings_s()
+    rate = Limits().slowest_per_s
+    for tenth in range(round(10.0 * low), round(10.0 * high)):
+        watch = Stopwatch(tenth / 10.0, 1.0, 1.0, 1.0)
+        if filter_fault(watch.filter, watch.sway, period_s, rate) is None:
+            return watch.ten_swings_s, high
+    return low, high  # with none at all: the check of the whole file tells why
+
+
+def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion | None":
+    """Slew and near-far as one motion, where there are both; ``others`` are messages left over."""
+    from canshaper.config.first import RADIUS_TIMEOUT_MS, FirstMotion
+    from canshaper.machine import suggest
+
+    slew = next((axis.name for axis in axes if axis.slewing), None)
+    possible = [axis.name for axis in axes if axis.swing and not axis.slewing]
+    if slew is None or not possible:
+        return None
+    likely = next((name for name in possible if NEAR_FAR.search(name)), NONE)
+    text = f"Axis that moves the tip in and out, and is to move a little with {slew}, of"
+    text += f" {', '.join(possible)}, - for none"
+    near_far = asked(text, one([*possible, NONE]), likely)
+    if near_far == NONE:
+        return None
+    radii = suggest.radii(others, RADIUS_TIMEOUT_MS)
+    if not radii:
+        return FirstMotion(slew, near_far)
+    text = f"Measured radius of the tip, of {', '.join(radii[:MOST_OFFERED])}, - for none"
+    radius = asked(text, one([*radii, NONE]), radii[0])
+    return FirstMotion(slew, near_far, None if radius == NONE else radius)
