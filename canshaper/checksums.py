@@ -159,9 +159,9 @@ class ChecksumKind:
 
     def __post_init__(self) -> None:
         if self.bits not in (4, 8, 16):
-            raise ValueError(f"a checksum of {self.bits} bits, allowed are 4, 8 and 16")
+            raise ValueError(f"bits of a checksum: expected 4, 8 or 16, got {self.bits}")
         if self.kernel and self.bits != 8:
-            raise ValueError(f"a checksum of can-gw of {self.bits} bits, allowed are 8")
+            raise ValueError(f"bits of a checksum of can-gw: expected 8, got {self.bits}")
 
     @property
     def kernel(self) -> Xor | Crc8 | None:
@@ -226,13 +226,13 @@ def known_checksum(kind: object) -> str:
     entries = _packages().get(name, [])
     owners = [*["canshaper"] * (name in _OURS), *sorted(map(_owner, entries))]
     if len(owners) > 1:
-        text = f"found {kind!r}, a name that {' and '.join(owners)} have"
-        raise ValueError(f"{text}; allowed is one package with it")
+        text = f"expected one package with the checksum {kind!r}"
+        raise ValueError(f"{text}, got {' and '.join(owners)}")
     if entries and name not in CHECKSUMS:
         CHECKSUMS[name], _SHA256[name] = _loaded(entries[0])
     if name not in CHECKSUMS:
         *first, last = map(repr, checksum_names())
-        raise ValueError(f"found {kind!r}, allowed is {', '.join(first)} or {last}")
+        raise ValueError(f"expected one of {', '.join(first)} or {last}, got {kind!r}")
     return name
 
 
@@ -275,13 +275,13 @@ def _owner(entry: EntryPoint) -> str:
 
 
 def _loaded(entry: EntryPoint) -> tuple[ChecksumKind, str]:
-    text = f"found {entry.name!r} of the package {_owner(entry)}"
+    text = f"{entry.name!r} of the package {_owner(entry)}"
     try:
         kind = entry.load()
         program = Path(str(sys.modules[entry.module].__file__)).read_bytes()
     except Exception as error:  # whatever the package does
         reason = " ".join(f"{type(error).__name__}: {error}".split())
-        raise ValueError(f"{text}, which cannot be loaded: {reason}") from None
+        raise ValueError(f"{text} cannot be loaded: {reason}") from None
     if not isinstance(kind, ChecksumKind):
-        raise ValueError(f"{text}, which is a {type(kind).__name__}; allowed is a ChecksumKind")
+        raise ValueError(f"{text}: expected a ChecksumKind, got a {type(kind).__name__}")
     return kind, sha256(program).hexdigest()

@@ -43,7 +43,7 @@ class Problem:
         file: its name.
         line: in it; None where there is none.
         where: key, message or option.
-        message: what was found and what is allowed.
+        message: what was expected and what came.
     """
 
     file: str
@@ -77,7 +77,7 @@ class ConfigError(CanshaperError):
 
 
 class UsageError(CanshaperError, ValueError):
-    """An option or argument of the command cannot be; says what was found and what is allowed."""
+    """An option or argument of the command cannot be; says what was expected and what came."""
 
 
 class BusError(CanshaperError):
@@ -114,11 +114,11 @@ class WrongLengthError(CanshaperError):
 
 
 class PageMessageError(CanshaperError, ValueError):
-    """What a page sent is no message; says what was found and what is allowed."""
+    """What a page sent is no message; says what was expected and what came."""
 
 
 class LogError(CanshaperError, ValueError):
-    """A log that cannot be used: says where, what was found and what is allowed."""
+    """A log that cannot be used: says where, what was expected and what came."""
 
 
 class CutOffError(LogError):

@@ -75,12 +75,12 @@ def read_box(path: Path) -> Box:
     """
     with path.open("rb") as file:
         if file.readline(len(MAGIC)) != MAGIC:
-            raise BoxError(f"{path}: found no black box, allowed is one of canshaper")
+            raise BoxError(f"{path}: expected a black box of canshaper, got another file")
         try:
             header = json.loads(file.readline(MOST_HEADER))
             box = Box(path, _checked(header), [])
         except (ValueError, KeyError, TypeError, RecursionError) as error:
-            text = f"found {type(error).__name__} {error}, allowed is what canshaper writes"
+            text = f"expected what canshaper writes, got {type(error).__name__} {error}"
             raise BoxError(f"{path}: header: {text}") from None
         while head := file.read(HEAD.size):
             number = len(box.segments) + 1
@@ -92,7 +92,7 @@ def read_box(path: Path) -> Box:
             if number == MOST_SEGMENTS:
                 break
     if not box.segments:
-        raise BoxError(box.cut_off or f"{path}: found no segment, allowed is one or more")
+        raise BoxError(box.cut_off or f"{path}: expected one segment or more, got none")
     return box
 
 
@@ -118,10 +118,10 @@ def _segment(read: Any, head: bytes) -> BoxSegment:
         raise ValueError("the file is cut off")
     begin_ns, follows, state_size, size, crc = HEAD.unpack(head)
     if state_size > MOST_STATE or size > MOST_RECORDS or size % SIZE:
-        raise ValueError(f"found a length of {state_size} and {size} bytes, which none has")
+        raise ValueError(f"expected the lengths of a segment, got {state_size} and {size} bytes")
     state, data = read(state_size), read(size)
     if len(state) < state_size or len(data) < size:
         raise ValueError("the file is cut off")
     if zlib.crc32(data, zlib.crc32(state)) != crc:
-        raise ValueError("found another check sum than that of its content")
+        raise ValueError("expected the checksum of its content, got another")
     return BoxSegment(begin_ns, follows, state, data)

@@ -68,7 +68,9 @@ def _fixed(number: int) -> Any:
 def _method(one: Any, name: str) -> Any:
     """In a pickle: a method of an object of ours."""
     if type(one).__module__ == "builtins" or name.startswith("__"):
-        raise StateError(f"found a method {name} of {type(one).__name__}")
+        raise StateError(
+            f"expected a method of an object of ours, got {name} of {type(one).__name__}"
+        )
     return MethodType(getattr(type(one), name), one)
 
 
@@ -116,14 +118,14 @@ class States:
         try:
             for opcode, _, _ in pickletools.genops(state):
                 if opcode.name not in OPCODES:
-                    raise StateError(f"found the opcode {opcode.name}")
+                    raise StateError(f"expected an opcode that is needed, got {opcode.name}")
             guarded, controller = _Unpickler(io.BytesIO(state), self._find).load()
         except StateError:
             raise
         except Exception as error:  # of many kinds, where it is damaged or of another version
             raise StateError(f"{type(error).__name__}: {error}") from None
         if type(guarded) is not type(self._root[0]) or type(controller) is not type(self._root[1]):
-            raise StateError("found no controller")
+            raise StateError("expected a controller, got another object")
         return guarded, controller
 
     def _number(self, one: Any) -> int | None:
@@ -147,7 +149,7 @@ class States:
         ours = isinstance(found, type) and found.__module__ == module
         if ours and package in self._packages:
             return found
-        raise StateError(f"found the name {module}.{name}")
+        raise StateError(f"expected a class of ours, got {module}.{name}")
 
 
 def attributes(kind: Any) -> tuple[str, ...]:
@@ -195,7 +197,8 @@ class _Pickler(pickle.Pickler):
         if kind is MethodType:
             return _method, (one.__self__, one.__func__.__name__)
         if kind is BuiltinFunctionType and not isinstance(one.__self__, ModuleType):
-            raise pickle.PicklingError(f"found a method of {type(one.__self__).__name__}")
+            got = type(one.__self__).__name__
+            raise pickle.PicklingError(f"expected a method of an object of ours, got one of {got}")
         if isinstance(one, FIXED) and (number := self._number(one)) is not None:
             return _fixed, (number,)
         names = _ATTRIBUTES.get(kind)

@@ -34,7 +34,7 @@ class LocalMulticastBus(UdpMulticastBus):
 
     def __init__(self, channel: str) -> None:
         if not _is_group(channel):
-            text = "allowed is a group of IPv4 such as 239.1.2.3; any other needs network: true"
+            text = f"expected a group of IPv4 such as 239.1.2.3 or network: true, got {channel}"
             raise ValueError(text)
         self._multicast = _LocalSocket(channel, PORT, hop_limit=0)
         # Not that of UdpMulticastBus, which joins the group on the network card.

@@ -29,9 +29,9 @@ def name(taken: Collection[str]) -> Callable[[str], str]:
     def parse(text: str) -> str:
         if text != NONE and not (text.isidentifier() and plain(text) == text):
             allowed = "a word of letters, digits and _, other than true, false and null"
-            raise ValueError(f"found {text!r}, allowed is {allowed}")
+            raise ValueError(f"expected {allowed}, got {text!r}")
         if text in taken:
-            raise ValueError(f"found {text!r}, allowed is another one than {', '.join(taken)}")
+            raise ValueError(f"expected another one than {', '.join(taken)}, got {text!r}")
         return text
 
     return parse
@@ -40,7 +40,7 @@ def name(taken: Collection[str]) -> Callable[[str], str]:
 def channel(text: str) -> str:
     """The name of a CAN interface."""
     if not text or not text.isprintable() or " " in text:
-        raise ValueError(f"found {text!r}, allowed is a name without spaces, such as can0")
+        raise ValueError(f"expected a name without spaces, such as can0, got {text!r}")
     return text
 
 
@@ -49,7 +49,7 @@ def one(allowed: Sequence[str]) -> Callable[[str], str]:
 
     def parse(text: str) -> str:
         if text not in allowed:
-            raise ValueError(f"found {text!r}, allowed is one of {', '.join(allowed)}")
+            raise ValueError(f"expected one of {', '.join(allowed)}, got {text!r}")
         return text
 
     return parse
@@ -61,7 +61,7 @@ def several(allowed: Sequence[str]) -> Callable[[str], list[str]]:
     def parse(text: str) -> list[str]:
         names = text.replace(",", " ").split()
         if not names or not {*names} <= {*allowed}:
-            raise ValueError(f"found {text!r}, allowed are some of {', '.join(allowed)}")
+            raise ValueError(f"expected some of {', '.join(allowed)}, got {text!r}")
         return names
 
     return parse
@@ -71,7 +71,7 @@ def number(low: float, high: float) -> Callable[[str], float]:
     """Takes a number within [low, high]."""
 
     def parse(text: str) -> float:
-        fault = f"found {text!r}, allowed is a number, {low:g} to {high:g}"
+        fault = f"expected a number, {low:g} to {high:g}, got {text!r}"
         try:
             value = float(text)
         except ValueError:
@@ -88,7 +88,7 @@ def whole(low: float, high: float) -> Callable[[str], int]:
 
     def parse(text: str) -> int:
         if not text.isdecimal() or not low <= int(text) <= high:
-            raise ValueError(f"found {text!r}, allowed is a whole number, {low:.0f} to {high:.0f}")
+            raise ValueError(f"expected a whole number, {low:.0f} to {high:.0f}, got {text!r}")
         return int(text)
 
     return parse

@@ -136,7 +136,7 @@ def loader(
             if not name and len(buses) == 1:
                 name = next(iter(buses))
             if name not in buses:
-                text = f"found {item!r}, allowed is NAME=CHANNEL with a bus of {', '.join(buses)}"
+                text = f"expected NAME=CHANNEL with one of {', '.join(buses)}, got {item!r}"
                 raise ConfigError([Problem("command line", None, "--channel", text)])
             buses[name] = buses[name].model_copy(update={"channel": channel})
         if interface:  # what the file says of sharing was said of its own interface
@@ -144,11 +144,11 @@ def loader(
             buses = {n: b.model_copy(update=update) for n, b in buses.items()}
         if network:
             if others := {b.interface for b in buses.values()} - {"udp_multicast"}:
-                text = f"found the interface {', '.join(others)}, allowed is udp_multicast only"
+                text = f"expected udp_multicast only, got the interface {', '.join(others)}"
                 raise ConfigError([Problem("command line", None, "--network", text)])
             buses = {n: b.model_copy(update={"network": True}) for n, b in buses.items()}
         if len({(b.interface, b.channel) for b in buses.values()}) < len(buses):
-            text = f"two of the buses {', '.join(buses)} have one channel; allowed is one for each"
+            text = f"expected a channel for each of {', '.join(buses)}, got one for two of them"
             raise ConfigError([Problem("command line", None, "--channel", text)])
         return replace(deployment, config=deployment.config.model_copy(update={"buses": buses}))
 

@@ -30,8 +30,8 @@ def timed_by_hand(timed: dict[str, float | None], logs: list[str], axis: str) ->
 
     missing = [name for name, value in timed.items() if value is None]
     if missing or logs:
-        found = f"without {', '.join(missing)}" if missing else f"with the log {logs[0]}"
-        raise UsageError(f"stopwatch {found}; allowed are {', '.join(timed)} together, and no log")
+        got = f"none of {', '.join(missing)}" if missing else f"the log {logs[0]}"
+        raise UsageError(f"expected {', '.join(timed)} together, and no log, got {got}")
     period, ratio = stopwatch(*(v for v in timed.values() if v is not None))
     return Finding(axis, "", None, [], period_s=period, damping_ratio=ratio)
 
@@ -41,8 +41,9 @@ def axis_named(axis: str | None, deployment: "Deployment | None") -> str:
     if deployment is None:
         return axis or UNNAMED
     if axis not in deployment.axes:
-        found = repr(axis) if axis else "none"
-        raise UsageError(f"--axis: found {found}, axes are {', '.join(deployment.axes)}")
+        got = repr(axis) if axis else "none"
+        names = ", ".join(deployment.axes)
+        raise UsageError(f"--axis: expected an axis, got {got}; there are {names}")
     return axis
 
 
@@ -52,9 +53,9 @@ def signals_named(pairs: Sequence[str], deployment: "Deployment | None") -> dict
     for pair in pairs:
         axis, equals, name = pair.partition("=")
         if not (axis and equals and name):
-            raise UsageError(f"--signal: found {pair!r}, allowed is AXIS=NAME")
+            raise UsageError(f"--signal: expected AXIS=NAME, got {pair!r}")
         if axis in signals:
-            raise UsageError(f"--signal: found two signals of {axis}, allowed is one")
+            raise UsageError(f"--signal: expected one signal of {axis}, got two")
         signals[axis_named(axis, deployment)] = name
     return signals
 
@@ -93,7 +94,9 @@ def logged(
     from canshaper.report.console import progress_bar
 
     if not logs:
-        raise UsageError("found no log and no stopwatch; see canshaper identify --help")
+        raise UsageError(
+            "expected a log or a stopwatch, got neither; see canshaper identify --help"
+        )
     series: dict[tuple[str, str], list[Series]] = {}
     with progress_bar("") as on_progress:
         for text in logs:
@@ -149,6 +152,6 @@ def _simulated(
     there = {a: s for a, s in SIMULATED.items() if a in axes and axis in (None, a)}
     if not there or isinstance(messages.find("GrappleSway"), str):
         raise UsageError(
-            "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL with what shows the swing"
+            "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none"
         )
     return there

@@ -17,15 +17,15 @@ except ImportError:  # no compiled part for this machine: the same in Python, an
 def layout_fault(message: Message) -> str | None:
     """Why the bits of a message cannot be read, or None; cantools tells with a frame only."""
     if not isinstance(message.cycle_time, int | None):
-        return f"GenMsgCycleTime is {message.cycle_time!r}, allowed is a whole number of ms"
+        return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
     for signal in message.signals:
         if signal.start < 0:
-            return f"{signal.name} begins at bit {signal.start}, allowed is 0 or more"
+            return f"{signal.name}: expected a start bit of 0 or more, got {signal.start}"
         first = signal.raw_initial or 0
         if not isinstance(first, int | float) or not math.isfinite(first):
-            return f"GenSigStartValue of {signal.name} is {first!r}, allowed is a number"
+            return f"GenSigStartValue of {signal.name}: expected a number, got {first!r}"
         if signal.is_float and signal.length not in (16, 32, 64):
-            return f"{signal.name} is a float of {signal.length} bits, allowed are 16, 32 and 64"
+            return f"{signal.name}: expected a float of 16, 32 or 64 bits, got {signal.length}"
     return None
 
 

@@ -45,7 +45,7 @@ def symmetrical_range(signal: Signal) -> str | None:
     if fault := _no_range(signal):
         return fault
     if not math.isclose(-(low or 0.0), high or 0.0):
-        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is a symmetrical one"
+        return f"{signal.name}: expected a symmetrical range, got [{low:g}|{high:g}]"
     return _not_reached(signal)
 
 
@@ -54,15 +54,15 @@ def magnitude_range(signal: Signal) -> str | None:
     if fault := _no_range(signal):
         return fault
     if signal.minimum != 0.0:
-        found = f"[{signal.minimum:g}|{signal.maximum:g}]"
-        return f"{signal.name} has the range {found}; allowed with direction flags is one from 0"
+        expected = "with direction flags expected a range from 0"
+        return f"{signal.name}: {expected}, got [{signal.minimum:g}|{signal.maximum:g}]"
     return _not_reached(signal)
 
 
 def _no_range(signal: Signal) -> str | None:
     low, high = signal.minimum, signal.maximum
     if not signal.scale:
-        return f"{signal.name} has a scale of 0, allowed is any other"
+        return f"{signal.name}: expected a scale other than 0, got 0"
     if low is None or high is None or high <= low:
         return f"{signal.name} has no range in the DBC; full speed is taken from it"
     return None
@@ -134,7 +134,7 @@ def radius_range(signal: Signal) -> str | None:
     if low is None or high is None or high <= low:
         return f"{signal.name} has no range in the DBC; what lies outside is no radius"
     if low < 0.0:
-        return f"{signal.name} has the range [{low:g}|{high:g}]; allowed is one from 0 m or more"
+        return f"{signal.name}: expected a range from 0 m or more, got [{low:g}|{high:g}]"
     return None
 
 

@@ -176,8 +176,8 @@ def status_faults(message: Message, fields: Iterable[StatusField[Source]]) -> li
         if signal is None:
             continue
         if signal.is_float or not signal.scale:
-            fault = "is a float" if signal.is_float else "has a scale of 0"
-            faults.append(f"{one.name} {fault}; allowed is an integer signal with a scale")
+            got = "a float" if signal.is_float else "a scale of 0"
+            faults.append(f"{one.name}: expected an integer signal with a scale, got {got}")
         elif raw_limits(signal)[1] < (one.largest or 0):
             faults.append(f"{one.name} cannot carry {one.largest} with {signal.length} bits")
     return faults

@@ -134,7 +134,7 @@ class ValveCodec:
             ValueError: it is beyond full command.
         """
         if not -self.steps <= steps <= self.steps:
-            raise ValueError(f"valve command of {steps} steps, allowed is +-{self.steps}")
+            raise ValueError(f"valve command: expected up to +-{self.steps} steps, got {steps}")
         raw = self._raw
         if self._plain:
             raw[self._signal] = self._zero + self._sign * steps

@@ -85,15 +85,15 @@ def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[st
     """Why a number of an axis cannot be adjustable within a range."""
     now = value(config, key)
     if now is None:
-        yield "found no number of that name in the axis' sway, filter or limits"
+        yield "expected a number in the axis' sway, filter or limits, got none of that name"
     elif key.section == "limits" and key.name not in LIMITS:
-        yield f"found {key.name}; adjustable limits are {', '.join(LIMITS)}"
+        yield f"expected one of the limits {', '.join(LIMITS)}, got {key.name}"
     elif config.gain_schedule or config.profiles:
         yield f"axis {key.axis} has a gain schedule or profiles, which choose its numbers"
     elif config.sway is None and key.section == "filter":
         yield f"axis {key.axis} has no sway data; adjustable are its limits"
     elif not low <= now <= high:
-        yield f"found {low:g} to {high:g}, and the number itself is {now:g}, outside of it"
+        yield f"expected a range around the number itself, {now:g}, got {low:g} to {high:g}"
     else:
         section = getattr(config, key.section)
         for end in (low, high):
@@ -104,4 +104,4 @@ def faults(key: Key, config: AxisConfig, low: float, high: float) -> Iterator[st
             except ValidationError as error:
                 # Whether two numbers go together is known when both are changed.
                 if any(one["loc"] == (key.name,) for one in error.errors()):
-                    yield f"found the end {end:g}, which is out of the range of this key"
+                    yield f"expected both ends within the range of this key, got {end:g}"

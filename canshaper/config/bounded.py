@@ -18,13 +18,13 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
         if stat.S_ISDIR(mode):
             raise OSError(errno.EISDIR, os.strerror(errno.EISDIR), str(path))
         if not stat.S_ISREG(mode):
-            text = "found a device or a pipe, allowed is a regular file"
+            text = "expected a regular file, got a device or a pipe"
             raise OSError(errno.EINVAL, text, str(path))
         with os.fdopen(number, "rb", closefd=False) as file:
             data = file.read(most_bytes + 1)
     finally:
         os.close(number)
     if len(data) > most_bytes:
-        text = f"found more bytes than {most_bytes}, which are allowed at most"
+        text = f"expected {most_bytes} bytes at most, got more"
         raise OSError(errno.EFBIG, text, str(path))
     return data

@@ -73,7 +73,7 @@ class Match(Section):
     @model_validator(mode="after")
     def _says_something(self) -> Self:
         if not self.model_dump(exclude_none=True):
-            raise ValueError(f"found nothing, allowed are {', '.join(type(self).model_fields)}")
+            raise ValueError(f"expected one of {', '.join(type(self).model_fields)}, got none")
         return self
 
     def may_be(self, other: "Match") -> bool:

@@ -28,7 +28,7 @@ class Control(Section):
     def _ordered(self) -> Self:
         for key, (low, high) in self.adjustable.items():
             if not low <= high:
-                text = f"found {low:g} to {high:g} for {key}; allowed is the lower one first"
+                text = f"{key}: expected the lower end first, got {low:g} to {high:g}"
                 raise ValueError(text)
         return self
 

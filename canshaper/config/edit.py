@@ -89,7 +89,7 @@ class _Edit:
                 raise self._error(root, f"no section {key}")
             self._not_shared(node)
         if not isinstance(node, yaml.MappingNode) or not node.value:
-            raise self._error(node, "found no keys, allowed is a section with keys")
+            raise self._error(node, "expected a section with keys, got none")
         self._flow = bool(node.flow_style)
         self._pairs: list[tuple[yaml.Node, yaml.Node]] = node.value
         self._newline = "\r\n" if "\r\n" in text else "\n"
@@ -220,7 +220,7 @@ def flow(value: float | str | Sequence[float | str] | Mapping[str, Any]) -> str:
         return str(value)
     if isinstance(value, str):
         if not value.isidentifier() and not re.fullmatch(RUN, value):
-            raise ValueError(f"found {value!r}, allowed is a word")
+            raise ValueError(f"expected a word, got {value!r}")
         return value
     text = repr(float(value))
     if "e" in text:

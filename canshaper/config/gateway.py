@@ -26,11 +26,11 @@ class Gateway(Section):
     def _possible(self) -> Self:
         first, second = self.between
         if first == second:
-            raise ValueError(f"between has {first} twice, allowed are two different buses")
+            raise ValueError(f"between: expected two different buses, got {first} twice")
         if self.forwarding == "daemon" and self.fallback != "stop":
             raise ValueError(
-                f"fallback is {self.fallback}, which only forwarding: kernel can do; allowed is"
-                " stop: without the daemon nothing passes"
+                f"fallback: expected stop with forwarding: daemon, got {self.fallback}:"
+                " without the daemon nothing passes"
             )
         return self
 

@@ -86,7 +86,8 @@ def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Prob
     kind, found, context = error["type"], error["input"], error.get("ctx", {})
     place = _Place.of(error["loc"], schema)
     if kind == "extra_forbidden":
-        text = f"unknown key; allowed are {', '.join(place.owner.model_fields)}"
+        names = ", ".join(place.owner.model_fields)
+        text = f"expected one of the keys {names}, got an unknown one"
     elif kind == "missing":
         text = f"missing: {place.description}"
     elif kind == "value_error":
@@ -94,15 +95,15 @@ def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Prob
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
         place.path += ("kind",)
         found = found.get("kind") if isinstance(found, dict) else found
-        text = f"found {found!r}, allowed is {context.get('expected_tags', place.kinds)}"
+        text = f"expected one of {context.get('expected_tags', place.kinds)}, got {found!r}"
     elif kind in ("too_short", "too_long"):
         number = context["min_length" if kind == "too_short" else "max_length"]
         most = "or more entries" if kind == "too_short" else "entries at most"
-        text = f"found {_short(found)}, allowed are {number} {most}"
+        text = f"expected {number} {most}, got {_short(found)}"
     elif kind == "literal_error":
-        text = f"found {_short(found)}, allowed is {context['expected']}"
+        text = f"expected {context['expected']}, got {_short(found)}"
     else:
-        text = f"found {_short(found)}, allowed is {place.allowed or error['msg']}"
+        text = f"expected {place.expected or error['msg']}, got {_short(found)}"
     return source.problem(place.path, text)
 
 
@@ -172,7 +173,7 @@ class _Place:
         return None if low is None or high is None else (low, high)
 
     @property
-    def allowed(self) -> str:
+    def expected(self) -> str:
         """What may stand here, in words."""
         if limits := self.limits:
             low, high = limits

@@ -44,10 +44,11 @@ class E2e(Section):
         needs = {"p01": ["data_id", "data_id_mode"], "p02": ["data_ids"]}[self.profile]
         given = [k for k in ("data_id", "data_id_mode", "data_ids") if getattr(self, k) is not None]
         if given != needs:
-            found = " and ".join(given) or "no data ID"
-            raise ValueError(f"found {found}; profile {self.profile} needs {' and '.join(needs)}")
+            got = " and ".join(given) or "no data ID"
+            expected = " and ".join(needs)
+            raise ValueError(f"expected {expected} with profile {self.profile}, got {got}")
         if self.data_id_mode == "nibble" and (self.data_id or 0) > 0xFFF:
-            raise ValueError(f"data_id is {self.data_id:#x}, allowed is up to 0xfff in mode nibble")
+            raise ValueError(f"data_id: expected up to 0xfff in mode nibble, got {self.data_id:#x}")
         return self
 
 

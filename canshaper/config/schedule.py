@@ -59,10 +59,9 @@ def schedule_fault(kind: str, sets: Sequence[Breakpoint]) -> str | None:
         return f"filter {kind} knows no sway; a gain schedule is for filters that do"
     for one in sets:
         if one.filter.kind != kind:
-            found = f"found a breakpoint with filter {one.filter.kind}"
-            return f"{found}, allowed is that of the axis, {kind}"
+            return f"expected the filter of the axis, {kind}, got {one.filter.kind} at a breakpoint"
     values = [one.breakpoint for one in sets]
     if any(a >= b for a, b in pairwise(values)):
-        found = ", ".join(f"{value:g}" for value in values)
-        return f"found breakpoints at {found}; allowed are rising values"
+        got = ", ".join(f"{value:g}" for value in values)
+        return f"expected rising breakpoints, got {got}"
     return None

@@ -77,7 +77,7 @@ class Command(Section):
     @model_validator(mode="after")
     def _one_direction(self) -> Self:
         if self.flags and self.negative:
-            raise ValueError("found flags and negative; allowed is one of them")
+            raise ValueError("expected one of flags and negative, got both")
         return self
 
 
@@ -93,8 +93,8 @@ class DirectionCodes(Section):
     def _different(self) -> Self:
         codes = (self.neutral, self.positive, self.negative)
         if len({*codes}) < len(codes):
-            found = ", ".join(str(code) for code in codes)
-            raise ValueError(f"found the codes {found}; allowed are three different ones")
+            got = ", ".join(str(code) for code in codes)
+            raise ValueError(f"expected three different codes, got {got}")
         return self
 
 
@@ -187,9 +187,9 @@ class Limits(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.min_pct >= self.max_pct:
-            raise ValueError(f"min_pct is {self.min_pct:g}, allowed is below max_pct")
+            raise ValueError(f"min_pct: expected less than max_pct, got {self.min_pct:g}")
         if self.curve() and self.deadband_pct:
-            raise ValueError("found deadband_pct and a curve; allowed is one of them")
+            raise ValueError("expected one of deadband_pct and a curve, got both")
         return self
 
     @property
@@ -248,9 +248,7 @@ class AxisConfig(Section):
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
         if KINDS[self.filter.kind].needs_sway and self.sway is None:
-            raise ValueError(
-                f"filter {self.filter.kind} needs the sway data of the axis; found no sway"
-            )
+            raise ValueError(f"expected sway data for filter {self.filter.kind}, got none")
         if fault := schedule_fault(self.filter.kind, self.gain_schedule):
             raise ValueError(fault)
         return self

@@ -127,10 +127,10 @@ class Source:
         if isinstance(node, yaml.ScalarNode) and node.tag in _SCALARS:
             value = _scalar(node)
             if isinstance(value, str) and _CONTROL.search(value):
-                text = f"found {value!r}, allowed is text without control characters"
+                text = f"expected text without control characters, got {value!r}"
                 self._add(path, node, text)
             return value
-        self._add(path, node, f"found the tag {node.tag.replace(_TAG, '!!')}, which is not allowed")
+        self._add(path, node, f"expected no tag, got {node.tag.replace(_TAG, '!!')}")
         return None
 
     def _mapping(self, node: yaml.MappingNode, path: Place) -> dict[str, Any]:
@@ -139,8 +139,8 @@ class Source:
             plain = isinstance(key_node, yaml.ScalarNode) and key_node.tag in _SCALARS
             key = _scalar(key_node) if plain else None
             if not isinstance(key, str) or _CONTROL.search(key):
-                found = repr(key_node.value) if key_node.id == "scalar" else f"a {key_node.id}"
-                self._add(path, key_node, f"found the key {found}, allowed are words")
+                got = repr(key_node.value) if key_node.id == "scalar" else f"a {key_node.id}"
+                self._add(path, key_node, f"expected a word as key, got {got}")
                 continue
             here = (*path, key)
             if key in result:

@@ -49,6 +49,6 @@ class Sway(Section):
             assert self.period_s and self.decay_per_swing is not None
             return SwayMode.from_decay(self.period_s, self.decay_per_swing)
         raise ValueError(
-            f"found {', '.join(sorted(given)) or 'no sway data'}; allowed are length_m, damping_nms"
-            " and mass_kg, or period_s and damping_ratio, or period_s and decay_per_swing"
+            "expected length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
+            f" and decay_per_swing, got {', '.join(sorted(given)) or 'no sway data'}"
         )

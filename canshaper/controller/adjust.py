@@ -47,7 +47,7 @@ class Adjuster:
             What has changed, a line for the log each.
 
         Raises:
-            ValueError: what was found and what is allowed; nothing has changed.
+            ValueError: what was expected and what came; nothing has changed.
         """
         numbers = dict(self._checked(values))
         by_axis: dict[str, dict[Key, float]] = {}
@@ -73,18 +73,19 @@ class Adjuster:
 
     def _checked(self, values: Mapping[str, object]) -> Iterable[tuple[Key, float]]:
         if not values:
-            raise ValueError("found no number to change")
+            raise ValueError("expected a number to change, got none")
         if len(values) > MOST_NUMBERS:
-            text = f"found {len(values)} numbers, allowed are {MOST_NUMBERS} in one request"
+            text = f"expected {MOST_NUMBERS} numbers at most, got {len(values)}"
             raise ValueError(text)
         for text, number in values.items():
             if text not in self._ranges:
-                raise ValueError(f"{text}: not adjustable; allowed are {', '.join(self._ranges)}")
+                names = ", ".join(self._ranges) or "none"
+                raise ValueError(f"{text}: expected an adjustable number; there are {names}")
             low, high = self._ranges[text]
             if isinstance(number, bool) or not isinstance(number, int | float):
-                raise ValueError(f"{text}: found {number!r}, allowed is a number")
+                raise ValueError(f"{text}: expected a number, got {number!r}")
             if not low <= number <= high:  # nor is one that is no number
-                raise ValueError(f"{text}: found {number:g}, allowed is {low:g} to {high:g}")
+                raise ValueError(f"{text}: expected {low:g} to {high:g}, got {number:g}")
             yield _key(text), float(number)
 
     def _config(self, name: str, runner: AxisRunner, values: Mapping[Key, float]) -> AxisConfig:

@@ -137,13 +137,11 @@ def _peer(client: socket.socket) -> str:
 def _answered(data: bytes, answer: Answer, peer: str) -> bytes:
     try:
         if len(data) > MOST_REQUEST:
-            raise ValueError(
-                f"found a request of more than {MOST_REQUEST} bytes, allowed are no more"
-            )
+            raise ValueError(f"expected a request of {MOST_REQUEST} bytes at most, got more")
         # A number of a thousand digits is infinite like every other that is too large.
         request = json.loads(data, parse_int=float)
         if not isinstance(request, dict):
-            raise ValueError('found no object; allowed is {} or {"set": {KEY: VALUE}}')
+            raise ValueError('expected {} or {"set": {KEY: VALUE}}, got no object')
         told = answer(request, peer)
     except (ValueError, ArithmeticError, RecursionError) as error:
         told = {"error": str(error)}

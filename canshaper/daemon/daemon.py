@@ -194,7 +194,8 @@ class Daemon:
         """One request from the control socket."""
         values = request.get("set", {})
         if request.keys() - {"set", "black_box"} or not isinstance(values, dict):
-            raise ValueError('allowed is {} or {"set": {KEY: VALUE}} or {"black_box": "write"}')
+            expected = '{} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
+            raise ValueError(f"expected {expected}, got another object")
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.ask()

@@ -17,5 +17,5 @@ def swinging_axis(deployment: Deployment, name: str) -> tuple[BoundAxis, Sway]:
     if bound is None or sway is None:
         fault = "no sway data" if bound else "no such axis"
         having = ", ".join(n for n, a in deployment.axes.items() if a.config.sway) or "none here"
-        raise DesignError(f"axis {name}: found {fault}; allowed are axes with sway data: {having}")
+        raise DesignError(f"axis {name}: expected one with sway data, {having}, got {fault}")
     return bound, sway

@@ -36,7 +36,7 @@ def _bind_axis(
         names = ", ".join(joysticks)
         add(
             (*place, "command", "joystick"),
-            f"found {axis.command.joystick!r}, joysticks are {names}",
+            f"expected a joystick, got {axis.command.joystick!r}; there are {names}",
         )
     valve = bind_valve(lookup, shared_valves, (*place, "valve"), axis.valve, axis.command)
     status = bind_status(lookup, (*place, "status"), axis.status, AXIS_STATUS)

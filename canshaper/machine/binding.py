@@ -117,5 +117,5 @@ def _check_values(lookup: Lookup, switch: BoundSwitch, values: Mapping[Place, fl
         return
     for place, value in values.items():
         if name := special_name(signal, value):
-            text = f"found {value:g}, which {signal.name} names {name} in the DBC"
-            lookup.diagnostics.add(place, f"{text}; allowed is a value that is no error")
+            text = f"expected a value of {signal.name} that the DBC names no error"
+            lookup.diagnostics.add(place, f"{text}, got {value:g}, {name}")

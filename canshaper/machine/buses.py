@@ -23,7 +23,7 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         _check_match(diagnostics, config, name, bus)
         _check_node_ids(diagnostics, name, bus)
         if bus.network and bus.interface != "udp_multicast":
-            text = f"found true with {bus.interface}, allowed is it with udp_multicast only"
+            text = f"expected true with udp_multicast only, got it with {bus.interface}"
             add(("buses", name, "network"), text)
         if bus.j1939 is None:
             continue
@@ -33,8 +33,8 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
             add(("buses", name, "j1939", "name"), f"{text} another ecu_instance will do")
         last = bus.j1939.first_spn + 2 * len(config.axes) - 1
         if last > LAST_SPN:
-            text = f"found {bus.j1939.first_spn}, which makes the last one {last};"
-            add(("buses", name, "j1939", "first_spn"), f"{text} allowed is {LAST_SPN}")
+            text = f"expected the last SPN up to {LAST_SPN}, got {last}"
+            add(("buses", name, "j1939", "first_spn"), f"{text} from {bus.j1939.first_spn} on")
 
 
 def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, bus: Bus) -> None:
@@ -43,18 +43,18 @@ def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, 
         return
     place = ("buses", name, "match")
     if bus.interface != "socketcan":
-        text = f"found it with the interface {bus.interface}, allowed is socketcan"
+        text = f"expected the interface socketcan with it, got {bus.interface}"
         diagnostics.add(place, text)
     rate = bus.match.bitrate
     if rate and bus.bitrate and rate != bus.bitrate:
-        text = f"found {rate}, the bitrate of the bus is {bus.bitrate}; allowed is the same"
+        text = f"expected the bitrate of the bus, {bus.bitrate}, got {rate}"
         diagnostics.add((*place, "bitrate"), text)
     for other, before in config.buses.items():
         if other == name:
             break
         if before.match and bus.match.may_be(before.match):
-            text = f"may be the device of bus {other} too; allowed is another serial, path"
-            diagnostics.add(place, f"{text} or port")
+            text = f"expected another serial, path or port than bus {other}"
+            diagnostics.add(place, f"{text}, got what may be its device")
 
 
 def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
@@ -64,9 +64,8 @@ def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
     owners = {bus.canopen.node: "node"}
     for node, config in bus.canopen.nodes.items():
         if config.id in owners:
-            text = f"found {config.id}, which is the node id of {owners[config.id]}"
-            place = ("buses", name, "canopen", "nodes", node, "id")
-            diagnostics.add(place, f"{text}; allowed is another one")
+            text = f"expected a node id of its own, got {config.id}, that of {owners[config.id]}"
+            diagnostics.add(("buses", name, "canopen", "nodes", node, "id"), text)
         owners.setdefault(config.id, f"nodes.{node}")
 
 
@@ -82,7 +81,7 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[ValveMessage]) 
     for i, bus in enumerate(gateway.between):
         if bus not in buses:
             names = ", ".join(buses)
-            add(("gateway", "between", i), f"found {bus!r}, buses are {names}")
+            add(("gateway", "between", i), f"expected a bus, got {bus!r}; there are {names}")
     for i, name in enumerate(gateway.blocked):
         if isinstance(result := lookup.messages.find(name), str):
             add(("gateway", "blocked", i), result)
@@ -90,10 +89,13 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[ValveMessage]) 
         return
     rewritten = [m.sender for m in valves if isinstance(m, RewrittenMessage)]
     if not rewritten:
-        text = f"found {gateway.fallback}, and no valve has the message of a joystick on the other"
-        add(("gateway", "fallback"), f"{text} bus; allowed is stop")
+        text = "expected stop where no valve has the message of a joystick on the other bus"
+        add(("gateway", "fallback"), f"{text}, got {gateway.fallback}")
     faults = {neutral_fault(s.protection, s.fields.message.length): s for s in rewritten}
     for fault, sender in faults.items():
         if fault and gateway.fallback == "neutral":
             name = sender.fields.message.name
-            add(("gateway", "fallback"), f"found neutral; {fault}, which {name} has")
+            add(
+                ("gateway", "fallback"),
+                f"expected stop or pass, got neutral: {fault}, which {name} has",
+            )

@@ -133,7 +133,7 @@ def too_many(files: Sequence[DbcFile]) -> str | None:
         ("bytes in what is used of them", sum(file.used_bytes for file in files), MOST_PARSED),
     ):
         if count > most:
-            return f"found {count} {what} in all, allowed are {most} at most"
+            return f"expected {most} {what} in all at most, got {count}"
     return None
 
 
@@ -239,7 +239,8 @@ class Messages:
         found = self._files.get(name, [])
         if not found:
             names = ", ".join(sorted(self._files)) or "none"
-            return f"found {name!r}, messages of the DBC files are {names[:MOST_LETTERS]}"
+            names = names[:MOST_LETTERS]
+            return f"expected a message of the DBC files, got {name!r}; there are {names}"
         if len(found) > 1:
             files = ", ".join(str(file.path) for file in found)
             return f"{name!r} stands more than once in the DBC files: {files}"

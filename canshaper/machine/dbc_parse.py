@@ -60,16 +60,16 @@ def _too_large(text: str, *, bounded: bool) -> tuple[int | None, str] | None:
     """Line and reason, where a file would take cantools more time or memory than there is."""
     if large := _TOO_LARGE.search(text):
         line = text.count("\n", 0, large.end()) + 1
-        return line, f"found {large[1] or large[2]} bytes or bits, allowed are 99999 at most"
+        return line, f"expected 99999 bytes or bits at most, got {large[1] or large[2]}"
     if not bounded:
         return None
     if (count := letters(text)) > MOST_PARSED:
-        why = f"found {count} bytes in what is used of it, allowed are {MOST_PARSED} at most"
+        why = f"expected {MOST_PARSED} bytes at most in what is used of it, got {count}"
         return None, why
     if (words := len(text.split())) > MOST_WORDS:
-        return None, f"found {words} words, allowed are {MOST_WORDS} at most"
+        return None, f"expected {MOST_WORDS} words at most, got {words}"
     if (payload := sum(map(int, _LENGTH.findall(text)))) > MOST_PAYLOAD:
-        return None, f"found {payload} bytes in its messages, allowed are {MOST_PAYLOAD} at most"
+        return None, f"expected {MOST_PAYLOAD} bytes at most in its messages, got {payload}"
     return None
 
 

@@ -22,7 +22,7 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
     parts, filters = _parts(place, axis), _filters(place, axis)
     for at, part in parts:
         if part.gain_schedule and not lookup.config.load_state:
-            add((*at, "gain_schedule"), "need the signal that chooses them; found no load_state")
+            add((*at, "gain_schedule"), "expected load_state, which chooses them, got none")
     wrong = {at: filter_fault(chosen, sway, period_s, rate) for at, chosen, sway in filters}
     for at, fault in wrong.items():
         if fault:
@@ -31,12 +31,12 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
         if fault := _fault_between(part.gain_schedule, period_s, rate):
             add((*at, "gain_schedule"), fault)
     if len(filters) > 1 and axis.sway is None:
-        add(place, "has profiles or a gain schedule, and no sway data of its own; found no sway")
+        add(place, "expected sway data of its own with profiles or a gain schedule, got none")
     codes = lookup.config.profile.codes if lookup.config.profile else {}
     for name in axis.profiles:
         if name not in codes:
-            allowed = ", ".join(codes) or "none: there is no profile at the top level"
-            add((*place, "profiles", name), f"found {name!r}, profiles are {allowed}")
+            names = ", ".join(codes) or "none: there is no profile at the top level"
+            add((*place, "profiles", name), f"expected a profile, got {name!r}; there are {names}")
 
 
 def _parts(place: Place, axis: AxisConfig) -> list[tuple[Place, AxisConfig | Profile]]:
@@ -75,9 +75,9 @@ def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         place = ("control", "adjustable", text)
         key = Key.parsed(text)
         if key is None:
-            add(place, "found no key of an axis; allowed is axes.AXIS.SECTION.NAME")
+            add(place, "expected axes.AXIS.SECTION.NAME, got no key of an axis")
         elif key.axis not in config.axes:
-            add(place, f"found axis {key.axis!r}, axes are {', '.join(config.axes)}")
+            add(place, f"expected an axis, got {key.axis!r}; there are {', '.join(config.axes)}")
         else:
             for fault in faults(key, config.axes[key.axis], low, high):
                 add(place, fault)

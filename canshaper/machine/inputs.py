@@ -145,8 +145,8 @@ def bind_input(
     most = protection.counts // 2
     # Beyond half of its range a step back would look like a step forward.
     if protection.counts and (config.alive_max_step or 0) > most:
-        text = f"is {config.alive_max_step}, allowed is up to {most}: its counter has"
-        used.add("alive_max_step", f"{text} {protection.counts} values")
+        text = f"expected up to {most} with a counter of {protection.counts} values"
+        used.add("alive_max_step", f"{text}, got {config.alive_max_step}")
     return used, kind(config, used.message, JoystickCodec(used.message, []), protection)
 
 
@@ -201,7 +201,7 @@ def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundFeedba
     used, bound = result
     signal = used.find((*place, "signal"), config.signal)
     if signal and config.full is None and not signal.maximum:
-        used.add_fault(f"{signal.name} has no range in the DBC; allowed is that, or full")
+        used.add_fault(f"{signal.name}: expected a range in the DBC, or full, got neither")
     return bound
 
 

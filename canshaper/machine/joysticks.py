@@ -52,7 +52,7 @@ def _bind_velocity(
         return None
     if fault := magnitude_range(signal) if flags else symmetrical_range(signal):
         if not flags and not magnitude_range(signal):
-            fault += ", or direction flags with this one"
+            fault += "; with direction flags it is right"
         used.add_fault(fault)
         return None
     used.check_unused((*place, "signal"), signal)

@@ -59,7 +59,10 @@ class Lookup:
         """
         add = self.diagnostics.add
         if bus not in self.config.buses:
-            add((*place, "bus"), f"found {bus!r}, buses are {', '.join(self.config.buses)}")
+            add(
+                (*place, "bus"),
+                f"expected a bus, got {bus!r}; there are {', '.join(self.config.buses)}",
+            )
         result = self.messages.find(name)
         if isinstance(result, str):
             add((*place, "message"), result)
@@ -80,7 +83,7 @@ class Lookup:
             used.add("message", f"{text} {key_path(self.used[key].place)}")
         self.used[key] = used
         if message.length > 8:
-            used.add("message", f"{name} has {message.length} bytes, allowed are 8")
+            used.add("message", f"{name}: expected 8 bytes at most, got {message.length}")
         if message.is_multiplexed():
             verb = "taken from" if received else "sent in"
             used.add("message", f"{name} is multiplexed; nothing can be {verb} it")
@@ -109,15 +112,15 @@ class Lookup:
         least = 2 * max(cycle, tick)
         if timeout_ms < least:
             twice = f"the cycle of {message.name}" if cycle >= tick else "tick_ms"
-            text = f"found {timeout_ms}, allowed is {least} ms or more: twice {twice}"
+            text = f"expected {least} ms or more, twice {twice}, got {timeout_ms}"
             used.add("timeout_ms", text)
 
     def period(self, used: UsedMessage) -> int:
         """Ticks between two sendings of a message, from its GenMsgCycleTime; 0 when impossible."""
         cycle, tick = used.message.cycle_time, self.config.tick_ms
         if not cycle or cycle % tick:
-            stated = f"GenMsgCycleTime {cycle} ms" if cycle else "no GenMsgCycleTime"
-            used.add_fault(f"has {stated}, allowed is a multiple of tick_ms, {tick} ms")
+            got = f"{cycle} ms" if cycle else "none"
+            used.add_fault(f"GenMsgCycleTime: expected a multiple of tick_ms, {tick} ms, got {got}")
             return 0
         return cycle // tick
 
@@ -126,7 +129,8 @@ class Lookup:
         config = self.config.buses.get(bus)
         nodes = config.canopen.nodes if config and config.canopen else {}
         if name is not None and name not in nodes:
-            text = f"found {name!r}, nodes of bus {bus} are {', '.join(nodes) or 'none'}"
+            names = ", ".join(nodes) or "none"
+            text = f"expected a node of bus {bus}, got {name!r}; there are {names}"
             self.diagnostics.add((*place, "node"), text)
 
     def _check_pdo(self, used: UsedMessage, bus: str) -> None:
@@ -134,8 +138,8 @@ class Lookup:
         config, message = self.config.buses.get(bus), used.message
         service = None if message.is_extended_frame else service_of(message.frame_id)
         if config and config.canopen and service:
-            text = f"{message.name} has the id {message.frame_id:#x}, which is one of {service}"
-            used.add("message", f"{text} in CANopen; allowed are those of PDOs")
+            text = f"{message.name}: expected the id of a PDO, got {message.frame_id:#x}"
+            used.add("message", f"{text}, which is one of {service} in CANopen")
 
     def _check_j1939(
         self, used: UsedMessage, bus: str, *, received: bool, source: int | None
@@ -146,15 +150,15 @@ class Lookup:
             if source is not None:
                 used.add("source", f"{name} is no message of J1939 (VFrameFormat in the DBC)")
         elif not received and own is None:
-            text = f"{name} is a message of J1939, and bus {bus} has no address for us"
-            used.add("bus", f"{text}: allowed is one with a section j1939")
+            text = f"{name}, a message of J1939: expected a bus with a section j1939"
+            used.add("bus", f"{text}, got {bus} without")
         elif received:
             if used.can_id & 0xFF == own:
                 text = f"{name} comes from address {own}, which is ours on bus {bus}"
                 used.add("source" if source is not None else "message", text)
             elif used.any_source and has_destination(used.can_id):
-                text = f"missing: {name} is sent from one node to another"
-                used.add("source", f"{text}; allowed is the address of its sender")
+                text = f"expected the address of the sender of {name}, got none"
+                used.add("source", f"{text}: it is sent from one node to another")
 
 
 def load_messages(
@@ -172,10 +176,10 @@ def load_messages(
     files = []
     for i, name in enumerate(config.dbc if inside else ()):
         if inside and not _is_inside(directory / name, inside):
-            add(("dbc", i), f"found {name!r}, allowed is a file of the bundle")
+            add(("dbc", i), f"expected a file of the bundle, got {name!r}")
             return None
     if (size := sum(_size(directory / name) for name in config.dbc)) > MOST_BYTES:
-        add(("dbc",), f"found {size} bytes in all, allowed are {MOST_BYTES} at most")
+        add(("dbc",), f"expected {MOST_BYTES} bytes at most in all, got {size}")
         return None
     unusable_bytes = 0
     names = {section.message for section in protected_sections(config)}
@@ -184,7 +188,7 @@ def load_messages(
         try:
             file, problems = load_dbc(directory / name, names)
         except OSError as error:
-            add(("dbc", i), f"found {name!r}: {error.strerror or error}")
+            add(("dbc", i), f"expected a file, got {name!r}: {error.strerror or error}")
             continue
         diagnostics.problems += problems
         if file:

@@ -37,7 +37,7 @@ def _check_axis(
     add, axes = lookup.diagnostics.add, lookup.config.axes
     at = ".".join(str(part) for part in place)
     if name not in axes:
-        add(place, f"expected one of the axes {', '.join(axes)}, got {name!r}")
+        add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
         return
     if name in taken:
         add(place, f"expected an axis that is in no other motion, got {name!r} of {taken[name]}")

@@ -38,8 +38,8 @@ def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None
     used.use(place, signal, "checksum")
     bits = CHECKSUMS[kind].bits
     if not _fills(signal, bits):
-        text = f"{signal.name} is no unsigned {PARTS[bits]} of its own"
-        add(place, f"{text}; allowed is one that is")
+        text = f"{signal.name}: expected an unsigned {PARTS[bits]} of its own"
+        add(place, f"{text}, got another signal")
         return None
     low = min(_bits(signal))
     big = bits > 8 and signal.byte_order == "big_endian"
@@ -47,12 +47,12 @@ def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None
     checksum = Checksum(kind, low // 8, low % 8, order, used.can_id)
     place = (*used.place, "checksum", "kind")
     if CHECKSUMS[kind].needs_id and used.any_source:
-        text = f"found {kind!r}, which depends on the id, and {message.name} may come from any"
-        add(place, f"{text} source; allowed is it with a known one")
+        text = f"expected a known source with {kind!r}, which depends on the id"
+        add(place, f"{text}, got {message.name} from any")
     try:
         checksum.protect(bytes(message.length), 0)
     except Exception as error:  # of a package: now, and not in the first tick
-        text = f"found {kind!r}, which fails on {message.name}: {type(error).__name__}: {error}"
+        text = f"{kind!r} fails on {message.name}: {type(error).__name__}: {error}"
         add(place, text)
     return checksum
 
@@ -60,10 +60,10 @@ def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None
 def _bind_e2e(used: UsedMessage, config: Protected) -> Protection:
     for key in ("alive_counter", "checksum"):
         if getattr(config, key) is not None:
-            used.add(key, "found besides e2e, which has its own; allowed is one")
+            used.add(key, f"expected one of {key} and e2e, got both")
     profile, message = _profile(config), used.message
     if message.length < 2:
-        used.add("e2e", f"{message.name} has {message.length} bytes, allowed are 2 or more")
+        used.add("e2e", f"{message.name}: expected 2 bytes or more, got {message.length}")
         return UNPROTECTED
     for signal in message.signals:
         if min(_bits(signal)) < profile.bits:

@@ -65,12 +65,12 @@ def stated_fault(axis: AxisConfig, *, timeout_ms: int, period_s: float) -> str |
         return None
     allowed = allowed_m(axis, timeout_ms=timeout_ms, period_s=period_s)
     if allowed is None:
-        return f"found {stated:g} m, and no speed of the tip: it needs the section sway or slewing"
+        return f"expected the section sway or slewing with it, got {stated:g} m without"
     if allowed <= stated:
         return None
     return (
-        f"found {stated:g} m; max_pct, tail_s, stop_s, fall_per_s and the speed of the tip allow"
-        f" {_up(allowed)} m"
+        f"expected {_up(allowed)} m or more, by max_pct, tail_s, stop_s, fall_per_s and the speed"
+        f" of the tip, got {stated:g} m"
     )
 
 

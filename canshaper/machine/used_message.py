@@ -50,7 +50,7 @@ class UsedMessage:
         signal = find_signal(self.message, name)
         if signal is None:
             names = ", ".join(s.name for s in self.message.signals)
-            text = f"found {name!r}, signals of {self.message.name} are {names}"
+            text = f"expected a signal of {self.message.name}, got {name!r}; there are {names}"
             self.diagnostics.add(place, text)
         return signal
 
@@ -66,9 +66,9 @@ class UsedMessage:
     def check_integer(self, place: Place, signal: Signal, *, signed: bool = True) -> None:
         """A raw value must be a whole number."""
         if signal.is_float or (signal.is_signed and not signed):
-            fault = "is a float" if signal.is_float else "has a sign"
-            allowed = "an integer" if signed else "an unsigned integer"
-            self.diagnostics.add(place, f"{signal.name} {fault}, allowed is {allowed} signal")
+            got = "a float" if signal.is_float else "a signed one"
+            kind = "an integer" if signed else "an unsigned integer"
+            self.diagnostics.add(place, f"{signal.name}: expected {kind} signal, got {got}")
 
     def use(self, place: Place, signal: Signal, use: str) -> None:
         """Note the one use of a signal."""
@@ -80,12 +80,15 @@ class UsedMessage:
     ) -> None:
         """Note a problem where the signal has a use already, by ``uses`` or by ``also``."""
         if use := self.uses.get(signal.name) or (also or {}).get(signal.name):
-            self.diagnostics.add(place, f"found {signal.name!r}, which is {use} already")
+            self.diagnostics.add(
+                place,
+                f"expected a free signal, got {signal.name!r}, which is {use} already",
+            )
 
     def check_state_bits(self, place: Place, signal: Signal) -> None:
         """Control and status word of CiA 408 have the state in their low bits."""
         if signal.length < STATE_BITS:
-            text = f"{signal.name} has {signal.length} bits, allowed is {STATE_BITS} or more"
+            text = f"{signal.name}: expected {STATE_BITS} bits or more, got {signal.length}"
             self.diagnostics.add(place, text)
 
 

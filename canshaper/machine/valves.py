@@ -87,7 +87,7 @@ def bind_valve(
         codec = FlagsCodec((flags.neutral, flags.positive, flags.negative))
     negative = used.find((*place, "signal"), command.negative) if name else None
     if signal and negative and not _alike(signal, negative):
-        used.add_fault(f"{negative.name} is not like {signal.name}; allowed are two that are")
+        used.add_fault(f"{negative.name}: expected a signal like {signal.name}, got another kind")
     if signal is None or not shared.ticks or len(lookup.diagnostics.problems) > before:
         return None
     return ValveCodec(shared.codec, signal, codec, [s for s in also if s], negative), shared.ticks
@@ -98,11 +98,13 @@ def _check_cycle(lookup: Lookup, place: Place, valve: Valve, shared: SharedValve
     cycle_ms = shared.ticks * lookup.config.tick_ms
     least_ms = cycle_ms * FRAMES_PER_TIMEOUT
     if cycle_ms > SLOWEST_VALVE_MS:
-        text = f"has GenMsgCycleTime {cycle_ms} ms, allowed for a valve is up to"
-        shared.used.add_fault(f"{text} {SLOWEST_VALVE_MS} ms")
+        text = f"expected up to {SLOWEST_VALVE_MS} ms for a valve, got {cycle_ms} ms"
+        shared.used.add_fault(f"GenMsgCycleTime: {text}")
     elif least_ms > valve.timeout_ms:
-        text = f"found {valve.timeout_ms}, allowed is {least_ms} ms or more: three cycles of"
-        text += f" {shared.used.message.name}, so that two lost frames do not close it"
+        text = (
+            f"expected {least_ms} ms or more, three cycles of {shared.used.message.name}, so that"
+        )
+        text += f" two lost frames do not close it, got {valve.timeout_ms}"
         lookup.diagnostics.add((*place, "timeout_ms"), text)
 
 
@@ -121,27 +123,27 @@ def _check_rewritten(
     """In the frames of a joystick only its own sticks may be rewritten, and protected as it is."""
     add, joystick = lookup.diagnostics.add, lookup.config.joysticks[name]
     if command.joystick != name:
-        text = f"found {valve.message!r}, the message of joystick {name}, whose frames leave with"
-        add((*place, "message"), f"{text} its own sticks; that of this axis is at another")
+        text = f"expected the message of joystick {command.joystick}, or one of no joystick"
+        add((*place, "message"), f"{text}, got {valve.message!r} of joystick {name}")
     elif valve.signal != command.signal:
-        text = f"found {valve.signal!r}; in the message of its joystick allowed is that of the"
-        add((*place, "signal"), f"{text} stick, {command.signal!r}")
+        text = f"expected the signal of its command, {command.signal!r}, in the message of its"
+        add((*place, "signal"), f"{text} joystick, got {valve.signal!r}")
     for axis, other in lookup.config.axes.items():
         there = other.valve.bus, other.valve.message
         if other.command.joystick == name and there != (valve.bus, valve.message):
-            text = f"found {other.valve.message!r}; the frames of joystick {name} leave as"
-            text += f" {valve.message} on bus {valve.bus}, with this stick unshaped in them"
+            text = f"expected {valve.message} on bus {valve.bus}, as the frames of joystick {name}"
+            text += f" leave with this command in them, got {other.valve.message!r}"
             add(("axes", axis, "valve", "message"), text)
     for key in ("direction", "cia408"):
         if getattr(valve, key) is not None:
-            text = f"found in the message of joystick {name}; allowed is what the stick has"
-            add((*place, key), text)
+            text = f"expected none in the message of joystick {name}, which has that of the command"
+            add((*place, key), f"{text}, got one")
     for key in PROTECTION_KEYS:
         if getattr(valve, key) != getattr(joystick, key):
-            add((*place, key), f"differs from that of joystick {name}, allowed is the same")
+            add((*place, key), f"expected the same as joystick {name}, got another")
     if valve.timeout_ms <= joystick.timeout_ms:
-        text = f"found {valve.timeout_ms}, allowed is more than the {joystick.timeout_ms} ms of"
-        text += f" joystick {name}: who takes its frames must not give up before we do"
+        text = f"expected more than the {joystick.timeout_ms} ms of joystick {name}, whose receiver"
+        text += f" must not give up before we do, got {valve.timeout_ms}"
         add((*place, "timeout_ms"), text)
 
 
@@ -153,8 +155,8 @@ def _bind_message(
     if shared := shared_valves.get(key):
         for part in PROTECTION_KEYS:
             if getattr(valve, part) != getattr(shared.config, part):
-                text = f"differs from that of the other axes of {valve.message}"
-                lookup.diagnostics.add((*place, part), f"{text}, allowed is the same")
+                text = f"expected the same as the other axes of {valve.message}, got another"
+                lookup.diagnostics.add((*place, part), text)
         return shared
     # A joystick's message keeps the address of its sender, who is not on this bus.
     rewritten = lookup.config.joysticks[joystick] if joystick is not None else None
@@ -198,7 +200,7 @@ def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -
         return None
     if fault := magnitude_range(signal) if magnitude else symmetrical_range(signal):
         if not magnitude and not magnitude_range(signal):
-            fault += ", or a direction with this one"
+            fault += "; with a direction it is right"
         used.add_fault(fault)
         return None
     used.check_integer(place, signal)
@@ -219,10 +221,12 @@ def _bind_direction(
     for key, code in zip(("neutral", "positive", "negative"), codes, strict=True):
         name = next((str(n) for raw, n in (signal.choices or {}).items() if raw == code), "")
         if code > largest:
-            text = f"found {code}, {signal.name} has {signal.length} bits: up to {largest}"
+            text = f"expected up to {largest}, of {signal.length} bits of {signal.name}, got {code}"
             used.diagnostics.add((*place, key), text)
         elif _FLOAT.search(name):
-            text = f"found {code}, which the DBC names {name}; a floating axis drops its load"
+            text = (
+                f"expected no code of floating, which drops the load, got {code}, in the DBC {name}"
+            )
             used.diagnostics.add((*place, key), text)
     return DirectionCodec(signal.name, codes)
 

@@ -65,7 +65,7 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
             bundle.getinfo(ABOUT)
             members = bundle.infolist()
             if len(members) > MOST_MEMBERS:
-                raise ValueError(f"{len(members)} files, allowed are {MOST_MEMBERS} at most")
+                raise ValueError(f"expected {MOST_MEMBERS} files at most, got {len(members)}")
             for member in members:
                 where = f"{path}: {member.filename}"
                 _extract(bundle, member, folder)
@@ -73,13 +73,13 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
         log, file = ((folder / about[key]).resolve() for key in ("log", "deployment"))
     except Exception as error:  # of many kinds, where the file is damaged
-        text = f"found {type(error).__name__} {error}, allowed is one of canshaper record"
+        text = f"expected a file of canshaper record, got {type(error).__name__} {error}"
         raise LogError(f"{where}: not a bundle: {text}") from None
     for one in (log, file):
         if folder.resolve() not in one.parents:
             raise LogError(f"{path}: not a bundle: a path leads out of it")
         if not one.is_file():
-            text = f"found no {one.relative_to(folder.resolve())}, allowed is one that has it"
+            text = f"expected {one.relative_to(folder.resolve())} in it, got none"
             raise LogError(f"{path}: not a bundle: {text}")
     return log, file
 
@@ -98,10 +98,12 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
         raise ValueError("a link or another special file")
     most = MOST_LOG_BYTES if member.filename in (LOG, BOX) else MOST_FILE_BYTES
     if member.file_size > most:
-        raise ValueError(f"{member.file_size} bytes, allowed are {most} at most")
+        raise ValueError(f"expected {most} bytes at most, got {member.file_size}")
     if member.file_size > max(RATIO_FROM_BYTES, MOST_RATIO * member.compress_size):
         ratio = member.file_size // max(1, member.compress_size)
-        raise ValueError(f"{ratio} bytes for each that is packed, allowed are {MOST_RATIO}")
+        raise ValueError(
+            f"expected {MOST_RATIO} bytes at most for each that is packed, got {ratio}"
+        )
     target = folder.joinpath(*parts)
     target.parent.mkdir(parents=True, exist_ok=True)
     # zipfile hands out no more than file_size, whatever is packed.

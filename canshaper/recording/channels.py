@@ -47,11 +47,11 @@ def bus_of_channel(
         channel = next((c for c in tries if c in found), None)
         names = ", ".join(repr(c) for c in sorted(found)) or "none"
         if channel is None:
-            text = f"bus {name}: found the channels {names} in the log, none is {tries[0]!r}"
-            raise LogError(f"{text}; allowed is --channel {name}=CHANNEL with one of them")
+            text = f"bus {name}: expected the channel {tries[0]!r}, got {names} in the log"
+            raise LogError(f"{text}; choose one of them with --channel {name}=CHANNEL")
         if channel in chosen:
-            text = f"bus {name}: found channel {channel!r}, which is that of bus {chosen[channel]}"
-            raise LogError(f"{text}; allowed is --channel {name}=CHANNEL with one of its own")
+            text = f"bus {name}: expected a channel of its own, got {channel!r}, that of bus"
+            raise LogError(f"{text} {chosen[channel]}; choose one with --channel {name}=CHANNEL")
         chosen[channel] = name
     return chosen
 

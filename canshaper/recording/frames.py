@@ -50,9 +50,9 @@ class Place:
     number: int = 0
     left_out: Counter[str] = field(default_factory=Counter)
 
-    def error(self, found: str, allowed: str) -> LogError:
+    def error(self, got: str, expected: str) -> LogError:
         """What is wrong here."""
-        return LogError(f"{self}: found {found}, allowed is {allowed}")
+        return LogError(f"{self}: expected {expected}, got {got}")
 
     def cut_off(self, found: str) -> CutOffError:
         """The log ends here, in the middle of something."""

@@ -119,9 +119,9 @@ class LogFile:
         if -OUT_OF_ORDER_NS <= step_ns < 0:
             self.disordered += 1
             return last_ns
-        found = f"a time {abs(step_ns) / 1e9:.3f} s {'after' if step_ns > 0 else 'before'}"
-        allowed = "one clock for the whole log; split it here"
-        raise place.error(f"mixed clocks: {found} that of the frame before", allowed)
+        got = f"a time {abs(step_ns) / 1e9:.3f} s {'after' if step_ns > 0 else 'before'}"
+        expected = "one clock for the whole log (split it here)"
+        raise place.error(f"mixed clocks: {got} that of the frame before", expected)
 
 
 class _UnpackedWithoutEndError(Exception):
@@ -170,6 +170,7 @@ def _format(place: Place) -> tuple[bool, str]:
     suffix = f".{suffix.rpartition('.')[2]}"
     if suffix not in READERS:
         known = ", ".join(READERS)
-        found = f"found the suffix {suffix!r}" if suffix != "." else "found no suffix"
-        raise LogError(f"{place.path}: {found}, allowed are {known}, each also with .gz behind")
+        got = repr(suffix) if suffix != "." else "none"
+        expected = f"the suffix {known}, each also with .gz behind"
+        raise LogError(f"{place.path}: expected {expected}, got {got}")
     return packed, suffix

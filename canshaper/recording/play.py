@@ -173,7 +173,7 @@ class _Played:
                 values, self._text = json.loads(self._text), b""
                 self._adjuster.change(values)
         else:
-            raise ValueError(f"found a record of kind {kind}")
+            raise ValueError(f"expected a known kind of record, got {kind}")
 
     def _call_with(self, frame: Frame, record: Record) -> None:
         guarded, kind = self._guarded, record.kind

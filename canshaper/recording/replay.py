@@ -153,12 +153,12 @@ class Replay:
         missed = self._missing()
         if len(missed) == len(deployment.joysticks) and not self.exact:
             named = "; ".join(missed)
-            found = ", ".join(f"{k[0]} {k[1]:#x}" for k in sorted(self.received)[:MOST_NAMED])
-            text = f"found none of its joystick messages ({named})"
-            text += f", of what it receives only {found}" if found else ""
+            other = ", ".join(f"{k[0]} {k[1]:#x}" for k in sorted(self.received)[:MOST_NAMED])
+            got = f"none of its joystick messages ({named})"
+            got += f", of what it receives only {other}" if other else ""
             raise LogError(
-                f"{self._drive.path}: {text}; allowed is a log of the buses of"
-                f" {deployment.path.name}: see --channel and the ids in the DBC files"
+                f"{self._drive.path}: expected a log of the buses of {deployment.path.name},"
+                f" got {got}: see --channel and the ids in the DBC files"
             )
 
     def _missing(self) -> list[str]:

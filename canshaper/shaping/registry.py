@@ -32,7 +32,7 @@ def with_entry_points(
             kind = point.load()
             if not isinstance(kind, ShaperKind):
                 raise ValueError(
-                    f"found a value of type {type(kind).__name__}, allowed is a ShaperKind"
+                    f"expected a ShaperKind, got a value of type {type(kind).__name__}"
                 )
             if kind.name in known:
                 raise ValueError(f"the kind {kind.name!r} is there already")
@@ -87,5 +87,5 @@ def build_shaper(
     if not declared.needs_sway:
         return declared.build(tick_s, **parameters)
     if sway is None:
-        raise ValueError(f"filter {kind} needs the sway data of the axis; found no sway")
+        raise ValueError(f"expected sway data for filter {kind}, got none")
     return declared.build(sway, **parameters)

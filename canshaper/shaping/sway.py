@@ -20,8 +20,8 @@ SLOWEST_RAD_S, FASTEST_RAD_S = 0.5, 50.0
 def _require(name: str, value: float, low: float, high: float, unit: str) -> float:
     """Return ``value`` when it is finite and within [low, high]; ValueError otherwise."""
     if not (math.isfinite(value) and low <= value <= high):
-        found, allowed = f"{value:g} {unit}".strip(), f"{low:g} to {high:g} {unit}".strip()
-        raise ValueError(f"{name} is {found}, allowed is {allowed}")
+        expected, got = f"{low:g} to {high:g} {unit}".strip(), f"{value:g} {unit}".strip()
+        raise ValueError(f"{name}: expected {expected}, got {got}")
     return value
 
 

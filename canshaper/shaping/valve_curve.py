@@ -51,14 +51,14 @@ class ValveCurve:
 def _faults(commands: Sequence[float], speeds: Sequence[float]) -> Iterator[str]:
     """Why points are no curve of a valve; each fault takes it that those before were none."""
     if len(commands) != len(speeds):
-        yield f"found {len(commands)} commands and {len(speeds)} speeds, allowed is one for each"
+        yield f"expected a speed for each command, got {len(commands)} and {len(speeds)}"
     if len(commands) < 4 or commands[0] != -1.0 or commands[-1] != 1.0:
-        yield "allowed are commands from -100 to 100 %, with the ends of the dead band between"
+        yield "expected commands from -100 to 100 %, with the ends of the dead band between"
     if any(b <= a for a, b in pairwise(commands)):
         yield "commands do not rise"
     zeros = [i for i, speed in enumerate(speeds) if speed == 0.0]
     if len(zeros) != 2 or zeros[1] != zeros[0] + 1 or not 0 < zeros[0] < len(speeds) - 2:
-        yield "allowed are two neighbouring commands with speed 0, the ends of the dead band"
+        yield "expected two neighbouring commands with speed 0, the ends of the dead band"
     if not commands[zeros[0]] <= 0.0 <= commands[zeros[1]]:
         yield "the dead band does not lie around command 0"
     if any(b <= a for a, b in pairwise([*speeds[: zeros[1]], *speeds[zeros[1] + 1 :]])):

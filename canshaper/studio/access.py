@@ -40,14 +40,14 @@ class Access:
             name, port = host, "80"
         known = name in LOOPBACK or name in self.names or (self.token and _is_address(name))
         if not known or port != str(self.port):
-            return f"found the host {host[:60]!r}; open the address that canshaper studio printed"
+            return f"expected the address that canshaper studio printed, got the host {host[:60]!r}"
         return None
 
     def origin_fault(self, host: str, origin: str | None) -> str | None:
         """Why a connection from this origin is refused, or None."""
         if origin != f"http://{host}":
-            found = f"found the origin {origin[:60]!r}" if origin else "found no origin"
-            return f"{found}; only the page of this studio may connect"
+            got = f"the origin {origin[:60]!r}" if origin else "no origin"
+            return f"expected the page of this studio, got {got}"
         return None
 
     def token_fault(self, query: Mapping[str, str], cookies: Mapping[str, str]) -> str | None:
@@ -58,7 +58,7 @@ class Access:
             if shown and secrets.compare_digest(shown.encode(), self.token.encode()):
                 return None
         return (
-            "found no token, or a wrong one; open the whole address that canshaper studio printed"
+            "expected the whole address that canshaper studio printed, got no token or a wrong one"
         )
 
 

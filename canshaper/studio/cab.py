@@ -77,11 +77,10 @@ class Cab:
         """
         for name, value in sticks.items():
             if name not in self._axes:
-                allowed = ", ".join(sorted(self._axes))
-                raise PageMessageError(f"found the stick {name[:20]!r}, there are {allowed}")
+                names = ", ".join(sorted(self._axes))
+                raise PageMessageError(f"expected an axis, got {name[:20]!r}; there are {names}")
             if not (is_number(value) and -1.0 <= value <= 1.0):  # false of NaN, too
-                found = repr(value)[:20]
-                raise PageMessageError(f"found {found} for the stick {name}, allowed is -1 to 1")
+                raise PageMessageError(f"axis {name}: expected -1 to 1, got {repr(value)[:20]}")
         if page != self.driver:
             return
         self._watch(now_s)

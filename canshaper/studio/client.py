@@ -95,9 +95,7 @@ class Client:
         self._allowance = min(BURST, self._allowance + MOST_PER_S * (now_s - self._filled_s))
         self._filled_s = now_s
         self._allowance -= 1.0
-        return (
-            f"too many messages; allowed are {MOST_PER_S} a second" if self._allowance < 0 else None
-        )
+        return f"expected {MOST_PER_S} messages a second at most" if self._allowance < 0 else None
 
     def _take(self, text: str | None) -> None:
         """Do what a message asks for.
@@ -109,7 +107,7 @@ class Client:
         number = self._number
         if (sticks := message.get("sticks")) is not None:
             if not isinstance(sticks, dict):
-                raise PageMessageError("found sticks that are no object")
+                raise PageMessageError("sticks: expected an object, got another value")
             self._stage.with_cab(lambda cab, now_s: cab.sticks(number, sticks, now_s))
         elif (word := message.get("do")) is not None:
             self._stage.with_cab(_action(word, number))
@@ -119,7 +117,7 @@ class Client:
             name, factor = message.get("slide"), message.get("to")
             known = isinstance(name, str) and name in self._stage.sliders
             if not known or not is_number(factor):
-                raise PageMessageError("found no message that is known")
+                raise PageMessageError("expected a message that is known, got another")
             self._wanted[str(name)] = factor
             self._slid.set()
 
@@ -174,13 +172,13 @@ def parsed(text: str | None) -> dict[str, Any]:
         PageMessageError: it is no JSON object.
     """
     if text is None:
-        raise PageMessageError("found bytes, allowed is JSON")
+        raise PageMessageError("expected JSON, got bytes")
     try:
         message = json.loads(text)
     except (ValueError, RecursionError):
-        raise PageMessageError(f"found {text[:40]!r}, allowed is JSON") from None
+        raise PageMessageError(f"expected JSON, got {text[:40]!r}") from None
     if not isinstance(message, dict):
-        raise PageMessageError(f"found {text[:40]!r}, allowed is an object")
+        raise PageMessageError(f"expected an object, got {text[:40]!r}")
     return message
 
 
@@ -194,6 +192,6 @@ def _action(word: object, number: int) -> Action:
     }
     if not isinstance(word, str) or word not in actions:
         raise PageMessageError(
-            f"found {str(word)[:20]!r}, allowed are {', '.join(map(str, actions))}"
+            f"expected one of {', '.join(map(str, actions))}, got {str(word)[:20]!r}"
         )
     return actions[word]

@@ -94,9 +94,8 @@ def values(numbers: dict[str, list[Number]], name: str, factor: float) -> dict[s
     """
     if name not in numbers:
         there = ", ".join(numbers) or "none"
-        raise ValueError(f"found the slider {name[:20]!r}, there are {there}")
+        raise ValueError(f"expected a slider, got {name[:20]!r}; there are {there}")
     low, high = RANGES[name]
     if not low <= factor <= high:
-        found = str(factor)[:20]
-        raise ValueError(f"found {found} for the slider {name}, allowed is {low:g} to {high:g}")
+        raise ValueError(f"slider {name}: expected {low:g} to {high:g}, got {str(factor)[:20]}")
     return {number.key: number.at(factor) for number in numbers[name]}

@@ -232,11 +232,13 @@ class Crane:
         Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
         """
         if not 0.0 < dt_s < math.inf:
-            raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
+            raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
         for name, command in commands.items():
             axis = self._axes.get(name)
             if axis is None:
-                raise ValueError(f"crane: axis {name!r}, allowed {', '.join(self._axes)}")
+                raise ValueError(
+                    f"crane: axis: expected one of {', '.join(self._axes)}, got {name!r}"
+                )
             axis.valve.set_command(command)
         # The smallest number of equal steps; the margin forgives rounding of dt_s.
         count = math.ceil(dt_s / INTERNAL_STEP_S - 1e-9)

@@ -30,7 +30,8 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
     """
     names = cranes(deployment)
     if crane not in names:
-        raise DesignError(f"crane {crane!r}, allowed {', '.join(names) or 'none: there is one'}")
+        expected = f"one of {', '.join(names)}" if names else "none, there is one"
+        raise DesignError(f"crane: expected {expected}, got {crane!r}")
     axes: dict[str, BoundAxis] = {
         name.removeprefix(f"{crane}_"): axis
         for name, axis in deployment.axes.items()

@@ -73,11 +73,11 @@ class JointParameters:
         for name in ("lift", "knuckle"):
             low, high = getattr(self, f"{name}_min_deg"), getattr(self, f"{name}_max_deg")
             if low >= high:
-                raise DesignError(f"joints: {name}_max_deg = {high}, allowed above {low}")
+                raise DesignError(f"joints: {name}_max_deg: expected more than {low}, got {high}")
         if self.start_extension_m > self.extension_max_m:
             raise DesignError(
-                f"joints: start_extension_m = {self.start_extension_m},"
-                f" allowed 0.0 .. {self.extension_max_m}"
+                f"joints: start_extension_m: expected 0.0 .. {self.extension_max_m},"
+                f" got {self.start_extension_m}"
             )
 
     @property
@@ -136,8 +136,8 @@ class JointBoom:
             value = joints[name]
             if not low <= value <= high:
                 raise DesignError(
-                    f"joints: the start pose puts {name} at {_readable(name, [value])},"
-                    f" allowed {_readable(name, (low, high))}"
+                    f"joints: {name} in the start pose: expected {_readable(name, (low, high))},"
+                    f" got {_readable(name, [value])}"
                 )
             self.axes[name] = Actuator(*drives[name], value, low, high)
         self._radius_m, self.height_m = self._boom.tip(lift, knuckle, extension)

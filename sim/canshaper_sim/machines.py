@@ -77,12 +77,14 @@ class TipControlledCrane:
         Raises ValueError for dt_s <= 0, an unknown axis or a command that is not finite.
         """
         if not 0.0 < dt_s < math.inf:
-            raise ValueError(f"crane: dt_s = {dt_s}, allowed positive values")
+            raise ValueError(f"crane: dt_s: expected a positive value, got {dt_s}")
         for name, command in commands.items():
             if name not in self._commands:
-                raise DesignError(f"crane: axis {name!r}, allowed {', '.join(TIP_AXES)}")
+                raise DesignError(
+                    f"crane: axis: expected one of {', '.join(TIP_AXES)}, got {name!r}"
+                )
             if not math.isfinite(command):
-                raise ValueError(f"tip controller: command = {command}, allowed finite values")
+                raise ValueError(f"tip controller: command: expected a finite value, got {command}")
             self._commands[name] = command
         rest_s = dt_s
         while rest_s > _SAME_TIME_S:
@@ -109,7 +111,7 @@ def build_machine(
         return TipControlledCrane(parameters, sway)
     if name == JOINTS:
         return ValveDrivenCrane(joint_crane(parameters, sway))
-    raise DesignError(f"machine {name!r}, allowed {', '.join(MACHINES)}")
+    raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {name!r}")
 
 
 def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
@@ -125,5 +127,5 @@ def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
         joints = {*JOINT_AXES} - {SLEW}
         return JOINTS if joints & axes.keys() else TIP
     if wish not in AXES_OF:
-        raise DesignError(f"machine {wish!r}, allowed {', '.join(MACHINES)}")
+        raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {wish!r}")
     return wish

@@ -32,7 +32,9 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
     strokes: list[Stroke] = []
     for axis in axes:
         if axis not in ALL_AXES:
-            raise DesignError(f"random script: axis {axis!r}, allowed {', '.join(ALL_AXES)}")
+            raise DesignError(
+                f"random script: axis: expected one of {', '.join(ALL_AXES)}, got {axis!r}"
+            )
         # A source for each axis: its strokes do not depend on which other axes move. A string
         # seeds the same way in every Python version.
         source = random.Random(f"canshaper operator {seed} {axis}")
@@ -106,4 +108,4 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     kind, _, seed = name.partition("-")
     if kind == "random" and seed.isdecimal():
         return random_script(int(seed), axes=axes)
-    raise DesignError(f"script {name!r}, allowed {', '.join(SCRIPTS)}, random-<seed>")
+    raise DesignError(f"script: expected one of {', '.join(SCRIPTS)}, random-<seed>, got {name!r}")

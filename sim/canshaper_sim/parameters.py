@@ -37,7 +37,7 @@ def changed_parameters(changes: list[str]) -> CraneParameters:
         try:
             value = float(text)
         except ValueError:
-            raise DesignError(f"--set {change}: found {text!r}, allowed is a number") from None
+            raise DesignError(f"--set {change}: expected a number, got {text!r}") from None
         parameters = _replaced(parameters, name, value)
     return parameters
 

@@ -20,4 +20,4 @@ def check_ranges(owner: str, values: Any, allowed: Mapping[str, tuple[float, flo
     for name, (low, high) in allowed.items():
         value = getattr(values, name)
         if not low <= value <= high:  # not-a-number compares false and is refused too
-            raise DesignError(f"{owner}: {name} = {value}, allowed {low} .. {high}")
+            raise DesignError(f"{owner}: {name}: expected {low} .. {high}, got {value}")

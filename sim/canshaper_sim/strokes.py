@@ -35,15 +35,16 @@ class Stroke:
 
     def __post_init__(self) -> None:
         if self.axis not in ALL_AXES:
-            raise DesignError(f"stroke: axis {self.axis!r}, allowed {', '.join(ALL_AXES)}")
+            raise DesignError(
+                f"stroke: axis: expected one of {', '.join(ALL_AXES)}, got {self.axis!r}"
+            )
         for name, (low, high) in _ALLOWED.items():
             value = getattr(self, name)
             if not (low <= value <= high and math.isfinite(value)):
-                raise DesignError(f"stroke: {name} = {value}, allowed {low} .. {high}")
+                raise DesignError(f"stroke: {name}: expected {low} .. {high}, got {value}")
         if self.duration_s < self.ramp_s:
-            raise DesignError(
-                f"stroke: duration_s = {self.duration_s}, allowed from ramp_s = {self.ramp_s} on"
-            )
+            least = f"{self.ramp_s}, its ramp_s, or more"
+            raise DesignError(f"stroke: duration_s: expected {least}, got {self.duration_s}")
 
     @property
     def end_s(self) -> float:
@@ -79,8 +80,8 @@ class Script:
             # The margin forgives rounding of start + duration + ramp.
             if stroke.end_s > self.duration_s + 1e-9:
                 raise DesignError(
-                    f"script {self.name}: a {stroke.axis} stroke ends at {stroke.end_s} s, "
-                    f"allowed up to duration_s = {self.duration_s}"
+                    f"script {self.name}: end of a {stroke.axis} stroke: expected up to"
+                    f" duration_s = {self.duration_s}, got {stroke.end_s}"
                 )
         by_axis = {
             axis: tuple(

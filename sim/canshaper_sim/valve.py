@@ -99,7 +99,7 @@ class Valve:
         Raises ValueError for a value that is not finite.
         """
         if not math.isfinite(command):
-            raise ValueError(f"valve: command = {command}, allowed finite values")
+            raise ValueError(f"valve: command: expected a finite value, got {command}")
         flow = self.parameters.flow(command)
         if flow == self._requested:
             return

@@ -36,7 +36,7 @@ class RotaryJoint(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.min_deg >= self.max_deg:
-            raise DesignError(f"min_deg is {self.min_deg:g}, allowed is below max_deg")
+            raise DesignError(f"min_deg: expected less than max_deg, got {self.min_deg:g}")
         return self
 
 
@@ -54,7 +54,7 @@ class SlidingJoint(Section):
     @model_validator(mode="after")
     def _ordered(self) -> Self:
         if self.min_m >= self.max_m:
-            raise DesignError(f"min_m is {self.min_m:g}, allowed is below max_m")
+            raise DesignError(f"min_m: expected less than max_m, got {self.min_m:g}")
         return self
 
 
@@ -75,7 +75,7 @@ class Joints(Section):
         for name, twist in _PLANE.items():
             found = getattr(self, name).alpha_deg
             if found != twist:
-                raise DesignError(f"{name}.alpha_deg is {found:g}, allowed is {twist:g} (Eq. 3)")
+                raise DesignError(f"{name}.alpha_deg: expected {twist:g} (Eq. 3), got {found:g}")
         for name, value in (
             ("slew.a_m", self.slew.a_m),
             ("lift.d_m", self.lift.d_m),
@@ -83,7 +83,7 @@ class Joints(Section):
             ("extension.theta_deg", self.extension.theta_deg),
         ):
             if value != 0.0:
-                raise DesignError(f"{name} is {value:g}, allowed is 0 (boom in one plane, Eq. 3)")
+                raise DesignError(f"{name}: expected 0 (boom in one plane, Eq. 3), got {value:g}")
         return self
 
 

@@ -69,8 +69,8 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
 
     for number in wanted:
         if number not in FIGURES:
-            allowed = ", ".join(map(str, FIGURES))
-            raise fail(ValueError(f"--figure {number}: allowed are {allowed}"))
+            known = ", ".join(map(str, FIGURES))
+            raise fail(ValueError(f"--figure: expected one of {known}, got {number}"))
     figures = tuple(n for n in FIGURES if n in wanted or not wanted)
     try:
         out.mkdir(parents=True, exist_ok=True)

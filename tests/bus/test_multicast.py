@@ -57,8 +57,8 @@ def test_only_a_group_of_ipv4_can_stay_on_this_machine(channel: str) -> None:
     with pytest.raises(BusError) as error:
         open_port("crane", Bus(interface="udp_multicast", channel=channel), lambda _: None)
     assert str(error.value) == (
-        f"bus crane: cannot open udp_multicast channel {channel}: allowed is a group of IPv4 such"
-        " as 239.1.2.3; any other needs network: true"
+        f"bus crane: cannot open udp_multicast channel {channel}: expected a group of IPv4 such"
+        f" as 239.1.2.3 or network: true, got {channel}"
     )
 
 

@@ -176,8 +176,11 @@ def test_check_of_a_broken_file_tells_every_problem(broken: Path) -> None:
         .index("tick_ms: 20 # period of the control loop")
     )
     first, second, count = result.stderr.splitlines()
-    assert first == f"{broken}:{line + 1}: tick_ms: found 0, allowed is a whole number, 1 to 50 ms"
-    assert "axes.lift.filter.kind: found 'x', allowed is 'off', 'gff'" in second
+    assert first == f"{broken}:{line + 1}: tick_ms: expected a whole number, 1 to 50 ms, got 0"
+    assert (
+        "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
+        " 'zvd', 'ei', 'two_mode', 'robust', got 'x'" in second
+    )
     assert count == "2 problems"
 
 
@@ -191,26 +194,27 @@ def test_check_of_no_file() -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "where"),
+    ("old", "new", "where", "got"),
     [
-        ("dbc: [", 'dbc: ["a\\0b.dbc", ', "dbc.0: found 'a\\x00b.dbc'"),
+        ("dbc: [", 'dbc: ["a\\0b.dbc", ', "dbc.0", r"'a\x00b.dbc'"),
         (
             "tick_ms: 20",
             'tick_ms: 20\ncontrol: { socket: "/run/a\\0b",'
             " adjustable: { axes.slew.limits.max_pct: [20, 100] } }",
-            "control.socket: found '/run/a\\x00b'",
+            "control.socket",
+            r"'/run/a\x00b'",
         ),
     ],
 )
 def test_check_refuses_a_path_that_the_system_would_not_take(
-    tmp_path: Path, old: str, new: str, where: str
+    tmp_path: Path, old: str, new: str, where: str, got: str
 ) -> None:
     text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
     file = tmp_path / "machine.yaml"
     file.write_text(text.replace(old, new, 1), encoding="utf-8")
     result = invoke("check", str(file))
     line = 1 + next(i for i, row in enumerate(file.read_text().splitlines()) if "\\0" in row)
-    problem = f"{file}:{line}: {where}, allowed is text without control characters"
+    problem = f"{file}:{line}: {where}: expected text without control characters, got {got}"
     assert (result.exit_code, result.stderr.splitlines()) == (2, [problem, "1 problem"])
 
 
@@ -229,8 +233,9 @@ def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.Mon
 def test_run_of_a_broken_file_opens_no_bus(broken: Path, opened: list[dict[str, Any]]) -> None:
     result = invoke("run", str(broken))
     assert result.exit_code == 2
-    assert "tick_ms: found 0" in result.stderr
-    assert "kind: found 'x'" in result.stderr
+    assert "tick_ms: expected a whole number, 1 to 50 ms, got 0" in result.stderr
+    assert "kind: expected one of 'off', " in result.stderr
+    assert ", got 'x'" in result.stderr
     assert opened == []
 
 
@@ -265,7 +270,7 @@ def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path
     assert not loader(*multicast)().config.buses["crane"].network
     assert loader(*multicast, network=True)().config.buses["crane"].network
     assert not loader(str(SHIPPED), "udp_multicast", ["239.1.2.3"])().config.buses["crane"].network
-    says = "--network: found the interface socketcan, allowed is udp_multicast only"
+    says = "--network: expected udp_multicast only, got the interface socketcan"
     with pytest.raises(ConfigError, match=says):
         loader(str(SHIPPED), network=True)()
 
@@ -273,10 +278,13 @@ def test_a_bus_is_shared_over_the_network_only_where_that_is_said(tmp_path: Path
 @pytest.mark.parametrize(
     ("channels", "says"),
     [
-        (["x"], "found 'x', allowed is NAME=CHANNEL with a bus of crane, boom"),
-        (["jib=x"], "found 'jib=x', allowed is NAME=CHANNEL with a bus of crane, boom"),
-        (["crane=vcan1"], "two of the buses crane, boom have one channel"),
-        (["crane=a", "boom=a"], "two of the buses crane, boom have one channel"),
+        (["x"], "expected NAME=CHANNEL with one of crane, boom, got 'x'"),
+        (["jib=x"], "expected NAME=CHANNEL with one of crane, boom, got 'jib=x'"),
+        (["crane=vcan1"], "expected a channel for each of crane, boom, got one for two of them"),
+        (
+            ["crane=a", "boom=a"],
+            "expected a channel for each of crane, boom, got one for two of them",
+        ),
     ],
 )
 def test_bus_options_that_do_not_fit(two_buses: Path, channels: list[str], says: str) -> None:

@@ -23,7 +23,7 @@ def invoke(*arguments: str) -> Any:
 def test_a_file_without_a_gateway_has_no_rules() -> None:
     result = invoke("gateway", str(ROOT / "config" / "forwarder.yaml"), "running")
     assert result.exit_code == 2
-    assert "found no gateway" in result.stderr
+    assert "expected a section gateway, got none" in result.stderr
 
 
 def test_a_kernel_that_refuses_is_told(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -178,24 +178,24 @@ def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
     result = init(file, given)
     assert result.exit_code == 0, result.output
     for told in (
-        "found 'fast', allowed is a whole number, 10000 to 1000000",
-        "found 'Left', allowed are some of JoystickLeft, JoystickRight",
-        "found 'Slew', allowed is one of Enable, AntiSwayOff, Reset",
-        "found 'can 0', allowed is a name without spaces",
-        "found 'Enable', allowed is one of AntiSwayOff, Reset, -",
-        "found 'big slew', allowed is a word",
-        "found 'null', allowed is a word",
-        "found 'turn', allowed is another one than turn",
-        "found '2.1', allowed is a number, 2.2 to 85.7",
-        "found '86', allowed is a number, 2.2 to 85.7",
-        "found 'Valve', allowed is one of SlewCommand.Velocity",
-        "found '50', allowed is a whole number, 60 to 5000",
-        "found '0', allowed is a number, 2.2 to 85.7",
-        "found '21', allowed is a number, 0.02 to 20",
-        "found '90', allowed is a number, 0.05 to 3",
-        "found '30', allowed is a number, 0.5 to 20",
-        "found 'turn', allowed is one of near_far, -",
-        "found 'Radius', allowed is one of TipPosition.Radius, -",
+        "expected a whole number, 10000 to 1000000, got 'fast'",
+        "expected some of JoystickLeft, JoystickRight, got 'Left'",
+        "expected one of Enable, AntiSwayOff, Reset, got 'Slew'",
+        "expected a name without spaces, such as can0, got 'can 0'",
+        "expected one of AntiSwayOff, Reset, -, got 'Enable'",
+        "expected a word of letters, digits and _, other than true, false and null, got 'big slew'",
+        "expected a word of letters, digits and _, other than true, false and null, got 'null'",
+        "expected another one than turn, got 'turn'",
+        "expected a number, 2.2 to 85.7, got '2.1'",
+        "expected a number, 2.2 to 85.7, got '86'",
+        "expected one of SlewCommand.Velocity, ",
+        "expected a whole number, 60 to 5000, got '50'",
+        "expected a number, 2.2 to 85.7, got '0'",
+        "expected a number, 0.02 to 20, got '21'",
+        "expected a number, 0.05 to 3, got '90'",
+        "expected a number, 0.5 to 20, got '30'",
+        "expected one of near_far, -, got 'turn'",
+        "expected one of TipPosition.Radius, -, got 'Radius'",
     ):
         assert told in result.output
     config = load_deployment(file).config
@@ -233,7 +233,7 @@ def test_a_slow_valve_takes_slow_swings_only(tmp_path: Path) -> None:
     file, dbc = tmp_path / "machine.yaml", changed_dbc(tmp_path, 200)
     given = answers({"slew ten": "13.8\n13.9", "slew timeout": "600"})
     result = CliRunner().invoke(app, ["init", str(file), "--dbc", str(dbc)], input=given)
-    assert "found '13.8', allowed is a number, 13.9 to 85.7" in result.output
+    assert "expected a number, 13.9 to 85.7, got '13.8'" in result.output
     assert result.exit_code == 0, result.output
     assert axis(file, "slew").sway.period_s == 1.39
 
@@ -246,7 +246,7 @@ def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path
     result = CliRunner().invoke(app, arguments, input=given)
     assert result.exit_code == 2
     told = [line for line in result.output.splitlines() if str(tmp_path) in line][1:]
-    assert "has GenMsgCycleTime 50 ms, allowed is a multiple of tick_ms, 20 ms" in told[0]
+    assert "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got 50 ms" in told[0]
     assert told[1:] == [f"{draft}: kept with all answers; fix it there and rename it to {file}"]
     assert not file.exists()
     again = CliRunner().invoke(app, arguments, input=given)

@@ -181,7 +181,7 @@ def test_flags_bind(machine: Machine) -> None:
     [
         (
             FLAGS.replace("SlewNeutral", "N"),
-            "flags.neutral: found 'N', signals of JoystickLeft are",
+            "flags.neutral: expected a signal of JoystickLeft, got 'N'; there are",
         ),
         (
             FLAGS.replace(", positive: SlewPositive", ""),
@@ -189,29 +189,36 @@ def test_flags_bind(machine: Machine) -> None:
         ),
         (
             FLAGS.replace(" }", ", invert: true }"),
-            "flags.invert: unknown key; allowed are neutral, negative, positive",
+            "flags.invert: expected one of the keys neutral, negative, positive",
         ),
         (
             FLAGS.replace("SlewNegative", "SlewPositive"),
-            "flags.positive: found 'SlewPositive', which is the negative flag of slew already",
+            "flags.positive: expected a free signal, got 'SlewPositive', which is the negative"
+            " flag of slew already",
         ),
         (
             FLAGS.replace("SlewNeutral", "Enable"),
-            "flags.neutral: found 'Enable', which is enable already",
+            "flags.neutral: expected a free signal, got 'Enable', which is enable already",
         ),
         (
             FLAGS.replace("SlewNeutral", "AliveCounter"),
-            "flags.neutral: found 'AliveCounter', which is alive_counter already",
+            "flags.neutral: expected a free signal, got 'AliveCounter', which is alive_counter"
+            " already",
         ),
         (
             FLAGS.replace("SlewNegative", "Slew "),
-            "flags.negative: found 'Slew', which is the stick of slew already",
+            "flags.negative: expected a free signal, got 'Slew', which is the stick of slew"
+            " already",
         ),
         (
             FLAGS.replace("SlewNegative", "NearFar"),
-            "flags.negative: NearFar has a sign, allowed is an unsigned integer signal",
+            "flags.negative: NearFar: expected an unsigned integer signal, got a signed one",
         ),
-        ("SlewNeutral", "flags: found 'SlewNeutral', allowed is a section with the keys neutral,"),
+        (
+            "SlewNeutral",
+            "flags: expected a section with the keys neutral, negative, positive, got"
+            " 'SlewNeutral'",
+        ),
     ],
 )
 def test_flags_that_do_not_fit(machine: Machine, flags: str, says: str) -> None:
@@ -226,7 +233,7 @@ def test_the_stick_of_another_axis_is_no_flag(machine: Machine) -> None:
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 16|16@1+")
     assert any(
         p == f"machine.yaml:{line}: axes.slew.command.flags.neutral:"
-        " found 'NearFar', which is the stick of near_far already"
+        " expected a free signal, got 'NearFar', which is the stick of near_far already"
         for p in machine.problems()
     )
 
@@ -246,7 +253,7 @@ def test_two_axes_do_not_share_a_stick_with_flags(machine: Machine) -> None:
     )
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.near_far.command.signal:"
-        " found 'Slew', which is the stick of slew already"
+        " expected a free signal, got 'Slew', which is the stick of slew already"
     ]
 
 
@@ -256,8 +263,8 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
     machine.in_dbc("AliveCounter : 56|8@1+", "AliveCounter : 38|16@1+")
     machine.dbc += "SIG_VALTYPE_ 272 AliveCounter : 1;\n"
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.command.flags.neutral: AliveCounter is a float, allowed is"
-        " an unsigned integer signal"
+        f"machine.yaml:{line}: axes.slew.command.flags.neutral: AliveCounter: expected an"
+        " unsigned integer signal, got a float"
     ]
 
 
@@ -267,16 +274,24 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
         (
             ("[-100|100]", "[-100|100]"),
             True,
-            "[-100|100]; allowed with direction flags is one",
+            "with direction flags expected a range from 0, got [-100|100]",
         ),
-        (("[-100|100]", "[10|100]"), True, "[10|100]; allowed with direction flags is one from 0"),
+        (
+            ("[-100|100]", "[10|100]"),
+            True,
+            "with direction flags expected a range from 0, got [10|100]",
+        ),
         (("[-100|100]", "[0|0]"), True, "Slew has no range in the DBC"),
-        (("16@1- (0.1,0) [-100|100]", "16@1+ (0,0) [0|100]"), True, "Slew has a scale of 0"),
+        (
+            ("16@1- (0.1,0) [-100|100]", "16@1+ (0,0) [0|100]"),
+            True,
+            "Slew: expected a scale other than 0, got 0",
+        ),
         (("16@1- (0.1,0) [-100|100]", "9@1+ (0.1,0) [0|100]"), True, "Slew cannot reach its range"),
         (
             ("[-100|100]", "[0|100]"),
             False,
-            "[0|100]; allowed is a symmetrical one, or direction flags with this one",
+            "expected a symmetrical range, got [0|100]; with direction flags it is right",
         ),
     ],
 )
@@ -289,7 +304,7 @@ def test_the_range_tells_whether_a_stick_has_flags(
         machine.in_dbc('Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n', _more_flags())
         machine.in_yaml(STICK, f"signal: Slew, flags: {FLAGS}")
     (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: JoystickLeft: Slew ")
+    assert problem.startswith(f"machine.dbc:{line}: JoystickLeft: Slew")
     assert says in problem
 
 

@@ -174,7 +174,7 @@ def test_what_has_no_layout() -> None:
     (message,) = cantools.database.load_string(DBC, "dbc").messages
     assert layout_fault(message) is None
     (message,) = cantools.database.load_string(DBC.replace("32|32@1-", "32|24@1-"), "dbc").messages
-    assert layout_fault(message) == "Ratio is a float of 24 bits, allowed are 16, 32 and 64"
+    assert layout_fault(message) == "Ratio: expected a float of 16, 32 or 64 bits, got 24"
 
 
 def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> str:
@@ -182,7 +182,7 @@ def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> s
     line = machine.in_dbc(f"BO_ {number} {message}", f"BO_ {number} {message}")
     machine.in_dbc(f"{name} : 16|16@1-", f"{name} : 16|9@1-")
     machine.dbc += f"SIG_VALTYPE_ {number} {name} : 1;\n"
-    fault = f"{name} is a float of 9 bits, allowed are 16, 32 and 64"
+    fault = f"{name}: expected a float of 16, 32 or 64 bits, got 9"
     return f"machine.dbc:{line}: {message}: {fault}"
 
 

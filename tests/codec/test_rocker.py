@@ -111,10 +111,16 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
         ("signal: RotateLeft, negative: RotateLeft", "which is the stick of front_rotator already"),
         ("signal: RotateLeft, negative: Enable", "which is enable already"),
         ("signal: Enable, negative: RotateRight", "which is enable already"),
-        ("signal: RotateLeft, negative: Nothing", "found 'Nothing', signals of RotatorRocker"),
-        ("signal: Nothing, negative: RotateRight", "found 'Nothing', signals of RotatorRocker"),
+        (
+            "signal: RotateLeft, negative: Nothing",
+            "expected a signal of RotatorRocker, got 'Nothing'",
+        ),
+        (
+            "signal: Nothing, negative: RotateRight",
+            "expected a signal of RotatorRocker, got 'Nothing'",
+        ),
         ("signal: RotateLeft, negative: RotateRight, flags: { neutral: A, negative: B, "
-         "positive: C }", "found flags and negative"),
+         "positive: C }", "expected one of flags and negative, got both"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_told(tmp_path: Path, new: str, told: str) -> None:
@@ -124,4 +130,4 @@ def test_what_cannot_be_is_told(tmp_path: Path, new: str, told: str) -> None:
 def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:
     sign = ("joystick: front_rocker, signal: RotateLeft, negative: RotateRight",
             "joystick: front_right, signal: Lift, negative: Rotate")  # fmt: skip
-    assert "allowed with direction flags is one from 0" in problems(tmp_path, sign)
+    assert "with direction flags expected a range from 0" in problems(tmp_path, sign)

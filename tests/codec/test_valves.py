@@ -100,7 +100,7 @@ def test_other_states_are_no_command(state: int) -> None:
 def test_beyond_full_flow_is_no_command() -> None:
     codec = avc("PortFlow")
     assert codec.read({"PortFlow": 251, "State": 1}) is None
-    with pytest.raises(ValueError, match=r"-251 steps, allowed is \+-250"):
+    with pytest.raises(ValueError, match=r"expected up to \+-250 steps, got -251"):
         codec.put(-251)
 
 
@@ -134,30 +134,39 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("valve", "says"),
     [
-        ("signal: PortFlow", "AVC0: PortFlow has the range [0|100]; allowed is a symmetrical one"),
-        ("signal: PortFlow", "symmetrical one, or a direction with this one"),
+        ("signal: PortFlow", "AVC0: PortFlow: expected a symmetrical range, got [0|100]"),
+        ("signal: PortFlow", "got [0|100]; with a direction it is right"),
         (
             f"signal: PortFlow, {CODES.replace('positive: 1', 'positive: 2')}",
-            "found the codes 0, 2, 2; allowed are three different ones",
+            "expected three different codes, got 0, 2, 2",
         ),
         (
             f"signal: PortFlow, {CODES.replace('positive: 1', 'positive: 3')}",
-            "axes.slew.valve.direction.positive: found 3, which the DBC names Float",
+            "axes.slew.valve.direction.positive: expected no code of floating, which drops the"
+            " load, got 3, in the DBC Float",
         ),
         (
             f"signal: PortFlow, {CODES.replace('negative: 2', 'negative: 16')}",
-            "axes.slew.valve.direction.negative: found 16, State has 4 bits: up to 15",
+            "axes.slew.valve.direction.negative: expected up to 15, of 4 bits of State, got 16",
         ),
         (
             f"signal: PortFlow, {CODES.replace('State', 'Stat')}",
-            "axes.slew.valve.direction.signal: found 'Stat', signals of AVC0 are PortFlow",
+            "axes.slew.valve.direction.signal: expected a signal of AVC0, got 'Stat'; there are"
+            " PortFlow",
         ),
         (
             f"signal: PortFlow, {CODES.replace('State', 'PortFlow')}",
-            "direction.signal: found 'PortFlow', which is axes.slew.valve.signal already",
+            "direction.signal: expected a free signal, got 'PortFlow', which is"
+            " axes.slew.valve.signal already",
         ),
-        (f"signal: PortFlow, also: [PortFlow], {CODES}", "valve.also.0: found 'PortFlow', which"),
-        (f"signal: PortFlow, also: [Flow], {CODES}", "also.0: found 'Flow', signals of AVC0 are"),
+        (
+            f"signal: PortFlow, also: [PortFlow], {CODES}",
+            "valve.also.0: expected a free signal, got 'PortFlow'",
+        ),
+        (
+            f"signal: PortFlow, also: [Flow], {CODES}",
+            "also.0: expected a signal of AVC0, got 'Flow'; there are",
+        ),
     ],
 )
 def test_what_does_not_fit_is_told(machine: Machine, valve: str, says: str) -> None:
@@ -235,12 +244,12 @@ def test_a_frame_that_is_not_sent_trips_all_of_its_axes(machine: Machine) -> Non
         (
             "signal: Second",
             "signal: First",
-            "found 'First', which is axes.slew.valve.signal already",
+            "expected a free signal, got 'First', which is axes.slew.valve.signal already",
         ),
         (
             "signal: ThirdState",
             "signal: Count",
-            "found 'Count', which is alive_counter already",
+            "expected a free signal, got 'Count', which is alive_counter already",
         ),
         (
             "signal: Second",
@@ -253,7 +262,7 @@ def test_no_signal_serves_two(machine: Machine, old: str, new: str, says: str) -
     with_valves(machine, *THREE)
     if not says:
         machine.in_yaml(f"alive_counter: Count, {old}", old)
-        says = "alive_counter: differs from that of the other axes of Block, allowed is the same"
+        says = "alive_counter: expected the same as the other axes of Block, got another"
     else:
         machine.in_yaml(old, new)
     found = machine.problems()

@@ -197,7 +197,7 @@ def test_what_cannot_run_between_two_sets_is_told(changed_rig: Make) -> None:
     with pytest.raises(ConfigError) as caught:
         changed_rig(yaml=changed, dbc=DBC)
     (problem,) = caught.value.problems
-    text = "at 31.25, between two breakpoints: sum of the taps is 1.001, allowed is 1"
+    text = "at 31.25, between two breakpoints: sum of the taps: expected 1, got 1.001"
     assert f"axes.slew.gain_schedule: {text}" in str(problem)
 
 
@@ -219,28 +219,33 @@ def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
         (
             "breakpoint: 1000",
             "breakpoint: 0",
-            "axes.slew: found breakpoints at 0, 0; allowed are rising values",
+            "axes.slew: expected rising breakpoints, got 0, 0",
         ),
         (
             "filter: { kind: gff, a1: 0.9, a2: 0.2 }",
             "filter: { kind: zv }",
-            "axes.slew: found a breakpoint with filter zv, allowed is that of the axis, gff",
+            "axes.slew: expected the filter of the axis, gff, got zv at a breakpoint",
         ),
         (
             "      fast: {",
             "      quick: {",
-            "profiles.quick: found 'quick', profiles are balanced, fast",
+            "profiles.quick: expected a profile, got 'quick'; there are balanced, fast",
         ),
-        ("signal: Weight", "signal: Mass", "load_state.signal: found 'Mass', signals of Load are"),
+        (
+            "signal: Weight",
+            "signal: Mass",
+            "load_state.signal: expected a signal of Load, got 'Mass'; there are",
+        ),
         (
             "load_state: { bus: crane, message: Load, signal: Weight, timeout_ms: 500 }\n",
             "",
-            "axes.slew.gain_schedule: need the signal that chooses them; found no load_state",
+            "axes.slew.gain_schedule: expected load_state, which chooses them, got none",
         ),
         (
             "filter: { kind: gff, a1: 0.5, a2: 0.06 }",
             "filter: { kind: gff, poles_rad_s: [-60, -3] }",
-            "axes.slew.profiles.fast.filter: pole is -60 rad/s",
+            "axes.slew.profiles.fast.filter: pole: expected -50 to below 0 rad/s at a tick of"
+            " 0.02 s, got -60 rad/s",
         ),
     ],
 )
@@ -267,13 +272,13 @@ def test_a_value_that_the_dbc_names_default_is_a_choice(changed_rig: Make) -> No
     [
         (
             'VAL_ 1297 Feel 1 "Error" ;',
-            "profile.codes.fast: found 1, which Feel names Error in the DBC; allowed is a value"
-            " that",
+            "profile.codes.fast: expected a value of Feel that the DBC names no error, got 1,"
+            " Error",
         ),
         (
             'VAL_ 1296 Weight 1000 "Reserved" ;',
-            "axes.slew.gain_schedule.1.breakpoint: found 1000, which Weight names"
-            " Reserved in the DBC; allowed is a",
+            "axes.slew.gain_schedule.1.breakpoint: expected a value of Weight that the DBC names no"
+            " error, got 1000, Reserved",
         ),
     ],
 )

@@ -129,5 +129,6 @@ def test_black_boxes_are_written_where_the_daemon_was_told(bench: Bench, tmp_pat
 
 def test_a_request_that_is_none_is_told_what_is_one(bench: Bench, path: Path) -> None:
     assert answered(bench, path, {"get": 1}) == {
-        "error": 'allowed is {} or {"set": {KEY: VALUE}} or {"black_box": "write"}'
+        "erro"
+        "r": 'expected {} or {"set": {KEY: VALUE}} or {"black_box": "write"}, got another object'
     }

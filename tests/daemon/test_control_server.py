@@ -75,13 +75,13 @@ def test_a_request_is_answered_and_says_who_asks(rig: Rig) -> None:
     [
         (b"nonsense", "Expecting value"),
         (b"\xff\xfe\x00", "codec"),
-        (b"[1]", "found no object"),
+        (b"[1]", "got no object"),
         (b'{"bad": 1}', "no such thing"),
         (b"[" * 4096, "recursion"),
         (b'{"a": ' + b"9" * 4000 + b', "bad": 1}', "no such thing"),
         (b'{"bad": 1' + b" " * 4086 + b"}", "no such thing"),
-        (b'{"bad": 1' + b" " * 4087 + b"}", "found a request of more than 4096 bytes"),
-        (b"[" * 60000, "found a request of more than 4096 bytes"),
+        (b'{"bad": 1' + b" " * 4087 + b"}", "expected a request of 4096 bytes at most, got more"),
+        (b"[" * 60000, "expected a request of 4096 bytes at most, got more"),
     ],
 )
 def test_nonsense_is_told_and_the_next_request_served(rig: Rig, data: bytes, why: str) -> None:

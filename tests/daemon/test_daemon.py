@@ -230,7 +230,7 @@ def test_a_number_that_is_refused_is_in_the_log(
 def test_a_request_that_is_none(bench: Bench, tmp_path: Path, request_: object) -> None:
     path = tmp_path / "c.sock"
     control(bench, path)
-    assert "allowed is {} or" in answered(bench, path, request_)["error"]
+    assert "expected {} or" in answered(bench, path, request_)["error"]
 
 
 def test_without_a_place_for_the_socket_the_machine_works(

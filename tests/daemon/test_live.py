@@ -104,11 +104,11 @@ def test_set_writes_when_asked(daemon: Daemon) -> None:
 
 def test_set_tells_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
     status, told = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
-    assert (status, told) == (1, f"{PERIOD}: found 4, allowed is 1.8 to 3\n")
-    daemon.logged(rf"set=refused uid=\d+ pid=\d+ {PERIOD}: found 4")
+    assert (status, told) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
+    daemon.logged(rf"set=refused uid=\d+ pid=\d+ {PERIOD}: expected 1.8 to 3, got 4")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text
     status, told = canshaper("set", str(daemon.file), PERIOD)
-    assert (status, told.splitlines()[0][:30]) == (2, f"found '{PERIOD}', allowed"[:30])
+    assert (status, told.splitlines()[0][:23]) == (2, "expected KEY=NUMBER, as")
 
 
 def test_set_without_a_daemon_or_a_section(tmp_path: Path) -> None:

@@ -42,44 +42,59 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
         (
             "message: JoystickLeft",
             "message: JoystickLeeft",
-            f"joysticks.left.message: found 'JoystickLeeft', messages of the DBC files are"
+            "joysticks.left.message: expected a message of the DBC files, got 'JoystickLeeft';"
+            " there are"
             f" {MESSAGES}",
         ),
         (
             "signal: Slew,",
             "signal: Sleww,",
-            "axes.slew.command.signal: found 'Sleww', signals of JoystickLeft are"
+            "axes.slew.command.signal: expected a signal of JoystickLeft, got 'Sleww'; there are"
             " Slew, NearFar, Enable, AntiSwayOff, Reset, AliveCounter",
         ),
         (
             "message: SlewCommand, signal: Velocity",
             "message: SlewCommand, signal: Speed",
-            "axes.slew.valve.signal: found 'Speed', signals of SlewCommand are"
+            "axes.slew.valve.signal: expected a signal of SlewCommand, got 'Speed'; there are"
             " Velocity, AliveCounter",
         ),
         (
             "message: SlewStatus",
             "message: Nothing",
-            f"axes.slew.status.message: found 'Nothing', messages of the DBC files are {MESSAGES}",
+            "axes.slew.status.message: expected a message of the DBC files, got 'Nothing'; there"
+            f" are {MESSAGES}",
         ),
-        ("bus: crane", "bus: boom", "joysticks.left.bus: found 'boom', buses are crane"),
+        (
+            "bus: crane",
+            "bus: boom",
+            "joysticks.left.bus: expected a bus, got 'boom'; there are crane",
+        ),
         (
             "joystick: left",
             "joystick: mid",
-            "axes.slew.command.joystick: found 'mid', joysticks are left, right",
+            "axes.slew.command.joystick: expected a joystick, got 'mid'; there are left, right",
         ),
         (
             "enable: Enable",
             "enable: On",
-            "joysticks.left.enable: found 'On', signals of JoystickLeft",
+            "joysticks.left.enable: expected a signal of JoystickLeft, got 'On'",
         ),
-        ("reset: Reset", "reset: R", "joysticks.left.reset: found 'R', signals of JoystickLeft"),
-        ("anti_sway_off: AntiSwayOff", "anti_sway_off: O", "anti_sway_off: found 'O', signals"),
+        (
+            "reset: Reset",
+            "reset: R",
+            "joysticks.left.reset: expected a signal of JoystickLeft, got 'R'",
+        ),
+        (
+            "anti_sway_off: AntiSwayOff",
+            "anti_sway_off: O",
+            "anti_sway_off: expected a signal of JoystickLeft, got 'O'",
+        ),
         # one id for two purposes
         (
             "message: NearFarCommand",
             "message: SlewCommand",
-            "axes.near_far.valve.signal: found 'Velocity', which is axes.slew.valve.signal already",
+            "axes.near_far.valve.signal: expected a free signal, got 'Velocity', which is"
+            " axes.slew.valve.signal already",
         ),
         (
             "message: SlewStatus",
@@ -91,25 +106,27 @@ def test_the_shipped_machine_binds(machine: Machine) -> None:
         (
             "alive_counter: AliveCounter }",
             "alive_counter: Velocity }",
-            "axes.slew.valve.signal: found 'Velocity', which is alive_counter already",
+            "axes.slew.valve.signal: expected a free signal, got 'Velocity', which is"
+            " alive_counter already",
         ),
         (
             "anti_sway_off: AntiSwayOff",
             "anti_sway_off: Enable",
-            "joysticks.left.anti_sway_off: found 'Enable', which is enable already",
+            "joysticks.left.anti_sway_off: expected a free signal, got 'Enable', which is enable"
+            " already",
         ),
         # times and filters
         (
             "timeout_ms: 100",
             "timeout_ms: 39",
-            "joysticks.left.timeout_ms: found 39, allowed is 40 ms or more: twice the cycle of"
-            " JoystickLeft",
+            "joysticks.left.timeout_ms: expected 40 ms or more, twice the cycle of JoystickLeft,"
+            " got 39",
         ),
         (
             "a1: 0.708, a2: 0.12",
             "poles_rad_s: [-3, -51]",
-            "axes.slew.filter: pole is -51 rad/s, allowed is -50 to below 0 rad/s at a tick of"
-            " 0.02 s",
+            "axes.slew.filter: pole: expected -50 to below 0 rad/s at a tick of 0.02 s, got"
+            " -51 rad/s",
         ),
     ],
 )
@@ -132,7 +149,8 @@ def test_a_stick_that_is_the_enable_switch_too(machine: Machine) -> None:
     machine.in_yaml("enable: Enable", "enable: Slew")
     line = machine.in_yaml("signal: Slew,", "signal: Slew,")
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.command.signal: found 'Slew', which is enable already"
+        f"machine.yaml:{line}: axes.slew.command.signal: expected a free signal, got 'Slew', which"
+        " is enable already"
     ]
 
 
@@ -184,8 +202,8 @@ def test_a_bus_that_is_no_multicast_is_not_shared(machine: Machine) -> None:
         "{ interface: socketcan, channel: vcan0, bitrate: 250000, network: true }",
     )
     assert machine.problems() == [
-        f"machine.yaml:{line}: buses.crane.network: found true with socketcan, allowed is it with"
-        " udp_multicast only"
+        f"machine.yaml:{line}: buses.crane.network: expected true with udp_multicast only, got it"
+        " with socketcan"
     ]
 
 
@@ -198,5 +216,5 @@ def test_an_age_limit_of_less_than_two_ticks_would_make_each_tick_a_standstill(
 ) -> None:
     machine.in_yaml("tick_ms: 20", "tick_ms: 50")
     line = machine.in_yaml("timeout_ms: 100", "timeout_ms: 99")
-    says = "joysticks.left.timeout_ms: found 99, allowed is 100 ms or more: twice tick_ms"
+    says = "joysticks.left.timeout_ms: expected 100 ms or more, twice tick_ms, got 99"
     assert [p for p in machine.problems() if p.endswith(says)] == [f"machine.yaml:{line}: {says}"]

@@ -14,16 +14,27 @@ LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [
-        (LAST_NODE, LAST_NODE.replace("0x22", "0x21"), "found 33, which is the node id of"),
-        (LAST_NODE, LAST_NODE.replace("0x22", "0x7E"), "found 126, which is the node id of node"),
-        ("node: lift\n", "node: lifft\n", "found 'lifft', nodes of bus crane are left, right"),
-        ("    node: right\n", "    node: wright\n", "found 'wright', nodes of bus crane"),
+        (
+            LAST_NODE, LAST_NODE.replace("0x22", "0x21"),
+            "expected a node id of its own, got 33, that of",
+        ),
+        (
+            LAST_NODE, LAST_NODE.replace("0x22", "0x7E"),
+            "expected a node id of its own, got 126, that of node",
+        ),
+        (
+            "node: lift\n", "node: lifft\n",
+            "expected a node of bus crane, got 'lifft'; there are left, right",
+        ),
+        ("    node: right\n", "    node: wright\n", "expected a node of bus crane, got 'wright'"),
         ("control: ControlWord\n        status: { bus: crane, message: Lift", "control: Nothing\n"
-         "        status: { bus: crane, message: Lift", "signals of LiftCommand are ControlWord"),
+         "        status: { bus: crane, message:"
+         " Lift", "expected a signal of LiftCommand, got 'Nothing'; there are ControlWord"),
         ("control: ControlWord\n        status: { bus: crane, message: Lift", "control: SetPoint\n"
-         "        status: { bus: crane, message: Lift", "found 'SetPoint', which is"),
+         "        status: { bus: crane, message:"
+         " Lift", "expected a free signal, got 'SetPoint', which is"),
         ("message: LiftValve, signal: StatusWord, timeout_ms: 300",
-         "message: LiftValve, signal: StatusWord, timeout_ms: 150", "allowed is 200 ms or more"),
+         "message: LiftValve, signal: StatusWord, timeout_ms: 150", "expected 200 ms or more, "),
         ("message: LiftValve, signal", "message: SlewValve,  signal",
          "SlewValve has the id 0x1a0 on bus crane"),
     ],
@@ -49,10 +60,16 @@ def test_problems_of_the_deployment_have_their_line(
         ("SG_ SetPoint : 16|16@1- (0.006103515625,0) [-100|100]",
          "SG_ SetPoint : 16|16@1- (0.006103515625,0.006103515625) [-100|100]",
          "SetPoint has the offset"),
-        ("SG_ ControlWord : 0|16@1+", "SG_ ControlWord : 0|3@1+", "ControlWord has 3 bits"),
-        ("SG_ StatusWord : 0|16@1+", "SG_ StatusWord : 0|3@1+", "StatusWord has 3 bits"),
-        ("BO_ 1696 SlewStatus", "BO_ 1586 SlewStatus", "SlewStatus has the id 0x632, which is one "
-         "of SDO in CANopen"),
+        (
+            "SG_ ControlWord : 0|16@1+", "SG_ ControlWord : 0|3@1+",
+            "ControlWord: expected 4 bits or more, got 3",
+        ),
+        (
+            "SG_ StatusWord : 0|16@1+", "SG_ StatusWord : 0|3@1+",
+            "StatusWord: expected 4 bits or more, got 3",
+        ),
+        ("BO_ 1696 SlewStatus", "BO_ 1586 SlewStatus", "SlewStatus: expected the id of a PDO, "
+         "got 0x632, which is one of SDO in CANopen"),
         ("BO_ 400 JoystickLeft", "BO_ 1809 JoystickLeft", "which is one of heartbeat in CANopen"),
     ],
 )  # fmt: skip

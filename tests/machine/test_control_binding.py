@@ -25,17 +25,47 @@ def test_numbers_of_sway_filter_and_limits_may_be_changed(machine: Machine) -> N
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("tick_ms: [1, 50]", "found no key of an axis; allowed is axes.AXIS.SECTION.NAME"),
-        ("axes.boom.sway.period_s: [1, 2]", "found axis 'boom', axes are slew, near_far, lift"),
-        ("axes.slew.sway.length_m: [1, 2]", "found no number of that name in the axis' sway, "),
-        ("axes.slew.valve.timeout_ms: [1, 2]", "found no number of that name"),
-        ("axes.lift.sway.period_s: [1, 2]", "found no number of that name"),
-        ("axes.slew.filter.kind: [1, 2]", "found no number of that name"),
-        ("axes.slew.limits.allow_reverse: [0, 1]", "found no number of that name"),
-        ("axes.slew.limits.tail_s: [0, 5]", "adjustable limits are max_pct, rise_per_s, fall_"),
-        ("axes.slew.sway.period_s: [2.4, 3]", "and the number itself is 2.356, outside of it"),
-        ("axes.slew.sway.period_s: [1, 13]", "found the end 13, which is out of the range"),
-        ("axes.slew.limits.max_pct: [0, 100]", "found the end 0, which is out of the range"),
+        ("tick_ms: [1, 50]", "expected axes.AXIS.SECTION.NAME, got no key of an axis"),
+        (
+            "axes.boom.sway.period_s: [1, 2]",
+            "expected an axis, got 'boom'; there are slew, near_far, lift",
+        ),
+        (
+            "axes.slew.sway.length_m: [1, 2]",
+            "expected a number in the axis' sway, filter or limits, got none",
+        ),
+        (
+            "axes.slew.valve.timeout_ms: [1, 2]",
+            "expected a number in the axis' sway, filter or limits, got none of that name",
+        ),
+        (
+            "axes.lift.sway.period_s: [1, 2]",
+            "expected a number in the axis' sway, filter or limits, got none of that name",
+        ),
+        (
+            "axes.slew.filter.kind: [1, 2]",
+            "expected a number in the axis' sway, filter or limits, got none of that name",
+        ),
+        (
+            "axes.slew.limits.allow_reverse: [0, 1]",
+            "expected a number in the axis' sway, filter or limits, got none of that name",
+        ),
+        (
+            "axes.slew.limits.tail_s: [0, 5]",
+            "expected one of the limits max_pct, rise_per_s, fall_",
+        ),
+        (
+            "axes.slew.sway.period_s: [2.4, 3]",
+            "expected a range around the number itself, 2.356, got 2.4 to 3",
+        ),
+        (
+            "axes.slew.sway.period_s: [1, 13]",
+            "expected both ends within the range of this key, got 13",
+        ),
+        (
+            "axes.slew.limits.max_pct: [0, 100]",
+            "expected both ends within the range of this key, got 0",
+        ),
     ],
 )
 def test_what_cannot_be_changed_is_told(machine: Machine, text: str, why: str) -> None:
@@ -75,9 +105,12 @@ def test_an_axis_with_a_choice_of_filters_stays(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("text", "why"),
     [
-        ("axes.slew.sway.period_s: [3, 1.8]", "found 3 to 1.8 for axes.slew.sway.period_s"),
-        ("axes.slew.sway.period_s: [3]", "allowed are 2 or more entries"),
-        ("axes.slew.sway.period_s: 3", "allowed is a list"),
+        (
+            "axes.slew.sway.period_s: [3, 1.8]",
+            "axes.slew.sway.period_s: expected the lower end first, got 3 to 1.8",
+        ),
+        ("axes.slew.sway.period_s: [3]", "expected 2 or more entries, got [3]"),
+        ("axes.slew.sway.period_s: 3", "expected a list, got 3"),
     ],
 )
 def test_a_range_is_two_numbers_in_order(machine: Machine, text: str, why: str) -> None:

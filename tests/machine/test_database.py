@@ -48,9 +48,9 @@ def test_what_is_no_dbc_file_is_one_problem(machine: Machine, text: str, says: s
 @pytest.mark.parametrize(
     ("name", "says"),
     [
-        ("none.dbc", "found 'none.dbc': No such file or directory"),
-        (".", "found '.': Is a directory"),
-        ("''", "found '': Is a directory"),
+        ("none.dbc", "expected a file, got 'none.dbc': No such file or directory"),
+        (".", "expected a file, got '.': Is a directory"),
+        ("''", "expected a file, got '': Is a directory"),
         ("n" * 300, "File name too long"),
     ],
 )
@@ -65,7 +65,8 @@ def test_a_dbc_file_without_messages(machine: Machine) -> None:
     machine.dbc = 'VERSION "1"\n'
     found = machine.problems()
     assert len(found) == 10  # each message asked for is missed once
-    assert all(p.endswith("messages of the DBC files are none") for p in found)
+    assert all("expected a message of the DBC files, got " in p for p in found)
+    assert all(p.endswith("; there are none") for p in found)
 
 
 @pytest.mark.parametrize(
@@ -80,7 +81,7 @@ def test_sizes_that_no_memory_holds(machine: Machine, old: str, new: str, number
     line = machine.in_dbc(old, new)
     assert machine.problems() == [
         f"machine.dbc:{line}: not a DBC file that can be used:"
-        f" found {number} bytes or bits, allowed are 99999 at most"
+        f" expected 99999 bytes or bits at most, got {number}"
     ]
 
 
@@ -133,7 +134,7 @@ def test_every_file_is_looked_at(machine: Machine) -> None:
     (machine.directory / "text.dbc").write_text("hello", encoding="cp1252")
     found = machine.problems()
     assert len(found) == 2
-    assert found[0].endswith("dbc.0: found 'none.dbc': No such file or directory")
+    assert found[0].endswith("dbc.0: expected a file, got 'none.dbc': No such file or directory")
     assert found[1].startswith("text.dbc:1: not a DBC file")
 
 
@@ -160,11 +161,11 @@ def test_messages_of_several_files_come_together(machine: Machine) -> None:
     [
         (
             [("JoystickLeft: 8", "JoystickLeft: 9")],
-            "joysticks.left.message: JoystickLeft has 9 bytes, allowed are 8",
+            "joysticks.left.message: JoystickLeft: expected 8 bytes at most, got 9",
         ),
         (
             [("SlewCommand: 2", "SlewCommand: 12")],
-            "axes.slew.valve.message: SlewCommand has 12 bytes, allowed are 8",
+            "axes.slew.valve.message: SlewCommand: expected 8 bytes at most, got 12",
         ),
         (
             [("Slew : 0|16", "Slew m0 : 0|16"), ("Enable : 32", "Enable M : 32")],
@@ -200,12 +201,22 @@ def test_messages_of_another_kind(
             SLEW_STICK,
             "Slew : 0|16@1- (0.1,0) [-100|102]",
             "JoystickLeft",
-            "Slew has the range [-100|102]; allowed is a symmetrical one",
+            "Slew: expected a symmetrical range, got [-100|102]",
         ),
         (SLEW_STICK, "Slew : 0|16@1+ (0.1,0) [-100|100]", "JoystickLeft", "Slew cannot reach its"),
-        (SLEW_STICK, "Slew : 0|16@1- (0,0) [-100|100]", "JoystickLeft", "Slew has a scale of 0"),
+        (
+            SLEW_STICK,
+            "Slew : 0|16@1- (0,0) [-100|100]",
+            "JoystickLeft",
+            "Slew: expected a scale other than 0, got 0",
+        ),
         (SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [0|0]", "SlewCommand", "Velocity has no range"),
-        (SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [0|100]", "SlewCommand", "the range [0|100]"),
+        (
+            SLEW_VALVE,
+            "Velocity : 0|8@1- (0.8,0) [0|100]",
+            "SlewCommand",
+            "a symmetrical range, got [0|100]",
+        ),
         (
             SLEW_VALVE,
             "Velocity : 0|8@1- (0.4,0) [-100|100]",
@@ -225,17 +236,22 @@ def test_messages_of_another_kind(
             "BO_ 512 20;",
             "BO_ 512 0;",
             "SlewCommand",
-            "has no GenMsgCycleTime, allowed is a multiple of tick_ms, 20 ms",
+            "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got none",
         ),
         (
             "BO_ 512 20;",
             "BO_ 512 50;",
             "SlewCommand",
-            "has GenMsgCycleTime 50 ms, allowed is a multiple of tick_ms, 20 ms",
+            "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got 50 ms",
         ),
-        ("BO_ 512 20;", "BO_ 512 220;", "SlewCommand", "allowed for a valve is up to 200 ms"),
-        ("BO_ 784 500;", "BO_ 784 0;", "ShaperStatus", "has no GenMsgCycleTime"),
-        ("BO_ 768 100;", "BO_ 768 110;", "SlewStatus", "has GenMsgCycleTime 110 ms"),
+        (
+            "BO_ 512 20;",
+            "BO_ 512 220;",
+            "SlewCommand",
+            "GenMsgCycleTime: expected up to 200 ms for a valve, got 220 ms",
+        ),
+        ("BO_ 784 500;", "BO_ 784 0;", "ShaperStatus", "a multiple of tick_ms, 20 ms, got none"),
+        ("BO_ 768 100;", "BO_ 768 110;", "SlewStatus", "a multiple of tick_ms, 20 ms, got 110 ms"),
         # status
         ("State : 0|4@1+", "State : 0|2@1+", "SlewStatus", "State cannot carry 5 with 2 bits"),
         (
@@ -254,7 +270,7 @@ def test_messages_of_another_kind(
             "PredictedSway : 48|16@1- (0.01,0)",
             "PredictedSway : 48|16@1- (0,0)",
             "SlewStatus",
-            "PredictedSway has a scale of 0",
+            "PredictedSway: expected an integer signal with a scale, got a scale of 0",
         ),
         (" SG_ SendFailures :", " SG_ Sends :", "ShaperStatus", "lacks the signals SendFailures"),
     ],
@@ -283,12 +299,13 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
         (
             [("SlewCommand: 2", "SlewCommand: 8"), ("0|8@1- (0.8", "32|32@1- (0.8")],
             "512 Velocity",
-            "axes.slew.valve.signal: Velocity is a float, allowed is an integer signal",
+            "axes.slew.valve.signal: Velocity: expected an integer signal, got a float",
         ),
         (
             [("SlewCommand: 2", "SlewCommand: 8"), ("Counter : 8|8@1+", "Counter : 8|32@1-")],
             "512 AliveCounter",
-            "axes.slew.valve.alive_counter: AliveCounter is a float, allowed is an unsigned",
+            "axes.slew.valve.alive_counter: AliveCounter: expected an unsigned integer signal, got"
+            " a float",
         ),
         (
             [
@@ -297,7 +314,7 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
                 ("ShapedCommand : 32|16", "Shaped : 24|8"),
             ],
             "768 PredictedSway",
-            "PredictedSway is a float; allowed is an integer signal",
+            "PredictedSway: expected an integer signal with a scale, got a float",
         ),
         (
             [
@@ -309,7 +326,8 @@ def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machin
                 ("Counter : 56|8@1+", "Counter : 32|32@1-"),
             ],
             "272 AliveCounter",
-            "joysticks.left.alive_counter: AliveCounter is a float, allowed is an unsigned",
+            "joysticks.left.alive_counter: AliveCounter: expected an unsigned integer signal, got"
+            " a float",
         ),
     ],
 )
@@ -328,8 +346,8 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
     machine.dbc = machine.dbc[:at] + machine.dbc[at:].replace("er : 8|8@1+", "er : 8|8@1-", 1)
     (problem,) = machine.problems()
     assert problem.endswith(
-        "axes.slew.valve.alive_counter: AliveCounter has a sign, allowed is an unsigned integer"
-        " signal"
+        "axes.slew.valve.alive_counter: AliveCounter: expected an unsigned integer signal, got a"
+        " signed one"
     )
 
 
@@ -340,13 +358,13 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
             "Slew : 0|16",
             "Slew : -1|16",
             "JoystickLeft",
-            "Slew begins at bit -1, allowed is 0 or more",
+            "Slew: expected a start bit of 0 or more, got -1",
         ),
         (
             '"GenMsgCycleTime" INT',  # a type that there is not: everything is text
             '"GenMsgCycleTime" nanINT',
             "JoystickLeft",
-            "GenMsgCycleTime is '20', allowed is a whole number of ms",
+            "GenMsgCycleTime: expected a whole number of ms, got '20'",
         ),
     ],
 )

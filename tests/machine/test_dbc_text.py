@@ -262,7 +262,10 @@ def test_their_ids_and_names_are_known(machine: Machine) -> None:
     assert messages.named({(5, False), (5, True), (6, False)}) == ["Other", "Widether"]
     assert "Other" not in {m.name for m in messages.all()}
     names = ", ".join(messages.named(messages.ids()))
-    assert messages.find("None") == f"found 'None', messages of the DBC files are {names}"
+    assert (
+        messages.find("None")
+        == f"expected a message of the DBC files, got 'None'; there are {names}"
+    )
 
 
 def test_check_shows_the_first_of_them(machine: Machine) -> None:
@@ -348,7 +351,7 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     assert [m.name for m in loaded.messages] == ["Other"]
     assert loaded.count == 1
     assert Messages([loaded]).find("None") == (
-        "found 'None', messages of the DBC files are Bad_other, Other"
+        "expected a message of the DBC files, got 'None'; there are Bad_other, Other"
     )
     for row in (
         OTHER,  # two of one id
@@ -404,13 +407,13 @@ def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.Monk
     machine.load()
     machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 208")
     (problem,) = machine.problems()
-    assert problem.endswith("bytes in its messages, allowed are 200 at most")
+    assert "expected 200 bytes at most in its messages, got " in problem
     monkeypatch.setattr(dbc_parse, "MOST_WORDS", 10)
     (problem,) = machine.problems()
-    assert problem.endswith("words, allowed are 10 at most")
+    assert "expected 10 words at most, got " in problem
     monkeypatch.setattr(dbc_parse, "MOST_PARSED", 100)
     (problem,) = machine.problems()
-    assert problem.endswith("bytes in what is used of it, allowed are 100 at most")
+    assert "expected 100 bytes at most in what is used of it, got " in problem
 
 
 @pytest.mark.parametrize("most", ["MOST_MESSAGES", "MOST_STATEMENTS", "MOST_PARSED"])
@@ -429,8 +432,8 @@ def test_more_than_any_machine_has(
     assert counts[1] == {"MOST_MESSAGES": 50, "MOST_STATEMENTS": 50, "MOST_PARSED": 11}[most]
     monkeypatch.setattr(database, most, sum(counts) - 1)
     (problem,) = machine.problems()
-    assert f"dbc: found {sum(counts)} " in problem
-    assert problem.endswith(f"in all, allowed are {sum(counts) - 1} at most")
+    assert f"dbc: expected {sum(counts) - 1} " in problem
+    assert problem.endswith(f" in all at most, got {sum(counts)}")
     monkeypatch.setattr(database, most, sum(counts))
     machine.load()
 

@@ -57,66 +57,67 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
         (
             JOYSTICK,
             "{ profile: p05, data_id: 1 }",
-            ".profile: found 'p05', allowed is 'p01' or 'p02'",
+            ".profile: expected 'p01' or 'p02', got 'p05'",
         ),
         (JOYSTICK, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
         (
             JOYSTICK,
             "{ profile: p01, data_id: 1 }",
-            ": found data_id; profile p01 needs data_id and data_id_mode",
+            ": expected data_id and data_id_mode with profile p01, got data_id",
         ),
         (
             JOYSTICK,
             "{ profile: p01, data_id_mode: low }",
-            ": found data_id_mode; profile p01 needs data_id and data_id_mode",
+            ": expected data_id and data_id_mode with profile p01, got data_id_mode",
         ),
-        (JOYSTICK, "{ profile: p02 }", ": found no data ID; profile p02 needs data_ids"),
+        (JOYSTICK, "{ profile: p02 }", ": expected data_ids with profile p02, got no data ID"),
         (
             JOYSTICK,
             "{ profile: p02, data_id: 1, data_id_mode: low }",
-            ": found data_id and data_id_mode; profile p02 needs data_ids",
+            ": expected data_ids with profile p02, got data_id and data_id_mode",
         ),
         (
             JOYSTICK,
             f"{{ profile: p01, data_id: 1, data_id_mode: low, data_ids: {IDS} }}",
-            ": found data_id and data_id_mode and data_ids; profile p01 needs data_id and",
+            ": expected data_id and data_id_mode with profile p01, got data_id and data_id_mode"
+            " and data_ids",
         ),
         (
             JOYSTICK,
             f"{{ profile: p02, data_ids: {IDS[:15]} }}",
-            ".data_ids: found [16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30],"
-            " allowed are 16 or more entries",
+            ".data_ids: expected 16 or more entries, got"
+            " [16, 17, 18, 19, 20, 21, 22, 23, 24, 25, 26, 27, 28, 29, 30]",
         ),
         (
             JOYSTICK,
             f"{{ profile: p02, data_ids: {[*IDS, 1]} }}",
-            "allowed are 16 entries at most",
+            ".data_ids: expected 16 entries at most, got [",
         ),
         (
             JOYSTICK,
             f"{{ profile: p02, data_ids: {[*IDS[:15], 256]} }}",
-            ".data_ids.15: found 256, allowed is a whole number, 0 to 255",
+            ".data_ids.15: expected a whole number, 0 to 255, got 256",
         ),
         (
             "data_id: 0x123",
             "data_id: 0x10000",
-            ".data_id: found 65536, allowed is a whole number, 0 to 65535",
+            ".data_id: expected a whole number, 0 to 65535, got 65536",
         ),
-        ("data_id: 0x123", "data_id: -1", ".data_id: found -1, allowed is a whole number"),
+        ("data_id: 0x123", "data_id: -1", ".data_id: expected a whole number, 0 to 65535, got -1"),
         (
             "data_id_mode: both",
             "data_id_mode: high",
-            ".data_id_mode: found 'high', allowed is 'both', 'low', 'alternating' or 'nibble'",
+            ".data_id_mode: expected 'both', 'low', 'alternating' or 'nibble', got 'high'",
         ),
         (
             "0x123, data_id_mode: both",
             "0x1234, data_id_mode: nibble",
-            ": data_id is 0x1234, allowed is up to 0xfff in mode nibble",
+            ": data_id: expected up to 0xfff in mode nibble, got 0x1234",
         ),
         (
             "data_id_mode: both",
             "data_id_mode: both, offset: 8",
-            ".offset: unknown key; allowed are profile, data_id, data_id_mode, data_ids",
+            ".offset: expected one of the keys profile, data_id, data_id_mode, data_ids",
         ),
     ],
 )
@@ -151,12 +152,13 @@ HEADER = "its header takes the first 12 bits of"
                 )
             ],
             "stick:",
-            "axes.slew.command.signal: found 'Crc', which is in the header of e2e already",
+            "axes.slew.command.signal: expected a free signal, got 'Crc', which is in the header"
+            " of e2e already",
         ),
         (
             [("message: TipPosition", "message: Short")],
             f"e2e: {RADIUS}",
-            "motion.crane.radius.e2e: Short has 1 bytes, allowed are 2 or more",
+            "motion.crane.radius.e2e: Short: expected 2 bytes or more, got 1",
         ),
         (
             [(STATUS, STATUS.replace("alternating", "nibble"))],
@@ -168,55 +170,59 @@ HEADER = "its header takes the first 12 bits of"
         (
             [("qualify: 2", "alive_counter: Alive")],
             "qualify: 2",
-            "joysticks.hand.alive_counter: found besides e2e, which has its own; allowed is one",
+            "joysticks.hand.alive_counter: expected one of alive_counter and e2e, got both",
         ),
         (
             [("qualify: 2", "checksum: { signal: Alive, kind: xor }")],
             "qualify: 2",
-            "joysticks.hand.checksum: found besides e2e, which has its own; allowed is one",
+            "joysticks.hand.checksum: expected one of checksum and e2e, got both",
         ),
         # the counter of the header
         (
             [("qualify: 2", "alive_max_step: 8")],
             "qualify: 2",
-            "joysticks.hand.alive_max_step: is 8, allowed is up to 7: its counter has 15 values",
+            "joysticks.hand.alive_max_step: expected up to 7 with a counter of 15 values, got 8",
         ),
         # axes that share a message
         (
             [(f"e2e: {VALVES}", "alive_counter: Alive")],
             "",
-            "differs from that of the other axes of Valves, allowed is the same",
+            "expected the same as the other axes of Valves, got another",
         ),
         (
             [(f"e2e: {VALVES}", VALVES.replace("16, 17", "17, 16").join(("e2e: ", "")))],
             "",
-            "axes.near_far.valve.e2e: differs from that of the other axes of Valves",
+            "axes.near_far.valve.e2e: expected the same as the other axes of Valves",
         ),
         # the other kind, of messages that are sent
         (
             [("alive_counter: Alive", "alive_counter: LastFault")],
             "alive_counter",
-            "status.alive_counter: found 'LastFault', which is a signal of the status already",
+            "status.alive_counter: expected a free signal, got 'LastFault', which is a signal of"
+            " the status already",
         ),
         (
             [("signal: Check", "signal: Reserve")],
             "checksum:",
-            "status.checksum.signal: found 'Reserve', signals of ShaperStatus are LastFault,",
+            "status.checksum.signal: expected a signal of ShaperStatus, got 'Reserve'; there are"
+            " LastFault,",
         ),
         (
             [("signal: Check", "signal: Alive")],
             "checksum:",
-            "status.checksum.signal: found 'Alive', which is alive_counter already",
+            "status.checksum.signal: expected a free signal, got 'Alive', which is alive_counter"
+            " already",
         ),
         (
             [("signal: Check", "signal: UnknownId")],
             "checksum:",
-            "status.checksum.signal: found 'UnknownId', which is a signal of the status already",
+            "status.checksum.signal: expected a free signal, got 'UnknownId', which is a signal of"
+            " the status already",
         ),
         (
             [("alive_counter: Alive", "alive_max_step: 2")],
             "alive_counter",
-            "status.alive_max_step: unknown key; allowed are bus, message, alive_counter,",
+            "status.alive_max_step: expected one of the keys bus, message, alive_counter,",
         ),
     ],
 )
@@ -246,14 +252,18 @@ def test_one_bit_of_a_signal_in_the_header_is_too_many(
     [
         (
             "checksum: { signal: Slew, kind: xor }",
-            "signal: found 'Slew', which is checksum already",
+            "signal: expected a free signal, got 'Slew', which is checksum already",
         ),
-        ("alive_counter: NearFar", "alive_counter: NearFar has a sign, allowed is an unsigned"),
-        ("checksum: { signal: Low, kind: xor }", "Low is no unsigned byte of its own"),
+        (
+            "alive_counter: NearFar",
+            "alive_counter: NearFar: expected an unsigned integer signal, got a signed one",
+        ),
+        ("checksum: { signal: Low, kind: xor }", "Low: expected an unsigned byte of its own, got"),
         (
             f"e2e: {JOYSTICK.replace('both', 'nibble')}\n"
             "      direction: { signal: Low, neutral: 0, positive: 1, negative: 2 }",
-            "direction.signal: found 'Low', which is in the header of e2e already",
+            "direction.signal: expected a free signal, got 'Low', which is in the header of e2e"
+            " already",
         ),
     ],
 )

@@ -49,21 +49,37 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "told"),
     [
-        ("[joysticks, machine]", "[joysticks, joysticks]", "has joysticks twice"),
+        (
+            "[joysticks, machine]", "[joysticks, joysticks]",
+            "between: expected two different buses, got joysticks twice",
+        ),
         ("[joysticks, machine]", "[joysticks, crane]",
-         "found 'crane', buses are joysticks, machine"),
-        ("forwarding: kernel", "forwarding: daemon", "only forwarding: kernel can do"),
-        ("fallback: neutral", "fallback: neutral\n  blocked: [Nobody]", "found 'Nobody'"),
-        (SLEW, SLEW.replace("Slew", "NearFar"), "allowed is that of the stick, 'Slew'"),
-        (f"{SLEW} {COUNTER}", f"{SLEW}", "alive_counter: differs from that of joystick left"),
-        (SLEW, SLEW.replace("200", "100"), "more than the 100 ms of joystick left"),
+         "expected a bus, got 'crane'; there are joysticks, machine"),
+        (
+            "forwarding: kernel", "forwarding: daemon",
+            "fallback: expected stop with forwarding: daemon, got neutral: without",
+        ),
+        (
+            "fallback: neutral", "fallback: neutral\n  blocked: [Nobody]",
+            "expected a message of the DBC files, got 'Nobody'",
+        ),
+        (
+            SLEW, SLEW.replace("Slew", "NearFar"),
+            "expected the signal of its command, 'Slew', in the message of its joystick, got"
+            " 'NearFar'",
+        ),
+        (
+            f"{SLEW} {COUNTER}", f"{SLEW}",
+            "alive_counter: expected the same as joystick left, got another",
+        ),
+        (SLEW, SLEW.replace("200", "100"), "expected more than the 100 ms of joystick left, whose"),
         (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
-         "direction: found in the message of joystick left"),
+         "direction: expected none in the message of joystick left, which"),
         (f"{SLEW} {COUNTER}",
          "bus: machine, message: SlewCommand, signal: Velocity, timeout_ms: 200",
-         "with this stick unshaped in them"),
+         "leave with this command in them, got 'SlewCommand'"),
         ("joystick: left, signal: Slew", "joystick: right, signal: Rotate",
-         "whose frames leave with its own sticks"),
+         "expected the message of joystick right, or one of no joystick, got 'JoystickLeft'"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
@@ -105,7 +121,10 @@ def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -
     changes += [("NearFar, timeout_ms: 200,", f"NearFar, timeout_ms: 200, {checksum},")]
     dbc = ("\nBO_ 273", ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273')
     (found,) = problems(tmp_path, *changes, dbc=dbc)
-    assert "gateway.fallback: found neutral; can-gw of the kernel reckons crc8_autosar in" in found
+    assert (
+        "gateway.fallback: expected stop or pass, got neutral: can-gw of the kernel reckons"
+        " crc8_autosar in" in found
+    )
     assert load(tmp_path, *changes, ("fallback: neutral", "fallback: stop"), dbc=dbc)
 
 

@@ -106,8 +106,9 @@ def test_a_checksum_that_fills_no_byte(protected: Machine, signal: str) -> None:
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
     line = joystick(protected, "checksum: { signal: Check, kind: xor }")
     assert protected.problems() == [
-        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check is no unsigned byte of its own"
-        "; allowed is one that is"
+        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check: expected an unsigned byte of"
+        " its"
+        " own, got another signal"
     ]
 
 
@@ -148,8 +149,9 @@ def test_a_checksum_that_fills_no_such_part(
     protected.in_dbc(SIGNALS, f' SG_ Check : {signal} (1,0) [0|1] "" SHAPER\n')
     line = joystick(protected, f"checksum: {{ signal: Check, kind: {kind} }}")
     assert protected.problems() == [
-        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check is no unsigned {part} of its"
-        " own; allowed is one that is"
+        f"machine.yaml:{line}: joysticks.left.checksum.signal: Check: expected an unsigned {part}"
+        " of"
+        " its own, got another signal"
     ]
 
 
@@ -161,8 +163,8 @@ def test_an_algorithm_that_fails_is_a_problem_of_the_file(
     monkeypatch.setitem(CHECKSUMS, "fails", row)
     line = joystick(protected, "checksum: { signal: Check, kind: fails }")
     assert protected.problems() == [
-        f"machine.yaml:{line}: joysticks.left.checksum.kind: found 'fails', which fails on"
-        " JoystickLeft: IndexError: index out of range"
+        f"machine.yaml:{line}: joysticks.left.checksum.kind: 'fails' fails on JoystickLeft:"
+        " IndexError: index out of range"
     ]
 
 
@@ -171,36 +173,50 @@ def test_an_algorithm_that_fails_is_a_problem_of_the_file(
     [
         (
             "checksum: { signal: Crc, kind: xor }",
-            "joysticks.left.checksum.signal: found 'Crc', signals of JoystickLeft are Slew,"
+            "joysticks.left.checksum.signal: expected a signal of JoystickLeft, got 'Crc'; there"
+            " are Slew,"
             " NearFar, Enable, AntiSwayOff, Reset, Half, Count2, Count1, Check, AliveCounter",
         ),
         (
             "checksum: { signal: Check, kind: crc8 }",
-            "joysticks.left.checksum.kind: found 'crc8', allowed is"
-            f" {', '.join(map(repr, [*CHECKSUMS][:-1]))} or {[*CHECKSUMS][-1]!r}",
+            "joysticks.left.checksum.kind: expected one of"
+            f" {', '.join(map(repr, [*CHECKSUMS][:-1]))} or {[*CHECKSUMS][-1]!r}, got 'crc8'",
         ),
         ("checksum: { signal: Check }", "joysticks.left.checksum.kind: "),
         ("checksum: { kind: xor }", "joysticks.left.checksum.signal: "),
         ("checksum: { signal: Check, kind: xor, byte: 6 }", "joysticks.left.checksum.byte: "),
         (
             "checksum: { signal: AliveCounter, kind: xor }",
-            "joysticks.left.checksum.signal: found 'AliveCounter', which is alive_counter already",
+            "joysticks.left.checksum.signal: expected a free signal, got 'AliveCounter', which is"
+            " alive_counter already",
         ),
         (
             "alive_max_step: 129",
-            "joysticks.left.alive_max_step: is 129, allowed is up to 128: its counter has 256"
-            " values",
+            "joysticks.left.alive_max_step: expected up to 128 with a counter of 256 values, got"
+            " 129",
         ),
-        ("alive_max_step: 0", "joysticks.left.alive_max_step: found 0, allowed is a whole number,"),
-        ("alive_max_step: 256", "joysticks.left.alive_max_step: found 256, allowed is a whole"),
-        ("alive_max_step: 1.5", "joysticks.left.alive_max_step: found 1.5, allowed is a whole"),
+        (
+            "alive_max_step: 0",
+            "joysticks.left.alive_max_step: expected a whole number, 1 to 255, got 0",
+        ),
+        (
+            "alive_max_step: 256",
+            "joysticks.left.alive_max_step: expected a whole number, 1 to 255, got 256",
+        ),
+        (
+            "alive_max_step: 1.5",
+            "joysticks.left.alive_max_step: expected a whole number, 1 to 255, got 1.5",
+        ),
         (
             "qualify: 0",
-            "joysticks.left.qualify: found 0, allowed is a whole number, 1 to 20 messages",
+            "joysticks.left.qualify: expected a whole number, 1 to 20 messages, got 0",
         ),
-        ("qualify: 21", "joysticks.left.qualify: found 21, allowed is a whole number, 1 to 20"),
-        ("stuck_s: 0.9", "joysticks.left.stuck_s: found 0.9, allowed is 1 to 3600 s"),
-        ("stuck_s: 3601", "joysticks.left.stuck_s: found 3601, allowed is 1 to 3600 s"),
+        (
+            "qualify: 21",
+            "joysticks.left.qualify: expected a whole number, 1 to 20 messages, got 21",
+        ),
+        ("stuck_s: 0.9", "joysticks.left.stuck_s: expected 1 to 3600 s, got 0.9"),
+        ("stuck_s: 3601", "joysticks.left.stuck_s: expected 1 to 3600 s, got 3601"),
         ("alive_step: 3", "joysticks.left.alive_step: "),
     ],
 )
@@ -235,7 +251,7 @@ def test_a_step_is_at_most_half_of_the_counters_range(
     protected.in_yaml(f"alive_max_step: {most}", f"alive_max_step: {most + 1}")
     (problem,) = protected.problems()
     values = {1: 2, 2: 4, 8: 16, 128: 256}[most]
-    wanted = f"is {most + 1}, allowed is up to {most}: its counter has {values} values"
+    wanted = f"expected up to {most} with a counter of {values} values, got {most + 1}"
     assert wanted in problem
 
 
@@ -249,7 +265,9 @@ def test_a_stick_that_is_protection_too(protected: Machine, key: str) -> None:
         protected.in_yaml(COUNTER, "alive_counter: Check")
     line = protected.in_yaml("signal: Slew,", "signal: Check,")
     problems = protected.problems()
-    wanted = f"axes.slew.command.signal: found 'Check', which is {key} already"
+    wanted = (
+        f"axes.slew.command.signal: expected a free signal, got 'Check', which is {key} already"
+    )
     assert f"machine.yaml:{line}: {wanted}" in problems
 
 
@@ -258,17 +276,17 @@ def test_a_switch_that_is_protection_too(protected: Machine, key: str) -> None:
     signal = {"enable": "Enable", "reset": "Reset", "anti_sway_off": "AntiSwayOff"}[key]
     line = protected.in_yaml(COUNTER, f"alive_counter: {signal}\n    alive_max_step: 2")
     assert protected.problems() == [
-        f"machine.yaml:{line}: joysticks.left.alive_counter: found '{signal}', which is {key}"
-        " already"
+        f"machine.yaml:{line}: joysticks.left.alive_counter: expected a free signal, got"
+        f" '{signal}', which is {key} already"
     ]
     protected.in_yaml(f"alive_counter: {signal}", f"checksum: {{ signal: {signal}, kind: xor }}")
-    wanted = f"joysticks.left.checksum.signal: found '{signal}', which is {key} already"
-    assert f"machine.yaml:{line}: {wanted}" in protected.problems()
+    wanted = f"expected a free signal, got '{signal}', which is {key} already"
+    assert f"machine.yaml:{line}: joysticks.left.checksum.signal: {wanted}" in protected.problems()
 
 
 @pytest.mark.parametrize(
     ("signal", "says"),
-    [("56|8@1-", "AliveCounter has a sign"), ("32|32@1-", "AliveCounter is a float")],
+    [("56|8@1-", "got a signed one"), ("32|32@1-", "got a float")],
 )
 def test_a_counter_that_cannot_count(machine: Machine, signal: str, says: str) -> None:
     kept = machine.dbc.index(" SG_ Enable : 32|2@1+")
@@ -284,8 +302,9 @@ def test_a_counter_that_cannot_count(machine: Machine, signal: str, says: str) -
             )
     machine.in_dbc("AliveCounter : 56|8@1+", f"AliveCounter : {signal}")
     line = joystick(machine) - 1
-    assert f"machine.yaml:{line}: joysticks.left.alive_counter: {says}, allowed is an unsigned" in (
-        "\n".join(machine.problems())
+    assert (
+        f"machine.yaml:{line}: joysticks.left.alive_counter: AliveCounter: expected an unsigned"
+        f" integer signal, {says}" in ("\n".join(machine.problems()))
     )
 
 
@@ -314,34 +333,52 @@ def test_an_emergency_stop(stoppable: Machine) -> None:
 @pytest.mark.parametrize(
     ("text", "says"),
     [
-        (STOP.replace("crane", "boom"), "emergency_stop.bus: found 'boom', buses are crane"),
-        (STOP.replace("Stop", "Halt"), "emergency_stop.message: found 'Halt', messages of the DBC"),
+        (
+            STOP.replace("crane", "boom"),
+            "emergency_stop.bus: expected a bus, got 'boom'; there are crane",
+        ),
+        (
+            STOP.replace("Stop", "Halt"),
+            "emergency_stop.message: expected a message of the DBC files, got 'Halt'",
+        ),
         (
             STOP.replace("Pressed", "Button"),
-            "emergency_stop.signal: found 'Button', signals of Stop are Pressed, Count, Check,",
+            "emergency_stop.signal: expected a signal of Stop, got 'Button'; there are Pressed,"
+            " Count, Check,",
         ),
-        (STOP.replace("Pressed", "Force"), "emergency_stop.signal: Force is a float, allowed is"),
+        (
+            STOP.replace("Pressed", "Force"),
+            "emergency_stop.signal: Force: expected an integer signal, got a float",
+        ),
         (
             STOP.replace("100", "39"),
-            "emergency_stop.timeout_ms: found 39, allowed is 40 ms or more: twice the cycle of",
+            "emergency_stop.timeout_ms: expected 40 ms or more, twice the cycle of Stop, got 39",
         ),
-        (STOP.replace("100", "1001"), "emergency_stop.timeout_ms: found 1001, allowed is a whole"),
+        (
+            STOP.replace("100", "1001"),
+            "emergency_stop.timeout_ms: expected a whole number, 10 to 1000 ms, got 1001",
+        ),
         (
             f"{STOP}, alive_counter: Pressed, alive_max_step: 2",
-            "emergency_stop.alive_counter: found 'Pressed', which is signal already",
+            "emergency_stop.alive_counter: expected a free signal, got 'Pressed', which is signal"
+            " already",
         ),
-        (f"{STOP}, alive_counter: Force", "emergency_stop.alive_counter: Force is a float"),
+        (
+            f"{STOP}, alive_counter: Force",
+            "emergency_stop.alive_counter: Force: expected an unsigned integer signal, got a float",
+        ),
         (
             f"{STOP}, alive_counter: Count, alive_max_step: 9",
-            "emergency_stop.alive_max_step: is 9, allowed is up to 8: its counter has 16 values",
+            "emergency_stop.alive_max_step: expected up to 8 with a counter of 16 values, got 9",
         ),
         (
             f"{STOP}, checksum: {{ signal: Count, kind: xor }}",
-            "emergency_stop.checksum.signal: Count is no unsigned byte of its own",
+            "emergency_stop.checksum.signal: Count: expected an unsigned byte of its own",
         ),
         (
             f"{STOP}, alive_counter: Check, checksum: {{ signal: Check, kind: xor }}",
-            "emergency_stop.checksum.signal: found 'Check', which is alive_counter already",
+            "emergency_stop.checksum.signal: expected a free signal, got 'Check', which is"
+            " alive_counter already",
         ),
         (f"{STOP}, stuck_s: 5", "emergency_stop.stuck_s: "),
         (f"{STOP}, enable: Pressed", "emergency_stop.enable: "),

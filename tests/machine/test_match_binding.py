@@ -71,24 +71,40 @@ def test_two_channels_that_nothing_tells_apart(tmp_path: Path, first: str, secon
     file = machine(tmp_path, first, second)
     with pytest.raises(ConfigError) as caught:
         load_deployment(file)
-    text = "buses.rear.match: may be the device of bus front too; allowed is another serial, path"
-    assert str(caught.value) == f"{file}:{line_of(file, TWO)}: {text} or port"
+    text = "expected another serial, path or port than bus front, got what may be its device"
+    assert str(caught.value) == f"{file}:{line_of(file, TWO)}: buses.rear.match: {text}"
 
 
 @pytest.mark.parametrize(
     ("match", "where", "text"),
     [
-        ("{}", "match", "found nothing, allowed are serial, path, port, driver, bitrate"),
-        ("{ serial: 17 }", "match.serial", "found 17, allowed is text (in quotes where it looks"),
-        ('{ serial: "" }', "match.serial", "found '', allowed is text"),
-        ("{ port: 64 }", "match.port", "found 64, allowed is a whole number, 0 to 63"),
-        ("{ bitrate: 9999 }", "match.bitrate", "found 9999, allowed is a whole number, 10000 to"),
-        ("{ name: can0 }", "match.name", "unknown key; allowed are serial, path, port, driver"),
-        ("true", "match", "found True, allowed is a section with the keys serial, path, port"),
+        ("{}", "match", "expected one of serial, path, port, driver, bitrate, got none"),
+        (
+            "{ serial: 17 }",
+            "match.serial",
+            "expected text (in quotes where it looks like a number), got 17",
+        ),
+        (
+            '{ serial: "" }',
+            "match.serial",
+            "expected text (in quotes where it looks like a number), got ''",
+        ),
+        ("{ port: 64 }", "match.port", "expected a whole number, 0 to 63, got 64"),
+        (
+            "{ bitrate: 9999 }",
+            "match.bitrate",
+            "expected a whole number, 10000 to 1e+06 bit/s, got 9999",
+        ),
+        ("{ name: can0 }", "match.name", "expected one of the keys serial, path, port, driver"),
+        (
+            "true",
+            "match",
+            "expected a section with the keys serial, path, port, driver, bitrate, got True",
+        ),
         (
             "{ bitrate: 500000 }",
             "match.bitrate",
-            "found 500000, the bitrate of the bus is 250000; allowed is the same",
+            "expected the bitrate of the bus, 250000, got 500000",
         ),
     ],
 )
@@ -106,7 +122,7 @@ def test_only_socketcan_has_devices(tmp_path: Path) -> None:
     file.write_text(file.read_text().replace(f"{front}socketcan", f"{front}virtual"))
     with pytest.raises(ConfigError) as caught:
         load_deployment(file)
-    text = "buses.front.match: found it with the interface virtual, allowed is socketcan"
+    text = "buses.front.match: expected the interface socketcan with it, got virtual"
     assert str(caught.value) == f"{file}:{line_of(file, ONE)}: {text}"
 
 

@@ -59,7 +59,7 @@ def measured(**changes: str) -> str:
     [
         (
             FIXED.replace("near_far: near_far", "near_far: telescope"),
-            ".near_far: expected one of the axes slew, near_far, lift, got 'telescope'",
+            ".near_far: expected an axis, got 'telescope'; there are slew, near_far, lift",
         ),
         (
             FIXED.replace("near_far: near_far", "near_far: slew"),
@@ -75,14 +75,26 @@ def measured(**changes: str) -> str:
         ),
         (f"{FIXED}, radius: {{ {TIP} }}", ": expected one of radius and radius_m, got both"),
         ("slew: slew, radius_m: 3", ": expected near_far with a radius, got none"),
-        (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "found 0.4, allowed is 0.5 to 30 m"),
-        (f"{FIXED}, max_pct: 51", ".max_pct: found 51, allowed is 1 to 50 % of full speed"),
-        (f"{FIXED}, speed: 1", ".speed: unknown key; allowed are slew, near_far, radius"),
-        (measured(signal="Reach"), ".radius.signal: found 'Reach', signals of TipPosition are"),
-        (measured(message="Tip"), ".radius.message: found 'Tip', messages of the DBC files are"),
-        (measured(bus="boom"), ".radius.bus: found 'boom', buses are crane"),
-        (measured(timeout_ms="30"), ".radius.timeout_ms: found 30, allowed is 40 ms or more"),
-        (measured(timeout_ms="5"), ".radius.timeout_ms: found 5, allowed is a whole number, 10 to"),
+        (FIXED.replace("radius_m: 3", "radius_m: 0.4"), "expected 0.5 to 30 m, got 0.4"),
+        (f"{FIXED}, max_pct: 51", ".max_pct: expected 1 to 50 % of full speed, got 51"),
+        (f"{FIXED}, speed: 1", ".speed: expected one of the keys slew, near_far, radius"),
+        (
+            measured(signal="Reach"),
+            ".radius.signal: expected a signal of TipPosition, got 'Reach'; there are",
+        ),
+        (
+            measured(message="Tip"),
+            ".radius.message: expected a message of the DBC files, got 'Tip'; there are",
+        ),
+        (measured(bus="boom"), ".radius.bus: expected a bus, got 'boom'; there are crane"),
+        (
+            measured(timeout_ms="30"),
+            ".radius.timeout_ms: expected 40 ms or more, twice the cycle of TipPosition, got 30",
+        ),
+        (
+            measured(timeout_ms="5"),
+            ".radius.timeout_ms: expected a whole number, 10 to 5000 ms, got 5",
+        ),
     ],
 )
 def test_what_does_not_fit_is_told_with_its_line(machine: Machine, text: str, says: str) -> None:
@@ -117,7 +129,7 @@ def test_slew_without_its_speed_is_refused(machine: Machine) -> None:
 def test_a_full_speed_of_zero_is_refused(machine: Machine) -> None:
     moving(machine, FIXED)
     machine.in_yaml("slewing: { full_speed_rad_s: 0.5", "slewing: { full_speed_rad_s: 0")
-    assert any("full_speed_rad_s: found 0, allowed is 0.05 to 3" in p for p in machine.problems())
+    assert any("full_speed_rad_s: expected 0.05 to 3 rad/s, got 0" in p for p in machine.problems())
 
 
 def test_a_slewing_axis_acts_first(machine: Machine) -> None:
@@ -138,7 +150,7 @@ def test_a_slewing_axis_acts_first(machine: Machine) -> None:
     ("limits", "says"),
     [
         ("[0|0]", "Radius has no range in the DBC; what lies outside is no radius"),
-        ("[-1|60]", "Radius has the range [-1|60]; allowed is one from 0 m or more"),
+        ("[-1|60]", "Radius: expected a range from 0 m or more, got [-1|60]"),
     ],
 )
 def test_a_radius_needs_a_range(machine: Machine, limits: str, says: str) -> None:

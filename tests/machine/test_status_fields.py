@@ -70,7 +70,7 @@ def test_a_required_field_that_is_missing_is_named(tmp_path: Path) -> None:
 
 
 def test_an_optional_field_that_cannot_carry_a_number_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(ConfigError, match="ActiveSet has a scale of 0"):
+    with pytest.raises(ConfigError, match="ActiveSet: expected an integer signal with a scale"):
         machine(tmp_path, ACTIVE_SET, ACTIVE_SET.replace("(1,0)", "(0,0)"))
 
 

@@ -40,8 +40,9 @@ def test_a_stated_distance_is_a_bound(machine: Machine, stated: str, good: bool)
         assert machine.load().axes["slew"].config.limits.stop_distance_m == float(stated)
         return
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.slew.limits.stop_distance_m: found 10.22 m; max_pct, tail_s,"
-        " stop_s, fall_per_s and the speed of the tip allow 10.23 m"
+        f"machine.yaml:{line}: axes.slew.limits.stop_distance_m: expected 10.23 m or more, by"
+        " max_pct,"
+        " tail_s, stop_s, fall_per_s and the speed of the tip, got 10.22 m"
     ]
 
 
@@ -60,14 +61,15 @@ def test_everything_that_lengthens_a_stop_is_seen(machine: Machine, old: str, ne
     machine.load()
     machine.in_yaml(old, new)
     (problem,) = machine.problems()
-    assert "axes.slew.limits.stop_distance_m: found 10.23 m" in problem
+    assert "axes.slew.limits.stop_distance_m: expected" in problem
+    assert problem.endswith(", got 10.23 m")
 
 
 def test_a_distance_of_an_axis_without_a_speed_says_nothing(machine: Machine) -> None:
     line = machine.in_yaml("stop_s: 0.5", "stop_s: 0.5, stop_distance_m: 2")
     assert machine.problems() == [
-        f"machine.yaml:{line}: axes.lift.limits.stop_distance_m: found 2 m, and no speed of the"
-        " tip: it needs the section sway or slewing"
+        f"machine.yaml:{line}: axes.lift.limits.stop_distance_m: expected the section sway or"
+        " slewing with it, got 2 m without"
     ]
 
 

@@ -83,13 +83,13 @@ def test_without_status_the_history_is_empty(machine: Path) -> None:
 def test_what_is_no_bundle_is_told(tmp_path: Path) -> None:
     path = tmp_path / "x.zip"
     path.write_bytes(b"PK no zip")
-    with pytest.raises(LogError, match=r"x.zip: not a bundle: found BadZipFile"):
+    with pytest.raises(LogError, match=r"x.zip: not a bundle: .*, got BadZipFile"):
         unpack(path, tmp_path / "there")
     with zipfile.ZipFile(path, "w") as bundle:
         bundle.writestr("readme.txt", "nothing")
-    with pytest.raises(LogError, match="not a bundle: found KeyError"):
+    with pytest.raises(LogError, match=r"not a bundle: .*, got KeyError"):
         unpack(path, tmp_path / "there")
-    with pytest.raises(LogError, match="not a bundle: found FileNotFoundError"):
+    with pytest.raises(LogError, match=r"not a bundle: .*, got FileNotFoundError"):
         unpack(tmp_path / "none.zip", tmp_path / "there")
 
 
@@ -115,7 +115,7 @@ def test_a_member_that_cannot_be_read_is_told(
     machine: Path, tmp_path: Path, damage: tuple[bytes, int, bytes], found: str
 ) -> None:
     bundle = damaged(packed(machine, tmp_path), *damage)
-    with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: found {found}"):
+    with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: .*, got {found}"):
         unpack(bundle, tmp_path / "there")
 
 
@@ -143,7 +143,7 @@ def test_a_bundle_without_its_log_is_told(tmp_path: Path) -> None:
     with zipfile.ZipFile(path, "w") as bundle:
         bundle.writestr("about.json", json.dumps({"log": "a.log", "deployment": "a.yaml"}))
         bundle.writestr("a.yaml", "")
-    with pytest.raises(LogError, match=r"x\.zip: not a bundle: found no a\.log"):
+    with pytest.raises(LogError, match=r"x\.zip: not a bundle: expected a\.log in it, got none"):
         unpack(path, tmp_path / "there")
 
 

@@ -44,11 +44,18 @@ def test_what_the_command_line_says_goes_first(one: Deployment, two: Deployment)
 def test_a_bus_without_a_channel_is_told_with_what_there_is(
     one: Deployment, two: Deployment
 ) -> None:
-    with pytest.raises(LogError, match="bus crane: found the channels 'can3', 'can4' in the log"):
+    with pytest.raises(
+        LogError, match="bus crane: expected the channel 'vcan0', got 'can3', 'can4' in the log"
+    ):
         bus_of_channel(one, {"can3", "can4"}, {})
-    with pytest.raises(LogError, match="none is 'can9'; allowed is --channel crane=CHANNEL"):
+    with pytest.raises(
+        LogError,
+        match=r"expected the channel 'can9', got .*; choose one .* --channel crane=CHANNEL",
+    ):
         bus_of_channel(one, {"can3"}, {"crane": "can9"})
-    with pytest.raises(LogError, match="found channel 'can3', which is that of bus crane"):
+    with pytest.raises(
+        LogError, match="expected a channel of its own, got 'can3', that of bus crane"
+    ):
         bus_of_channel(two, {"can3"}, {"crane": "can3", "joy": "can3"})
 
 

@@ -70,11 +70,18 @@ def test_part_of_a_drive(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "text"),
     [
-        ("", "found no data frame"),
+        ("", "got no data frame"),
         ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (JoystickLeft"),
-        ("(1.0) can3 110#00\n(2.0) can4 110#00\n", "bus crane: found the channels 'can3', 'can4'"),
-        ("(2.0) vcan0 110#00\n(1.0) vcan0 110#00\n", "found mixed clocks: a time 1.000 s before"),
-        ("nothing\n", "x.log:1: found 'nothing', allowed is a line of candump -L"),
+        (
+            "(1.0) can3 110#00\n(2.0) can4 110#00\n",
+            "bus crane: expected the channel 'vcan0', got 'can3', 'can4'",
+        ),
+        ("(2.0) vcan0 110#00\n(1.0) vcan0 110#00\n", "got mixed clocks: a time 1.000 s before"),
+        (
+            "nothing\n",
+            "x.log:1: expected a line of candump -L, such as (1436509052.249713) can0 110#0102,"
+            " got 'nothing'",
+        ),
     ],
 )
 def test_a_log_that_cannot_be_used_is_told(tmp_path: Path, rows: str, text: str) -> None:
@@ -87,9 +94,13 @@ def test_a_log_that_cannot_be_used_is_told(tmp_path: Path, rows: str, text: str)
 def test_options_that_cannot_be(tmp_path: Path) -> None:
     file = ("--config", "forwarder.yaml", "--out", tmp_path)
     assert "which deployment?" in called(DRIVE, code=2)
-    assert "is no black box of these files" in called(DRIVE, *file, "--verify", code=2)
-    assert "allowed is --channel BUS=CHANNEL" in called(DRIVE, *file, "--channel", "can0", code=2)
-    assert "found the bus joy, allowed are crane" in called(
+    assert "expected a black box of these files, without --config" in called(
+        DRIVE, *file, "--verify", code=2
+    )
+    assert "--channel: expected BUS=CHANNEL, got" in called(
+        DRIVE, *file, "--channel", "can0", code=2
+    )
+    assert "expected a bus, got joy; there are crane" in called(
         DRIVE, *file, "--channel", "joy=can0", code=2
     )
     assert "No such file" in called(tmp_path / "none.log", *file, code=2)

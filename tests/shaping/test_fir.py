@@ -103,7 +103,7 @@ def test_fir_is_the_convolution_of_the_newest_commands() -> None:
 
 @pytest.mark.parametrize("taps", [[], [0.5, 0.4], [1.0, math.nan], [0.0]])
 def test_taps_that_are_no_shaper_are_refused(taps: list[float]) -> None:
-    with pytest.raises(ValueError, match=r"sum of the taps is .*, allowed is 1"):
+    with pytest.raises(ValueError, match=r"sum of the taps: expected 1, got .*"):
         Fir(taps)
 
 

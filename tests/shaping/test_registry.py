@@ -94,13 +94,13 @@ def test_gff_by_poles_or_by_denominator_with_and_without_a_third_pole(
 
 @pytest.mark.parametrize("given", [{}, {"a1": 0.42}, {"a2": 0.043}])
 def test_half_a_denominator_is_refused(given: dict[str, object]) -> None:
-    with pytest.raises(ValueError, match=r"^allowed are a1 and a2, or poles_rad_s$"):
+    with pytest.raises(ValueError, match=r"^expected a1 and a2, or poles_rad_s, got neither$"):
         build_shaper("gff", TICK_S, model(), **given)
 
 
 @pytest.mark.parametrize("kind", OF_SWAY)
 def test_a_filter_of_the_swing_needs_sway_data(kind: str) -> None:
-    says = f"^filter {kind} needs the sway data of the axis; found no sway$"
+    says = f"^expected sway data for filter {kind}, got none$"
     with pytest.raises(ValueError, match=says):
         build_shaper(kind, TICK_S, None, **parameters(kind))
 
@@ -112,7 +112,7 @@ def test_the_others_do_without(kind: str) -> None:
 
 
 def test_a_second_mode_that_is_none_is_named() -> None:
-    with pytest.raises(ValueError, match=r"^second mode: period is 13 s, allowed is 0\.15 to 12"):
+    with pytest.raises(ValueError, match=r"^second mode: period: expected 0\.15 to 12 s, got 13 s"):
         build_shaper("two_mode", TICK_S, model(), period_s=13.0, damping_ratio=0.0)
     # six samples to a swing are needed, also of the second mode
     with pytest.raises(ValueError, match=r"^second mode: natural frequency at a tick of 0\.15 s"):
@@ -129,18 +129,18 @@ def test_without_a_valve_rate_the_robust_shaper_takes_the_valve_for_quick() -> N
     assert answer(LimitAware(slow, Fir(TAPS), 1.5), slow, 0.03) != got
 
 
-WHICH = "allowed are a1 and a2, or poles_rad_s"
+WHICH = "expected a1 and a2, or poles_rad_s, got"
 
 
 @pytest.mark.parametrize(
     ("kind", "given", "says"),
     [
-        ("gff", {}, f"found neither; {WHICH}"),
-        ("gff", {"third_pole_rad_s": -4.0}, f"found neither; {WHICH}"),
-        ("gff", {"a2": 0.1}, f"found a2; {WHICH}"),
-        ("gff", {"poles_rad_s": [-4.0, -4.0], "a1": 1.0}, f"found a1, poles_rad_s; {WHICH}"),
-        ("gff", {"a1": 1.0, "a2": 1.0}, r"a1 is 1, allowed is 2 or more for a2 = 1 .*"),
-        ("robust", {"taps": [0.5, 0.4], "tick_ms": 20}, r"sum of the taps is 0\.9, allowed is 1"),
+        ("gff", {}, f"{WHICH} neither"),
+        ("gff", {"third_pole_rad_s": -4.0}, f"{WHICH} neither"),
+        ("gff", {"a2": 0.1}, f"{WHICH} a2"),
+        ("gff", {"poles_rad_s": [-4.0, -4.0], "a1": 1.0}, f"{WHICH} a1, poles_rad_s"),
+        ("gff", {"a1": 1.0, "a2": 1.0}, r"a1: expected 2 or more for a2 = 1 .*, got 1"),
+        ("robust", {"taps": [0.5, 0.4], "tick_ms": 20}, r"sum of the taps: expected 1, got 0\.9"),
     ],
 )
 def test_parameters_that_do_not_go_together_are_refused_without_sway_data(
@@ -160,7 +160,7 @@ def test_what_goes_together_passes_the_check() -> None:
 
 
 def test_taps_run_at_their_own_period() -> None:
-    says = r"^tick_ms of the taps is 40 ms, allowed is the period of the valve, 20 ms$"
+    says = r"^tick_ms of the taps: expected the period of the valve, 20 ms, got 40 ms$"
     with pytest.raises(ValueError, match=says):
         build_shaper("robust", TICK_S, model(), taps=TAPS, tick_ms=40)
     build_shaper("robust", TICK_S, model(), taps=TAPS, tick_ms=20)
@@ -251,7 +251,7 @@ def test_entry_points_add_kinds_after_the_others_in_the_order_of_their_names() -
     [
         (ImportError("No module\nnamed x"), "ImportError: No module named x"),
         (kind_of("zv"), "ValueError: the kind 'zv' is there already"),
-        (7, "ValueError: found a value of type int, allowed is a ShaperKind"),
+        (7, "ValueError: expected a ShaperKind, got a value of type int"),
     ],
 )
 def test_a_package_that_gives_no_kind_is_named_and_the_next_one_counts(

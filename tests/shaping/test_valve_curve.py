@@ -16,8 +16,8 @@ from canshaper.shaping.valve_curve import ValveCurve
 COMMANDS = (-1.0, -0.5, -0.04, 0.07, 0.4, 1.0)
 SPEEDS = (-0.8, -0.3, 0.0, 0.0, 0.35, 1.0)
 CURVE = ValveCurve(COMMANDS, SPEEDS)
-NO_ENDS = "allowed are commands from -100 to 100 %, with the ends of the dead band between"
-NO_BAND = "allowed are two neighbouring commands with speed 0, the ends of the dead band"
+NO_ENDS = "expected commands from -100 to 100 %, with the ends of the dead band between"
+NO_BAND = "expected two neighbouring commands with speed 0, the ends of the dead band"
 NOT_FULL = "the faster direction has speed 100 % at full command, and none has more"
 
 
@@ -87,7 +87,7 @@ def test_the_grid_stays_within_its_bounds(
 @pytest.mark.parametrize(
     ("commands", "speeds", "says"),
     [
-        ((-1, 0, 1), (-1, 0, 0, 1), "found 3 commands and 4 speeds, allowed is one for each"),
+        ((-1, 0, 1), (-1, 0, 0, 1), "expected a speed for each command, got 3 and 4"),
         ((-1, 0, 1), (-1, 0, 1), NO_ENDS),
         ((-0.9, -0.1, 0.1, 1), (-1, 0, 0, 1), NO_ENDS),
         ((-1, -0.1, 0.1, 0.9), (-1, 0, 0, 1), NO_ENDS),

@@ -197,9 +197,9 @@ def test_ticks_do_not_depend_on_the_step_of_the_plant() -> None:
 @pytest.mark.parametrize(
     ("dt_s", "commands", "message"),
     [
-        (0.0, {}, "dt_s = 0.0"),
-        (0.02, {"knuckle": 0.1}, "axis 'knuckle', allowed slew, near_far, lift"),
-        (0.02, {"lift": math.nan}, "command = nan"),
+        (0.0, {}, "dt_s: expected a positive value, got 0.0"),
+        (0.02, {"knuckle": 0.1}, "axis: expected one of slew, near_far, lift, got 'knuckle'"),
+        (0.02, {"lift": math.nan}, "command: expected a finite value, got nan"),
     ],
 )
 def test_impossible_steps_are_refused(
@@ -210,5 +210,7 @@ def test_impossible_steps_are_refused(
 
 
 def test_impossible_settings_are_refused() -> None:
-    with pytest.raises(ValueError, match=r"tip controller: period_s = 0.0, allowed 0.001 .. 0.1"):
+    with pytest.raises(
+        ValueError, match=r"tip controller: period_s: expected 0.001 .. 0.1, got 0.0"
+    ):
         replace(TipControllerParameters(), period_s=0.0)

@@ -156,7 +156,7 @@ def test_neutral_brings_the_speed_to_zero() -> None:
 
 
 @pytest.mark.parametrize(
-    ("name", "value", "allowed"),
+    ("name", "value", "expected"),
     [
         ("dead_time_s", 0.3, "0.0 .. 0.2"),
         ("dead_time_s", -0.01, "0.0 .. 0.2"),
@@ -168,8 +168,8 @@ def test_neutral_brings_the_speed_to_zero() -> None:
         ("lag_s", 0.0, "0.01 .. 1.0"),
     ],
 )
-def test_parameters_out_of_range_are_refused(name: str, value: float, allowed: str) -> None:
-    with pytest.raises(ValueError, match=rf"valve: {name} = {value}, allowed {allowed}"):
+def test_parameters_out_of_range_are_refused(name: str, value: float, expected: str) -> None:
+    with pytest.raises(ValueError, match=rf"valve: {name}: expected {expected}, got {value}"):
         replace(ValveParameters(), **{name: value})
 
 

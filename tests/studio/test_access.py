@@ -29,7 +29,7 @@ def test_loopback_is_always_ours(access: Access, host: str) -> None:
 )
 def test_other_hosts_are_refused(host: str) -> None:
     """Another name can be made to point to this machine; then it would be the page's own origin."""
-    assert "found the host" in (LOCAL.host_fault(host) or "")
+    assert "got the host" in (LOCAL.host_fault(host) or "")
 
 
 @pytest.mark.parametrize("host", ["192.168.1.5:8377", "[fe80::1]:8377", "crane-pc:8377"])

@@ -120,7 +120,7 @@ def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> No
         page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
         assert any("axes.slew.filter.a2 = 0.48" in text for text in page.texts())
         page.send(slide="calm", to=3.0)
-        page.until(lambda _: any("allowed is 0.5 to 2" in text for text in page.refused))
+        page.until(lambda _: any("expected 0.5 to 2" in text for text in page.refused))
         assert page.look()["sliders"]["calm"] == 2.0
 
 
@@ -141,7 +141,7 @@ def test_nonsense_is_refused_with_a_word_and_nothing_moves(shared: Studio, start
             page.refused.clear()
             page.connection.send(text)
             page.until(lambda _: bool(page.refused), "refusal")
-            assert "found" in page.refused[0], text
+            assert "expected " in page.refused[0], text
             assert valves(page.shown, "shaped") == valves(page.shown, "raw") == [0.0] * 3
         page.for_s(0.3)
         assert pose(page.shown) == before
@@ -150,7 +150,7 @@ def test_nonsense_is_refused_with_a_word_and_nothing_moves(shared: Studio, start
 def test_bytes_are_nonsense(shared: Studio) -> None:
     with shared.page() as page:
         page.connection.send(b"\x00\xff" * 40)
-        page.until(lambda _: "found bytes, allowed is JSON" in page.refused)
+        page.until(lambda _: "expected JSON, got bytes" in page.refused)
 
 
 def test_nonsense_of_the_driver_takes_its_sticks_to_neutral(shared: Studio) -> None:
@@ -195,7 +195,7 @@ def test_a_page_that_sends_too_fast_is_closed_and_its_sticks_go_to_neutral(share
         flooding.join(WAIT_S)
         assert not flooding.is_alive()
         assert closed.value.rcvd and closed.value.rcvd.code == 1008
-        assert f"allowed are {MOST_PER_S} a second" in closed.value.rcvd.reason
+        assert f"expected {MOST_PER_S} messages a second at most" in closed.value.rcvd.reason
         other.now()
         other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
         other.until(lambda s: not s["enable"])
@@ -273,7 +273,7 @@ def test_a_connection_from_elsewhere_is_refused(shared: Studio, origin: Any) -> 
     ):
         pass
     assert refused.value.response.status_code == 403
-    assert b"only the page of this studio" in refused.value.response.body
+    assert b"expected the page of this studio, got" in refused.value.response.body
 
 
 @pytest.mark.parametrize("path", ["/", "/static/main.js", "/static/../server.py"])
@@ -282,7 +282,7 @@ def test_another_host_gets_no_page(shared: Studio, path: str) -> None:
         fetch(shared, path, Host="evil.example")
     with refused.value as answer:
         assert answer.code == 403
-        assert b"found the host 'evil.example'" in answer.read()
+        assert b"got the host 'evil.example'" in answer.read()
 
 
 @pytest.mark.parametrize(
@@ -358,7 +358,7 @@ def test_from_other_machines_a_token_is_needed(own: Callable[..., Studio]) -> No
         fetch(studio, "/")
     with refused.value as answer:
         assert answer.code == 403
-        assert b"found no token" in answer.read()
+        assert b"got no token" in answer.read()
     with (
         pytest.raises(InvalidStatus) as no,
         connect(f"ws://{studio.host}/ws", origin=f"http://{studio.host}"),

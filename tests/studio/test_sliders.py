@@ -42,7 +42,7 @@ def test_length_is_that_of_the_pendulum() -> None:
 )
 def test_what_is_no_position_of_a_slider_is_refused(name: str, factor: float) -> None:
     found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
-    with pytest.raises(ValueError, match="found"):
+    with pytest.raises(ValueError, match="expected"):
         values(found, name, factor)
 
 

@@ -112,12 +112,13 @@ def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str,
     """
     bound = deployment.axes.get(axis)
     if bound is None:
-        raise UsageError(f"--axis: found {axis!r}, axes are {', '.join(deployment.axes)}")
+        names = ", ".join(deployment.axes)
+        raise UsageError(f"--axis: expected an axis, got {axis!r}; there are {names}")
     if speed is None and bound.config.feedback:
         return bound.config.feedback.message, bound.config.feedback.signal
     message, dot, signal = (speed or SIMULATED.get(axis, "")).partition(".")
     if not (message and dot and signal):
-        raise UsageError(f"--speed: found {speed or 'none'}, allowed is MESSAGE.SIGNAL")
+        raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
     return message, signal
 
 

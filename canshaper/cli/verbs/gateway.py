@@ -42,7 +42,7 @@ def gateway(
 
     deployment = loader(file, interface, channel)()
     if deployment.config.gateway is None:
-        raise UsageError(f"{deployment.path}: found no gateway; allowed is a file with one")
+        raise UsageError(f"{deployment.path}: expected a section gateway, got none")
     kernel = deployment.config.gateway.forwarding == "kernel"
     passing = passing_rules(deployment) if kernel else []
     fallback = fallback_rules(deployment) if kernel else []

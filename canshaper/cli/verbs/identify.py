@@ -85,7 +85,7 @@ def identify(
 
     deployment = loader(file)() if file else None
     if write and (deployment is None or file is None):
-        raise UsageError("--write: allowed with --file, the deployment to write to")
+        raise UsageError("--write: expected --file too, the deployment to write to, got none")
     if write and file:
         refuse_shipped(file)
     with os_errors(out):
@@ -156,7 +156,8 @@ def _write(
         config = deployment.axes[one.axis].config
         if config.sway is None:
             raise UsageError(
-                f"axis {one.axis}: found no section sway to write to; put in sway: {flow(one.sway)}"
+                f"axis {one.axis}: expected a section sway to write to, got none; put in sway:"
+                f" {flow(one.sway)}"
             )
         faster = config.model_copy(update={"sway": Sway.model_validate(one.sway)})
         if fault := stop_fault(deployment, one.axis, faster):

@@ -80,7 +80,7 @@ def record(
         return
     out = out or Path(f"recording-{datetime.now():%Y%m%d-%H%M%S}.zip")
     if out.suffix not in (".zip", ".log"):
-        raise typer.BadParameter(f"found {out}, allowed are .zip and .log", param_hint="--out")
+        raise typer.BadParameter(f"expected .zip or .log, got {out}", param_hint="--out")
     deployment = loader(file, interface, channel, network=network)()
     console = SafeConsole(stderr=True)
     recording = Recording(deployment)

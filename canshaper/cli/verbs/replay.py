@@ -90,7 +90,7 @@ def replay(
             echo("interrupted; what was written so far stays", err=True)
             raise typer.Exit(130) from None
     if verify and not all(one.replay.exact for one in replays):
-        text = f"--verify: {log} is no black box of these files; allowed is one, without --config"
+        text = f"--verify: expected a black box of these files, without --config, got {log}"
         raise UsageError(text)
     different = _show(replays, out, console)
     if verify and different:
@@ -115,7 +115,7 @@ def _run(
     for deployment in deployments:
         if unknown := channels.keys() - deployment.config.buses.keys():
             buses = ", ".join(deployment.config.buses)
-            text = f"--channel: found the bus {', '.join(unknown)}, allowed are {buses}"
+            text = f"--channel: expected a bus, got {', '.join(unknown)}; there are {buses}"
             raise UsageError(text)
     drives = [look(one, log, channels, own=inside is not None) for one in deployments]
     out.mkdir(parents=True, exist_ok=True)
@@ -219,7 +219,7 @@ def _channels(given: list[str]) -> dict[str, str]:
     for item in given:
         bus, mark, channel = item.partition("=")
         if not mark:
-            raise typer.BadParameter(f"found {item!r}, allowed is --channel BUS=CHANNEL")
+            raise typer.BadParameter(f"expected BUS=CHANNEL, got {item!r}", param_hint="--channel")
         found[bus] = channel
     return found
 

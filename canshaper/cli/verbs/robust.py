@@ -98,7 +98,7 @@ def design(
     tick_ms = bound.period_ticks * deployment.config.tick_ms
     tick_s = tick_ms / 1000.0
     if residual_pct is not None and duration_s is not None:
-        raise UsageError("found both, allowed is one of --duration and --residual")
+        raise UsageError("expected one of --duration and --residual, got both")
     asked: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
     two = _second(second, mode, tick_s, rate)
     try:

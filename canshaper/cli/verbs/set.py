@@ -74,7 +74,7 @@ def _parsed(text: str) -> tuple[str, float]:
     try:
         return key.strip(), float(number)
     except ValueError:
-        text = f"found {text!r}, allowed is KEY=NUMBER, as in axes.slew.sway.period_s=2.45"
+        text = f"expected KEY=NUMBER, as in axes.slew.sway.period_s=2.45, got {text!r}"
         raise UsageError(text) from None
 
 

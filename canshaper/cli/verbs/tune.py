@@ -166,7 +166,7 @@ def _solve(
             )
         return manual(task.mode)
     if method != "optimal":
-        raise UsageError(f"method is {method}, allowed are optimal, manual")
+        raise UsageError(f"--method: expected optimal or manual, got {method}")
     report(0.0, "loading the solver")
     from canshaper.design.tuning.optimal import tune as optimal
 

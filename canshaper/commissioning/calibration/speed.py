@@ -76,11 +76,13 @@ def _find(deployment: Deployment, message: str, signal: str) -> tuple[Message, S
     definition = find_signal(found[1], signal)
     if definition is None:
         names = ", ".join(s.name for s in found[1].signals)
-        raise _problem(deployment, f"found {signal!r}, signals of {message} are {names}")
+        raise _problem(
+            deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
+        )
     if found[1].is_multiplexed():
         raise _problem(deployment, f"{message} is multiplexed; nothing can be taken from it")
     if found[1].length > MOST_BYTES:
-        text = f"{message} has {found[1].length} bytes, allowed are {MOST_BYTES}"
+        text = f"{message}: expected {MOST_BYTES} bytes at most, got {found[1].length}"
         raise _problem(deployment, text)
     return found[1], definition
 

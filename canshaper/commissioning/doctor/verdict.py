@@ -51,7 +51,7 @@ def _share_finding(
         return Finding(subject, Level.OK, found)
     if part <= worst:
         return Finding(subject, Level.WARNING, f"{found}; good is up to {100 * good:g} %", remedy)
-    return Finding(subject, Level.BAD, f"{found}; allowed is up to {100 * worst:g} %", remedy)
+    return Finding(subject, Level.BAD, f"{found}; expected is up to {100 * worst:g} %", remedy)
 
 
 def _held_up(run: Run) -> str:

@@ -73,7 +73,7 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
     """
     message_name, dot, signal_name = name.partition(".")
     if not (message_name and dot and signal_name):
-        raise IdentificationError(f"--signal: found {name!r}, allowed is AXIS=MESSAGE.SIGNAL")
+        raise IdentificationError(f"--signal: expected AXIS=MESSAGE.SIGNAL, got {name!r}")
     found = messages.find(message_name)
     if isinstance(found, str):
         raise IdentificationError(f"--signal {name}: {found}")
@@ -167,7 +167,7 @@ def _read(
     except CutOffError as error:
         notes.append(f"{error}; what stands before it was used")
     if channel is not None and not frames:
-        raise LogError(f"{path}: found no bus {channel!r}, its frames are of {_listed(channels)}")
+        raise LogError(f"{path}: expected the bus {channel!r}, got frames of {_listed(channels)}")
     return frames, set(readers_of), notes
 
 
@@ -182,9 +182,8 @@ def _checked(
     if not reader.senders:
         there = ", ".join(messages.named(seen)) or "none of the DBC files"
         raise IdentificationError(
-            f"{path}: found no frame of {reader.message.name} (id {reader.message.frame_id:#x}) in"
-            f" {frames} frames; messages in the log are {there}. Is it the right log, and the"
-            " right DBC file?"
+            f"{path}: expected frames of {reader.message.name} (id {reader.message.frame_id:#x}),"
+            f" got {frames} of {there}. Is it the right log, and the right DBC file?"
         )
     if len(reader.senders) > 1:
         found = ", ".join(f"{i:#x}" + (f" on {c}" if c else "") for c, i in sorted(reader.senders))

@@ -34,15 +34,15 @@ def series_of(table: Table, label: str, column: str | None, about_s: float | Non
     gyroscope = table.gyroscope()
     if not gyroscope:
         raise IdentificationError(
-            f"{table.path}: found no gyroscope among {', '.join(table.columns)}; name the column"
-            " of the swing with --signal AXIS=COLUMN"
+            f"{table.path}: expected the columns of a gyroscope, got {', '.join(table.columns)};"
+            " name the column of the swing with --signal AXIS=COLUMN"
         )
     # One without any number would leave none of the sum of all.
     names = [n for n in gyroscope if np.isfinite(table.columns[n]).any()]
     if not names:
         raise IdentificationError(
-            f"{table.path}: found no number in {', '.join(gyroscope)}, allowed is one in each line;"
-            " is the sensor on?"
+            f"{table.path}: expected a number in each line of {', '.join(gyroscope)}, got none; is"
+            " the sensor on?"
         )
     if len(names) == 1:
         return _series(table, label, names[0], table.columns[names[0]], notes=[])

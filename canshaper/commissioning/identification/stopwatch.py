@@ -26,14 +26,14 @@ def stopwatch(
         IdentificationError: a number makes no swing, or too few swings were counted.
     """
     if not swings >= 3:
-        raise IdentificationError(f"--swings: found {swings:g}, allowed is 3 or more, better 10")
+        raise IdentificationError(f"--swings: expected 3 or more, better 10, got {swings:g}")
     if not 0.15 <= seconds / swings <= 12.0:
-        text = f"--seconds: {seconds:g} s for {swings:g} swings are {seconds / swings:g} s each"
-        raise IdentificationError(f"{text}, allowed are 0.15 to 12 s")
+        text = f"{seconds / swings:g} s, of {seconds:g} s for {swings:g} swings"
+        raise IdentificationError(f"--seconds: expected 0.15 to 12 s a swing, got {text}")
     if not 0.0 < last_deg <= first_deg <= 60.0:
         raise IdentificationError(
-            f"--first, --last: found {first_deg:g} and {last_deg:g} degrees, allowed are up to 60,"
-            " the last one above 0 and not larger than the first"
+            "--first, --last: expected up to 60 degrees, the last one above 0 and not larger than"
+            f" the first, got {first_deg:g} and {last_deg:g}"
         )
     decrement = (math.log(first_deg) - math.log(last_deg)) / swings
     ratio = decrement / math.hypot(2.0 * math.pi, decrement)

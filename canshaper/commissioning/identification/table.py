@@ -84,7 +84,7 @@ class Table:
             if wanted in (known.lower(), plain):
                 return known
         raise IdentificationError(
-            f"{self.path}: found no column {name!r}, columns are {', '.join(self.columns)}"
+            f"{self.path}: expected a column, got {name!r}; there are {', '.join(self.columns)}"
         )
 
     def gyroscope(self) -> list[str]:
@@ -154,16 +154,16 @@ def _header(path: Path, file: TextIO) -> tuple[int, list[str], str]:
         names = [n.strip() for n in _row(path, number, text, delimiter)]
         if len(names) < 2:
             raise IdentificationError(
-                f"{path}:{number}: found {text[:60]!r}, allowed is a header with the names of at"
-                " least two columns, separated by comma, semicolon or tab"
+                f"{path}:{number}: expected a header with the names of at least two columns,"
+                f" separated by comma, semicolon or tab, got {text[:60]!r}"
             )
         if _numbers(names, delimiter) is not None:
             raise IdentificationError(
-                f"{path}:{number}: found numbers, allowed is a header that names the columns,"
-                ' such as "Time (s),Gyroscope x (rad/s)"'
+                f"{path}:{number}: expected a header that names the columns, such as"
+                ' "Time (s),Gyroscope x (rad/s)", got numbers'
             )
         return number, names, delimiter
-    raise IdentificationError(f"{path}: found no text, allowed is a table with a header")
+    raise IdentificationError(f"{path}: expected a table with a header, got no text")
 
 
 def _outside_quotes(text: str) -> str:
@@ -175,7 +175,7 @@ def _row(path: Path, number: int, line: str, delimiter: str) -> list[str]:
     try:
         return next(csv.reader([line.replace("\0", "")], delimiter=delimiter), [])
     except csv.Error as error:  # a field longer than the reader takes
-        text = f"found {error}, allowed is a table of numbers"
+        text = f"expected a table of numbers, got {error}"
         raise IdentificationError(f"{path}:{number}: {text}") from None
 
 
@@ -198,27 +198,29 @@ def _table(
     if wrong:
         if len(wrong) * _WRONG_LINES > count + _WRONG_LINES:
             raise IdentificationError(
-                f"{path}:{wrong[0]}: {len(wrong)} of {count + len(wrong)} lines are not"
-                f" {len(names)} numbers; allowed is a table of numbers"
+                f"{path}:{wrong[0]}: expected {len(names)} numbers a line, got"
+                f" {len(wrong)} lines of {count + len(wrong)} without"
             )
         ending = len(wrong) == 1 and (not count or wrong[0] > lines[-1])
         what = "the last line is cut off and" if ending else f"{len(wrong)} lines are wrong and"
         notes.append(f"{path}:{wrong[0]}: {what} left out")
     if count < 2:
-        raise IdentificationError(f"{path}: found {count} lines of numbers, allowed are more")
+        raise IdentificationError(f"{path}: expected 2 lines of numbers or more, got {count}")
     columns = dict(zip(names, values, strict=True))
     time_name, factor = _time(path, columns)
     time = columns.pop(time_name)
     others = {n: c for n, c in columns.items() if not _TIME.search(n)}
     if not others:
-        raise IdentificationError(f"{path}: found no column but times: {', '.join(names)}")
+        raise IdentificationError(
+            f"{path}: expected a column of values, got times only: {', '.join(names)}"
+        )
     good = np.abs(time) * factor <= _LATEST_S  # which NaN is not
     if not good.all():
-        found = f"{path}:{lines[~good][0]}: {np.count_nonzero(~good)} lines"
+        place, wrong_times = f"{path}:{lines[~good][0]}", np.count_nonzero(~good)
         if np.count_nonzero(good) < 2:
-            text = f"of {count} have no number in column {time_name} that is a time"
-            raise IdentificationError(f"{found} {text}; allowed is a time in each line")
-        notes.append(f"{found} are without a time and left out")
+            text = f"expected a time in each line of column {time_name}"
+            raise IdentificationError(f"{place}: {text}, got none in {wrong_times} of {count}")
+        notes.append(f"{place}: {wrong_times} lines are without a time and left out")
     time = time[good]
     # Infinite is no number either; two of them would make a warning of a sum.
     others = {n: np.where(np.isfinite(c), c, np.nan)[good] for n, c in others.items()}
@@ -249,12 +251,12 @@ def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:
             if _SAMPLING_S[0] <= step * factor <= _SAMPLING_S[1]:
                 return name, factor
         raise IdentificationError(
-            f"{path}: column {name} has steps of {step:g}, which are no sampling in s, ms, µs or"
-            ' ns; allowed is a unit in the header, such as "Time (s)"'
+            f'{path}: column {name}: expected a unit in the header, such as "Time (s)", got none,'
+            f" and steps of {step:g} are no sampling in s, ms, µs or ns"
         )
     raise IdentificationError(
-        f"{path}: found no column with times, columns are {', '.join(columns)};"
-        ' allowed is one that is called time, such as "Time (s)"'
+        f'{path}: expected a column that is called time, such as "Time (s)", got'
+        f" {', '.join(columns)}"
     )
 
 

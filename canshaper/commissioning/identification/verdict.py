@@ -114,8 +114,8 @@ def _useless(finding: Finding, series: Series) -> bool:
         text = f"it stands at {series.value[0]:g}; is it the right signal, and the sensor on?"
     elif (step := float(np.median(np.diff(series.time_s)))) > 0.25:
         text = (
-            f"a value every {step:.2g} s; allowed are {SAMPLES} or more a swing: log it at 10 Hz"
-            " or faster"
+            f"expected {SAMPLES} values or more a swing, got one every {step:.2g} s: log it at"
+            " 10 Hz or faster"
         )
     else:
         return False
@@ -212,7 +212,7 @@ def _faults(finding: Finding) -> list[str]:
     if fit is not None:
         if fit.swings < LEAST_SWINGS:
             faults.append(
-                f"only {fit.swings:.1f} swings, allowed are {LEAST_SWINGS:g} or more, better ten:"
+                f"expected {LEAST_SWINGS:g} swings or more, better ten, got {fit.swings:.1f}:"
                 f" {SWING_FREELY}"
             )
         largest = max(_angle(s) for s in fit.segments)
@@ -226,13 +226,13 @@ def _faults(finding: Finding) -> list[str]:
         faults += flat[:1]
     if period.relative > WIDEST_PERIOD:
         faults.append(
-            f"the period is known to {100 * period.relative:.1f} % only, allowed are"
-            f" {100 * WIDEST_PERIOD:g} %: {_noise_text(fit)}"
+            f"expected the period to {100 * WIDEST_PERIOD:g} %, got it to"
+            f" {100 * period.relative:.1f} %: {_noise_text(fit)}"
         )
     elif ratio.half > max(WIDEST_RATIO * ratio.value, WIDEST_RATIO_ABS):
         faults.append(
-            f"the damping ratio is {ratio.value:.3f}, known to {ratio.half:.3f} only, allowed are"
-            f" {100 * WIDEST_RATIO:g} %: {_noise_text(fit)}"
+            f"expected the damping ratio to {100 * WIDEST_RATIO:g} %, got {ratio.value:.3f}"
+            f" to {ratio.half:.3f}: {_noise_text(fit)}"
         )
     elif ratio.value <= ratio.half:
         faults.append(

@@ -37,10 +37,10 @@ OVER_COMMAND = 1e-4
 
 
 def in_range(name: str, value: float, low: float, high: float, unit: str = "") -> None:
-    """ValueError with the value found and the range allowed, unless finite and in [low, high]."""
+    """DesignError with range and value, unless the value is finite and in [low, high]."""
     if not (math.isfinite(value) and low <= value <= high):
-        text = f"{name} is {value:g} {unit}".rstrip()
-        raise DesignError(f"{text}, allowed is {low:g} to {high:g} {unit}".rstrip())
+        expected = f"{low:g} to {high:g} {unit}".rstrip()
+        raise DesignError(f"{name}: expected {expected}, got {value:g} {unit}".rstrip())
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,7 +68,7 @@ class Weights:
         for name, value in named:
             in_range(f"weight {name}", value, 0.0, 1e6)
         if self.r + self.s == 0.0:
-            raise DesignError("weights R and S are both 0, allowed is at least one above 0")
+            raise DesignError("weights R and S: expected one above 0, got both 0")
 
 
 PAPER_SLEW = Weights()
@@ -101,8 +101,8 @@ class Requirements:
 
     def __post_init__(self) -> None:
         if self.pole_distance not in get_args(PoleDistance):
-            allowed = ", ".join(get_args(PoleDistance))
-            raise DesignError(f"pole distance is {self.pole_distance}, allowed are {allowed}")
+            names = ", ".join(get_args(PoleDistance))
+            raise DesignError(f"pole distance: expected one of {names}, got {self.pole_distance}")
         if self.max_jump is not None:
             in_range("first jump", self.max_jump, 0.01, 100.0, "of the command")
         if self.max_rate_per_s is not None:
@@ -141,8 +141,8 @@ class Task:
         in_range("tick", self.tick_s, 1e-3, 0.2, "s")
         in_range("horizon", self.horizon_s, max(0.2, 5.0 * self.tick_s), 60.0, "s")
         if self.states not in get_args(States):
-            allowed = ", ".join(get_args(States))
-            raise DesignError(f"states are {self.states}, allowed are {allowed}")
+            names = ", ".join(get_args(States))
+            raise DesignError(f"states: expected one of {names}, got {self.states}")
         if self.length_range_pct is not None:
             in_range("length range", self.length_range_pct, 1.0, 60.0, "%")
             if self.require.max_run_on_s is None:

@@ -22,10 +22,9 @@ def manual(mode: SwayMode) -> Tuning:
     if -first < SLOWEST_RAD_S or -poles[1] > FASTEST_RAD_S:
         ratio = SLOWEST_RAD_S / POLE_DISTANCE / mode.omega_rad_s
         raise DesignError(
-            f"the manual rule puts the poles at {-first:.3g} and {-poles[1]:.3g} rad/s from a"
-            f" damping ratio of {mode.damping_ratio:.3g}, allowed are {SLOWEST_RAD_S:g} to"
-            f" {FASTEST_RAD_S:g} rad/s (damping ratio {ratio:.3g} or more);"
-            " the optimal method needs no damping"
+            f"poles of the manual rule: expected {SLOWEST_RAD_S:g} to {FASTEST_RAD_S:g} rad/s"
+            f" (damping ratio {ratio:.3g} or more), got {-first:.3g} and {-poles[1]:.3g} rad/s from"
+            f" a damping ratio of {mode.damping_ratio:.3g}; the optimal method needs no damping"
         )
     a1, a2 = denominator_from_poles(poles)
     return Tuning(poles, None, a1, a2, "manual")

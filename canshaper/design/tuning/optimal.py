@@ -72,7 +72,7 @@ def tune(
     """
     report = on_progress or (lambda _done, _what: None)
     if isinstance(starts, int) and not 1 <= starts <= 1000:
-        raise DesignError(f"starts is {starts}, allowed is 1 to 1000")
+        raise DesignError(f"starts: expected 1 to 1000, got {starts}")
     box_conflict(task)
     report(0.0, "building the programme")
     begin = time.perf_counter()
@@ -133,7 +133,7 @@ def given(program: Program, starts: Sequence[tuple[float, ...]]) -> list[Vector]
     points = []
     for poles in starts:
         if len(poles) != program.size or not all(p < 0.0 for p in poles):
-            text = f"start is {poles}, allowed are {program.size} negative poles"
+            text = f"start: expected {program.size} negative poles, got {poles}"
             raise DesignError(text)
         q = np.log(np.sort(-np.array(poles)))
         points.append(np.array([q[0], *np.diff(q)]))

@@ -92,7 +92,7 @@ def least_residual(
     count = round(duration_s / tick_s) + 1
     if count * tick_s * rate_per_s < 1.0:
         raise DesignError(
-            f"duration is {duration_s:g} s, allowed is {1.0 / rate_per_s:g} s or more:"
+            f"duration: expected {1.0 / rate_per_s:g} s or more, got {duration_s:g} s:"
             f" the valve takes that long to full speed at {rate_per_s:g} /s"
         )
     weights = _weights(swing, range_pct, LENGTHS)
@@ -164,8 +164,8 @@ def shortest(
     best = design(high)
     if left_pct(best) > residual_pct:
         raise DesignError(
-            f"residual is {residual_pct:g} %, allowed is {left_pct(best):.2g} % or more"
-            f" for +-{range_pct:g} % length with a valve rate of {rate_per_s:g} /s"
+            f"residual: expected {left_pct(best):.2g} % or more for +-{range_pct:g} % length"
+            f" with a valve rate of {rate_per_s:g} /s, got {residual_pct:g} %"
         )
     while low < high:
         middle = (low + high) // 2
@@ -240,4 +240,5 @@ def _check(tick_s: float, duration_s: float, range_pct: float, rate_per_s: float
         ("valve rate", rate_per_s, 0.2, 1000.0, "1/s"),
     ):
         if not low <= value <= high:
-            raise DesignError(f"{name} is {value:g} {unit}, allowed is {low:g} to {high:g} {unit}")
+            expected = f"{low:g} to {high:g} {unit}"
+            raise DesignError(f"{name}: expected {expected}, got {value:g} {unit}")

@@ -32,7 +32,7 @@ class Fir:
         total = math.fsum(taps)
         # A tenth of a percent is rounding of taps written to a file, far below any valve's step.
         if not abs(total - 1.0) <= 1e-3:
-            raise ValueError(f"sum of the taps is {total:g}, allowed is 1")
+            raise ValueError(f"sum of the taps: expected 1, got {total:g}")
         self.taps = tuple(tap / total for tap in taps)
         self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
 

@@ -42,8 +42,8 @@ class Gff:
         for pole in (*poles_rad_s, *([] if third_pole_rad_s is None else [third_pole_rad_s])):
             if not fastest <= pole < 0.0:
                 raise ValueError(
-                    f"pole is {pole:g} rad/s, allowed is {fastest:g} to below 0 rad/s"
-                    f" at a tick of {sway.tick_s:g} s"
+                    f"pole: expected {fastest:g} to below 0 rad/s at a tick of {sway.tick_s:g} s,"
+                    f" got {pole:g} rad/s"
                 )
         self._sway = sway
         # The lag reaches exp(p T) in the tick of the step; a share of 1 is no lag.
@@ -94,12 +94,12 @@ def poles_from_denominator(a1: float, a2: float) -> tuple[float, float]:
         ValueError: a1 or a2 is not positive, or the poles are not real (paper Eq. 14d).
     """
     if not (math.isfinite(a1) and math.isfinite(a2) and a1 > 0.0 and a2 > 0.0):
-        raise ValueError(f"a1 is {a1:g}, a2 is {a2:g}, allowed are positive numbers")
+        raise ValueError(f"a1, a2: expected positive numbers, got {a1:g}, {a2:g}")
     discriminant = a1 * a1 - 4.0 * a2
     if discriminant < 0.0:
         raise ValueError(
-            f"a1 is {a1:g}, allowed is {2.0 * math.sqrt(a2):.6g} or more for a2 = {a2:g}"
-            " (real poles, a1^2 >= 4 a2)"
+            f"a1: expected {2.0 * math.sqrt(a2):.6g} or more for a2 = {a2:g}"
+            f" (real poles, a1^2 >= 4 a2), got {a1:g}"
         )
     # Citardauq's form: no cancellation when the poles lie far apart.
     q = -0.5 * (a1 + math.sqrt(discriminant))
@@ -124,7 +124,7 @@ def _gff(
         return Gff(sway, (poles_rad_s[0], poles_rad_s[1]), third_pole_rad_s)
     if a1 is not None and a2 is not None:
         return Gff.from_denominator(sway, a1, a2, third_pole_rad_s)
-    raise ValueError("allowed are a1 and a2, or poles_rad_s")
+    raise ValueError("expected a1 and a2, or poles_rad_s, got neither")
 
 
 def _check(**parameters: float) -> None:
@@ -132,8 +132,8 @@ def _check(**parameters: float) -> None:
     if given == {"a1", "a2"}:
         poles_from_denominator(parameters["a1"], parameters["a2"])
     elif given != {"poles_rad_s"}:
-        found = ", ".join(sorted(given)) or "neither"
-        raise ValueError(f"found {found}; allowed are a1 and a2, or poles_rad_s")
+        got = ", ".join(sorted(given)) or "neither"
+        raise ValueError(f"expected a1 and a2, or poles_rad_s, got {got}")
 
 
 def _by_poles(parameters: Parameters) -> Parameters:

@@ -44,8 +44,8 @@ class LimitAware:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
         if omega > fastest:
             raise ValueError(
-                f"natural frequency is {omega:g} rad/s, allowed is up to {fastest:g} rad/s"
-                f" for this filter at a tick of {sway.tick_s:g} s"
+                f"natural frequency: expected up to {fastest:g} rad/s for this filter"
+                f" at a tick of {sway.tick_s:g} s, got {omega:g} rad/s"
             )
         pole = max(POLE_PER_OMEGA * omega, POLE_PER_ROOT * math.sqrt(rate_per_s * omega))
         self._gff = Gff(sway, (pole, pole))
@@ -89,8 +89,8 @@ def _robust(
 ) -> Shaper:
     if tick_ms is not None and tick_ms != round(1000.0 * sway.tick_s):
         raise ValueError(
-            f"tick_ms of the taps is {tick_ms:g} ms, allowed is the period of the valve,"
-            f" {1000.0 * sway.tick_s:g} ms"
+            f"tick_ms of the taps: expected the period of the valve, {1000.0 * sway.tick_s:g} ms,"
+            f" got {tick_ms:g} ms"
         )
     return LimitAware(sway, Fir(taps), valve_rate_per_s)
 

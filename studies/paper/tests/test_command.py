@@ -71,7 +71,7 @@ def test_one_figure_comes_without_the_table(tmp_path: Path) -> None:
 def test_unknown_figure(tmp_path: Path) -> None:
     result = run("--out", str(tmp_path / "new"), "--figure", "3", "--figure", "5")
     assert result.exit_code == 2
-    assert result.stderr == "--figure 5: allowed are 3, 4, 6, 7, 8\n"
+    assert result.stderr == "--figure: expected one of 3, 4, 6, 7, 8, got 5\n"
     assert not (tmp_path / "new").exists()
 
 

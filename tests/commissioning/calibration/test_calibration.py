@@ -202,10 +202,16 @@ def test_no_other_valve_moves(deployment: Deployment) -> None:
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["--axis", "boom"], "found 'boom', axes are slew, near_far, lift"),
-        (["--axis", "slew", "--speed", "TipVelocity.Rate"], "found 'Rate', signals of TipVelocity"),
-        (["--axis", "slew", "--speed", "Tip.Rate"], "found 'Tip', messages of the DBC files are"),
-        (["--axis", "slew", "--speed", "Rate"], "--speed: found Rate, allowed is MESSAGE.SIGNAL"),
+        (["--axis", "boom"], "expected an axis, got 'boom'; there are slew, near_far, lift"),
+        (
+            ["--axis", "slew", "--speed", "TipVelocity.Rate"],
+            "expected a signal of TipVelocity, got 'Rate'",
+        ),
+        (
+            ["--axis", "slew", "--speed", "Tip.Rate"],
+            "expected a message of the DBC files, got 'Tip'; there are",
+        ),
+        (["--axis", "slew", "--speed", "Rate"], "--speed: expected MESSAGE.SIGNAL, got Rate"),
     ],
 )
 def test_wrong_options_are_told(arguments: list[str], says: str) -> None:
@@ -222,7 +228,7 @@ def test_a_signal_that_is_none_of_the_axis_is_told(deployment: Deployment) -> No
 
 
 def test_no_signal_at_all_is_refused(deployment: Deployment) -> None:
-    with pytest.raises(ConfigError, match="found 'Nothing'"):
+    with pytest.raises(ConfigError, match="expected a signal of TipVelocity, got 'Nothing'"):
         CalibrationDrive(deployment, "slew", ("TipVelocity", "Nothing"), RAMP)
 
 

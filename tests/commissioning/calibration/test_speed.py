@@ -101,10 +101,11 @@ def test_what_is_no_speed_counts_as_silence(tmp_path: Path, message: str, data: 
 
 
 @pytest.mark.parametrize(
-    ("message", "why"), [("Chosen", "is multiplexed"), ("Long", "has 20 bytes, allowed are 8")]
+    ("message", "why"),
+    [("Chosen", " is multiplexed"), ("Long", ": expected 8 bytes at most, got 20")],
 )
 def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why: str) -> None:
-    with pytest.raises(ConfigError, match=f"--speed: {message} {why}"):
+    with pytest.raises(ConfigError, match=f"--speed: {message}{why}"):
         CalibrationDrive(with_messages(tmp_path), "slew", (message, "Speed"), RAMP)
 
 

@@ -95,7 +95,7 @@ def test_a_wrong_deployment_is_told_before_anything_runs(tmp_path: Path) -> None
     file.write_text("tick_ms: 0\n")
     done = doctor(file)
     assert done.returncode == 2
-    assert f"{file}:1: tick_ms: found 0" in done.stderr
+    assert f"{file}:1: tick_ms: expected a whole number, 1 to 50 ms, got 0" in done.stderr
     assert done.stdout == ""
 
 

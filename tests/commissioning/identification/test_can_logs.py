@@ -116,7 +116,7 @@ def test_a_log_without_the_signal(log: Path, deployment: Deployment) -> None:
     write(log, kept)
     with pytest.raises(IdentificationError) as error:
         read_can(log, "", SWAY, deployment.messages)
-    assert "found no frame of GrappleSway (id 0x400) in 1800 frames" in str(error.value)
+    assert "expected frames of GrappleSway (id 0x400), got 1800 of " in str(error.value)
     assert "LiftCommand, NearFarCommand, SlewCommand" in str(error.value)
 
 
@@ -170,15 +170,15 @@ def test_two_senders_need_a_choice(tmp_path: Path, deployment: Deployment) -> No
         read_can(log, "", SWAY, deployment.messages)
     chosen = read_can(log, "", SWAY, deployment.messages, channel="can1")["slew"]
     assert len(chosen.value) == 600
-    with pytest.raises(LogError, match=r"no bus 'can7', its frames are of 'can0', 'can1'"):
+    with pytest.raises(LogError, match=r"expected the bus 'can7', got frames of 'can0', 'can1'"):
         read_can(log, "", SWAY, deployment.messages, channel="can7")
 
 
 @pytest.mark.parametrize(
     ("name", "text"),
     [
-        ("Sway", "allowed is AXIS=MESSAGE.SIGNAL"),
-        ("Nothing.Here", "messages of the DBC files are"),
+        ("Sway", "expected AXIS=MESSAGE.SIGNAL, got"),
+        ("Nothing.Here", "expected a message of the DBC files, got 'Nothing'; there are"),
         ("GrappleSway.Nothing", "has the signals SwayPerpendicular, SwayParallel"),
     ],
 )

@@ -58,7 +58,7 @@ def test_a_speed_with_which_the_tip_stops_too_late_is_not_written(
     result = run(tmp_path, logs / "empty.log", "--file", file, "--write")
     assert result.exit_code == 2
     assert "axis near_far: with sway: { period_s: 2.20" in said(result)
-    assert "limits.stop_distance_m: found 1.1 m; max_pct, tail_s" in said(result)
+    assert "limits.stop_distance_m: expected" in said(result)
     assert file.read_text() == before
 
 
@@ -188,38 +188,50 @@ def test_one_state_that_is_too_poor_keeps_the_axis_from_being_written(
 
 
 BAD = {
-    "nothing": ([], "found no log and no stopwatch"),
+    "nothing": ([], "expected a log or a stopwatch, got neither"),
     "no such log": (["nowhere.log"], "nowhere.log"),
     "no such table": (["nowhere.csv"], "nowhere.csv"),
-    "no suffix": (["{logs}/empty"], "no suffix"),
+    "each also with .gz behind, got none": (
+        ["{logs}/empty"],
+        "each also with .gz behind, got none",
+    ),
     "no such file": (["{logs}/empty.log", "--file", "nowhere.yaml"], "nowhere.yaml"),
-    "write to nothing": (["{logs}/empty.log", "--write"], "--write: allowed with --file"),
-    "no equals": (["{logs}/empty.log", "--signal", "slew"], "allowed is AXIS=NAME"),
+    "write to nothing": (["{logs}/empty.log", "--write"], "--write: expected --file too"),
+    "no equals": (
+        ["{logs}/empty.log", "--signal", "slew"],
+        "--signal: expected AXIS=NAME, got 'slew'",
+    ),
     "no such axis": (
         ["{logs}/empty.log", "--file", "{file}", "--signal", "crab=A.B"],
-        "found 'crab', axes are slew, near_far, lift",
+        "expected an axis, got 'crab'; there are slew, near_far, lift",
     ),
     "twice": (
         ["{logs}/empty.log", "--signal", "slew=A.B", "--signal", "slew=A.C"],
-        "two signals of slew",
+        "--signal: expected one signal of slew, got two",
     ),
-    "no such message": (["{logs}/empty.log", "--signal", "slew=A.B"], "found 'A', messages"),
+    "no such message": (
+        ["{logs}/empty.log", "--signal", "slew=A.B"],
+        "expected a message of the DBC files, got 'A'",
+    ),
     "phone without axis": (
         ["{logs}/Gyroscope.csv", "--file", "{file}"],
-        "--axis: found none, axes are slew, near_far, lift",
+        "--axis: expected an axis, got none; there are slew, near_far, lift",
     ),
     "axis without sway": (
         ["{logs}/Gyroscope.csv", "--file", "{file}", "--axis", "lift", "--write"],
-        "axis lift: found no section sway to write to; put in sway: { period_s: 2.35",
+        "axis lift: expected a section sway to write to, got none; put in sway: { period_s: 2.35",
     ),
-    "half a stopwatch": (["--swings", "10", "--seconds", "23"], "without --first, --last"),
+    "half a stopwatch": (
+        ["--swings", "10", "--seconds", "23"],
+        "together, and no log, got none of --first, --last",
+    ),
     "stopwatch and log": (
         ["{logs}/empty.log", "--swings", "9", "--seconds", "20", "--first", "9", "--last", "5"],
-        "stopwatch with the log",
+        "together, and no log, got the log",
     ),
     "bad stopwatch": (
         ["--swings", "1", "--seconds", "2", "--first", "9", "--last", "5"],
-        "--swings: found 1",
+        "--swings: expected 3 or more, better 10, got 1",
     ),
     "dbc": (["{logs}/empty.log", "--dbc", "{file}"], "not a DBC file"),
     "one of two axes without sway": (
@@ -233,11 +245,11 @@ BAD = {
             "--signal",
             "lift=GrappleSway.SwayParallel",
         ],
-        "axis lift: found no section sway to write to",
+        "axis lift: expected a section sway to write to, got none",
     ),
     "no signal of an axis": (
         ["{logs}/empty.log", "--file", "{file}", "--axis", "lift"],
-        "found no --signal; allowed is --signal AXIS=MESSAGE.SIGNAL",
+        "expected --signal AXIS=MESSAGE.SIGNAL with what shows the swing, got none",
     ),
 }
 

@@ -147,7 +147,9 @@ def test_a_gyroscope_with_an_empty_column(tmp_path: Path) -> None:
     file.write_text("\n".join([header, *(row.rpartition(",")[0] + "," for row in rows), ""]))
     assert identify("slew", "", [series_of(read_table(file), "", None)]).usable
     file.write_text("\n".join([header, *(row.partition(",")[0] + ",,," for row in rows), ""]))
-    with pytest.raises(IdentificationError, match=r"a\.csv: found no number in Gyroscope x"):
+    with pytest.raises(
+        IdentificationError, match=r"a\.csv: expected a number in each line of Gyroscope x"
+    ):
         series_of(read_table(file), "", None)
 
 
@@ -160,31 +162,34 @@ def test_a_clock_that_goes_back(tmp_path: Path) -> None:
 
 
 WRONG = {
-    "empty": ("", "found no text"),
-    "no header": ("0.0,1.0\n0.1,2.0\n", "found numbers, allowed is a header"),
+    "empty": ("", "expected a table with a header, got no text"),
+    "nono header": ("0.0,1.0\n0.1,2.0\n", 'such as "Time (s),Gyroscope x (rad/s)", got numbers'),
     "one column": ("Time (s)\n0.0\n", "at least two columns"),
-    "no times": ("x,y\n0.0,1.0\n0.1,2.0\n", "found no column with times, columns are x, y"),
-    "only times": ("time (s),timestamp\n0.0,1.0\n0.1,2.0\n", "found no column but times"),
-    "one line": ("time (s),x\n0.0,1.0\n", "found 1 lines of numbers"),
+    "no times": ("x,y\n0.0,1.0\n0.1,2.0\n", "got x, y"),
+    "only times": ("time (s),timestamp\n0.0,1.0\n0.1,2.0\n", "got times only"),
+    "one line": ("time (s),x\n0.0,1.0\n", "expected 2 lines of numbers or more, got 1"),
     "text": (
         "time (s),x\n" + "\n".join(f"{k},hello" for k in range(100)),
-        ":2: 100 of 100 lines are not 2 numbers",
+        ":2: expected 2 numbers a line, got 100 lines of 100 without",
     ),
     "dates": (
         "time,x\n" + "\n".join(f"2026-01-01T00:00:{k:02},{k}" for k in range(50)),
-        "are not 2 numbers",
+        "expected 2 numbers a line, got",
     ),
-    "bytes": ("\0\1\2,\0", "found no text"),
+    "bytes": ("\0\1\2,\0", "expected a table with a header, got no text"),
     "an endless field": (
         "time (s),x\n0.0,1.0\n0.1," + "2" * 140_000,
-        ":3: found field larger than field limit (131072), allowed is a table of numbers",
+        ":3: expected a table of numbers, got field larger than field limit (131072)",
     ),
-    "an endless header": ("a," + "b" * 140_000, ":1: found field larger than field limit"),
+    "an endless header": (
+        "a," + "b" * 140_000,
+        ":1: expected a table of numbers, got field larger than field limit",
+    ),
     "times of no clock": (
         "time (s),x\n" + "1e12,1.0\n" * 50,
-        ":2: 50 lines of 50 have no number in column time (s) that is a time",
+        ":2: expected a time in each line of column time (s), got none in 50 of 50",
     ),
-    "no unit of time": ("time,x\n0.0,1.0\n1e12,2.0\n", "which are no sampling in s, ms"),
+    "no unit of time": ("time,x\n0.0,1.0\n1e12,2.0\n", "are no sampling in s, ms"),
 }
 
 
@@ -201,7 +206,9 @@ def test_wrong_tables(tmp_path: Path, name: str) -> None:
 
 def test_a_column_that_is_not_there(tmp_path: Path) -> None:
     table = read_table(phone(tmp_path / "a.csv", SWUNG))
-    with pytest.raises(IdentificationError, match=r"no column 'Gyro w', columns are Gyroscope x"):
+    with pytest.raises(
+        IdentificationError, match=r"expected a column, got 'Gyro w'; there are Gyroscope x"
+    ):
         series_of(table, "", "Gyro w")
 
 

@@ -170,8 +170,8 @@ def test_a_candidate_gets_time_to_run_on(deployment: Deployment) -> None:
 @pytest.mark.parametrize(
     "axis, message",
     [
-        ("lift", "axis lift: found no sway data; allowed are axes with sway data: slew, near_far"),
-        ("boom", "axis boom: found no such axis; allowed are axes with sway data: slew, near_far"),
+        ("lift", "axis lift: expected one with sway data, slew, near_far, got no sway data"),
+        ("boom", "axis boom: expected one with sway data, slew, near_far, got no such axis"),
     ],
 )
 def test_an_axis_that_cannot_be_compared(axis: str, message: str, tmp_path: Path) -> None:

@@ -157,7 +157,7 @@ REFUSED = {
         "comment stands inside poles_rad_s",
     ),
     "no such section": ("other: 1\n", "no section filter"),
-    "not a section": ("filter: 3\n", "allowed is a section with keys"),
+    "not a section": ("filter: 3\n", "expected a section with keys, got none"),
     "not YAML": ("filter: [1\n", "not YAML"),
 }
 
@@ -171,7 +171,9 @@ def test_what_cannot_be_changed_alone_is_refused(name: str) -> None:
 
 def test_a_result_that_is_no_deployment_is_not_written(file: Path) -> None:
     before = file.read_bytes()
-    with pytest.raises(ConfigError, match=r"machine.yaml:\d+: axes.slew.filter: a1 is 0.1"):
+    with pytest.raises(
+        ConfigError, match=r"machine.yaml:\d+: axes.slew.filter: a1: expected .*, got 0.1"
+    ):
         set_values(file, SLEW, {"a1": 0.1, "a2": 0.12})
     assert file.read_bytes() == before
     assert list(file.parent.iterdir()) == [file]
@@ -242,7 +244,7 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
 
 
 def test_only_words_and_numbers_are_written() -> None:
-    with pytest.raises(ValueError, match="allowed is a word"):
+    with pytest.raises(ValueError, match="expected a word, got 'a: b'"):
         edited("filter: { kind: gff }", ("filter",), {"kind": "a: b"})
 
 

@@ -74,9 +74,9 @@ def test_time_optimal_limit(rate: float, low: float, seconds: float) -> None:
 
 
 def test_what_cannot_be_is_refused_with_what_can() -> None:
-    with pytest.raises(ValueError, match=r"duration is 0.1 s, allowed is 0.2 s or more"):
+    with pytest.raises(ValueError, match=r"duration: expected 0.2 s or more, got 0.1 s"):
         least_residual(MODE, duration_s=0.1, range_pct=15.0, **VALVE)
-    with pytest.raises(ValueError, match=r"range of length is 80 %, allowed is 0 to 60 %"):
+    with pytest.raises(ValueError, match=r"range of length: expected 0 to 60 %, got 80 %"):
         least_residual(MODE, duration_s=1.0, range_pct=80.0, **VALVE)
-    with pytest.raises(ValueError, match=r"residual is 0 %, allowed is .* % or more"):
+    with pytest.raises(ValueError, match=r"residual: expected .* % or more for .*, got 0 %"):
         shortest(MODE, residual_pct=0.0, range_pct=60.0, **VALVE)

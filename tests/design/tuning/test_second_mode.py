@@ -234,7 +234,7 @@ def test_the_file_records_it(file: Path) -> None:
     checked = CliRunner().invoke(app, ["check", str(file)])
     assert checked.exit_code == 2
     where = "axes.near_far.filter.designed_for.second.length_range_pct"
-    assert f"{where}: found 61.0, allowed is 0 to 60 %" in " ".join(checked.output.split())
+    assert f"{where}: expected 0 to 60 %, got 61.0" in " ".join(checked.output.split())
 
 
 def test_another_period_stretches_the_taps_as_long_as_the_second_mode_is_covered(
