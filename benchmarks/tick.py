@@ -4,7 +4,8 @@ Both take the same two joystick frames from a bus and send four valve frames to 
 python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,
 decode, encode, send. The daemon's body also checks, shapes, limits, counts and publishes status; it
 is timed with the output guard in front of the bus, and without. What the black box adds is timed
-without a bus: in the tick, behind it, and for the state that it keeps every ten seconds.
+without a bus: in the tick, behind it, and for the state that it keeps every ten seconds. So is what
+the two-axis motion adds to forwarder-robust.yaml, with both joysticks moved all the time.
 Each is timed tick by tick, in turn, in one run; the ratio is the figure that counts.
 
     python benchmarks/tick.py [--ticks 5000]
@@ -16,6 +17,7 @@ import statistics
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import can
@@ -33,6 +35,8 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shipped import data_directory
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import random_script
+from canshaper_sim.plant import PlantNode
+from canshaper_sim.strokes import Script, Stroke
 
 FOURTH_VALVE = """
 BO_ 515 RotateCommand: 2 SHAPER
@@ -146,6 +150,41 @@ def black_box(one: Deployment, other: Deployment, ticks: int) -> None:
     )
 
 
+def two_axis_motion(ticks: int) -> None:
+    """Measure and print what slew and near-far cost as one motion."""
+    deployment = load_deployment(data_directory() / "config" / "forwarder-robust.yaml")
+    apart = deployment.config.model_copy(update={"motion": {}})
+    alone = replace(deployment, config=apart, motions={})
+    with_motion, without = Controller(deployment), Controller(alone)
+    strokes = []
+    for begin_s in range(0, int(ticks * 0.02), 8):
+        for axis, level in (("slew", 1.0), ("near_far", 0.7)):
+            strokes.append(Stroke(axis, begin_s + 0.1, 3.0, level))
+            strokes.append(Stroke(axis, begin_s + 4.1, 3.0, -level))
+    joysticks = JoystickNode(deployment, Script("both", tuple(strokes), ticks * 0.02 + 8.0))
+    plant = PlantNode(deployment)
+    spent: tuple[list[int], list[int]] = [], []
+    both = tuple(zip((with_motion, without), spent, strict=True))
+    measured: list[Frame] = []
+    gc.collect()
+    for i in range(ticks):
+        frames, now_ns = [*measured, *joysticks.frames(i * 20)], i * 20_000_000
+        for controller, times in both[:: 1 if i % 2 else -1]:
+            for frame in frames:
+                controller.receive(frame, now_ns)
+            start = time.perf_counter_ns()
+            sent = list(controller.tick(now_ns))
+            times.append(time.perf_counter_ns() - start)
+            controller.events.clear()
+            if controller is with_motion:
+                for frame in sent:
+                    plant.receive(frame)
+        plant.advance(0.02)
+        measured = plant.feedback()
+    whole, bare = (statistics.median(times) / 1e3 for times in spent)
+    print(f"two-axis motion: {whole - bare:.1f} us more in a tick of {bare:.0f} us without a bus")
+
+
 def print_rows(ticks: int, pure: list[int], spent: dict[str, list[int]]) -> None:
     """Print what a tick took, and the ratios."""
     print(f"{ticks} ticks, 2 joystick frames in, 4 axes (3 with G_FF, 1 off), us per tick")
@@ -217,6 +256,7 @@ def main() -> None:
 
     print_rows(ticks, pure, spent)
     black_box(*boxed, ticks)
+    two_axis_motion(ticks)
 
 
 if __name__ == "__main__":

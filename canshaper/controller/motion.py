@@ -24,12 +24,17 @@ class _Member:
         """Take the state of the axis; see ``MotionRunner.step``."""
         moving, runner = self.moving, self.runner
         axis, period = runner.axis, runner.period_ticks
-        passed = now // period - last // period
-        if passed > 1:
-            moving.held((passed - 1) * moving.period_s)
-        moving.ahead_s = 0.0 if passed else (period - now % period) * tick_s
-        assert axis.sway is not None
-        moving.sway, moving.applied = axis.sway, axis.applied
+        if period == 1 == now - last:
+            moving.ahead_s = 0.0
+        else:
+            passed = now // period - last // period
+            if passed > 1:
+                moving.held((passed - 1) * moving.period_s)
+            moving.ahead_s = 0.0 if passed else (period - now % period) * tick_s
+        if axis.sway is not moving.sway:  # changed while it runs
+            assert axis.sway is not None
+            moving.follow(axis.sway)
+        moving.applied = axis.applied
         moving.commanded, moving.able = axis.commanded, axis.state in ABLE
 
 
@@ -79,15 +84,16 @@ class MotionRunner:
             last: number of the deadline before; axes have held their output since then.
             now: number of this deadline.
         """
-        if any(member.runner.alone for member in self._members):
-            self._end()
-            return
-        for member in self._members:
-            member.take(self._tick_s, last, now)
+        tick_s, members = self._tick_s, self._members
+        for member in members:
+            if member.runner.alone:
+                self._end()
+                return
+            member.take(tick_s, last, now)
         tip_m = self._radius.fresh(now_ns) if self._radius else None
-        self._motion.step((now - last) * self._tick_s, tip_m, self._circle_m)
-        for member in self._members:
-            member.runner.add(member.moving.added)
+        self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
+        for member in members:
+            member.runner.added = member.moving.added
 
     def on_trip(self, tripped: AxisRunner) -> None:
         """An axis has tripped: where it is one of these, nothing is added any more, at once."""

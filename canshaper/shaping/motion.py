@@ -17,8 +17,7 @@ in on its circle.
 """
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, field
 
 from canshaper.shaping.sway import SwayModel
 
@@ -30,6 +29,9 @@ FADE_S = 0.2
 # Largest change of an added velocity between two ticks of an axis, fraction of full speed.
 MOST_STEP = 0.1
 _NOTHING = 1e-6
+# Lead of the tip and its rate, speed and acceleration of the grapple; rad or m, per second.
+_Path = tuple[float, float, float, float]
+_REST: _Path = 0.0, 0.0, 0.0, 0.0
 # Least part of gravity that is left across the boom; beyond it the small angles are none.
 _LEAST = 0.5
 # Least radius of the grapple that the map takes: a sensor may say 0.
@@ -51,6 +53,8 @@ class MovingAxis:
         able: it may carry out what is added.
         added: velocity to add now, [-1, 1]; the result.
         reached: position that the added velocities reach at the end of the period, rad or m.
+        stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
+        lag_s: 2 zeta / w.
     """
 
     full_speed: float
@@ -62,24 +66,36 @@ class MovingAxis:
     able: bool = False
     added: float = 0.0
     reached: float = 0.0
+    stiffness: float = field(init=False)
+    damping: float = field(init=False)
+    lag_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.follow(self.sway)
+
+    def follow(self, sway: SwayModel) -> None:
+        """The axis has this sway model now."""
+        omega, ratio = sway.mode.omega_rad_s, sway.mode.damping_ratio
+        self.sway = sway
+        self.stiffness, self.damping = omega * omega, 2.0 * ratio * omega
+        self.lag_s = 2.0 * ratio / omega
 
     def held(self, seconds: float) -> None:
         """The last output was held for so much longer."""
         self.reached += self.added * self.full_speed * seconds
 
-    def path(self, after_s: float) -> "_Path":
+    def path(self, after_s: float) -> _Path:
         """The grapple's motion at a time from now, the applied velocity held until then."""
         after_s -= self.ahead_s
-        sway, full = self.sway, self.full_speed
-        omega, angle = sway.mode.omega_rad_s, sway.angle
-        damping = 2.0 * sway.mode.damping_ratio * omega
-        rate = sway.rate + self.applied
-        acceleration = -omega * omega * angle - damping * rate
-        angle += after_s * (rate + 0.5 * after_s * acceleration)
-        rate += after_s * acceleration
+        sway, full, applied = self.sway, self.full_speed, self.applied
+        stiffness, damping = self.stiffness, self.damping
+        angle, rate = sway.angle, sway.rate + applied
+        change = -after_s * (stiffness * angle + damping * rate)
+        angle += after_s * (rate + 0.5 * change)
+        rate += change
         # The grapple's speed is that of the tip less the lead's.
-        pull = omega * omega * angle + damping * rate
-        return _Path(full * angle, full * rate, full * (self.applied - rate), full * pull)
+        pull = stiffness * angle + damping * rate
+        return full * angle, full * rate, full * (applied - rate), full * pull
 
     def add(self, target: float, weight: float) -> None:
         """Run to a position of the added part within the period.
@@ -90,25 +106,19 @@ class MovingAxis:
         """
         way = self.period_s * self.full_speed
         velocity = weight * (target - self.reached) / way
-        velocity = min(max(velocity, self.added - MOST_STEP), self.added + MOST_STEP)
-        if not abs(velocity) >= _NOTHING:  # or not a number
-            self.added = 0.0
-            return
-        self.added = min(max(velocity, -1.0), 1.0)
+        last = self.added
+        if velocity > last + MOST_STEP:
+            velocity = last + MOST_STEP
+        elif velocity < last - MOST_STEP:
+            velocity = last - MOST_STEP
+        if not _NOTHING <= abs(velocity) <= 1.0:
+            if not abs(velocity) > 1.0:  # next to nothing, or not a number
+                self.added = 0.0
+                return
+            velocity = math.copysign(1.0, velocity)
+        self.added = velocity
         # What a fading part leaves out is not made up for.
-        self.reached = target if weight < 1.0 else self.reached + self.added * way
-
-
-class _Path(NamedTuple):
-    """Lead of the tip and its rate, speed and acceleration of the grapple; rad or m, per second."""
-
-    lead: float
-    lead_rate: float
-    speed: float
-    acceleration: float
-
-
-_REST = _Path(0.0, 0.0, 0.0, 0.0)
+        self.reached = target if weight < 1.0 else self.reached + velocity * way
 
 
 class TwoAxisMotion:
@@ -140,8 +150,10 @@ class TwoAxisMotion:
         slew, near_far = self._slew, self._near_far
         commanded = slew.commanded or (near_far is not None and near_far.commanded)
         able = slew.able and (near_far is None or near_far.able)
-        fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
-        weight = self._weight = min(max(self._weight + fade, 0.0), 1.0)
+        weight = self._weight
+        if weight < 1.0 or not able:
+            fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
+            weight = self._weight = min(max(weight + fade, 0.0), 1.0)
         if not commanded or not weight:
             self._rest()
             return
@@ -154,19 +166,20 @@ class TwoAxisMotion:
         turn = slew.path(slew.period_s)
         if near_far is None or radius_m is None:
             if not slew.ahead_s:
-                slew.add(_psi(turn, slew.sway) - turn.lead, weight)
+                slew.add(_psi(turn, slew.stiffness) - turn[0], weight)
             if near_far is not None:
                 near_far.add(near_far.reached, 0.0)
             return
         psi, way_m = self._tip(turn, slew.period_s, near_far, radius_m)
         if not slew.ahead_s:
-            slew.add(psi - turn.lead, weight)
+            slew.add(psi - turn[0], weight)
         if near_far.ahead_s:
             return
         if near_far.period_s != slew.period_s:
             turn = slew.path(near_far.period_s)
             _, way_m = self._tip(turn, near_far.period_s, near_far, radius_m)
-        near_far.add(min(max(way_m, -self._path_m), self._path_m), weight)
+        path_m = self._path_m
+        near_far.add(path_m if way_m > path_m else max(way_m, -path_m), weight)
 
     def stop(self) -> None:
         """One of the axes has tripped: nothing is added any more, at once."""
@@ -207,9 +220,11 @@ class TwoAxisMotion:
         """
         lead, lead_rate, speed, acceleration = turn
         out, _, out_rate, out_acceleration = near_far.path(after_s) if near_far.commanded else _REST
-        mode_5, mode_6 = self._slew.sway.mode, near_far.sway.mode
-        across_2, along_2 = mode_5.omega_rad_s**2, mode_6.omega_rad_s**2
-        radius_m = max(radius_m + after_s * out_rate, _LEAST_RADIUS_M)
+        slew = self._slew
+        across_2, along_2 = slew.stiffness, near_far.stiffness
+        radius_m += after_s * out_rate
+        if not radius_m > _LEAST_RADIUS_M:
+            radius_m = _LEAST_RADIUS_M
         # Coriolis and centripetal acceleration, and their rates for the dampers.
         turning = 2.0 * out_rate * speed / radius_m
         turning_rate = (
@@ -220,18 +235,18 @@ class TwoAxisMotion:
         inwards_rate = out_rate * speed * speed + 2.0 * radius_m * (
             speed * acceleration - across_2 * lead * lead_rate
         )
-        damping_5 = 2.0 * mode_5.damping_ratio / mode_5.omega_rad_s
-        damping_6 = 2.0 * mode_6.damping_ratio / mode_6.omega_rad_s
-        pull_t = radius_m * (across_2 * lead + turning - damping_5 * turning_rate)
-        pull_r = along_2 * out - inwards + damping_6 * inwards_rate
+        pull_t = radius_m * (across_2 * lead + turning - slew.lag_s * turning_rate)
+        pull_r = along_2 * out - inwards + near_far.lag_s * inwards_rate
         left = radius_m * across_2
-        psi = math.atan2(pull_t, max(left + pull_r, _LEAST * left))
-        cosine, sine = math.cos(psi), math.sin(psi)
+        bottom = left + pull_r
+        bottom = max(bottom, _LEAST * left)
+        cosine = bottom / math.hypot(pull_t, bottom)
+        sine = pull_t / bottom * cosine
         tip_m = radius_m * cosine + (pull_r * cosine + pull_t * sine) / along_2
-        return psi, tip_m - radius_m - out
+        return math.atan2(pull_t, bottom), tip_m - radius_m - out
 
 
-def _psi(turn: _Path, sway: SwayModel) -> float:
+def _psi(turn: _Path, stiffness: float) -> float:
     """Angle of the boom ahead of a grapple that stays on its circle, of whatever radius."""
-    left = 1.0 - turn.speed * turn.speed / sway.mode.omega_rad_s**2
-    return math.atan2(turn.lead, max(left, _LEAST))
+    lead, _, speed, _ = turn
+    return math.atan2(lead, max(1.0 - speed * speed / stiffness, _LEAST))
