@@ -75,6 +75,8 @@ def test_check_of_a_good_file_shows_what_it_does() -> None:
         "  axis slew: JoystickLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
         "  axis near_far: JoystickLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
         "  axis lift: JoystickRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
+        "  slew is in no motion: together with another axis it leaves more swing;",
+        "    a motion takes one axis that moves the tip in and out, which joints are not",
         f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
         *(f"    {line}" for line in identity.lines()[1:]),
     ]
@@ -347,6 +349,22 @@ print(len(controller.axes), sorted({{m.split(".")[0] for m in sys.modules}} & se
 
 def test_the_watch_of_heavy_imports_would_see_one() -> None:
     assert python("import sys, numpy; print('numpy' in sys.modules)") == "True"
+
+
+@pytest.mark.parametrize(
+    ("file", "slews"),
+    [
+        ("forwarder.yaml", ["slew"]),
+        ("forwarder-joints.yaml", ["slew"]),
+        ("two-cranes.yaml", ["front_slew", "rear_slew"]),
+        ("forwarder-robust.yaml", []),
+    ],
+)
+def test_check_names_an_axis_that_slews_in_no_motion(file: str, slews: list[str]) -> None:
+    lines = invoke("check", file).stdout.splitlines()
+    found = [line.split()[0] for line in lines if "is in no motion" in line]
+    assert found == slews
+    assert sum("which joints are not" in line for line in lines) == len(slews)
 
 
 # The imports stand for a machine without the extra.

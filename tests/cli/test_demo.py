@@ -50,6 +50,16 @@ def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path
         )
 
 
+def test_readme_shows_what_the_demo_prints(tmp_path: Path) -> None:
+    text, _ = demo(tmp_path)
+    printed = [line.rstrip() for line in text.splitlines()]
+    first = next(k for k, line in enumerate(printed) if line.endswith("Whole crane"))
+    last = next(k for k, line in enumerate(printed) if "re-rise" in line)
+    page = (ROOT / "README.md").read_text(encoding="utf-8")
+    block = page.partition("<!-- canshaper demo --lockstep -->\n```text\n")[2].partition("```")[0]
+    assert list(filter(None, block.splitlines())) == list(filter(None, printed[first : last + 1]))
+
+
 def test_one_of_several_cranes_is_driven(tmp_path: Path) -> None:
     first, _ = demo(tmp_path, "two-cranes.yaml", "--script", "pulse-slew")
     assert "Crane: front (of front, rear)" in first

@@ -6,6 +6,7 @@ import pytest
 
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
+from canshaper.report.crane_metrics import crane_metrics
 from canshaper.report.metrics import compare
 from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.grapple import Sway
@@ -48,6 +49,28 @@ def test_slew_pulse_is_the_same_with_and_without_joints() -> None:
 )
 def test_pulse_of_each_joint(axis: str, least_pct: float) -> None:
     assert residual_reduction_pct("forwarder-joints.yaml", f"pulse-{axis}", axis) >= least_pct
+
+
+def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
+    """Why the shipped deployment has no motion: it knows nothing of lift and knuckle."""
+    shipped = CONFIG / "forwarder-joints.yaml"
+    text = shipped.read_text().replace("../dbc", str(CONFIG.parent / "dbc"))
+    radius = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 200"
+    motion = f"slew: slew, near_far: extension, radius: {{ {radius} }}"
+    file = tmp_path / "motion.yaml"
+    file.write_text(f"{text}\nmotion: {{ crane: {{ {motion} }} }}\n")
+
+    def left_deg(path: Path, script: str) -> float:
+        recording = drive(load_deployment(path), script_named(script, JOINT_AXES))
+        assert recording.crane is not None
+        found = crane_metrics(recording, recording.crane).residual_deg
+        assert found is not None
+        return found
+
+    slew, loading = ((left_deg(shipped, s), left_deg(file, s)) for s in ("pulse-slew", "loading"))
+    print(f"slew {slew[0]:.1f} and {slew[1]:.1f}, loading {loading[0]:.1f} and {loading[1]:.1f}")
+    assert slew[1] < 0.5 * slew[0]
+    assert loading[1] > loading[0]
 
 
 def test_drive_joint_by_joint_is_recorded() -> None:

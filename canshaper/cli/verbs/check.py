@@ -71,6 +71,11 @@ def check(file: str = FILE) -> None:
         )
     for motion in config.motion.values():
         echo(_motion(deployment, motion))
+    moved = {motion.slew for motion in config.motion.values()}
+    for name, section in config.axes.items():
+        if section.slewing and section.sway and name not in moved:
+            echo(f"  {name} is in no motion: together with another axis it leaves more swing;")
+            echo("    a motion takes one axis that moves the tip in and out, which joints are not")
     identity = deployment.identity
     echo(f"  digest {identity.digest:#06x} of deployment, DBC files and program:")
     for line in identity.lines()[1:]:
