@@ -26,6 +26,9 @@ class Joystick(Input):
     enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(None, description="signal that asks for the unshaped stick")
+    next_profile: str | None = Field(
+        None, description="signal whose rising edge chooses the next profile"
+    )
     node: str | None = Field(None, description="name of its node on a bus of CANopen")
     stuck_s: Annotated[
         float, number(1, 3600, "s", "a stick deflected for so long without change is broken")

@@ -224,11 +224,9 @@ class Controller:
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Let load state and operator choose filters, and axes move as one."""
-        profile = self.deployment.config.profile
         for runner in self.axes.values():
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
-                codes = profile.codes if profile else {}
-                runner.add_chooser(inputs.load_state, inputs.profile, codes)
+                runner.add_chooser(inputs.load_state, inputs.profile)
         for name, bound in self.deployment.motions.items():
             motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None

@@ -4,6 +4,7 @@ from collections.abc import Iterable, Mapping
 
 from canshaper.inputs.input import EmergencyStopInput, MessageInput
 from canshaper.inputs.joystick import JoystickInput
+from canshaper.inputs.profile import ProfileButtons, ProfileChoice, ProfileSwitch, profile_names
 from canshaper.inputs.radius import radius_input
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
@@ -36,12 +37,20 @@ class MachineInputs:
             self.stop = EmergencyStopInput(stop, stop.config.signal)
             self.bound.append((stop, self.stop))
         self.load_state = self._switch(deployment.load_state)
-        self.profile = self._switch(deployment.profile)
+        self.profile = self._profile(deployment)
         self.radii: dict[str, ValueInput] = {}
         for name, motion in deployment.motions.items():
             if motion.radius is not None:
                 self.radii[name] = radius_input(motion.radius)
                 self.bound.append((motion.radius, self.radii[name]))
+
+    def _profile(self, deployment: Deployment) -> ProfileChoice | None:
+        config = deployment.config
+        value = self._switch(deployment.profile)
+        if value and config.profile:
+            return ProfileSwitch(value, config.profile.codes)
+        having = [self.joysticks[n] for n, one in config.joysticks.items() if one.next_profile]
+        return ProfileButtons(having, profile_names(config)) if having else None
 
     def _switch(self, bound: BoundSwitch | None) -> ValueInput | None:
         if bound is None:

@@ -1,7 +1,6 @@
 """One axis of a deployment at work."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Protocol, Self
 
@@ -10,6 +9,7 @@ from canshaper.config.schema import AxisConfig
 from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
+from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
@@ -120,11 +120,9 @@ class AxisRunner:
         """Let something else agree before the axis may move."""
         self._interlocks.append(interlock)
 
-    def add_chooser(
-        self, load_state: ValueInput | None, profile: ValueInput | None, codes: Mapping[str, int]
-    ) -> None:
+    def add_chooser(self, load_state: ValueInput | None, profile: ProfileChoice | None) -> None:
         """Let load state and operator choose sway data and filter."""
-        self.chooser = SetChooser(self.bound, self.axis, load_state, profile, codes)
+        self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
 
     def isolate(self, joystick: StickSource, axis: Axis | None = None) -> None:
         """For a measurement: another stick, perhaps another state machine, nothing of other axes.

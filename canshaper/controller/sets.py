@@ -1,9 +1,11 @@
 """Sway data and filter of an axis in motion: by the load, and by the operator's choice."""
 
+import math
 from collections.abc import Mapping, Sequence
 
 from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
+from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.filters import parameter_sets
@@ -15,6 +17,10 @@ from canshaper.shaping.sway import SwayModel
 
 # Between two changes of one axis: a weight that trembles must not keep the loop busy.
 LEAST_BETWEEN_NS = 100_000_000
+# A profile that changes on the way to a speed leaves as much swing as no filter: it waits until the
+# axis is at rest, or has had the commanded speed, to a part of full speed, for so long.
+STEADY = 0.02
+STEADY_NS = 200_000_000
 
 
 class SetChooser:
@@ -25,7 +31,6 @@ class SetChooser:
         axis: its state machine, which is retuned.
         load_state: says what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
-        codes: its codes by name.
 
     Attributes:
         number: set in force: 0 the axis' own, then its sets, then each profile and its sets, in the
@@ -37,8 +42,7 @@ class SetChooser:
         bound: BoundAxis,
         axis: Axis,
         load_state: ValueInput | None,
-        profile: ValueInput | None,
-        codes: Mapping[str, int],
+        profile: ProfileChoice | None,
     ) -> None:
         config = bound.config
         self.number = 0
@@ -46,7 +50,6 @@ class SetChooser:
         self._load_state = load_state
         self._profile = profile
         self._rate = config.limits.slowest_per_s
-        self._codes = {float(code): name for name, code in codes.items()}
         self._programs = programs(bound)
         self._first: dict[str, int] = {}
         number = 0
@@ -55,13 +58,18 @@ class SetChooser:
             number += 1 + len(sets)
         self._now: tuple[str, int | None] = ("", None)
         self._not_before_ns = 0
+        self._maximum = config.limits.max_pct / 100.0
+        self._restless_ns: int | None = None  # seen on the way to a speed, while a profile waits
 
     def update(self, now_ns: int) -> None:
         """Retune the axis where something has changed."""
-        profile = self._profile.fresh(now_ns) if self._profile else None
-        name = self._codes.get(profile, "") if profile is not None else ""
+        name = self._profile.name(now_ns) if self._profile else ""
         if name not in self._programs:
             name = ""
+        if name != self._now[0]:
+            name = name if self._steady(now_ns) else self._now[0]
+        else:
+            self._restless_ns = None
         base, sets = self._programs[name]
         value = self._load_state.fresh(now_ns) if self._load_state and sets else None
         steps = None if value is None else position(sets, value)
@@ -73,6 +81,17 @@ class SetChooser:
         if steps is not None:
             self.number += 1 + round(steps / STEPS_BETWEEN)
         self._axis.retune(chosen.mode, lambda sway: self._shaper(chosen, sway))
+
+    def _steady(self, now_ns: int) -> bool:
+        """Whether another profile may be taken now."""
+        axis = self._axis
+        if axis.neutral:
+            return True
+        speed = min(abs(axis.command), self._maximum)
+        off = abs(axis.applied - math.copysign(speed, axis.command))
+        if off > STEADY or self._restless_ns is None:
+            self._restless_ns = now_ns
+        return now_ns - self._restless_ns >= STEADY_NS
 
     def _shaper(self, chosen: ParameterSet, sway: SwayModel) -> Shaper:
         return build_shaper(

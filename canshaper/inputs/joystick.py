@@ -16,6 +16,7 @@ class JoystickInput(Input):
     Attributes:
         releases: how often its enable was seen released. A release counts when it is read, however
             long ago its frame arrived; all that has an age is as old as its arrival.
+        presses: how often its button for the next profile was pressed.
     """
 
     def __init__(self, joystick: BoundJoystick) -> None:
@@ -24,9 +25,11 @@ class JoystickInput(Input):
         self._enable = config.enable
         self._reset = config.reset
         self._off = config.anti_sway_off
+        self._next = config.next_profile
         self._frozen_ns = round(config.stuck_s * 1e9)
         self._changed_ns: dict[str, int] = {}
-        self.releases = 0
+        self.releases = self.presses = 0
+        self._next_held = True  # what is held when it is first seen was not pressed
         self._released = False
         self._doubted = 0  # number of the last release in a frame that does not count
 
@@ -56,6 +59,8 @@ class JoystickInput(Input):
             self._released = False
         if not accepted:
             return GOOD
+        if self._next is not None:
+            self._press(raw[self._next], arrived_ns)
         valid = enable in (0, 1)
         last = self.commands
         for name, command in commands.items():
@@ -64,6 +69,14 @@ class JoystickInput(Input):
             if type(command) is Reason:
                 valid = False
         return GOOD if valid else FrameFault.INVALID_SIGNAL
+
+    def _press(self, code: int, arrived_ns: int) -> None:
+        """A press is seen to begin: of what is held after a gap no one knows when."""
+        received_ns = self._received_ns
+        if received_ns is None or arrived_ns - received_ns > self._timeout_ns:
+            self._next_held = True
+        self.presses += code == 1 and not self._next_held
+        self._next_held = code != 0  # nor does a code that is neither on nor off end a press
 
     def copy_state(self, before: Self) -> None:
         """An enable that is released stays so until a frame that counts says otherwise."""

@@ -15,7 +15,7 @@ from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.diagnostics import Diagnostics
-from canshaper.machine.filters import check_control
+from canshaper.machine.filters import check_control, check_profiles
 from canshaper.machine.identity import Identity, filter_lines
 from canshaper.machine.inputs import BoundSwitch, bind_emergency_stop, bind_switch
 from canshaper.machine.joysticks import bind_joystick
@@ -58,6 +58,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
+    check_profiles(diagnostics, config)
     check_control(diagnostics, config)
     diagnostics.raise_problems()
     return Deployment(

@@ -33,8 +33,9 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
     if len(filters) > 1 and axis.sway is None:
         add(place, "expected sway data of its own with profiles or a gain schedule, got none")
     codes = lookup.config.profile.codes if lookup.config.profile else {}
+    buttons = any(one.next_profile for one in lookup.config.joysticks.values())
     for name in axis.profiles:
-        if name not in codes:
+        if name not in codes and not buttons:
             names = ", ".join(codes) or "none: there is no profile at the top level"
             add((*place, "profiles", name), f"expected a profile, got {name!r}; there are {names}")
 
@@ -66,6 +67,18 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
                     again = f"design it again: canshaper {KINDS[chosen.kind].designed_by}"
                     cure = "lengthen it" if key == "duration_s" else again
                     yield (*place, "designed_for", key), f"{fault}; {cure}"
+
+
+def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
+    """A button for the next profile needs profiles, and no switch beside it that says which."""
+    for name, joystick in config.joysticks.items():
+        if joystick.next_profile:
+            place = ("joysticks", name, "next_profile")
+            if config.profile:
+                text = "expected one of profile and next_profile, got both"
+                diagnostics.add(place, text)
+            if not any(axis.profiles for axis in config.axes.values()):
+                diagnostics.add(place, "expected an axis with profiles, got none")
 
 
 def check_control(diagnostics: Diagnostics, config: DeploymentConfig) -> None:

@@ -13,7 +13,8 @@ from canshaper.machine.used_message import UsedMessage
 def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick | None:
     """A joystick; its velocities are those that the axes name."""
     place: Place = ("joysticks", name)
-    result = bind_input(lookup, BoundInput, place, config, ("enable", "reset", "anti_sway_off"))
+    switches = ("enable", "reset", "anti_sway_off", "next_profile")
+    result = bind_input(lookup, BoundInput, place, config, switches)
     if result is None:
         return None
     used, bound = result

@@ -22,12 +22,14 @@ class Held:
         enable: the enable switch.
         reset: the reset switch.
         anti_sway: the anti-sway switch.
+        next_profile: the button for the next profile.
     """
 
     sticks: Mapping[str, float] = field(default_factory=dict)
     enable: bool = False
     reset: bool = False
     anti_sway: bool = True
+    next_profile: bool = False
 
 
 class Hand:
@@ -97,6 +99,8 @@ class _Joystick(_Message):
             raw[config.reset] = int(held.reset)
         if config.anti_sway_off:
             raw[config.anti_sway_off] = int(not held.anti_sway)
+        if config.next_profile:
+            raw[config.next_profile] = int(held.next_profile)
         for axis, stick in self._sticks.items():
             command = held.sticks.get(axis, 0.0)
             if flags := stick.flags:

@@ -44,7 +44,8 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
             "enable: Enable",
             "enable: Enable\n    on: X",
             "joysticks.left.on: expected one of the keys bus, message, alive_counter, checksum,"
-            " e2e, source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off, node,"
+            " e2e, source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off,"
+            " next_profile, node,"
             " stuck_s",
         ),
         (

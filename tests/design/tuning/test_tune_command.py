@@ -137,7 +137,7 @@ def test_a_tail_that_the_stopping_distance_forbids_stays_and_check_warns(file: P
     assert (minus[0], plus[0]) == ("-", "+")
     assert warning.startswith(
         "WARNING: axes.near_far.limits.tail_s: expected 2.6 s, got 2 s, which stays:"
-        " stop_distance_m: found 2.2 m;"
+        " stop_distance_m: expected 2.73 m or more,"
     )
     assert load_config(file)[0].axes["near_far"].limits.tail_s == 2.0
     checked = CliRunner().invoke(app, ["check", str(file)])

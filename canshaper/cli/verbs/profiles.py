@@ -1,0 +1,52 @@
+"""``canshaper profiles``: what each profile of a deployment does."""
+
+import json
+from dataclasses import asdict
+
+import typer
+
+from canshaper.cli.common import echo, loader
+from canshaper.errors import DesignError, UsageError
+
+
+def profiles(
+    file: str = typer.Argument(
+        "j1939-profiles.yaml", help="Deployment file; by default a shipped one."
+    ),
+    as_json: bool = typer.Option(False, "--json", help="Print the figures as JSON, no table."),
+) -> None:
+    """Measure what each profile of a deployment does with a full press of 3 s.
+
+    On the simulated crane, with the file's limits: how long and far the axis runs on after release,
+    the largest swing, and what is left of it with the right pendulum length and with one that is
+    15 % longer or shorter. "normal" is the axis' own filter.
+
+    Examples:
+
+      canshaper profiles
+
+      canshaper profiles machine.yaml --json
+    """
+    from canshaper.design.profiles import figures
+    from canshaper.report.console import SafeConsole, new_table
+
+    deployment = loader(file)()
+    try:
+        found = list(figures(deployment))
+    except DesignError as error:
+        raise UsageError(f"{deployment.path}: {error}") from None
+    if as_json:
+        echo(json.dumps([asdict(one) for one in found], indent=2))
+        return
+    heads = ("run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
+    table = new_table("axis, profile", *heads)
+    for one in found:
+        table.add_row(
+            f"{one.axis}, {one.profile}",
+            f"{one.run_on_s:.2f}",
+            f"{one.run_on_travel_s:.2f}",
+            f"{one.peak_deg:.1f}",
+            f"{one.residual_deg:.2f}",
+            f"{one.residual_wrong_deg:.1f}",
+        )
+    SafeConsole().print(table)

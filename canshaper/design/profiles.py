@@ -1,0 +1,94 @@
+"""What each profile of a deployment does with a full press, on the simulated crane."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+from canshaper.controller.controller import Controller
+from canshaper.design.lockstep import drive
+from canshaper.errors import DesignError
+from canshaper.inputs.profile import profile_names
+from canshaper.machine.deployment import Deployment
+from canshaper.report.metrics import AxisMetrics, axis_metrics
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.operator import Script, Stroke
+
+OWN = "normal"
+"""What the axes' own filters are called, which no profile names."""
+# Of the pendulum length; the profiles are compared where the sway data is as wrong as is usual.
+LENGTH_PCT = 15
+_PRESS = (0.5, 3.0, 1.0, 0.1)  # start, duration, level, ramp
+_DRIVE_S = 10.0
+
+
+@dataclass(frozen=True)
+class Figures:
+    """What a profile does with one axis after a full press of 3 s.
+
+    Attributes:
+        axis: the axis.
+        profile: the profile; ``OWN`` for the axis' own filter.
+        run_on_s: from the release to the tip below 5 % of full speed.
+        run_on_travel_s: distance run on, seconds of full speed.
+        peak_deg: largest swing.
+        residual_deg: swing left with the right length.
+        residual_wrong_deg: the most that is left with the length 15 % wrong.
+    """
+
+    axis: str
+    profile: str
+    run_on_s: float
+    run_on_travel_s: float
+    peak_deg: float
+    residual_deg: float
+    residual_wrong_deg: float
+
+
+class Chosen:
+    """A profile that stays chosen."""
+
+    def __init__(self, name: str) -> None:
+        self._name = name
+
+    def name(self, _now_ns: int) -> str:
+        """That one."""
+        return self._name
+
+
+def figures(deployment: Deployment) -> Iterator[Figures]:
+    """What every profile does with every axis that has it, and the axis' own filter.
+
+    Raises:
+        DesignError: the deployment has no profiles.
+        DriveError: the simulated crane does not fit it.
+    """
+    if len(profile_names(deployment.config)) == 1:
+        raise DesignError("expected an axis with profiles, got none")
+    for axis, bound in deployment.axes.items():
+        for name in ["", *bound.config.profiles] if bound.config.profiles else []:
+            right, *wrong = (
+                _press(deployment, axis, name, pct) for pct in (0, -LENGTH_PCT, LENGTH_PCT)
+            )
+            yield Figures(
+                axis,
+                name or OWN,
+                right.run_on_s or 0.0,
+                right.run_on_travel or 0.0,
+                right.peak_deg or 0.0,
+                right.residual_deg or 0.0,
+                max(one.residual_deg or 0.0 for one in wrong),
+            )
+
+
+def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> AxisMetrics:
+    crane = CraneParameters()
+    length_m = crane.grapple.l2_m * (1.0 + length_pct / 100.0)
+    crane = replace(crane, grapple=replace(crane.grapple, l2_m=length_m))
+
+    def choose(controller: Controller) -> None:
+        for runner in controller.axes.values():
+            if runner.chooser:
+                runner.add_chooser(None, Chosen(name))
+
+    script = Script("press", (Stroke(axis, *_PRESS),), _DRIVE_S)
+    recording = drive(deployment, script, parameters=crane, prepare=choose)
+    return axis_metrics(recording, axis)
