@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from canshaper.api import AxisState, Controller, load_machine
     from canshaper.checksums import Checksum, ChecksumKind, Crc8, Xor
     from canshaper.codec.frame import Frame
-    from canshaper.controller.events import FeedbackEvent, RefusalEvent, StateEvent
+    from canshaper.controller.events import FeedbackEvent, MotionEvent, RefusalEvent, StateEvent
     from canshaper.machine.deployment import Deployment
     from canshaper.protocols.interface import Event
     from canshaper.shaping.registry import build_shaper
@@ -52,6 +52,7 @@ __all__ = [
     "FeedbackEvent",
     "Fir",
     "Frame",
+    "MotionEvent",
     "Parameter",
     "Reason",
     "RefusalEvent",
@@ -71,7 +72,7 @@ _HOMES = {
     "api": ("AxisState", "Controller", "load_machine"),
     "checksums": ("Checksum", "ChecksumKind", "Crc8", "Xor"),
     "codec.frame": ("Frame",),
-    "controller.events": ("FeedbackEvent", "RefusalEvent", "StateEvent"),
+    "controller.events": ("FeedbackEvent", "MotionEvent", "RefusalEvent", "StateEvent"),
     "machine.deployment": ("Deployment",),
     "protocols.interface": ("Event",),
     "shaping.registry": ("build_shaper",),

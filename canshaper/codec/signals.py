@@ -128,8 +128,14 @@ def special_name(signal: Signal, value: float) -> str | None:
     return str((signal.choices or {})[codes[value]]) if value in codes else None
 
 
+# Unit of a length in a DBC file; many have none.
+LENGTHS = (None, "", "m")
+
+
 def radius_range(signal: Signal) -> str | None:
-    """Why the DBC range of a radius cannot serve to tell what is one, or None when it can."""
+    """Why a signal is no radius, or its range does not tell what is one; None where it does."""
+    if signal.unit not in LENGTHS:
+        return f"{signal.name}: expected a radius in m, got a signal in {signal.unit}"
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or high <= low:
         return f"{signal.name} has no range in the DBC; what lies outside is no radius"

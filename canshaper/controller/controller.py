@@ -220,7 +220,8 @@ class Controller:
             for runner in self.axes.values():
                 runner.hold(last, now)
         for motion in self.motions:
-            motion.step(now_ns, last, now)
+            if (event := motion.step(now_ns, last, now)) is not None:
+                self.events.append(event)
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Let load state and operator choose filters, and axes move as one."""
@@ -231,7 +232,8 @@ class Controller:
             motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None
             slew, radius = self.axes[motion.slew], inputs.radii.get(name)
-            self.motions.append(MotionRunner(motion, slew, near_far, radius, tick_s))
+            one = MotionRunner(name, motion, slew, near_far, radius, tick_s=tick_s)
+            self.motions.append(one)
 
     def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
         """Report when the valve no longer follows its command, and when it does again."""

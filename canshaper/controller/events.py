@@ -48,6 +48,25 @@ class FeedbackEvent:
 
 
 @dataclass(frozen=True, slots=True)
+class MotionEvent:
+    """The axes of a two-axis motion move as one again, or each by itself.
+
+    Attributes:
+        motion: its name in the file.
+        why: what keeps them from it: ``radius=lost``, or an axis with its state; empty where
+            nothing does.
+    """
+
+    motion: str
+    why: str
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"motion={self.motion} axes=" + (f"single {self.why}" if self.why else "together")
+
+
+@dataclass(frozen=True, slots=True)
 class RefusalEvent:
     """The output guard has refused a valve frame."""
 

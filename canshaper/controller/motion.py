@@ -1,6 +1,7 @@
 """The two-axis motion of a crane at work: it adds to both axes before either of them moves."""
 
 from canshaper.config.motion import Motion
+from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.value import ValueInput
 from canshaper.shaping.motion import MovingAxis, TwoAxisMotion
@@ -8,6 +9,7 @@ from canshaper.shaping.states import State
 
 # An axis at rest in READY may be moved by the other one.
 ABLE = (State.READY, State.ACTIVE)
+RADIUS = "radius"
 
 
 class _Member:
@@ -42,6 +44,7 @@ class MotionRunner:
     """Slew and near-far of one crane.
 
     Args:
+        name: of the motion, in the file.
         config: the motion.
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
@@ -51,10 +54,12 @@ class MotionRunner:
 
     def __init__(
         self,
+        name: str,
         config: Motion,
         slew: AxisRunner,
         near_far: AxisRunner | None,
         radius: ValueInput | None,
+        *,
         tick_s: float,
     ) -> None:
         self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
@@ -63,6 +68,8 @@ class MotionRunner:
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
+        self._name = name
+        self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
         for member in self._members:
             member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
         self._motion = TwoAxisMotion(
@@ -76,24 +83,40 @@ class MotionRunner:
         if self._near_far:
             self._near_far.moving.full_speed = _full_speed_m_s(self._near_far.runner)
 
-    def step(self, now_ns: int, last: int, now: int) -> None:
+    def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
         """Give both axes what they add in this tick.
 
         Args:
             now_ns: monotonic time.
             last: number of the deadline before; axes have held their output since then.
             now: number of this deadline.
+
+        Returns:
+            Whether they move as one, where that has changed.
         """
+        apart = ""
         tick_s, members = self._tick_s, self._members
         for member in members:
             if member.runner.alone:
                 self._end()
-                return
+                return None
             member.take(tick_s, last, now)
+            if not (apart or member.moving.able):
+                apart = member.runner.bound.name
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
             member.runner.added = member.moving.added
+        if tip_m is None and self._radius and not apart:
+            apart = RADIUS
+        return None if apart == self._apart else self._changed(apart)
+
+    def _changed(self, apart: str) -> MotionEvent:
+        """Something else keeps the axes apart, or nothing any more."""
+        self._apart = apart
+        states = {one.runner.bound.name: one.runner.axis.state.name for one in self._members}
+        why = f"{apart}={states.get(apart, 'lost')}" if apart else ""
+        return MotionEvent(self._name, why)
 
     def on_trip(self, tripped: AxisRunner) -> None:
         """An axis has tripped: where it is one of these, nothing is added any more, at once."""

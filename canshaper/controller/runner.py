@@ -107,10 +107,6 @@ class AxisRunner:
         self._trip = self._trip or Reason.SECOND_SENDER
         self._foreign_ns = now_ns
 
-    def add(self, velocity: float) -> None:
-        """A two-axis motion adds so much from the next tick on, fraction of full speed."""
-        self.added = velocity
-
     def drop_added(self) -> None:
         """Nothing is added any more, and the next output is not faster for what was."""
         self.added = 0.0

@@ -24,6 +24,7 @@ def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
         place: Place = ("motion", name)
         for key in ("slew", "near_far"):
             _check_axis(lookup, (*place, key), getattr(motion, key), taken, turns=key == "slew")
+        _check_crane(lookup, (*place, "near_far"), motion)
         radius = bind_radius(lookup, (*place, "radius"), motion.radius) if motion.radius else None
         motions[name] = BoundMotion(motion, radius)
     return motions
@@ -45,3 +46,14 @@ def _check_axis(
     for key in ("sway", "slewing") if turns else ("sway",):
         if getattr(axes[name], key) is None:
             add(place, f"expected an axis with {key}, got {name!r} without")
+
+
+def _check_crane(lookup: Lookup, place: Place, motion: Motion) -> None:
+    """Axes with the usual names, as front_slew, say which crane they are of."""
+    slew, near_far = motion.slew, motion.near_far
+    if near_far is None or not (slew.endswith("slew") and near_far.endswith("near_far")):
+        return
+    crane = slew.removesuffix("slew")
+    if near_far.removesuffix("near_far") != crane:
+        text = f"expected an axis of the same crane as {slew!r}, got {near_far!r}"
+        lookup.diagnostics.add(place, text)

@@ -230,3 +230,54 @@ def test_a_float_that_is_no_radius(machine: Machine, value: Any) -> None:
     assert radius.fresh(0) is None
     assert radius.receive(struct.pack("<hf", 0, 3.5), 0) is FrameFault.NONE
     assert radius.fresh(0) == pytest.approx(3.5)
+
+
+# -- what is no motion of a crane ------------------------------------------------------------------
+
+
+def test_axes_of_two_cranes_are_no_motion(machine: Machine) -> None:
+    for name in ("slew", "near_far"):
+        machine.in_yaml(f"  {name}:\n", f"  front_{name}:\n")
+    line = moving(machine, FIXED.replace("slew: slew", "slew: front_slew"))
+    machine.in_yaml("near_far: near_far", "near_far: front_near_far")
+    machine.load()
+    machine.yaml = machine.yaml.replace("front_near_far", "rear_near_far")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: motion.crane.near_far: expected an axis of the same crane as"
+        " 'front_slew', got 'rear_near_far'"
+    ]
+
+
+def test_axes_with_names_of_their_own_may_be_of_one_crane(machine: Machine) -> None:
+    machine.in_yaml("  near_far:\n", "  reach:\n")
+    moving(machine, FIXED.replace("near_far: near_far", "near_far: reach"))
+    assert machine.load().motions["crane"].config.near_far == "reach"
+
+
+@pytest.mark.parametrize("unit", ["deg", "mm", "%"])
+def test_a_radius_that_is_no_length_is_refused(machine: Machine, unit: str) -> None:
+    moving(machine, MEASURED)
+    line = machine.in_dbc(RADIUS, RADIUS.replace('"m"', f'"{unit}"'))
+    (found,) = machine.problems()
+    assert found.startswith("machine.dbc:")
+    assert f"Radius: expected a radius in m, got a signal in {unit}" in found
+    assert line > 0
+
+
+@pytest.mark.parametrize("axis", ["slew", "near_far"])
+def test_an_axis_without_sway_data_is_refused(machine: Machine, axis: str) -> None:
+    line = moving(machine, FIXED)
+    section = machine.yaml.index(f"  {axis}:\n")
+    begin = machine.yaml.index("    sway:", section)
+    end = machine.yaml.index("\n", machine.yaml.index("    filter:", section))
+    machine.yaml = machine.yaml[:begin] + "    filter: { kind: off }" + machine.yaml[end:]
+    says = f"machine.yaml:{line}: motion.crane.{axis}: expected an axis with sway, got '{axis}'"
+    assert f"{says} without" in machine.problems()
+
+
+def test_a_full_speed_of_the_tip_of_zero_is_refused(machine: Machine) -> None:
+    moving(machine, FIXED)
+    line = machine.in_yaml("mass_kg: 300, full_speed_m_s: 1.0", "mass_kg: 300, full_speed_m_s: 0")
+    (found,) = machine.problems()
+    assert found.startswith(f"machine.yaml:{line}: axes.near_far.sway.full_speed_m_s: ")
+    assert found.endswith("got 0")
