@@ -60,9 +60,9 @@ def calibrate(
 
     Examples:
 
-      canshaper calibrate config/forwarder.yaml --axis slew
+      canshaper calibrate config/forwarder-robust.yaml --axis slew
 
-      canshaper calibrate config/forwarder.yaml --axis slew --set slew.deadband=0.08
+      canshaper calibrate config/forwarder-robust.yaml --axis slew --set slew.deadband=0.08
 
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """

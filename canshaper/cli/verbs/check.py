@@ -36,7 +36,7 @@ def check(file: str = FILE) -> None:
 
     Examples:
 
-      canshaper check config/forwarder.yaml
+      canshaper check config/forwarder-robust.yaml
     """
 
     from canshaper.commissioning.stopping import print_stopping

@@ -49,11 +49,11 @@ def doctor(
 
     Examples:
 
-      canshaper doctor config/forwarder.yaml
+      canshaper doctor config/forwarder-robust.yaml
 
-      sudo canshaper doctor config/forwarder.yaml --seconds 600 --json doctor.json
+      sudo canshaper doctor config/forwarder-robust.yaml --seconds 600 --json doctor.json
 
-      canshaper doctor config/forwarder.yaml --no-load --listen 10
+      canshaper doctor config/forwarder-robust.yaml --no-load --listen 10
     """
     from canshaper.commissioning.doctor.finding import fit
     from canshaper.commissioning.doctor.interfaces import bus_findings

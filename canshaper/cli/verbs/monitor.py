@@ -32,7 +32,7 @@ def monitor(
 
     Examples:
 
-      canshaper monitor config/forwarder.yaml
+      canshaper monitor config/forwarder-robust.yaml
 
       canshaper monitor machine.yaml --refresh 2
 

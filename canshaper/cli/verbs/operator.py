@@ -19,13 +19,13 @@ def operator(
 
     Examples:
 
-      canshaper operator config/forwarder.yaml --script loading
+      canshaper operator config/forwarder-robust.yaml --script loading
 
-      canshaper operator config/forwarder.yaml --script random-7 --bypass
+      canshaper operator config/forwarder-robust.yaml --script random-7 --bypass
 
       canshaper operator config/forwarder-joints.yaml --script loading-joints
 
-      canshaper operator config/forwarder.yaml --list
+      canshaper operator config/forwarder-robust.yaml --list
     """
     from canshaper_sim.axes import ALL_AXES
     from canshaper_sim.cranes import one_crane

@@ -62,7 +62,7 @@ def record(
 
     Examples:
 
-      canshaper record config/forwarder.yaml
+      canshaper record config/forwarder-robust.yaml
 
       canshaper record machine.yaml --seconds 600 --out stop-at-the-tree.zip
 

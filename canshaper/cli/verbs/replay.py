@@ -62,7 +62,7 @@ def replay(
 
     Examples:
 
-      canshaper replay drive.log --config config/forwarder.yaml
+      canshaper replay drive.log --config config/forwarder-robust.yaml
 
       canshaper replay drive.blf --config machine.yaml --channel crane=1
 

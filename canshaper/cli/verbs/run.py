@@ -49,9 +49,9 @@ def run(
 
     Examples:
 
-      canshaper run config/forwarder.yaml
+      canshaper run config/forwarder-robust.yaml
 
-      canshaper run config/forwarder.yaml --interface socketcan --channel can0
+      canshaper run config/forwarder-robust.yaml --interface socketcan --channel can0
 
       canshaper run machine.yaml --listen-only
     """

@@ -28,15 +28,15 @@ def sim(
 
     Examples:
 
-      canshaper sim config/forwarder.yaml
+      canshaper sim config/forwarder-robust.yaml
 
-      canshaper sim config/forwarder.yaml --set grapple.l2_m=1.5 --set near_far.lag_s=0.15
+      canshaper sim config/forwarder-robust.yaml --set grapple.l2_m=1.5 --set near_far.lag_s=0.15
 
-      canshaper sim config/forwarder.yaml --machine tip-controller --set joints.main_boom_m=4.2
+      canshaper sim forwarder-robust.yaml --machine tip-controller --set joints.main_boom_m=4.2
 
       canshaper sim config/forwarder-joints.yaml
 
-      canshaper sim config/forwarder.yaml --show
+      canshaper sim config/forwarder-robust.yaml --show
     """
     from canshaper_sim.cranes import one_crane
     from canshaper_sim.parameters import changed_parameters, parameter_names
