@@ -69,6 +69,17 @@ def test_residual_and_run_on_after_both_joysticks(hand_made: HandMade) -> None:
     assert found.rms_deg == pytest.approx(math.sqrt((16 * 3 + 81 * 3.5 + 9 * 5.5) / 12), rel=0.01)
 
 
+def test_run_on_is_the_farthest_from_where_the_tip_was_at_the_release(
+    hand_made: HandMade,
+) -> None:
+    recording = both(hand_made, still)
+    # Half a metre on after the release, and 0.4 m back.
+    after = [max(0.0, t - NEAR_FAR[1]) for t in recording.t_s]
+    way = [(3.0 + (t if t < 0.5 else max(1.0 - t, 0.1)), 0.0) for t in after]
+    crane = CraneTrace(way, way, after)
+    assert crane_metrics(recording, crane).run_on_m == pytest.approx(0.5, abs=0.021)
+
+
 def test_a_drive_that_is_never_let_go_has_no_residual_and_no_run_on(hand_made: HandMade) -> None:
     stick = held(1.0, END_S + 1.0)
     recording = hand_made(END_S, slew=(stick, stick, stick, still))
