@@ -14,7 +14,7 @@ from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
-from canshaper_sim.grapple import Sway
+from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import Script
 from canshaper_sim.plant import PlantNode
@@ -120,6 +120,7 @@ def drive(
     parameters: CraneParameters | None = None,
     machine: str | None = None,
     sway: Sway | None = None,
+    load: tuple[float, Grapple] | None = None,
     prepare: Callable[[Controller], None] | None = None,
     crane: str | None = None,
     on_progress: Callable[[float], None] | None = None,
@@ -134,6 +135,7 @@ def drive(
         machine: tip, tip-controller or joints; by default what the axes of the deployment say.
         sway: swing of the grapple at the start; by default it hangs still.
         crane: which one moves, where the deployment has several; the others' joysticks stand still.
+        load: time in s at which a load is picked up, and what hangs there from then on.
         prepare: called with the fresh controller, to put another filter in.
         on_progress: called with the simulated seconds now and then.
 
@@ -161,7 +163,11 @@ def drive(
     recorder = Recorder(driven, parameters)
     lock_step = LockStep(deployment, guarded, plant, hands, recorder.receive)
     end_ms = round(script.duration_s * 1000.0)
+    picked_up = load is None
     while (time_ms := lock_step.time_ms) < end_ms:
+        if load and not picked_up and time_ms >= 1000.0 * load[0]:
+            picked_up = True
+            plant.crane.pick_up(load[1])
         lock_step.step()
         controller.events.clear()
         if on_progress and time_ms % 1000 == 0:

@@ -35,7 +35,7 @@ class Limits:
 
     Attributes:
         curve: (stop in s, least worst residual in degrees) of any non-negative impulse response
-            within the valve's rate.
+            within the valve's rate, on an axis by itself.
         time_optimal_s: no command whatever stops the swing sooner.
     """
 
@@ -63,7 +63,7 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         (panels[0], "run-on of the tip after release, s", [p.stop_s for p in points]),
         (
             panels[1],
-            "time to 95 % of the asked speed after the press, s",
+            "time to 95 % of the commanded speed after the press, s",
             [p.rise_s for p in points],
         ),
     ):
@@ -88,7 +88,7 @@ def _limits(axes: Axes, limits: Limits) -> None:
         x, y = zip(*limits.curve, strict=True)
         axes.plot(x, y, color=LIMIT_COLOUR, linestyle="--", linewidth=1.2)
         axes.annotate(
-            "limit of every shaper\nwithin the valve's rate",
+            "limit of every shaper\nwithin the valve's rate,\nnear-far alone",
             (x[3], y[3]),
             xytext=(-8, -6),
             textcoords="offset points",

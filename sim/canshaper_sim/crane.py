@@ -8,7 +8,7 @@ are left out, as in the paper.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple, Protocol
 
 from canshaper_sim.actuator import Actuator
@@ -224,6 +224,10 @@ class Crane:
         """How far the valve of an axis is open, -1 .. 1; 0 for an axis that has none."""
         moved = self._axes.get(axis)
         return moved.valve.speed if moved else 0.0
+
+    def pick_up(self, loaded: Grapple) -> None:
+        """From now on this hangs from the tip, at the angles of before: the grapple with a load."""
+        self.parameters = replace(self.parameters, grapple=loaded)
 
     def step(self, dt_s: float, commands: Mapping[str, float]) -> None:
         """Hold the commands (axis -> value of its valve frame, -1 .. 1) for dt_s seconds.

@@ -29,8 +29,9 @@ from canshaper_sim.operator import script_named
 
 deployment = load_deployment(Path(sys.argv[1]))
 sent = drive(deployment, script_named("pulse-slew")).axes["slew"].sent
-own = [c for c in candidates(deployment, "slew") if c.filter.kind == "moving_average"]
-outcomes = [measure(deployment, "slew", c, manoeuvres("slew")[0], 0) for c in own]
+own = [c for c in candidates(deployment) if c.filters["slew"].kind == "moving_average"]
+pulse = next(task for task in manoeuvres() if task.name == "pulse near-far")
+outcomes = [measure(deployment, c, pulse, 0) for c in own]
 print(json.dumps({
     "sent": sent,
     "rows": [(c.name, c.ours, c.motion) for c in own],

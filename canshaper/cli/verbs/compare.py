@@ -10,15 +10,29 @@ import typer
 from canshaper.cli.common import echo, loader, picture, picture_line
 
 if TYPE_CHECKING:
-    from rich.console import Console
     from rich.table import Table
 
+    from canshaper.design.comparison.limits import Least
     from canshaper.design.comparison.summary import Row
+
+# Columns of the first table: head and kind of work.
+_WORKS = {
+    "pulse": "pulse",
+    "tap": "tap",
+    "rev.": "reversal",
+    "both": "both",
+    "rand.": "random",
+    "cycle": "cycle",
+    "load": "load",
+    "slow": "gain",
+    "start": "start",
+}
 
 
 def compare(
-    file: str = typer.Argument("forwarder.yaml", help="Deployment file; by default a shipped one."),
-    axis: str = typer.Option("near_far", "--axis", help="Axis that is driven."),
+    file: str = typer.Argument(
+        "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
+    ),
     out: Path = typer.Option(Path("out/compare"), "--out", help="Directory for picture and data."),
     as_json: bool = typer.Option(False, "--json", help="Print the rows as JSON, no table."),
     processes: int | None = typer.Option(
@@ -27,99 +41,123 @@ def compare(
 ) -> None:
     """Drive every filter through the same manoeuvres and say which to take.
 
-    Pulse, partial stroke, early release, reversal, double tap and loading cycle at -30 to +30 %
-    pendulum length, random sticks of twelve seeds and a start with swing, on the simulated crane
-    with the valves' lag, deadband, rate limit and resolution, under the output limits of the
-    file. Below the table it says for every other shaper which of ours stops at least as soon and
-    leaves less swing within 30 % length. Writes compare-AXIS.png and compare-AXIS.json. Takes
-    about a minute.
+    Each filter is put on slew and near-far of the file, and the simulated crane driven under the
+    output limits and with the two-axis motion of the file: pulses, taps and reversals of each
+    axis, strokes of both, random joysticks, a loading cycle, a load picked up on the way, a slow
+    valve, a start with swing; at -30 to +30 % pendulum length. The tables have the largest swing
+    that is left, what the operator feels, the worst case of each filter, which of ours stops as
+    soon and leaves less, and what no shaper can beat. Writes compare.png and compare.json. Takes
+    one to two minutes.
 
     Examples:
 
       canshaper compare
 
-      canshaper compare config/forwarder.yaml --axis slew
+      canshaper compare config/forwarder.yaml
 
       canshaper compare --json --processes 1
     """
-    from canshaper.design.comparison.candidates import candidates, nominal_mode
+    from canshaper.design.comparison.candidates import candidates
+    from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
+    from canshaper.design.swinging import swinging_axis
     from canshaper.report.console import SafeConsole, progress_bar
 
     console = SafeConsole(stderr=as_json)
     deployment = loader(file)()
-    found = candidates(deployment, axis)
-    tasks = manoeuvres(axis)
+    tasks = manoeuvres()
     try:
+        found = candidates(deployment)
         with progress_bar(f"{len(found)} filters, {len(tasks)} manoeuvres") as on_progress:
             outcomes = measure_all(
-                deployment.path, axis, found, tasks, on_progress=on_progress, processes=processes
+                deployment.path, found, tasks, on_progress=on_progress, processes=processes
             )
+            limits = least(deployment)
     except KeyboardInterrupt:
         echo("interrupted", err=True)
         raise typer.Exit(130) from None
     table = rows(found, outcomes)
-    advice = recommendations(table, nominal_mode(deployment, axis).period_s)
+    advice = recommendations(table, swinging_axis(deployment, AXIS)[1].mode().period_s)
     data = {
-        "axis": axis,
         "rows": [asdict(row) for row in table],
         "recommendations": {k: {"filter": r.name, "why": why} for k, (r, why) in advice.items()},
+        "limits": [asdict(limit) for limit in limits],
     }
     out.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**data, "outcomes": [asdict(o) for o in outcomes]}, indent=2)
-    (out / f"compare-{axis}.json").write_text(text + "\n", encoding="utf-8")
+    (out / "compare.json").write_text(text + "\n", encoding="utf-8")
     if as_json:
         echo(json.dumps(data, indent=2))
     else:
-        _print_rows(table, [why for _, why in advice.values()], console, slew=axis == "slew")
+        for drawn in (_residuals(table), _feel(table), _worst(table), _limits(limits)):
+            console.print(drawn)
+        for _, why in advice.values():
+            console.print(f"- {why}.")
 
     def draw(path: Path) -> None:
-        from canshaper.design.comparison.limits import limits_for
         from canshaper.report.pareto import Point
         from canshaper.report.pareto import draw as draw_points
 
         points = [Point(r.name, r.ours, r.stop_s, r.rise_s, r.worst_30_deg) for r in table]
-        draw_points(points, limits_for(deployment, axis, outcomes), title, path)
+        draw_points(points, limits_for(deployment, outcomes), title, path)
 
     off = next(row for row in table if row.name == "off")
     calm = advice["calm"][0]
-    title = (
-        f"{axis.replace('_', '-').capitalize()}: {calm.name} leaves {calm.worst_30_deg:.1f}°"
-        f" of {off.worst_30_deg:.1f}° in the worst case"
-    )
-    console.print(picture_line(picture(out / f"compare-{axis}.png", draw)))
+    title = f"{calm.name} leaves {calm.worst_30_deg:.1f}° of {off.worst_30_deg:.1f}° at worst"
+    console.print(picture_line(picture(out / "compare.png", draw)))
 
 
-def _print_rows(table: "list[Row]", advice: list[str], console: "Console", *, slew: bool) -> None:
-    """Table, recommendations, and which of ours beats each of the others."""
-    from canshaper.design.comparison.summary import beaten_by
-
-    console.print(_table(table, slew=slew))
-    for why in advice:
-        console.print(f"- {why}.")
-    for row in table:
-        if row.name != "off" and not row.ours:
-            better = beaten_by(row, table)
-            text = f"beaten by {better.name}" if better else "not beaten by any of ours"
-            console.print(f"  {row.name}: {text}", style="dim")
-
-
-def _table(table: "list[Row]", *, slew: bool) -> "Table":
+def _residuals(table: "list[Row]") -> "Table":
+    """Largest swing left by kind of work."""
     from canshaper.report.console import new_table
 
-    heads = ["stop\ns"] + ([] if slew else ["rise\ns"])
-    heads += ["res.\ndeg", "15 %\ndeg", "30 %\ndeg", "rand.\ndeg"]
-    heads += ["other\ndeg"] if slew else []
-    heads += ["peak\ndeg", "dip\n%"] + ([] if slew else ["re-\nrise"])
-    drawn = new_table("filter", *heads)
+    drawn = new_table("left, deg", *_WORKS)
     for row in table:
-        cells = [f"{row.stop_s:.2f}"] + ([] if slew else [f"{row.rise_s:.2f}"])
-        cells += [f"{row.residual_deg:.2f}", f"{row.worst_15_deg:.1f}", f"{row.worst_30_deg:.1f}"]
-        cells += [f"{row.random_deg:.2f}"]
-        cells += [f"{row.cross_deg:.2f}"] if slew else []
-        cells += [f"{row.peak_deg:.1f}", f"{100 * row.dip:.0f}"]
-        cells += [] if slew else [f"{100 * row.re_rise:.0f}"]
+        left = [row.worst_deg[work] for work in _WORKS.values()]
+        cells = [f"{deg:.2f}" if deg < 9.995 else f"{deg:.1f}" for deg in left]
         drawn.add_row(row.name, *cells, style="bold" if row.ours else None)
+    return drawn
+
+
+def _feel(table: "list[Row]") -> "Table":
+    """What the operator feels of each filter."""
+    from canshaper.report.console import new_table
+
+    heads = ["rise\ns", "stop\ns", "stop\nm", "slew\nm", "dip\n%", "re-\nrise", "peak\ndeg"]
+    drawn = new_table("felt", *heads, "tap\n%", "mo-\nves", "way\n%")
+    for row in table:
+        seconds = [f"{value:.2f}" for value in (row.rise_s, row.stop_s)]
+        metres = [f"{value:.2f}" for value in (row.run_on_m, row.slew_run_on_m)]
+        feel = [f"{100 * row.dip:.0f}", f"{100 * row.re_rise:.0f}", f"{row.peak_deg:.1f}"]
+        ways = [f"{100 * row.tap_part:.0f}", str(row.tap_movements), f"{100 * row.path_part:.0f}"]
+        cells = (*seconds, *metres, *feel, *ways)
+        drawn.add_row(row.name, *cells, style="bold" if row.ours else None)
+    return drawn
+
+
+def _worst(table: "list[Row]") -> "Table":
+    """With the wrong length: what makes the worst case, and which of ours beats it."""
+    from canshaper.design.comparison.summary import beaten_by
+    from canshaper.report.console import new_table
+
+    drawn = new_table("worst, deg", "15 %", "30 %", "in", "beaten by")
+    for row in table:
+        better = None if row.ours or row.name == "off" else beaten_by(row, table)
+        degrees = (f"{row.worst_15_deg:.1f}", f"{row.worst_30_deg:.1f}")
+        name = better.name if better else ""
+        drawn.add_row(row.name, *degrees, row.worst_case, name, style="bold" if row.ours else None)
+    return drawn
+
+
+def _limits(limits: "list[Least]") -> "Table":
+    """What no shaper of near-far can beat, by duration."""
+    from canshaper.report.console import new_table
+
+    heads = ("ours\n±15 %", "no dip\n±15 %", "any\n±15 %", "no dip\n±30 %")
+    drawn = new_table("limit, % of swing", *heads)
+    for least in limits:
+        parts = (least.ours_15, least.no_dip_15, least.any_15, least.no_dip_30)
+        drawn.add_row(f"{least.duration_s:.1f} s", *(f"{100 * part:.1f}" for part in parts))
     return drawn

@@ -1,16 +1,31 @@
-"""What every filter has to do: short strokes, a loading cycle, random sticks."""
+"""What every filter has to do: strokes of one axis and of both, loading, random joysticks."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
+from canshaper.design.comparison.candidates import AXES
+from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import SCRIPTS, Script, Stroke, random_script
 
 RANDOM_SEEDS = tuple(range(1, 13))
 INITIAL_SWAY_DEG = 10.0
 LENGTH_ERRORS_PCT = (-30, -15, 0, 15, 30)
+# What a load does to the grapple: times the mass, and more length of the pendulum.
+LOAD_MASS = 3.0
+LOAD_M = 0.4
+# In the loading cycle: the joysticks are neutral before it goes up, and it lies in the bunk after.
+_LOAD_FROM_S, _LOAD_TO_S = 7.5, 17.0
+# What is left of the full speed that the file names.
+SLOW_VALVE = 0.7
+# Near-far begins so much later than slew, where both move.
+LATE_S = (-1.2, 0.0, 1.2)
+# Duration in s and level.
+TAPS = ((0.15, 1.0), (0.4, 1.0), (0.6, 0.2))
 
 _START_S = 0.5
 _REST_S = 5.0
 _RAMP_S = 0.1
+_NOMINAL = CraneParameters()
 
 
 @dataclass(frozen=True)
@@ -18,41 +33,93 @@ class Manoeuvre:
     """A script with what goes with it.
 
     Attributes:
+        work: kind of work, a column of the table: pulse, tap, reversal, both, random, cycle,
+            load, gain or start.
         name: what it is called.
         script: the strokes, with a rest at the end.
-        initial_deg: swing at the start.
+        axis: the axis that moves, None where several do.
+        initial_deg: swing along the boom at the start.
         lengths_pct: errors of the pendulum length at which it is driven.
+        crane: the crane at the right length.
+        load_s: when a load is picked up.
     """
 
+    work: str
     name: str
     script: Script
+    axis: str | None = None
     initial_deg: float = 0.0
-    lengths_pct: tuple[int, ...] = LENGTH_ERRORS_PCT
+    lengths_pct: tuple[int, ...] = (0,)
+    crane: CraneParameters = _NOMINAL
+    load_s: float | None = None
 
 
-def manoeuvres(axis: str) -> list[Manoeuvre]:
-    """All manoeuvres for one axis."""
-
-    def strokes(name: str, *parts: tuple[float, float, float]) -> Manoeuvre:
-        """Parts: (start after the begin, duration, level)."""
-        row = tuple(Stroke(axis, _START_S + s, d, v, _RAMP_S) for s, d, v in parts)
-        return Manoeuvre(name, Script(name, row, max(s.end_s for s in row) + _REST_S))
-
-    pulse = strokes("pulse", (0.0, 3.0, 1.0))
-    loading = tuple(s for s in SCRIPTS["loading"].strokes if s.axis == axis)
-    end_s = max(s.end_s for s in loading)
+def manoeuvres() -> list[Manoeuvre]:
+    """All manoeuvres."""
+    single = [task for axis in AXES for task in _single(axis)]
+    pulse = next(task for task in single if task.name == "pulse near-far")
+    loading = SCRIPTS["loading"].strokes
+    with_load = [stroke for stroke in loading if stroke.end_s <= _LOAD_TO_S]
+    both = list(_both())
+    at_once = next(task for task in both if task.name == "both at once out")
     return [
-        pulse,
-        strokes("partial stroke", (0.0, 2.5, 0.4)),
-        strokes("early release", (0.0, 0.6, 1.0)),
-        strokes("reversal", (0.0, 1.5, 1.0), (1.5, 1.5, -1.0)),
-        strokes("double tap", (0.0, 0.4, 1.0), (0.7, 0.4, 1.0)),
-        Manoeuvre("loading cycle", Script("loading cycle", loading, end_s + _REST_S)),
-        *(Manoeuvre(f"random {n}", _random(axis, n), lengths_pct=(0,)) for n in RANDOM_SEEDS),
-        Manoeuvre("initial sway", pulse.script, INITIAL_SWAY_DEG, (0,)),
+        *single,
+        *both,
+        *(
+            Manoeuvre("random", f"random {n}", _resting(random_script(n, 20.0, AXES).strokes))
+            for n in RANDOM_SEEDS
+        ),
+        Manoeuvre("cycle", "loading cycle", _resting(loading), lengths_pct=(-15, 0, 15)),
+        Manoeuvre("load", "load picked up", _resting(with_load), load_s=_LOAD_FROM_S),
+        *(
+            replace(at_once, work="gain", name=f"slow {_word(axis)}", lengths_pct=(0,), crane=crane)
+            for axis, crane in _slow_cranes()
+        ),
+        replace(
+            pulse, work="start", name="swinging", lengths_pct=(0,), initial_deg=INITIAL_SWAY_DEG
+        ),
     ]
 
 
-def _random(axis: str, seed: int) -> Script:
-    script = random_script(seed, 25.0, (axis,))
-    return Script(script.name, script.strokes, 25.0 + _REST_S)
+def _single(axis: str) -> Iterator[Manoeuvre]:
+    """Pulse, reversal and taps of one axis."""
+    pulse = Stroke(axis, _START_S, 3.0, 1.0, _RAMP_S)
+    out = replace(pulse, duration_s=1.5)
+    back = replace(out, start_s=_START_S + 1.5, level=-1.0)
+    for work, strokes in (("pulse", [pulse]), ("reversal", [out, back])):
+        yield Manoeuvre(
+            work, f"{work} {_word(axis)}", _resting(strokes), axis, lengths_pct=LENGTH_ERRORS_PCT
+        )
+    for duration_s, level in TAPS:
+        name = f"tap {duration_s:g} s {100 * level:g} % {_word(axis)}"
+        stroke = Stroke(axis, _START_S, duration_s, level, _RAMP_S)
+        yield Manoeuvre("tap", name, _resting([stroke]), axis)
+
+
+def _both() -> Iterator[Manoeuvre]:
+    """A slew, and a stroke of near-far before, with and after it: out, or a little in."""
+    for late_s in LATE_S:
+        start_s = _START_S + max(0.0, -late_s)
+        slew = Stroke("slew", start_s, 3.0, 1.0, _RAMP_S)
+        when = f"{late_s:+g} s" if late_s else "at once"
+        for way, duration_s, level in (("out", 3.0, 1.0), ("in", 2.0, -0.4)):
+            near_far = Stroke("near_far", start_s + late_s, duration_s, level, _RAMP_S)
+            script = _resting([slew, near_far])
+            name = f"both {when} {way}"
+            yield Manoeuvre("both", name, script, lengths_pct=LENGTH_ERRORS_PCT)
+
+
+def _slow_cranes() -> Iterator[tuple[str, CraneParameters]]:
+    """The valve of one axis is slower than the file says."""
+    slew, near_far = _NOMINAL.slew_full_speed_rad_s, _NOMINAL.near_far_full_speed_m_s
+    yield "slew", replace(_NOMINAL, slew_full_speed_rad_s=SLOW_VALVE * slew)
+    yield "near_far", replace(_NOMINAL, near_far_full_speed_m_s=SLOW_VALVE * near_far)
+
+
+def _resting(strokes: "list[Stroke] | tuple[Stroke, ...]") -> Script:
+    row = tuple(strokes)
+    return Script("compared", row, max(stroke.end_s for stroke in row) + _REST_S)
+
+
+def _word(axis: str) -> str:
+    return axis.replace("_", "-")

@@ -1,25 +1,28 @@
 """Driving one candidate through one manoeuvre, and all of them on all processors."""
 
 import math
-from collections.abc import Callable
+import multiprocessing
+import signal
+from collections.abc import Callable, Iterable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from pathlib import Path
 
-from canshaper.design.comparison.candidates import Candidate, with_candidate
-from canshaper.design.comparison.manoeuvres import Manoeuvre
+from canshaper.design.comparison.candidates import AXES, Candidate, with_candidate
+from canshaper.design.comparison.manoeuvres import LOAD_M, LOAD_MASS, Manoeuvre
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import axis_metrics
 from canshaper_sim.crane import CraneParameters
-from canshaper_sim.grapple import Sway
+from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.recording import Recording
 
 # Residual: largest swing later than this after the last stroke, as in the report of a drive.
 DWELL_S = 2.5
-_PLANE = {"slew": "slew", "near_far": "near_far"}
-_OTHER = {"slew": "near_far", "near_far": "slew"}
+# Below this part of full speed the tip stands, and what comes after is another movement.
+STANDS = 0.01
 
 
 @dataclass(frozen=True)
@@ -27,66 +30,113 @@ class Outcome:
     """What one candidate left in one manoeuvre at one length error.
 
     Attributes:
-        residual_deg: largest swing after the dwell, in the plane of the axis.
-        cross_deg: the same in the other plane.
-        peak_deg: largest swing of the drive, in the plane of the axis.
-        rise_s: time to 95 % of the asked speed.
-        stop_s: run-on after release until the tip stays below 5 % of full speed.
-        dip: largest fall of the command while the stick is held.
-        re_rise: largest rise of the command after release.
+        residual_deg: largest swing after the dwell: tilt of the grapple, of both planes together.
+        peak_deg: largest tilt of the drive.
+        path: way of the tip on both axes, to and fro, in s of full speed.
+        travel: of a tap: way of the tip along the axis, in s of full speed.
+        movements: of a tap: how often the tip began to move.
+        rise_s: of a pulse: time to 95 % of the asked speed.
+        stop_s: of a pulse: run-on after release until the tip stays below 5 % of full speed.
+        run_on_m: of a pulse: travel after release; of slew on the largest radius.
+        dip: of a pulse: largest fall of the command while the joystick is held.
+        re_rise: of a pulse: largest rise of the command after release.
     """
 
     candidate: str
     manoeuvre: str
+    work: str
+    axis: str | None
     length_pct: int
     residual_deg: float
-    cross_deg: float
     peak_deg: float
+    path: float
+    travel: float | None = None
+    movements: int | None = None
     rise_s: float | None = None
     stop_s: float | None = None
+    run_on_m: float | None = None
     dip: float | None = None
     re_rise: float | None = None
 
 
 def measure(
-    deployment: Deployment, axis: str, candidate: Candidate, task: Manoeuvre, length_pct: int
+    deployment: Deployment, candidate: Candidate, task: Manoeuvre, length_pct: int
 ) -> Outcome:
     """Drive once and measure."""
-    crane = CraneParameters()
-    length_m = crane.grapple.l2_m * (1.0 + length_pct / 100.0)
-    crane = replace(crane, grapple=replace(crane.grapple, l2_m=length_m))
-    start = math.radians(task.initial_deg)
-    sway = Sway(theta5_rad=start) if axis == "slew" else Sway(theta6_rad=start)
+    crane = task.crane
+    grapple = replace(crane.grapple, l2_m=crane.grapple.l2_m * (1.0 + length_pct / 100.0))
     recording = drive(
-        with_candidate(deployment, axis, candidate), task.script, parameters=crane, sway=sway
+        with_candidate(deployment, candidate),
+        task.script,
+        parameters=replace(crane, grapple=grapple),
+        sway=Sway(theta6_rad=math.radians(task.initial_deg)),
+        load=None if task.load_s is None else (task.load_s, _loaded(grapple)),
     )
+    tilt_deg = _tilt_deg(recording)
     quiet_s = max(s.end_s for s in task.script.strokes) + DWELL_S
-    own, other = recording.axes[_PLANE[axis]], recording.axes[_OTHER[axis]]
-    assert own.sway_deg is not None
-    assert other.sway_deg is not None
     outcome = Outcome(
         candidate.name,
         task.name,
+        task.work,
+        task.axis,
         length_pct,
-        _largest(recording, own.sway_deg, quiet_s),
-        _largest(recording, other.sway_deg, quiet_s),
-        max(map(abs, own.sway_deg)),
+        residual_deg=max(a for t, a in zip(recording.t_s, tilt_deg, strict=True) if t >= quiet_s),
+        peak_deg=max(tilt_deg),
+        path=sum(_integral(recording.t_s, map(abs, recording.axes[a].speed)) for a in AXES),
     )
-    if task.name != "pulse":
-        return outcome
-    found = axis_metrics(recording, axis)
+    if task.work == "tap" and task.axis:
+        speed = recording.axes[task.axis].speed
+        travel = _integral(recording.t_s, speed)
+        return replace(outcome, travel=travel, movements=_movements(speed))
+    if task.work == "pulse" and task.axis:
+        return _with_metrics(outcome, recording, task.axis, deployment)
+    return outcome
+
+
+def _loaded(grapple: Grapple) -> Grapple:
+    return replace(grapple, m2_kg=LOAD_MASS * grapple.m2_kg, l2_m=grapple.l2_m + LOAD_M)
+
+
+def _tilt_deg(recording: Recording) -> list[float]:
+    across, along = (recording.axes[axis].sway_deg for axis in AXES)
+    assert across is not None
+    assert along is not None
+    return [math.hypot(a, b) for a, b in zip(across, along, strict=True)]
+
+
+def _integral(t_s: list[float], speed: Iterable[float]) -> float:
+    steps = zip(pairwise(t_s), pairwise(speed), strict=True)
+    return math.fsum(0.5 * (v + w) * (t - s) for (s, t), (v, w) in steps)
+
+
+def _movements(speed: list[float]) -> int:
+    moves = [abs(v) > STANDS for v in speed]
+    return sum(now and not before for before, now in pairwise([False, *moves]))
+
+
+def _with_metrics(
+    outcome: Outcome, recording: Recording, axis: str, deployment: Deployment
+) -> Outcome:
+    """What the operator feels of a pulse."""
+    of_axis = axis_metrics(recording, axis)
+    crane = CraneParameters()
+    full_m_s = crane.near_far_full_speed_m_s
+    if axis == "slew":
+        slewing = deployment.axes[axis].config.slewing
+        radius_m = slewing.largest_radius_m if slewing else crane.radius_max_m
+        full_m_s = crane.slew_full_speed_rad_s * radius_m
     return replace(
         outcome,
-        rise_s=found.time_to_95_s,
-        stop_s=found.run_on_s,
-        dip=found.dip,
-        re_rise=found.re_rise,
+        rise_s=of_axis.time_to_95_s,
+        stop_s=of_axis.run_on_s,
+        run_on_m=(of_axis.run_on_travel or 0.0) * full_m_s,
+        dip=of_axis.dip,
+        re_rise=of_axis.re_rise,
     )
 
 
 def measure_all(
     file: Path,
-    axis: str,
     found: list[Candidate],
     tasks: list[Manoeuvre],
     *,
@@ -95,9 +145,10 @@ def measure_all(
 ) -> list[Outcome]:
     """Every candidate through every manoeuvre, on all processors.
 
+    Interrupted it ends at once, and so do its processes.
+
     Args:
         file: deployment file, loaded again in every process.
-        axis: the axis that is driven.
         found: the candidates.
         tasks: the manoeuvres.
         on_progress: called with the part done, 0 to 1.
@@ -106,20 +157,18 @@ def measure_all(
     jobs = [(c, t, p) for c in found for t in tasks for p in t.lengths_pct]
     outcomes = []
     with ProcessPoolExecutor(processes, initializer=_load, initargs=(file,)) as pool:
-        futures = [pool.submit(_measure, axis, *job) for job in jobs]
+        futures = [pool.submit(_measure, *job) for job in jobs]
         try:
             for done, future in enumerate(as_completed(futures), 1):
                 outcomes.append(future.result())
                 on_progress(done / len(jobs))
         except BaseException:
             pool.shutdown(wait=False, cancel_futures=True)
+            for worker in multiprocessing.active_children():
+                worker.terminate()
             raise
     order = {(c.name, t.name, p): i for i, (c, t, p) in enumerate(jobs)}
     return sorted(outcomes, key=lambda o: order[o.candidate, o.manoeuvre, o.length_pct])
-
-
-def _largest(recording: Recording, sway_deg: list[float], from_s: float) -> float:
-    return max(abs(s) for t, s in zip(recording.t_s, sway_deg, strict=True) if t >= from_s)
 
 
 _deployment: Deployment | None = None
@@ -127,9 +176,10 @@ _deployment: Deployment | None = None
 
 def _load(file: Path) -> None:
     global _deployment  # noqa: PLW0603  (one deployment a process)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
     _deployment = load_deployment(file)
 
 
-def _measure(axis: str, candidate: Candidate, task: Manoeuvre, length_pct: int) -> Outcome:
+def _measure(candidate: Candidate, task: Manoeuvre, length_pct: int) -> Outcome:
     assert _deployment is not None
-    return measure(_deployment, axis, candidate, task, length_pct)
+    return measure(_deployment, candidate, task, length_pct)

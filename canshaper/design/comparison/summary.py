@@ -1,6 +1,7 @@
 """One row a candidate, and a plain recommendation."""
 
 from dataclasses import dataclass
+from statistics import fmean
 
 from canshaper.design.comparison.candidates import Candidate
 from canshaper.design.comparison.measure import Outcome
@@ -10,8 +11,12 @@ from canshaper.design.comparison.measure import Outcome
 FAST_LEAVES = 0.12
 # "Balanced" may stop later than the fast one, up to this share of a swing in all.
 BALANCED_PERIODS = 0.9
+# The operator feels a larger dip of the speed while the joystick is held.
+FELT_DIP = 0.05
 # Run-on is read from feedback every 20 ms.
 HALF_TICK_S = 0.01
+# Another grapple or valve than the deployment has, or swing at the start: columns of their own.
+_OTHER_CRANES = ("load", "gain", "start")
 
 
 @dataclass(frozen=True)
@@ -19,63 +24,90 @@ class Row:
     """What a candidate did in all manoeuvres.
 
     Attributes:
-        stop_s, rise_s, dip, re_rise, peak_deg, residual_deg, cross_deg: of the pulse at the right
-            length.
-        pulse_15_deg: largest residual of the pulse at length errors up to 15 %.
-        worst_15_deg, worst_30_deg: largest residual of all manoeuvres but random and initial sway
-            at length errors up to 15 and 30 %.
-        random_deg: largest residual of the random sticks.
-        initial_deg: residual of the pulse that began with swing.
+        worst_deg: by kind of work, largest residual at the right length.
+        mean_deg: by kind of work, its mean.
+        worst_15_deg, worst_30_deg: largest residual at length errors up to 15 and 30 %.
+        worst_case: manoeuvre and length error of the latter.
+        stop_s, rise_s, run_on_m: of the pulse of near-far at the right length.
+        slew_run_on_m: travel after release of the pulse of slew, on its largest radius.
+        dip, re_rise: of both pulses.
+        peak_deg: largest swing with both joysticks at the right length.
+        tap_part: travel of the shortest tap of near-far, as a part of that without filter.
+        tap_movements: largest number of movements of a tap.
+        path_part: way of the tip in random drives and cycle, as a part of that without filter.
     """
 
     name: str
     ours: bool
-    stop_s: float
-    rise_s: float
-    residual_deg: float
-    cross_deg: float
-    pulse_15_deg: float
+    worst_deg: dict[str, float]
+    mean_deg: dict[str, float]
     worst_15_deg: float
     worst_30_deg: float
-    random_deg: float
-    initial_deg: float
-    peak_deg: float
+    worst_case: str
+    stop_s: float
+    rise_s: float
+    run_on_m: float
+    slew_run_on_m: float
     dip: float
     re_rise: float
+    peak_deg: float
+    tap_part: float
+    tap_movements: int
+    path_part: float
 
 
 def rows(found: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
     """Summaries in the order of the candidates."""
-    return [_row(c, [o for o in outcomes if o.candidate == c.name]) for c in found]
+    raw = [o for o in outcomes if o.candidate == "off"]
+    return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in found]
 
 
-def _row(candidate: Candidate, outcomes: list[Outcome]) -> Row:
-    pulses = [o for o in outcomes if o.manoeuvre == "pulse"]
-    pulse = next(o for o in pulses if o.length_pct == 0)
+def _row(candidate: Candidate, outcomes: list[Outcome], raw: list[Outcome]) -> Row:
+    right = [o for o in outcomes if o.length_pct == 0]
+    works = {o.work: [p.residual_deg for p in right if p.work == o.work] for o in right}
+    pulses = {o.axis: o for o in right if o.work == "pulse"}
+    pulse = pulses["near_far"]
 
-    def worst(range_pct: int) -> float:
-        return max(
-            o.residual_deg
-            for o in outcomes
-            if abs(o.length_pct) <= range_pct and not o.manoeuvre.startswith(("random", "initial"))
-        )
+    def worst(range_pct: int) -> Outcome:
+        near = (o for o in outcomes if abs(o.length_pct) <= range_pct)
+        return max((o for o in near if o.work not in _OTHER_CRANES), key=lambda o: o.residual_deg)
 
+    case = worst(30)
     return Row(
         candidate.name,
         candidate.ours,
-        pulse.stop_s if pulse.stop_s is not None else float("nan"),
-        pulse.rise_s if pulse.rise_s is not None else float("nan"),
-        pulse.residual_deg,
-        pulse.cross_deg,
-        max(o.residual_deg for o in pulses if abs(o.length_pct) <= 15),
-        worst(15),
-        worst(30),
-        max(o.residual_deg for o in outcomes if o.manoeuvre.startswith("random")),
-        next(o.residual_deg for o in outcomes if o.manoeuvre == "initial sway"),
-        pulse.peak_deg,
-        pulse.dip or 0.0,
-        pulse.re_rise or 0.0,
+        worst_deg={work: max(left) for work, left in works.items()},
+        mean_deg={work: fmean(left) for work, left in works.items()},
+        worst_15_deg=worst(15).residual_deg,
+        worst_30_deg=case.residual_deg,
+        worst_case=f"{case.manoeuvre} {case.length_pct:+d} %"
+        if case.length_pct
+        else case.manoeuvre,
+        stop_s=_number(pulse.stop_s),
+        rise_s=_number(pulse.rise_s),
+        run_on_m=_number(pulse.run_on_m),
+        slew_run_on_m=_number(pulses["slew"].run_on_m),
+        dip=max(o.dip or 0.0 for o in pulses.values()),
+        re_rise=max(o.re_rise or 0.0 for o in pulses.values()),
+        peak_deg=max(o.peak_deg for o in right if o.work == "both"),
+        tap_part=_shortest_tap(right) / _shortest_tap(raw),
+        tap_movements=max(o.movements or 0 for o in right if o.work == "tap"),
+        path_part=_path(right) / _path(raw),
     )
+
+
+def _number(value: float | None) -> float:
+    return float("nan") if value is None else value
+
+
+def _shortest_tap(outcomes: list[Outcome]) -> float:
+    first = next(o for o in outcomes if o.work == "tap" and o.axis == "near_far")
+    return first.travel or 0.0
+
+
+def _path(outcomes: list[Outcome]) -> float:
+    works = ("random", "cycle")
+    return sum(o.path for o in outcomes if o.work in works and o.length_pct == 0)
 
 
 def beaten_by(row: Row, table: list[Row]) -> Row | None:
@@ -89,13 +121,17 @@ def beaten_by(row: Row, table: list[Row]) -> Row | None:
 
 
 def recommendations(table: list[Row], period_s: float) -> dict[str, tuple[Row, str]]:
-    """For "fast", "balanced" and "calm" a row and a sentence that says why."""
+    """For "fast", "balanced" and "calm" a row and a sentence that says why.
+
+    The filter that is off dips never, so that there always is one.
+    """
     off = next(r for r in table if r.name == "off")
-    quiet = [r for r in table if r.worst_15_deg <= FAST_LEAVES * off.worst_15_deg]
-    fast = min(quiet or table, key=lambda r: (r.stop_s, r.worst_15_deg))
-    in_time = [r for r in table if r.stop_s <= BALANCED_PERIODS * period_s]
-    balanced = min(in_time or table, key=lambda r: (r.worst_15_deg, r.stop_s))
-    calm = min(table, key=lambda r: (r.worst_30_deg, r.stop_s))
+    even = [r for r in table if r.dip <= FELT_DIP]
+    quiet = [r for r in even if r.worst_15_deg <= FAST_LEAVES * off.worst_15_deg]
+    fast = min(quiet or even, key=lambda r: (r.stop_s, r.worst_15_deg))
+    in_time = [r for r in even if r.stop_s <= BALANCED_PERIODS * period_s]
+    balanced = min(in_time or even, key=lambda r: (r.worst_15_deg, r.stop_s))
+    calm = min(even, key=lambda r: (r.worst_30_deg, r.stop_s))
     return {
         "fast": (
             fast,

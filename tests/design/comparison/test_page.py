@@ -1,0 +1,70 @@
+"""The page has what the command gives: the row of what we recommend, and the limits."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from canshaper.design.comparison.candidates import candidates
+from canshaper.design.comparison.limits import least
+from canshaper.design.comparison.manoeuvres import manoeuvres
+from canshaper.design.comparison.measure import Outcome, measure
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+
+ROOT = Path(__file__).parents[3]
+PAGE = (ROOT / "docs" / "comparison.md").read_text("utf-8")
+ROBUST = "robust 1.8 s ±15 %"
+
+
+def table(head: str) -> str:
+    """A block of the page, by how its heads begin."""
+    block = re.search(rf"```text\n(?:[^`]*\n)? {head} [^`]*```", PAGE)
+    assert block is not None
+    return block[0]
+
+
+def cells(head: str, name: str) -> list[str]:
+    line = next(line for line in table(head).splitlines() if line.strip().startswith(name + " "))
+    return line.replace(name, "", 1).split()
+
+
+@pytest.fixture(scope="module")
+def deployment() -> Deployment:
+    return load_deployment(ROOT / "config" / "forwarder-robust.yaml")
+
+
+@pytest.fixture(scope="module")
+def outcomes(deployment: Deployment) -> list[Outcome]:
+    """Of the works of one and both axes, at the right length."""
+    robust = next(c for c in candidates(deployment) if c.name == ROBUST)
+    works = ("pulse", "tap", "reversal", "both")
+    return [measure(deployment, robust, t, 0) for t in manoeuvres() if t.work in works]
+
+
+def test_residuals(outcomes: list[Outcome]) -> None:
+    worst = [
+        max(o.residual_deg for o in outcomes if o.work == work)
+        for work in ("pulse", "tap", "reversal", "both")
+    ]
+    assert cells("left, deg", ROBUST)[:4] == [f"{deg:.2f}" for deg in worst]
+
+
+def test_what_is_felt(outcomes: list[Outcome]) -> None:
+    slew, near_far = (o for o in outcomes if o.work == "pulse")
+    felt = (near_far.rise_s, near_far.stop_s, near_far.run_on_m, slew.run_on_m)
+    row = cells("felt", ROBUST)
+    assert row[:4] == [f"{value:.2f}" for value in felt]
+    assert row[6] == f"{max(o.peak_deg for o in outcomes if o.work == 'both'):.1f}"
+    assert row[8] == str(max(o.movements or 0 for o in outcomes))
+
+
+def test_limits(deployment: Deployment) -> None:
+    head = "limit, % of swing"
+    rows = {}
+    for limit in least(deployment):
+        parts = (limit.ours_15, limit.no_dip_15, limit.any_15, limit.no_dip_30)
+        rows[f"{limit.duration_s:.1f} s"] = [f"{100 * part:.1f}" for part in parts]
+    given = re.findall(r"^ (\d\.\d s) ", table(head), re.MULTILINE)
+    assert len(given) >= 4
+    assert {name: cells(head, name) for name in given} == {name: rows[name] for name in given}
