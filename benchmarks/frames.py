@@ -116,7 +116,7 @@ class Ticking:
         for _ in range(50):
             self._move(0.0)
         for _ in range(200):  # until the filter has settled about the middle
-            self._move(self._stick())
+            self._move(self._joystick())
         seen = self._sweep(self._at, self.tick_ns, 50)
         self._grid_ns = seen[0].out_ns
         for width_ns in (self.tick_ns // 10, self.tick_ns // 100 + 20_000, 8_000):
@@ -128,7 +128,7 @@ class Ticking:
     def measure(self, at_work: Callable[[], bool]) -> list[Result]:
         """Frames at every phase, once the load is at work."""
         while not at_work():  # without frames the axis would stop
-            self._move(self._stick())
+            self._move(self._joystick())
         before, begin = cpu_ns(self.pid), time.monotonic_ns()
         seen = self._sweep(self._at, self.tick_ns, self.count)
         ticks = (time.monotonic_ns() - begin) / self.tick_ns
@@ -153,7 +153,7 @@ class Ticking:
         self._at = max(self._at + JOYSTICK_NS, time.monotonic_ns())
         self.wire.send(self._at, pct, self.right_ns)
 
-    def _stick(self) -> float:
+    def _joystick(self) -> float:
         self._high = not self._high
         return HIGH_PCT if self._high else LOW_PCT
 
@@ -165,7 +165,7 @@ class Ticking:
         for _ in range(count):
             soonest = max(soonest, time.monotonic_ns() + AHEAD_NS)
             at += max(0, -(-(soonest - at) // self.tick_ns)) * self.tick_ns
-            seen.append(self.wire.exchange(at, self._stick(), self.right_ns, jump=True))
+            seen.append(self.wire.exchange(at, self._joystick(), self.right_ns, jump=True))
             slack.append(seen[-1].in_ns - at)
             at += self.tick_ns + width_ns // count
         self._at = at

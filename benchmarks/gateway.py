@@ -89,8 +89,8 @@ class Line:
             self._number = (self._number + 1) % 256
             on = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0, "AliveCounter": self._number}
             # a hand is never quite still
-            sticks = {"Slew": pct + 0.1 * (self._number % 2), "NearFar": 0}
-            left = self._left.encode(on | sticks)
+            joysticks = {"Slew": pct + 0.1 * (self._number % 2), "NearFar": 0}
+            left = self._left.encode(on | joysticks)
             right = self._right.encode(on | {"Lift": 0, "Rotate": 0})
             sleep_until(at)
             self._hand.send(FRAME.pack(JOYSTICK_LEFT, 8, left))

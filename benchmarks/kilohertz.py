@@ -51,7 +51,7 @@ JOYSTICK_MS = 20
 JOYSTICK, VALVE = 0x110, 0x200
 JOYSTICK_TEXT = """
 BO_ {id} Joystick{n}: 8 JOYSTICKS
- SG_ Stick : 0|16@1- (0.1,0) [-100|100] "%" SHAPER
+ SG_ Joystick : 0|16@1- (0.1,0) [-100|100] "%" SHAPER
  SG_ Enable : 32|2@1+ (1,0) [0|1] "" SHAPER
  SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER
 """
@@ -83,7 +83,7 @@ def deployment(directory: Path, axes: int, tick_ms: int, bus: Bus) -> Path:
         }
         valve = {"bus": "crane", "message": f"Valve{n}", "signal": "Velocity", "timeout_ms": 200}
         config["axes"][f"axis{n}"] = {
-            "command": {"joystick": f"joystick{n}", "signal": "Stick"},
+            "command": {"joystick": f"joystick{n}", "signal": "Joystick"},
             "valve": {**valve, "alive_counter": "AliveCounter"},
             "sway": {"period_s": 2.0 + 0.1 * n, "damping_ratio": 0.05, "full_speed_m_s": 1.0},
             "filter": {"kind": "gff", "a1": 0.708, "a2": 0.12},
@@ -111,8 +111,8 @@ class Hands:
         for i in range(frames):
             self._count += 1
             phase = i / 100 % 2  # there and back in four seconds
-            stick = 0.0 if neutral else 20.0 + 60.0 * min(phase, 2 - phase)
-            values = {"Stick": stick, "Enable": 1, "AliveCounter": self._count % 256}
+            joystick = 0.0 if neutral else 20.0 + 60.0 * min(phase, 2 - phase)
+            values = {"Joystick": joystick, "Enable": 1, "AliveCounter": self._count % 256}
             for message in self._joysticks:
                 data = message.encode(values)
                 self._port.send(Frame("crane", message.frame_id, False, data))

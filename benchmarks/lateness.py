@@ -78,7 +78,7 @@ class Bench:
             self.results[loaded].append(Ticks(title, late))
 
     def daemon(self, title: str, file: Path, tick_ms: int, fifo: int | None) -> None:
-        """The daemon with a stick that moves all the time."""
+        """The daemon with a joystick that moves all the time."""
         notes, log = self.directory / "ticks", self.directory / "log"
         command = [sys.executable, ROOT / "benchmarks" / "observed.py", "ticks", notes, file]
         count = self.count if tick_ms == 1 else self.count // SHORTER
@@ -103,7 +103,7 @@ class Bench:
             self.results[loaded].append(ticks)
 
     def _drive(self, duration_ns: int, *, neutral: bool = False) -> tuple[int, int]:
-        """Move the stick for so long; begin and end.
+        """Move the joystick for so long; begin and end.
 
         What waits is read before: ours is the higher priority than that of a loop without any.
         """

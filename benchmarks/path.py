@@ -1,6 +1,6 @@
 """Where the way from joystick frame to valve frame goes: bytecodes by function.
 
-One axis at 1 ms, in motion, a new stick position in every tick. Counted are the bytecodes that
+One axis at 1 ms, in motion, a new joystick position in every tick. Counted are the bytecodes that
 Python executes from begin of the tick's I/O cycle until the valve frame is handed to the kernel;
 frames are the kernel's, on a pair of sockets. The same on every machine that has the same Python.
 

@@ -1,6 +1,6 @@
 """What the live page costs: pictures a second, and how late the daemon is with and without it.
 
-Two daemons and two cranes on udp_multicast as ``canshaper studio`` starts them, with sticks that
+Two daemons and two cranes on udp_multicast as ``canshaper studio`` starts them, with joysticks that
 move all the time, for so many seconds without a page, then with both cranes in a headless Chromium,
 and so on in turn. Lateness is that of every tick of the shaped crane's daemon, which has the
 priority of its unit where that is permitted. Where there is no graphics card, Chromium draws on the
@@ -103,11 +103,11 @@ class Hand(threading.Thread):
         self.resting = threading.Event()
 
     def run(self) -> None:
-        """Send the sticks until the end."""
+        """Send the joysticks until the end."""
         while not self._end.wait(HAND_S):
             at = 0.0 if self.resting.is_set() else wave()
-            sticks = dict.fromkeys(AXES, at)
-            self._stage.with_cab(lambda cab, now_s, s=sticks: cab.sticks(0, s, now_s))
+            joysticks = dict.fromkeys(AXES, at)
+            self._stage.with_cab(lambda cab, now_s, s=joysticks: cab.joysticks(0, s, now_s))
 
     def close(self) -> None:
         """Let go."""

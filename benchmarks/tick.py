@@ -87,8 +87,8 @@ def gateway(deployment: Deployment, bus: can.BusABC) -> Callable[[int], None]:
             decoded = joysticks[message.arbitration_id].decode(message.data, decode_choices=False)
             values.update(decoded)  # type: ignore[arg-type]
         count = (count + 1) % 256
-        for stick, valve, signal in routes:
-            data = valve.encode({signal: values.get(stick, 0.0), "AliveCounter": count})
+        for joystick, valve, signal in routes:
+            data = valve.encode({signal: values.get(joystick, 0.0), "AliveCounter": count})
             bus.send(can.Message(arbitration_id=valve.frame_id, is_extended_id=False, data=data))
 
     return body

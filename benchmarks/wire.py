@@ -1,7 +1,7 @@
 """Joystick frames at chosen moments, and the valve frames that answer them.
 
-The stick jumps between two deflections with every frame, so that a valve frame tells which joystick
-frame it answers: the valve jumps the same way.
+The joystick jumps between two deflections with every frame, so that a valve frame tells which
+joystick frame it answers: the valve jumps the same way.
 """
 
 import socket
@@ -103,7 +103,7 @@ class Wire:
             if not jump or (abs(rise) >= LEAST_STEPS and (rise > 0) is (pct == HIGH_PCT)):
                 break
         else:
-            raise SystemExit(f"the valve does not follow the stick: it stays at {self._steps}")
+            raise SystemExit(f"the valve does not follow the joystick: it stays at {self._steps}")
         _, in_ns, _ = receive_stamped(self._in)
         return Exchange(send_ns, in_ns, out_ns, back_ns)
 

@@ -33,7 +33,7 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
     last = asked("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
     allowed = number(*limits(Sway, "full_speed_m_s"))
-    speed = asked("    speed of the tip at full stick, m/s", allowed, "1")
+    speed = asked("    speed of the tip at full deflection, m/s", allowed, "1")
     return Stopwatch(seconds, first, last, speed)
 
 
@@ -46,7 +46,7 @@ def slewing_of(axis: str) -> "FirstSlewing | None":
     if not typer.confirm(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
-    speed = asked("    speed at full stick, rad/s (a turn is 6.28)", allowed, "0.5")
+    speed = asked("    speed at full deflection, rad/s (a turn is 6.28)", allowed, "0.5")
     least, most = limits(Slewing, "largest_radius_m")
     allowed = number(least, min(most, _FASTEST_M_S / speed))
     return FirstSlewing(speed, asked("    largest radius of the tip, m", allowed, "9"))

@@ -1,4 +1,4 @@
-"""Sticks without a sign: a magnitude with flags as in J1939-71, or a signal for each direction."""
+"""Commands without a sign: a magnitude with flags as in J1939-71, or a signal a direction."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -10,8 +10,8 @@ from canshaper.shaping.states import Reason
 # position sensor are two parts and do not meet at one angle. More is a sensor that is broken.
 SMALL_IN_NEUTRAL = 0.05
 # (neutral, negative, positive) to sign and largest position; every other set is contradictory. No
-# flag at all is none while the position is 0: a stick may stand between the neutral switch and the
-# switch of a direction, and 0 moves nothing whatever the direction.
+# flag at all is none while the position is 0: a joystick may stand between the neutral switch and
+# the switch of a direction, and 0 moves nothing whatever the direction.
 _DIRECTIONS = {
     (0, 0, 1): (1.0, 1.0),
     (0, 1, 0): (-1.0, 1.0),
@@ -24,11 +24,11 @@ _NOT_AVAILABLE = 3
 
 @dataclass(frozen=True, slots=True)
 class FlaggedVelocity:
-    """Velocity of a stick with direction flags: raw values of a frame to command or fault.
+    """Velocity of a joystick with direction flags: raw values of a frame to command or fault.
 
     Attributes:
         magnitude: signal of the magnitude (``magnitude_range``).
-        neutral: name of the flag that the stick is in neutral.
+        neutral: name of the flag that the joystick is in neutral.
         negative: name of the flag that the command is negative.
         positive: name of the flag that the command is positive.
     """
@@ -52,14 +52,14 @@ class FlaggedVelocity:
         if isinstance(size, Reason):
             return size
         if size < -ROUNDING:
-            return Reason.STICK_OUT_OF_RANGE
+            return Reason.JOYSTICK_OUT_OF_RANGE
         flags = raw[self.neutral], raw[self.negative], raw[self.positive]
         direction = _DIRECTIONS.get(flags)
         if direction is None:
             return _fault(flags)
         sign, largest = direction
         if size > largest:
-            return Reason.STICK_CONTRADICTORY
+            return Reason.JOYSTICK_CONTRADICTORY
         return sign * size if size > ROUNDING else 0.0
 
 
@@ -91,9 +91,9 @@ class RockerVelocity:
         if isinstance(negative, Reason):
             return negative
         if min(positive, negative) < -ROUNDING:
-            return Reason.STICK_OUT_OF_RANGE
+            return Reason.JOYSTICK_OUT_OF_RANGE
         if min(positive, negative) > SMALL_IN_NEUTRAL:
-            return Reason.STICK_CONTRADICTORY
+            return Reason.JOYSTICK_CONTRADICTORY
         return positive - negative
 
 
@@ -101,5 +101,5 @@ def _fault(flags: tuple[int, int, int]) -> Reason:
     """Why these flags tell no direction."""
     codes = {flag for flag in flags if flag > 1}
     if not codes:
-        return Reason.STICK_CONTRADICTORY
-    return Reason.STICK_NOT_AVAILABLE if codes == {_NOT_AVAILABLE} else Reason.STICK_ERROR
+        return Reason.JOYSTICK_CONTRADICTORY
+    return Reason.JOYSTICK_NOT_AVAILABLE if codes == {_NOT_AVAILABLE} else Reason.JOYSTICK_ERROR

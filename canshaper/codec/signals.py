@@ -115,9 +115,9 @@ def special_codes(signal: Signal) -> dict[Any, Reason]:
     for raw, name in (signal.choices or {}).items():
         words = " ".join(_WORD.findall(str(name))).lower()
         if _NOT_AVAILABLE.search(words):
-            special[raw] = Reason.STICK_NOT_AVAILABLE
+            special[raw] = Reason.JOYSTICK_NOT_AVAILABLE
         elif _ERROR.search(words):
-            special[raw] = Reason.STICK_ERROR
+            special[raw] = Reason.JOYSTICK_ERROR
     return special
 
 
@@ -150,7 +150,7 @@ ROUNDING = 1e-6
 
 @dataclass(frozen=True, slots=True)
 class VelocitySignal:
-    """Signed velocity of a stick: raw value to command or fault."""
+    """Signed velocity of a joystick: raw value to command or fault."""
 
     name: str
     scale: float
@@ -174,9 +174,9 @@ class VelocitySignal:
         if -1.0 <= value <= 1.0:
             return value
         if not math.isfinite(value):
-            return Reason.STICK_NOT_A_NUMBER
+            return Reason.JOYSTICK_NOT_A_NUMBER
         if abs(value) > 1.0 + ROUNDING:
-            return Reason.STICK_OUT_OF_RANGE
+            return Reason.JOYSTICK_OUT_OF_RANGE
         return math.copysign(1.0, value)
 
 

@@ -75,7 +75,7 @@ class Stopwatch:
 
 @dataclass(frozen=True)
 class FirstSlewing:
-    """An axis that turns the crane: its speed at full stick, and how far out the tip may be."""
+    """An axis that turns the crane: its full speed, and how far out the tip may be."""
 
     full_speed_rad_s: float
     largest_radius_m: float
@@ -97,11 +97,11 @@ class FirstMotion:
 
 @dataclass(frozen=True)
 class FirstAxis:
-    """An axis: its stick, its valve, its swing where it has one, and how it turns the crane."""
+    """An axis: its joystick, its valve, its swing where it has one, and how it turns the crane."""
 
     name: str
     joystick: str
-    stick: str
+    command_signal: str
     valve: str
     signal: str
     timeout_ms: int
@@ -212,7 +212,8 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
     valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
     yield f"  {axis.name}:"
-    yield f"    command: {{ joystick: {axis.joystick}, signal: {axis.stick}, neutral_pct: 2 }}"
+    command = f"joystick: {axis.joystick}, signal: {axis.command_signal}"
+    yield f"    command: {{ {command}, neutral_pct: 2 }}"
     yield f"    valve: {{ bus: crane, {valve} }}"
     if axis.status:
         yield f"    status: {{ bus: crane, message: {axis.status} }}"

@@ -25,13 +25,15 @@ class Joystick(Input):
 
     enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
-    anti_sway_off: str | None = Field(None, description="signal that asks for the unshaped stick")
+    anti_sway_off: str | None = Field(
+        None, description="signal that asks for the unshaped joystick"
+    )
     next_profile: str | None = Field(
         None, description="signal whose rising edge chooses the next profile"
     )
     node: str | None = Field(None, description="name of its node on a bus of CANopen")
     stuck_s: Annotated[
-        float, number(1, 3600, "s", "a stick deflected for so long without change is broken")
+        float, number(1, 3600, "s", "a joystick deflected for so long without change is broken")
     ] = 20.0
 
 
@@ -56,9 +58,9 @@ class EmergencyStop(Input):
 
 
 class DirectionFlags(Section):
-    """Signals that tell the direction of a stick, as in J1939-71: 1 yes, 0 no, all else invalid."""
+    """Signals of the direction of a joystick, as in J1939-71: 1 yes, 0 no, all else invalid."""
 
-    neutral: str = Field(description="signal that the stick is in neutral")
+    neutral: str = Field(description="signal that the joystick is in neutral")
     negative: str = Field(description="signal that the velocity is negative")
     positive: str = Field(description="signal that the velocity is positive")
 
@@ -67,14 +69,14 @@ class Command(Section):
     """Where an axis gets its command from."""
 
     joystick: str = Field(description="name of a joystick")
-    signal: str = Field(description="signal with the velocity; its DBC range is full stick")
+    signal: str = Field(description="signal with the velocity; its DBC range is full deflection")
     flags: DirectionFlags | None = None
     """Signals of the direction, only where the velocity has no sign of its own."""
     negative: str | None = Field(
         None, description="rocker of two signals: that of the negative direction"
     )
     neutral_pct: Annotated[
-        float, number(0.1, 20, "% of full stick", "deflection that still counts as neutral")
+        float, number(0.1, 20, "% of full deflection", "deflection that still counts as neutral")
     ] = 2.0
 
     @model_validator(mode="after")
@@ -228,7 +230,7 @@ class Limits(Section):
 
 
 class AxisConfig(Section):
-    """One axis: from which stick, through which filter and limits, to which valve."""
+    """One axis: from which joystick, through which filter and limits, to which valve."""
 
     command: Command = Field(description="the joystick that commands the axis")
     valve: Valve = Field(description="the valve that moves the axis")

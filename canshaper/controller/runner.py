@@ -15,7 +15,7 @@ from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.states import REACTION_OF, Reaction, Reason, State, StickInput, Transition
+from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
 from canshaper.shaping.sway import SwayModel
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
@@ -23,12 +23,12 @@ from canshaper.shaping.sway import SwayModel
 FOREIGN_NS = 1_000_000_000
 
 
-class StickSource(Protocol):
-    """Where an axis gets its stick from."""
+class CommandSource(Protocol):
+    """Where an axis gets its joystick from."""
 
-    def stick(
+    def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> StickInput:
+    ) -> CommandInput:
         """What the axis may use now, see ``JoystickInput``."""
 
     @property
@@ -48,7 +48,7 @@ class AxisRunner:
         chooser: which sway data and filter are in force, where there is a choice.
     """
 
-    def __init__(self, bound: BoundAxis, tick_s: float, joystick: StickSource) -> None:
+    def __init__(self, bound: BoundAxis, tick_s: float, joystick: CommandSource) -> None:
         config = bound.config
         self.bound = bound
         self._joystick = joystick
@@ -120,11 +120,11 @@ class AxisRunner:
         """Let load state and operator choose sway data and filter."""
         self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
 
-    def isolate(self, joystick: StickSource, axis: Axis | None = None) -> None:
-        """For a measurement: another stick, perhaps another state machine, nothing of other axes.
+    def isolate(self, joystick: CommandSource, axis: Axis | None = None) -> None:
+        """For a measurement: another joystick, perhaps another ``Axis``, nothing of other axes.
 
         Args:
-            joystick: where the stick comes from now.
+            joystick: where the joystick comes from now.
             axis: what drives the valve now; by default the same as before.
         """
         self._joystick = joystick
@@ -195,17 +195,24 @@ class AxisRunner:
             fault = self._objections(now_ns, emergency)
         axis, joystick = self.axis, self._joystick
         trip, self._trip = self._trip, None
-        stick = joystick.stick(self._signal, now_ns, self._releases, trip, self._neutral_band)
+        command = joystick.command(self._signal, now_ns, self._releases, trip, self._neutral_band)
         self._releases = joystick.releases
         # A release is more than a fault.
-        if fault is not None and (stick.enabled or axis.neutral):
-            stick = StickInput(fault=fault, reset=stick.reset, trip=trip)
+        if fault is not None and (command.enabled or axis.neutral):
+            command = CommandInput(fault=fault, reset=command.reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
-        if overrun and axis.state is not State.BYPASS_ON and stick.enabled and stick.fault is None:
-            stick = StickInput(fault=Reason.LOOP_OVERRUN, reset=stick.reset, trip=stick.trip)
+        if (
+            overrun
+            and axis.state is not State.BYPASS_ON
+            and command.enabled
+            and command.fault is None
+        ):
+            command = CommandInput(
+                fault=Reason.LOOP_OVERRUN, reset=command.reset, trip=command.trip
+            )
         if self.chooser is not None:
             self.chooser.update(now_ns)
-        transition = axis.act(stick, self.added)
+        transition = axis.act(command, self.added)
         self._put(axis.raw)
         return transition
 
@@ -233,7 +240,7 @@ class AxisRunner:
                 fault = fault or stop
         if self._invalid:
             self._invalid = False
-            fault = fault or Reason.STICK_TIMEOUT
+            fault = fault or Reason.JOYSTICK_TIMEOUT
         self._trip = trip
         return fault
 

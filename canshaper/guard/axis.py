@@ -2,7 +2,7 @@
 
 import math
 
-from canshaper.guard.bits import MOST_KNOWN, CommandBits, StickBits
+from canshaper.guard.bits import MOST_KNOWN, CommandBits, JoystickBits
 from canshaper.guard.inputs import (
     BACK,
     FOREVER,
@@ -80,7 +80,7 @@ class GuardedAxis(Asked):
     ) -> None:
         config, limits = bound.config, bound.config.limits
         message = deployment.joysticks[config.command.joystick].message
-        super().__init__(StickBits(message, config.command))
+        super().__init__(JoystickBits(message, config.command))
         joystick.drives(self)
         period_ns = deployment.config.tick_ms * 1_000_000 * bound.period_ticks
         period_s = period_ns * 1e-9

@@ -81,7 +81,7 @@ class Part:
         return 0.0 if not abs(value) <= 1.0 + ROUNDING or raw in self._special else value
 
 
-class StickBits:
+class JoystickBits:
     """What a joystick frame asks of one axis.
 
     Attributes:
@@ -89,15 +89,17 @@ class StickBits:
         span: the bytes with all of them.
     """
 
-    def __init__(self, message: Message, stick: Command) -> None:
+    def __init__(self, message: Message, joystick: Command) -> None:
         length = message.length
-        self._part = Part(_signal(message, stick.signal), length)
-        self._negative = Part(_signal(message, stick.negative), length) if stick.negative else None
+        self._part = Part(_signal(message, joystick.signal), length)
+        self._negative = (
+            Part(_signal(message, joystick.negative), length) if joystick.negative else None
+        )
         self._flags: tuple[Field, ...] = ()
-        if flags := stick.flags:
+        if flags := joystick.flags:
             names = (flags.neutral, flags.positive, flags.negative)
             self._flags = tuple(Field(_signal(message, name), length) for name in names)
-        self._band = stick.neutral_pct / 100.0 - ROUNDING
+        self._band = joystick.neutral_pct / 100.0 - ROUNDING
         self.fields = [self._part.field, *self._flags]
         self.fields += [self._negative.field] if self._negative else []
         self.span = span_of(reduce(or_, (field.bits for field in self.fields)))
@@ -121,8 +123,8 @@ class CommandBits:
         span: bytes with the signals that tell it.
     """
 
-    def __init__(self, message: Message, valve: Valve, stick: Command | None) -> None:
-        """``stick`` is that of a joystick whose own message carries the command, else None."""
+    def __init__(self, message: Message, valve: Valve, joystick: Command | None) -> None:
+        """``joystick`` is that of a joystick whose own message carries the command, else None."""
         length = message.length
         signal = _signal(message, valve.signal)
         self._size, self._zero, self._sign, self.full = _steps(signal, length)
@@ -132,13 +134,13 @@ class CommandBits:
             self._direction = (Field(_signal(message, direction.signal), length),)
             codes = (direction.neutral, direction.positive, direction.negative)
             self._codes = {(code,): sign for code, sign in zip(codes, (0, 1, -1), strict=True)}
-        elif stick and (flags := stick.flags):
+        elif joystick and (flags := joystick.flags):
             names = (flags.neutral, flags.positive, flags.negative)
             self._direction = tuple(Field(_signal(message, name), length) for name in names)
             self._codes = _SIGNS
         self._back: Field | None = None
-        if stick and stick.negative:
-            self._back = _steps(_signal(message, stick.negative), length)[0]
+        if joystick and joystick.negative:
+            self._back = _steps(_signal(message, joystick.negative), length)[0]
         self._also = [_steps(_signal(message, name), length) for name in valve.also]
         fields = [self._size, *self._direction, *(also[0] for also in self._also)]
         fields += [self._back] if self._back else []

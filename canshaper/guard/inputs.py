@@ -8,7 +8,7 @@ raise what the guard allows, never what the controller does.
 from abc import ABC, abstractmethod
 from collections import deque
 
-from canshaper.guard.bits import MOST_KNOWN, Field, StickBits, span_of
+from canshaper.guard.bits import MOST_KNOWN, Field, JoystickBits, span_of
 from canshaper.machine.inputs import BoundInput
 
 NEVER, FOREVER = -(10**18), 10**19  # ns
@@ -18,12 +18,12 @@ Sizes = deque[tuple[float, int]]
 
 
 class Asked:
-    """What a stick asks of one axis, and asked of late: amortised constant time.
+    """What a joystick asks of one axis, and asked of late: amortised constant time.
 
     Attributes:
         now: what its last frame asks, [-1, 1].
         positive, negative: sizes that it asked before in each direction, where it then asked less.
-        stick: how its frames are read.
+        joystick: how its frames are read.
         asks: what it asked, by the bytes of that.
         good_ns: until when the last command may leave again, if nothing forbids it meanwhile.
         sure: by direction the speed that was asked for at least, and until when that holds, if
@@ -33,15 +33,15 @@ class Asked:
     __slots__ = (
         "asks",
         "good_ns",
+        "joystick",
         "negative",
         "now",
         "positive",
-        "stick",
         "sure",
     )
 
-    def __init__(self, stick: StickBits) -> None:
-        self.stick = stick
+    def __init__(self, joystick: JoystickBits) -> None:
+        self.joystick = joystick
         self.asks: dict[bytes, float] = {}
         self.now = 0.0
         self.positive: Sizes = deque()
@@ -53,7 +53,7 @@ class Asked:
         """Read what a frame asks."""
         if len(self.asks) >= MOST_KNOWN:
             self.asks.clear()
-        ask = self.asks[data[self.stick.span]] = self.stick.ask(data)
+        ask = self.asks[data[self.joystick.span]] = self.joystick.ask(data)
         return ask
 
     def forbid(self) -> None:
@@ -176,9 +176,9 @@ class GuardedJoystick(GuardedInput):
         self.released = False
 
     def drives(self, asked: Asked) -> None:
-        """A stick of it commands an axis."""
-        self._asked.append((asked.stick.span, asked.asks, asked))
-        for field in asked.stick.fields:
+        """A joystick of it commands an axis."""
+        self._asked.append((asked.joystick.span, asked.asks, asked))
+        for field in asked.joystick.fields:
             self._bits |= field.bits
         self._span = span_of(self._bits)
 

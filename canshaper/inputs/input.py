@@ -105,8 +105,8 @@ class Input(ABC):
         if self._received_ns is not None and now_ns - self._received_ns <= self._timeout_ns:
             return None
         if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
-            return Reason.STICK_UNTRUSTED
-        return Reason.STICK_TIMEOUT
+            return Reason.JOYSTICK_UNTRUSTED
+        return Reason.JOYSTICK_TIMEOUT
 
 
 class EmergencyStopInput(Input):

@@ -5,9 +5,9 @@ from typing import Any, Self
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input
 from canshaper.machine.inputs import BoundJoystick
-from canshaper.shaping.states import Reason, StickInput
+from canshaper.shaping.states import CommandInput, Reason
 
-_new = tuple.__new__  # StickInput(...) in half the time
+_new = tuple.__new__  # CommandInput(...) in half the time
 
 
 class JoystickInput(Input):
@@ -45,7 +45,7 @@ class JoystickInput(Input):
         arrived_ns: int,
         accepted: bool,
     ) -> FrameFault:
-        """Note since when each stick is where it is; codes that are no measurement are a fault.
+        """Note since when each joystick is where it is; codes that are no measurement are a fault.
 
         A released enable needs no trust, however short it is; only a frame that counts ends it.
         """
@@ -83,9 +83,9 @@ class JoystickInput(Input):
         super().copy_state(before)
         self._released = before._released
 
-    def stick(
+    def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> StickInput:
+    ) -> CommandInput:
         """Input of the axis that this signal drives.
 
         Args:
@@ -93,7 +93,7 @@ class JoystickInput(Input):
             now_ns: monotonic time.
             releases: as they were when this axis asked last.
             trip: a cause for neutral at once, handed through.
-            neutral_band: |stick| up to which it counts as neutral and may stand still for ever.
+            neutral_band: |joystick| up to which it counts as neutral and may stand still for ever.
         """
         released = self._released or self.releases > releases
         received_ns = self._received_ns
@@ -101,10 +101,10 @@ class JoystickInput(Input):
             lost = self.lost(now_ns)
             # Seen released is more than lost: an immediate stop, not the shaped one.
             released = self.releases > releases or (
-                self._released and lost is Reason.STICK_UNTRUSTED
+                self._released and lost is Reason.JOYSTICK_UNTRUSTED
             )
             # What the switches did meanwhile is not known; one that is held was not pressed.
-            return StickInput(fault=lost, enabled=not released, reset=True, trip=trip)
+            return CommandInput(fault=lost, enabled=not released, reset=True, trip=trip)
         raw = self.raw
         command = self.commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
@@ -117,11 +117,11 @@ class JoystickInput(Input):
         elif enable != 1:  # nor 0, which is released
             fault = Reason.SWITCH_INVALID
         elif abs(command) > neutral_band and now_ns - self._changed_ns[signal] > self._frozen_ns:
-            fault = Reason.STICK_FROZEN
+            fault = Reason.JOYSTICK_FROZEN
         else:
-            return _new(StickInput, (command, None, True, bypass, reset, trip))
+            return _new(CommandInput, (command, None, True, bypass, reset, trip))
         if released and enable != 0 and (self._released or self._doubted > releases):
-            fault = Reason.STICK_UNTRUSTED  # it moves nothing, and is no press
+            fault = Reason.JOYSTICK_UNTRUSTED  # it moves nothing, and is no press
         elif fault is None:
-            return StickInput(command, enabled=False, reset=reset, trip=trip)
-        return StickInput(fault=fault, enabled=not released, reset=reset, trip=trip)
+            return CommandInput(command, enabled=False, reset=reset, trip=trip)
+        return CommandInput(fault=fault, enabled=not released, reset=reset, trip=trip)

@@ -20,7 +20,7 @@ def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick 
     used, bound = result
     lookup.check_node(place, config.bus, config.node)
     of_axes = {n: a.command for n, a in lookup.config.axes.items() if a.command.joystick == name}
-    moves = {s.signal: f"the stick of {axis}" for axis, s in reversed(of_axes.items())}
+    moves = {s.signal: f"the joystick of {axis}" for axis, s in reversed(of_axes.items())}
     velocities = [
         (_bind_rocker if command.negative else _bind_velocity)(used, axis, command, moves)
         for axis, command in of_axes.items()

@@ -14,14 +14,14 @@ RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
 ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
 RADIUS = re.compile(r"radius|reach", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
-_JOYSTICK = re.compile(r"lever|joy|stick", re.IGNORECASE)
+_JOYSTICK = re.compile(r"lever|joy|joystick", re.IGNORECASE)
 # A switch has two bits at most: off, on, error, not available.
 _SWITCH_BITS = 2
 # Part of a name that two have in common, from which on they are likely to belong together.
 LIKELY = 0.6
 
 
-def sticks(message: Message) -> list[Signal]:
+def axes(message: Message) -> list[Signal]:
     """Signals of a message that can be the velocity of an axis."""
     return [s for s in message.signals if not s.is_float and symmetrical_range(s) is None]
 
@@ -43,20 +43,20 @@ def counter(message: Message) -> str | None:
 
 
 def joysticks(messages: Sequence[Message]) -> list[Message]:
-    """Messages that come again and again with a stick and a switch; the likely ones first."""
-    found = [m for m in messages if m.cycle_time and sticks(m) and switches(m)]
+    """Messages that come again and again with a joystick and a switch; the likely ones first."""
+    found = [m for m in messages if m.cycle_time and axes(m) and switches(m)]
     return sorted(found, key=lambda m: not _JOYSTICK.search(m.name))
 
 
 def commands(message: Message) -> list[Signal]:
     """Signals of a message that can command a valve."""
-    return [s for s in sticks(message) if command_fault(s) is None]
+    return [s for s in axes(message) if command_fault(s) is None]
 
 
-def valves(messages: Sequence[Message], stick: str) -> list[Message]:
-    """Messages that can command a valve; those whose names are like that of its stick first."""
+def valves(messages: Sequence[Message], joystick: str) -> list[Message]:
+    """Messages that can command a valve; those whose names are like that of its joystick first."""
     found = [m for m in messages if m.cycle_time and commands(m) and not is_status(m)]
-    return sorted(found, key=lambda m: -likeness(m.name, stick))
+    return sorted(found, key=lambda m: -likeness(m.name, joystick))
 
 
 def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
@@ -98,7 +98,7 @@ def _with(signals: set[str], messages: Sequence[Message]) -> Message | None:
 
 
 def axis_name(signal: str) -> str:
-    """A name for an axis after its stick: NearFar is near_far."""
+    """A name for an axis after its joystick: NearFar is near_far."""
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])", "_", signal).lower()
 
 

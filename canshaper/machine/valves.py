@@ -120,7 +120,7 @@ def _rewritten_joystick(config: DeploymentConfig, valve: Valve) -> str | None:
 def _check_rewritten(
     lookup: Lookup, place: Place, valve: Valve, command: Command, name: str
 ) -> None:
-    """In the frames of a joystick only its own sticks may be rewritten, and protected as it is."""
+    """In the frames of a joystick only its own axes may be rewritten, and protected as it is."""
     add, joystick = lookup.diagnostics.add, lookup.config.joysticks[name]
     if command.joystick != name:
         text = f"expected the message of joystick {command.joystick}, or one of no joystick"

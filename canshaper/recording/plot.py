@@ -1,4 +1,4 @@
-"""The picture of a replay: stick and command above predicted sway, each deployment in a colour.
+"""The picture of a replay: joystick and command above predicted sway, each deployment in a colour.
 
 The only module here that needs matplotlib; it draws through the object API, so no display and no
 global state is involved.
@@ -12,9 +12,9 @@ from matplotlib.axes import Axes
 from canshaper.recording.report import Replayed
 from canshaper.report.style import (
     DPI,
+    JOYSTICK_COLOUR,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     coloured_words,
     command_scale,
@@ -47,7 +47,7 @@ def draw(replays: Sequence[Replayed], path: Path) -> None:
     heights = [1.6 if sway else 1.0 for _, sway in rows]
     inches = 0.7 + BLOCK_IN * sum(heights) / 2.6
     fig = new_figure(WIDTH_PX, inches * DPI)
-    words = [("stick straight to the valve", STRAIGHT_COLOUR)]
+    words = [("joystick straight to the valve", STRAIGHT_COLOUR)]
     words += [(one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(replays)]
     coloured_words(fig, words, (0.052, 1.0 - 0.08 / inches), size=15, sep=14)
     grid = fig.add_gridspec(
@@ -70,11 +70,11 @@ def draw(replays: Sequence[Replayed], path: Path) -> None:
 def _draw_command(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw the command of the valve, over the stick as a filled step."""
+    """Draw the command of the valve, over the joystick as a filled step."""
     panel.set_title(axis_title(name), loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
     if name in straight.axes:
-        stick = straight.axes[name].stick
-        panel.fill_between(straight.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0)
+        joystick = straight.axes[name].joystick
+        panel.fill_between(straight.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0)
     command_scale(panel, 1.1)
     panel.set_ylabel("command, %", color=TEXT_COLOUR)
     for i, recording in enumerate(recordings):
@@ -87,11 +87,11 @@ def _draw_command(
 def _draw_sway(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
-    """Draw the predicted sway, and that of the stick straight to the valve."""
+    """Draw the predicted sway, and that of the joystick straight to the valve."""
     panel.set_ylabel("predicted sway, degrees", color=TEXT_COLOUR)
-    stick = straight.axes.get(name)
-    if stick is not None and stick.sway_deg is not None:
-        panel.plot(straight.t_s, stick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
+    joystick = straight.axes.get(name)
+    if joystick is not None and joystick.sway_deg is not None:
+        panel.plot(straight.t_s, joystick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
     for i, recording in enumerate(recordings):
         if name in recording.axes and (sway := recording.axes[name].sway_deg) is not None:
             panel.plot(recording.t_s, sway, color=COLOURS[i % len(COLOURS)], linewidth=1.8)

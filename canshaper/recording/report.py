@@ -16,7 +16,7 @@ from canshaper.recording.trace import Trace
 from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper.report.table import NOTHING, axis_title
 
-STRAIGHT = "stick"
+STRAIGHT = "joystick"
 ROWS = (
     ("peak sway, deg", "peak_deg", 1.0, 1),
     ("RMS sway, deg", "rms_deg", 1.0, 1),
@@ -54,7 +54,7 @@ class Replayed:
     straight: dict[str, AxisMetrics] = field(default_factory=dict)
 
     def measure(self) -> None:
-        """Measure the drive, and the same with the stick straight to the valve."""
+        """Measure the drive, and the same with the joystick straight to the valve."""
         if self.trace.rows < 2:
             return
         recording, straight = self.trace.recording(), self.trace.straight()
@@ -96,7 +96,7 @@ class Replayed:
 
 
 def print_replays(replays: Sequence[Replayed], console: Console) -> None:
-    """A table an axis: the stick straight to the valve, then each deployment."""
+    """A table an axis: the joystick straight to the valve, then each deployment."""
     for axis in _axes(replays):
         table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title_justify="left")
         table.add_column(axis_title(axis), no_wrap=True)

@@ -75,7 +75,7 @@ class Trace:
         return self._recording(sent=1, sway=2)
 
     def straight(self) -> Recording:
-        """The drive as it would be with the stick straight to the valve."""
+        """The drive as it would be with the joystick straight to the valve."""
         return self._recording(sent=0, sway=3)
 
     def _recording(self, sent: int, sway: int) -> Recording:

@@ -12,7 +12,7 @@ from canshaper_sim.recording import CraneTrace, Point, Recording
 class CraneMetrics:
     """Measures of the whole crane over one drive, whatever axes were moved together.
 
-    A rest is the time from the release of the last stick until any is pressed.
+    A rest is the time from the release of the last joystick until any is pressed.
 
     Attributes:
         peak_deg: largest total swing of the grapple over the whole drive, degrees.

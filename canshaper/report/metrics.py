@@ -41,11 +41,11 @@ class AxisMetrics:
         rms_deg: square root of the time mean of sway^2 over the whole drive (trapezoids, so a
             lost sample gets no extra weight), degrees.
         residual_deg: largest |sway| later than ``RESIDUAL_DWELL_S`` after the release of the axis,
-            until any stick is moved; only after strokes during which no other axis was moved.
+            until any joystick is moved; only after strokes during which no other axis was moved.
             Swing still left from before the press is in it.
         cross_residual_deg: the same windows, the sway of the other planes.
         time_to_95_s: from the press to the tip speed reaching 95 % of the asked speed, while the
-            stick is held at its plateau. A speed that falls below 90 % again while held was only
+            joystick is held at its plateau. A speed that falls below 90 % again while held was only
             passed through: the last reaching counts. Worst over the strokes that reach it.
         run_on_s: from the release to the tip speed falling below 5 % of full speed and staying
             there for the rest. Worst over the strokes of this axis alone; a rest that ends
@@ -53,7 +53,7 @@ class AxisMetrics:
         run_on_travel: integral of the speed in the direction of the stroke from the release to the
             end of the rest, full speed x s. Largest over the strokes of this axis alone.
         dip: largest fall of the sent command below its running maximum since the press, while the
-            stick is held at its plateau, less what the stick itself fell by; fraction of full
+            joystick is held at its plateau, less what the joystick itself fell by; fraction of full
             command.
         re_rise: largest rise of |sent| above its running minimum since the release, within the
             rest, fraction of full command.

@@ -22,10 +22,10 @@ from canshaper.report.strokes import (
     rests,
 )
 from canshaper.report.style import (
+    JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     coloured_words,
     command_scale,
@@ -204,9 +204,11 @@ def _shade(panel: Axes, drive: Recording, windows: list[range]) -> None:
 def _draw_command(
     panel: Axes, raw: Recording, shaped: Recording, name: str, strokes: list[Stroke]
 ) -> None:
-    """Draw the stick as a filled step, and the command to the valve without and with filters."""
-    stick = raw.axes[name].stick
-    panel.fill_between(raw.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0, zorder=1.5)
+    """Draw the joystick as a filled step, and the command to the valve without and with filters."""
+    joystick = raw.axes[name].joystick
+    panel.fill_between(
+        raw.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0, zorder=1.5
+    )
     _draw_pair(panel, raw, shaped, lambda drive: drive.axes[name].sent, drawstyle="steps-post")
     command_scale(panel, 1.2)
     panel.set_ylabel("command, %", fontsize=_TEXT, color=TEXT_COLOUR)
@@ -214,7 +216,7 @@ def _draw_command(
         first, last = strokes[0].plateau
         middle_s = 0.5 * (raw.t_s[first] + raw.t_s[last])
         level = -0.5 * strokes[0].direction
-        panel.text(middle_s, level, "stick", ha="center", va="center", fontsize=_TEXT)
+        panel.text(middle_s, level, "joystick", ha="center", va="center", fontsize=_TEXT)
 
 
 def _draw_sway(panel: Axes, raw: Recording, shaped: Recording, name: str) -> None:

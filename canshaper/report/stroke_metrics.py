@@ -1,4 +1,4 @@
-"""What one stroke of the stick shows: rise, run-on, dip, and how the output rose again."""
+"""What one stroke of the joystick shows: rise, run-on, dip, and how the output rose again."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -63,11 +63,11 @@ def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
 
 
 def dip(trace: AxisTrace, stroke: Stroke) -> float:
-    """How far the output fell back while the stick was held, in parts of full command."""
+    """How far the output fell back while the joystick was held, in parts of full command."""
     first, last = stroke.plateau
     sent_max, asked_max, dip = -math.inf, 0.0, 0.0
     for k in range(stroke.press, last + 1):
-        sent, asked = stroke.direction * trace.sent[k], abs(trace.stick[k])
+        sent, asked = stroke.direction * trace.sent[k], abs(trace.joystick[k])
         sent_max, asked_max = max(sent_max, sent), max(asked_max, asked)
         if k >= first:
             dip = max(dip, (sent_max - sent) - (asked_max - asked))

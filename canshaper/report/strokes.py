@@ -1,4 +1,4 @@
-"""Strokes of the stick in a recorded drive, and the rests after them in which swing is measured."""
+"""Strokes of the joystick in a recorded drive, and the rests after them that show the swing."""
 
 import math
 import statistics
@@ -6,7 +6,9 @@ from dataclasses import dataclass
 
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
-NEUTRAL_BAND = 0.02  # stick: two steps of a joystick frame of 1/125 and a little, never a command
+NEUTRAL_BAND = (
+    0.02  # joystick: two steps of a joystick frame of 1/125 and a little, never a command
+)
 PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far
 RESIDUAL_DWELL_S = 2.5  # the slowest shapers have stopped the crane by then (stop 2.4 s)
 RESIDUAL_WINDOW_MIN_S = 1.0  # half a period of a 1 m tool: a shorter look may fall on a zero
@@ -15,18 +17,18 @@ _ROUNDING_S = 1e-6  # a time base that was shifted must not lose the sample on t
 
 @dataclass(frozen=True)
 class Stroke:
-    """One deflection of one stick; indices are samples of the recording.
+    """One deflection of one joystick; indices are samples of the recording.
 
     Attributes:
         axis: name of the axis.
         direction: +1.0 or -1.0.
         press: first sample outside the neutral band.
         release: first sample back in neutral or on the other side; None when the drive ends first.
-        level: asked speed, median of |stick| over the plateau, fraction of full speed.
-        plateau: first and last sample of the longest run of |stick| above ``PLATEAU`` of the
+        level: asked speed, median of |joystick| over the plateau, fraction of full speed.
+        plateau: first and last sample of the longest run of |joystick| above ``PLATEAU`` of the
             largest deflection of the stroke.
-        alone: no other stick left neutral between press and release.
-        rest: samples from the release until any stick is pressed, or another one released;
+        alone: no other joystick left neutral between press and release.
+        rest: samples from the release until any joystick is pressed, or another one released;
             empty for a reversal and for a stroke without release.
     """
 
@@ -41,13 +43,13 @@ class Stroke:
 
 
 def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
-    """Segment every stick of the drive into strokes, in order of time.
+    """Segment every joystick of the drive into strokes, in order of time.
 
     Raises:
         ValueError: lists of different length, time not increasing, or a value that is no number.
     """
     _check(recording)
-    spans = {name: _spans(trace.stick) for name, trace in recording.axes.items()}
+    spans = {name: _spans(trace.joystick) for name, trace in recording.axes.items()}
     return {
         name: [_stroke(recording, spans, name, span) for span in own] for name, own in spans.items()
     }
@@ -56,7 +58,7 @@ def find_strokes(recording: Recording) -> dict[str, list[Stroke]]:
 def residual_windows(recording: Recording, strokes: list[Stroke]) -> list[range]:
     """Rests in which the residual swing of these strokes (of one axis) shows.
 
-    A window holds the samples from ``RESIDUAL_DWELL_S`` after the release until a stick is moved.
+    A window holds the samples from ``RESIDUAL_DWELL_S`` after the release until a joystick moves.
     Strokes during which another axis was moved have none, nor have rests that leave less than
     ``RESIDUAL_WINDOW_MIN_S``.
     """
@@ -75,7 +77,7 @@ def residual_window(t_s: list[float], rest: range) -> range:
 
 
 def rests(recording: Recording) -> list[range]:
-    """Samples from the release of the last stick until any is pressed, or to the end."""
+    """Samples from the release of the last joystick until any is pressed, or to the end."""
     strokes = [one for own in find_strokes(recording).values() for one in own]
 
     def moved(k: int) -> bool:
@@ -89,7 +91,7 @@ def rests(recording: Recording) -> list[range]:
 def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
     """Cut two drives of the same script to the span both cover, and give them one time base.
 
-    The first press of any stick is put at the same time in both (good to one sample); without a
+    The first press of any joystick is put at the same time in both (good to one sample); without a
     press in both, the starts are. A longer recording is thus not measured over more rest.
 
     Raises:
@@ -116,7 +118,7 @@ def _check(recording: Recording) -> None:
         raise ValueError("the time of a recording must increase")
     for name, trace in recording.axes.items():
         sway = {} if trace.sway_deg is None else {"sway_deg": trace.sway_deg}
-        lists = {"stick": trace.stick, "sent": trace.sent, "speed": trace.speed, **sway}
+        lists = {"joystick": trace.joystick, "sent": trace.sent, "speed": trace.speed, **sway}
         for signal, values in lists.items():
             if len(values) != len(recording.t_s):
                 raise ValueError(
@@ -126,18 +128,18 @@ def _check(recording: Recording) -> None:
                 raise ValueError(f"{name}.{signal} holds a value that is no finite number")
 
 
-def _side(stick: float) -> int:
+def _side(joystick: float) -> int:
     """Return 0 in neutral, else the sign of the deflection."""
-    return 0 if abs(stick) <= NEUTRAL_BAND else (1 if stick > 0 else -1)
+    return 0 if abs(joystick) <= NEUTRAL_BAND else (1 if joystick > 0 else -1)
 
 
-def _spans(stick: list[float]) -> list[tuple[int, int]]:
+def _spans(joystick: list[float]) -> list[tuple[int, int]]:
     """Return runs of samples on one side of neutral, as (first, one past the last)."""
     spans = []
     start = 0
-    for k in range(1, len(stick) + 1):
-        if k == len(stick) or _side(stick[k]) != _side(stick[start]):
-            if _side(stick[start]):
+    for k in range(1, len(joystick) + 1):
+        if k == len(joystick) or _side(joystick[k]) != _side(joystick[start]):
+            if _side(joystick[start]):
                 spans.append((start, k))
             start = k
     return spans
@@ -149,32 +151,32 @@ def _stroke(
     axis: str,
     span: tuple[int, int],
 ) -> Stroke:
-    stick = recording.axes[axis].stick
+    joystick = recording.axes[axis].joystick
     press, end = span
     others = [other for name, own in spans.items() if name != axis for other in own]
     rest_end = min(
         [first for own in spans.values() for first, _ in own if first >= end]
         + [past for _, past in others if past > end]
-        + [len(stick)]
+        + [len(joystick)]
     )
-    first, last = _plateau(recording.t_s, stick, span)
+    first, last = _plateau(recording.t_s, joystick, span)
     return Stroke(
         axis=axis,
-        direction=float(_side(stick[press])),
+        direction=float(_side(joystick[press])),
         press=press,
-        release=end if end < len(stick) else None,
-        level=statistics.median(abs(v) for v in stick[first : last + 1]),
+        release=end if end < len(joystick) else None,
+        level=statistics.median(abs(v) for v in joystick[first : last + 1]),
         plateau=(first, last),
         alone=all(past <= press or begin >= end for begin, past in others),
         rest=range(end, rest_end),
     )
 
 
-def _plateau(t_s: list[float], stick: list[float], span: tuple[int, int]) -> tuple[int, int]:
-    held = PLATEAU * max(abs(stick[k]) for k in range(*span))
+def _plateau(t_s: list[float], joystick: list[float], span: tuple[int, int]) -> tuple[int, int]:
+    held = PLATEAU * max(abs(joystick[k]) for k in range(*span))
     runs: list[tuple[int, int]] = []
     for k in range(*span):
-        if abs(stick[k]) < held:
+        if abs(joystick[k]) < held:
             continue
         if runs and runs[-1][1] == k - 1:
             runs[-1] = (runs[-1][0], k)
@@ -196,7 +198,7 @@ def _cut(recording: Recording, begin_s: float, end_s: float) -> Recording:
     part = slice(keep[0], keep[-1] + 1)
     axes = {
         name: AxisTrace(
-            stick=trace.stick[part],
+            joystick=trace.joystick[part],
             sent=trace.sent[part],
             speed=trace.speed[part],
             sway_deg=None if trace.sway_deg is None else trace.sway_deg[part],

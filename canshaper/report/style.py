@@ -13,7 +13,7 @@ from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 # Vermilion and blue of Okabe and Ito: told apart by colour-blind eyes too.
 RAW_COLOUR: Final = "#D55E00"
 SHAPED_COLOUR: Final = "#0072B2"
-STICK_COLOUR: Final = "#D5D5D5"
+JOYSTICK_COLOUR: Final = "#D5D5D5"
 TEXT_COLOUR: Final = "#333333"
 MINUS: Final = "\N{MINUS SIGN}"
 DPI: Final = 100

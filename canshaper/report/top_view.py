@@ -6,9 +6,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from canshaper.report.style import (
+    JOYSTICK_COLOUR,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     plain,
     titled,
@@ -64,7 +64,7 @@ def _draw(panel: Axes, crane: CraneTrace, rests: Sequence[range], colour: str) -
     for number, rest in enumerate(rests):
         label = "tip runs on" if number == 0 else None
         part = [crane.tip_m[k] for k in rest]
-        panel.plot(*_columns(part), color=STICK_COLOUR, linewidth=5.0, zorder=1.5, label=label)
+        panel.plot(*_columns(part), color=JOYSTICK_COLOUR, linewidth=5.0, zorder=1.5, label=label)
     panel.plot(*_columns(crane.tip_m), color=TEXT_COLOUR, linewidth=0.8, label="tip")
     panel.plot(*_columns(crane.grapple_m), color=colour, linewidth=1.4, label="grapple")
 

@@ -19,7 +19,7 @@ from canshaper.shaping.limits import (
 from canshaper.shaping.shapers.kind import Shaper, spreads
 from canshaper.shaping.small_strokes import SmallStrokes
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, TRIPPED, StateMachine
-from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
+from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import BumplessTransfer
 
@@ -38,7 +38,7 @@ class Axis:
         limits: output limits.
         sway: sway model, or None where the axis has none.
         shaper: the filter.
-        neutral_band: |stick| up to which it counts as neutral.
+        neutral_band: |joystick| up to which it counts as neutral.
         stop_s: longest duration of STOPPING.
         grid_steps: raw steps of the valve frame from zero to full command.
 
@@ -103,19 +103,19 @@ class Axis:
         """Whether the axis is at rest in a state that cannot move without the operator."""
         return self._states.state not in MOVING
 
-    def tick(self, stick: StickInput, added: float = 0.0) -> Transition | None:
+    def tick(self, joystick: CommandInput, added: float = 0.0) -> Transition | None:
         """A whole tick: ``act`` and ``advance``."""
-        transition = self.act(stick, added)
+        transition = self.act(joystick, added)
         self.advance()
         return transition
 
-    def act(self, stick: StickInput, added: float) -> Transition | None:
+    def act(self, joystick: CommandInput, added: float) -> Transition | None:
         """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
 
         Args:
-            stick: the checked input.
+            joystick: the checked input.
             added: velocity that the motion of two axes adds to this one, [-1, 1] of full speed.
-                It is carried out while this axis is enabled, its stick valid, and anti-sway on, as
+                It is carried out while this axis is enabled, its joystick valid, anti-sway on, as
                 ``range_with_added`` says. The sway model is not driven by it: it is there to cause
                 no swing, so the model swings with what is left for the axis itself. One that is no
                 velocity trips the axis.
@@ -124,10 +124,10 @@ class Axis:
             The change of state of this tick, or None.
         """
         states = self._states
-        if not self._largest_added or stick.bypass or not self._may_add(added):
+        if not self._largest_added or joystick.bypass or not self._may_add(added):
             added = 0.0
         old = states.state
-        state = states.step(stick, added, self.raw == 0 and not self.commanded)
+        state = states.step(joystick, added, self.raw == 0 and not self.commanded)
         if state is not old:
             self._transfer.entered(state, old)
             if state is not ACTIVE:
@@ -137,7 +137,7 @@ class Axis:
         command = 0.0
         try:
             if state is ACTIVE or state is BYPASS_ON:
-                command = stick.command
+                command = joystick.command
                 size = abs(command)
                 if size <= self._neutral_band:
                     command = 0.0

@@ -40,12 +40,12 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "nothing received yet",
         "joysticks on, bus up",
     ),
-    Reason.STICK_NEUTRAL: ReasonText(
-        "stick in neutral",
+    Reason.JOYSTICK_NEUTRAL: ReasonText(
+        "joystick in neutral",
         "the joystick is valid, fresh, enabled and in neutral",
     ),
-    Reason.STICK_MOVED: ReasonText(
-        "stick moved",
+    Reason.JOYSTICK_MOVED: ReasonText(
+        "joystick moved",
         "the joystick left neutral",
     ),
     Reason.AT_REST: ReasonText(
@@ -70,12 +70,12 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "cause of a trip gone, joystick in neutral, then a rising edge of reset or enable",
     ),
     Reason.COMPENSATING: ReasonText(
-        "moves for slewing, without its own stick",
+        "moves for slewing, without its own joystick",
         "another axis moves this one without its own joystick, within "
         "[bounds](safety.md#added-velocity)",
     ),
-    Reason.STICK_NOT_NEUTRAL: ReasonText(
-        "let go of the stick",
+    Reason.JOYSTICK_NOT_NEUTRAL: ReasonText(
+        "let go of the joystick",
         "the joystick is deflected before the axis is ready",
         "let go of the joystick",
     ),
@@ -84,28 +84,28 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "enable switch off",
         "press enable with the joystick in neutral",
     ),
-    Reason.STICK_TIMEOUT: ReasonText(
+    Reason.JOYSTICK_TIMEOUT: ReasonText(
         "no joystick message",
         "no joystick message within `timeout_ms`",
         "bus, joystick",
     ),
-    Reason.STICK_ERROR: ReasonText(
+    Reason.JOYSTICK_ERROR: ReasonText(
         "the joystick reports an error",
         "the signal carries its error code",
         "joystick",
     ),
-    Reason.STICK_NOT_AVAILABLE: ReasonText(
-        "the stick is not available",
+    Reason.JOYSTICK_NOT_AVAILABLE: ReasonText(
+        "the joystick is not available",
         "the signal carries its not-available code",
         "joystick, DBC",
     ),
-    Reason.STICK_OUT_OF_RANGE: ReasonText(
-        "the stick is out of range",
+    Reason.JOYSTICK_OUT_OF_RANGE: ReasonText(
+        "the joystick is out of range",
         "beyond the range of the DBC",
         "joystick, DBC",
     ),
-    Reason.STICK_NOT_A_NUMBER: ReasonText(
-        "the stick is no number",
+    Reason.JOYSTICK_NOT_A_NUMBER: ReasonText(
+        "the joystick is no number",
         "a float signal without a number",
         "joystick",
     ),
@@ -114,17 +114,17 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "enable is neither 0 nor 1",
         "joystick",
     ),
-    Reason.STICK_CONTRADICTORY: ReasonText(
-        "flags and stick do not agree",
+    Reason.JOYSTICK_CONTRADICTORY: ReasonText(
+        "flags and joystick do not agree",
         "direction flags and position do not agree, or a rocker is pressed both ways",
         "joystick, DBC",
     ),
-    Reason.STICK_FROZEN: ReasonText(
-        "the stick has not changed for too long",
+    Reason.JOYSTICK_FROZEN: ReasonText(
+        "the joystick has not changed for too long",
         "the joystick is deflected and has not changed for longer than `stuck_s`",
         "move the joystick, then neutral; joystick",
     ),
-    Reason.STICK_UNTRUSTED: ReasonText(
+    Reason.JOYSTICK_UNTRUSTED: ReasonText(
         "joystick messages are not right",
         "wrong checksum, repeated or jumping alive counter, or too few good ones for `qualify`",
         "joystick, a gateway that repeats, two senders of one id",

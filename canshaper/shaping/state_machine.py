@@ -1,22 +1,22 @@
 """The state machine of one axis: what an input makes of its state.
 
 Nothing but MOVING states may give anything but neutral, and a MOVING state is entered only from
-READY, which takes a fresh, valid, enabled stick seen in neutral.
+READY, which takes a fresh, valid, enabled joystick seen in neutral.
 """
 
-from canshaper.shaping.states import MOVING, TRANSITIONS, Reason, State, StickInput
+from canshaper.shaping.states import MOVING, TRANSITIONS, CommandInput, Reason, State
 
 # A member by way of its class takes ten times as long as a name, and a tick looks at many.
 NEUTRAL_WAIT, READY, ACTIVE, BYPASS_ON, STOPPING, TRIPPED = State
 # Faults with which the switches are not known either: enable counts as held.
-NOTHING_KNOWN = (Reason.STICK_TIMEOUT, Reason.STICK_UNTRUSTED)
+NOTHING_KNOWN = (Reason.JOYSTICK_TIMEOUT, Reason.JOYSTICK_UNTRUSTED)
 
 
 class StateMachine:
     """State of one axis.
 
     Args:
-        neutral_band: |stick| up to which it counts as neutral.
+        neutral_band: |joystick| up to which it counts as neutral.
         stop_ticks: longest duration of STOPPING.
 
     Attributes:
@@ -61,11 +61,11 @@ class StateMachine:
         """So many ticks were missed: they lengthen no stop."""
         self._stopping += ticks
 
-    def step(self, stick: StickInput, added: float, at_rest: bool) -> State:
+    def step(self, joystick: CommandInput, added: float, at_rest: bool) -> State:
         """Move to the state that this tick's input asks for.
 
         Args:
-            stick: the checked input.
+            joystick: the checked input.
             added: velocity that another axis asks of this one.
             at_rest: neutral is sent, and the filter can ask for nothing any more.
 
@@ -73,7 +73,7 @@ class StateMachine:
             The state.
         """
         state = self.state
-        command, fault, enabled, bypass, reset, trip = stick
+        command, fault, enabled, bypass, reset, trip = joystick
         centred = pressed = False
         if fault is None:
             centred = abs(command) <= self._neutral_band
@@ -96,11 +96,11 @@ class StateMachine:
             elif bypass is not (state is BYPASS_ON):
                 self._switch(bypass)
         elif state is READY:
-            self._ready(stick, centred, added)
+            self._ready(joystick, centred, added)
         elif state is NEUTRAL_WAIT:
-            self._wait(stick, centred)
+            self._wait(joystick, centred)
         elif state is STOPPING:
-            self._stop(stick, at_rest)
+            self._stop(joystick, at_rest)
         elif pressed and centred:
             self._go(NEUTRAL_WAIT, Reason.RESET)
         return self.state
@@ -109,26 +109,26 @@ class StateMachine:
         if self.state is not TRIPPED:  # of a latched axis the first reason stays
             self._go(TRIPPED, reason)
 
-    def _wait(self, stick: StickInput, centred: bool) -> None:
-        if stick.fault is not None:
-            self.reason = stick.fault if stick.enabled else Reason.ENABLE_OFF
+    def _wait(self, joystick: CommandInput, centred: bool) -> None:
+        if joystick.fault is not None:
+            self.reason = joystick.fault if joystick.enabled else Reason.ENABLE_OFF
         elif not centred:
-            self.reason = Reason.STICK_NOT_NEUTRAL
-        elif not stick.enabled:
+            self.reason = Reason.JOYSTICK_NOT_NEUTRAL
+        elif not joystick.enabled:
             self.reason = Reason.ENABLE_OFF
         else:
-            self._go(READY, Reason.STICK_NEUTRAL)
+            self._go(READY, Reason.JOYSTICK_NEUTRAL)
 
-    def _ready(self, stick: StickInput, centred: bool, added: float) -> None:
-        if not stick.enabled:
+    def _ready(self, joystick: CommandInput, centred: bool, added: float) -> None:
+        if not joystick.enabled:
             self._go(NEUTRAL_WAIT, Reason.ENABLE_OFF)
-        elif stick.fault is not None:
-            self._go(NEUTRAL_WAIT, stick.fault)
+        elif joystick.fault is not None:
+            self._go(NEUTRAL_WAIT, joystick.fault)
         elif not centred:
-            if stick.bypass:
+            if joystick.bypass:
                 self._go(BYPASS_ON, Reason.BYPASS_REQUESTED)
             else:
-                self._go(ACTIVE, Reason.STICK_MOVED)
+                self._go(ACTIVE, Reason.JOYSTICK_MOVED)
         elif added:
             self._go(ACTIVE, Reason.COMPENSATING)
 
@@ -138,8 +138,8 @@ class StateMachine:
         else:
             self._go(ACTIVE, Reason.BYPASS_RELEASED)
 
-    def _stop(self, stick: StickInput, at_rest: bool) -> None:
-        if not stick.enabled:
+    def _stop(self, joystick: CommandInput, at_rest: bool) -> None:
+        if not joystick.enabled:
             self._go(TRIPPED, Reason.ENABLE_LOST)
             return
         self._stopping += 1

@@ -15,13 +15,13 @@ class State(IntEnum):
     """State of one axis."""
 
     NEUTRAL_WAIT = 0
-    """Output neutral; waiting for a valid, enabled stick in neutral."""
+    """Output neutral; waiting for a valid, enabled joystick in neutral."""
     READY = 1
-    """Output neutral; the next movement of the stick moves the axis."""
+    """Output neutral; the next movement of the joystick moves the axis."""
     ACTIVE = 2
-    """The stick drives the axis through the filter; also the bounded run-on after release."""
+    """The joystick drives the axis through the filter; also the bounded run-on after release."""
     BYPASS_ON = 3
-    """The stick drives the axis through the output limits only."""
+    """The joystick drives the axis through the output limits only."""
     STOPPING = 4
     """The input is lost or invalid: command to zero through the filter, bounded in time."""
     TRIPPED = 5
@@ -36,26 +36,26 @@ class Reason(IntEnum):
     """Why an axis is in its state; in NEUTRAL_WAIT, what it still waits for."""
 
     START = 0
-    STICK_NEUTRAL = 1
-    STICK_MOVED = 2
+    JOYSTICK_NEUTRAL = 1
+    JOYSTICK_MOVED = 2
     AT_REST = 3
     BYPASS_REQUESTED = 4
     BYPASS_RELEASED = 5
     STOP_DONE = 6
     RESET = 7
     COMPENSATING = 8
-    STICK_NOT_NEUTRAL = 16
+    JOYSTICK_NOT_NEUTRAL = 16
     ENABLE_OFF = 17
     # Input lost or invalid: bounded shaped stop.
-    STICK_TIMEOUT = 32
-    STICK_ERROR = 33
-    STICK_NOT_AVAILABLE = 34
-    STICK_OUT_OF_RANGE = 35
-    STICK_NOT_A_NUMBER = 36
+    JOYSTICK_TIMEOUT = 32
+    JOYSTICK_ERROR = 33
+    JOYSTICK_NOT_AVAILABLE = 34
+    JOYSTICK_OUT_OF_RANGE = 35
+    JOYSTICK_NOT_A_NUMBER = 36
     SWITCH_INVALID = 37
-    STICK_CONTRADICTORY = 38
-    STICK_FROZEN = 39
-    STICK_UNTRUSTED = 40
+    JOYSTICK_CONTRADICTORY = 38
+    JOYSTICK_FROZEN = 39
+    JOYSTICK_UNTRUSTED = 40
     LOOP_OVERRUN = 41
     ADDRESS_NOT_CLAIMED = 42
     NODE_FAULT = 43
@@ -87,7 +87,7 @@ class Reaction(Enum):
 REACTION_OF: Mapping[Reason, Reaction] = {
     reason: Reaction.NEUTRAL
     if reason >= Reason.ENABLE_LOST
-    else (Reaction.SHAPED_STOP if reason >= Reason.STICK_TIMEOUT else Reaction.NONE)
+    else (Reaction.SHAPED_STOP if reason >= Reason.JOYSTICK_TIMEOUT else Reaction.NONE)
     for reason in Reason
 }
 """By the number, so that who reads a log knows it without this table."""
@@ -98,9 +98,9 @@ _STOPS, _TRIPS = (
 )
 
 TRANSITIONS: Mapping[tuple[State, State], frozenset[Reason]] = {
-    (State.NEUTRAL_WAIT, State.READY): frozenset({Reason.STICK_NEUTRAL}),
+    (State.NEUTRAL_WAIT, State.READY): frozenset({Reason.JOYSTICK_NEUTRAL}),
     (State.READY, State.NEUTRAL_WAIT): _STOPS | {Reason.ENABLE_OFF, Reason.EMERGENCY_STOP_LOST},
-    (State.READY, State.ACTIVE): frozenset({Reason.STICK_MOVED, Reason.COMPENSATING}),
+    (State.READY, State.ACTIVE): frozenset({Reason.JOYSTICK_MOVED, Reason.COMPENSATING}),
     (State.READY, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
     (State.ACTIVE, State.READY): frozenset({Reason.AT_REST}),
     (State.ACTIVE, State.BYPASS_ON): frozenset({Reason.BYPASS_REQUESTED}),
@@ -119,15 +119,15 @@ TRANSITIONS: Mapping[tuple[State, State], frozenset[Reason]] = {
 """Every change of state with the reasons for which it may happen; there is no other."""
 
 
-class StickInput(NamedTuple):
+class CommandInput(NamedTuple):
     """Input of one axis at one tick, already checked.
 
     Attributes:
-        command: stick in [-1, 1]; not looked at while ``fault`` is set.
-        fault: why the stick (or a switch it needs) cannot be used; None when fresh and valid.
-        enabled: False where the enable switch was seen released, be the stick as it may: a lost
+        command: joystick in [-1, 1]; not looked at while ``fault`` is set.
+        fault: why the joystick (or a switch it needs) cannot be used; None when fresh and valid.
+        enabled: False where the enable switch was seen released, be the joystick as it may: a lost
             frame gives a shaped stop, and a released switch an immediate one.
-        bypass: the operator asks for the unshaped stick.
+        bypass: the operator asks for the unshaped joystick.
         reset: reset switch (its rising edge counts); True while it is not known.
         trip: a cause for neutral at once that is there now.
     """

@@ -11,7 +11,7 @@ from typing import Self
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.states import MOVING, Reason, StickInput
+from canshaper.shaping.states import MOVING, CommandInput, Reason
 
 # Until a filter of the schema gives full speed: five times the longest time constant.
 WARM_UP_S = 25.0
@@ -77,29 +77,29 @@ def travel(new_axis: Callable[[], Axis], *, timeout_s: float, period_s: float) -
 
 
 def _travel(axis: Axis, sign: float, timeout_s: float, period_s: float) -> Travel:
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     for _ in range(round(WARM_UP_S / period_s)):
-        axis.tick(StickInput(sign))
+        axis.tick(CommandInput(sign))
     # An event waits for the next tick, and silence for the timeout before; until then it goes on.
     full = sign * axis.sent
 
-    def after(stick: StickInput, wait_s: float = period_s) -> float:
-        return full * wait_s + _way_s(axis, stick, sign, period_s)
+    def after(joystick: CommandInput, wait_s: float = period_s) -> float:
+        return full * wait_s + _way_s(axis, joystick, sign, period_s)
 
     return Travel(
-        release=after(StickInput()),
-        reversal=after(StickInput(-sign)),
-        lost=after(StickInput(fault=Reason.STICK_TIMEOUT), timeout_s + period_s),
-        enable=after(StickInput(enabled=False)),
+        release=after(CommandInput()),
+        reversal=after(CommandInput(-sign)),
+        lost=after(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), timeout_s + period_s),
+        enable=after(CommandInput(enabled=False)),
     )
 
 
-def _way_s(steady: Axis, stick: StickInput, sign: float, period_s: float) -> float:
+def _way_s(steady: Axis, joystick: CommandInput, sign: float, period_s: float) -> float:
     """How far the axis gets in the old direction."""
     axis = copy.deepcopy(steady)
     way_s = most_s = 0.0
     for _ in range(round(LONGEST_STOP_S / period_s)):
-        axis.tick(stick)
+        axis.tick(joystick)
         if axis.state not in MOVING:
             break
         way_s += sign * axis.sent * period_s

@@ -1,4 +1,4 @@
-"""A filter, or the stick past it, without a jump where one takes over from the other."""
+"""A filter, or the joystick past it, without a jump where one takes over from the other."""
 
 import math
 
@@ -32,7 +32,7 @@ class BumplessTransfer:
         """The axis has another state; a stop goes on with what drove the axis before."""
         if state is not STOPPING:
             bypassed = state is BYPASS_ON
-            # From rest there is nothing to join to: the stick counts in full at once.
+            # From rest there is nothing to join to: the joystick counts in full at once.
             self._joins = old in MOVING and bypassed is not self._bypassed
             self._bypassed = bypassed
 

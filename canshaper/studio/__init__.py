@@ -1,1 +1,1 @@
-"""The live page: a crane under the stick, raw and shaped, in a browser (never in the daemon)."""
+"""The live page: a crane under the joystick, raw and shaped, in a browser (never in the daemon)."""

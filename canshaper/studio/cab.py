@@ -1,9 +1,9 @@
-"""The driver's seat: which page drives, and what its sticks count for. No clock, no sockets.
+"""The driver's seat: which page drives, and what its joysticks count for. No clock, no sockets.
 
 Nothing moves by accident: a page that falls silent, sends nonsense or is replaced by another one
-has its sticks put in neutral, and they count again only after they were in neutral. Enable is
+has its joysticks put in neutral, and they count again only after they were in neutral. Enable is
 released when the run-on of the axes is over, so that they come to rest through the filter; only a
-page that was silent and comes back in time, with its sticks in neutral, keeps it.
+page that was silent and comes back in time, with its joysticks in neutral, keeps it.
 """
 
 import math
@@ -16,11 +16,11 @@ from canshaper_sim.hand import Held
 SILENT_S = 0.2
 """A page that drives sends every 20 ms."""
 RELEASE_S = 3.0
-"""From sticks in neutral to enable released: the longest usual run-on after release."""
+"""From joysticks in neutral to enable released: the longest usual run-on after release."""
 RESET_S = 0.3
 """How long the reset switch is held: some messages of a joystick."""
 NEUTRAL = 0.02
-"""Below it a stick of the page counts as neutral."""
+"""Below it a joystick of the page counts as neutral."""
 
 Report = Callable[[str], None]
 
@@ -34,7 +34,7 @@ class Cab:
     """The seat of one driver.
 
     Args:
-        axes: axes that have a stick.
+        axes: axes that have a joystick.
         report: called with what the driver does.
     """
 
@@ -44,7 +44,7 @@ class Cab:
         self.driver: int | None = None
         self.enable = False
         self.anti_sway = True
-        self._sticks: dict[str, float] = {}
+        self._joysticks: dict[str, float] = {}
         self._centred = False  # seen in neutral since they last stopped counting
         self._heard_s = 0.0
         self._release_at_s: float | None = None
@@ -52,11 +52,11 @@ class Cab:
         self._reset_until_s = -math.inf
 
     def take(self, page: int, now_s: float) -> None:
-        """Let a page drive; a driver that is there loses the sticks, and enable is released."""
+        """Let a page drive; a driver that is there loses the joysticks, and enable is released."""
         if page == self.driver:
             return
         if self.driver is not None:
-            self._report(f"page {page} takes the sticks from page {self.driver}")
+            self._report(f"page {page} takes the joysticks from page {self.driver}")
             self._let_go(now_s)
         self.driver = page
         self._heard_s = now_s
@@ -65,17 +65,17 @@ class Cab:
     def leave(self, page: int, now_s: float) -> None:
         """A page has gone, or has to let go."""
         if page == self.driver:
-            self._report(f"page {page} leaves the sticks; they go to neutral")
+            self._report(f"page {page} leaves the joysticks; they go to neutral")
             self._let_go(now_s)
             self.driver = None
 
-    def sticks(self, page: int, sticks: Mapping[str, Any], now_s: float) -> None:
-        """Take the positions of all sticks; those of a page that does not drive count for nothing.
+    def joysticks(self, page: int, joysticks: Mapping[str, Any], now_s: float) -> None:
+        """Take the positions of all joysticks; those of a page that does not drive do not count.
 
         Raises:
             PageMessageError: they are no positions.
         """
-        for name, value in sticks.items():
+        for name, value in joysticks.items():
             if name not in self._axes:
                 names = ", ".join(sorted(self._axes))
                 raise PageMessageError(f"expected an axis, got {name[:20]!r}; there are {names}")
@@ -85,15 +85,15 @@ class Cab:
             return
         self._watch(now_s)
         self._heard_s = now_s
-        if all(abs(value) <= NEUTRAL for value in sticks.values()):
+        if all(abs(value) <= NEUTRAL for value in joysticks.values()):
             self._centred = True
             if self._silent:
                 self._silent, self._release_at_s = False, None
                 self._report(f"page {page} is back")
-        self._sticks = {n: float(v) for n, v in sticks.items()} if self._centred else {}
+        self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
-        """A page has sent what it should not: it loses the sticks until they are in neutral."""
+        """A page has sent what it should not: it loses the joysticks until they are in neutral."""
         if page == self.driver:
             self._let_go(now_s)
 
@@ -102,7 +102,7 @@ class Cab:
         if page != self.driver:
             return
         if not on:
-            self._sticks, self._centred, self._silent = {}, False, False
+            self._joysticks, self._centred, self._silent = {}, False, False
             self.enable, self._release_at_s = False, None
         elif self._release_at_s is None or now_s >= self._release_at_s:
             self.enable, self._release_at_s = True, None
@@ -122,17 +122,17 @@ class Cab:
         """What the hand does now."""
         self._watch(now_s)
         reset = now_s < self._reset_until_s
-        return Held(dict(self._sticks), self.enable, reset, self.anti_sway)
+        return Held(dict(self._joysticks), self.enable, reset, self.anti_sway)
 
     def _watch(self, now_s: float) -> None:
         """Let go when the driver is silent; release enable when it is time."""
         silent = self.driver is not None and now_s - self._heard_s > SILENT_S
         if silent and self.enable and self._release_at_s is None:
-            self._report(f"page {self.driver} is silent; sticks in neutral")
+            self._report(f"page {self.driver} is silent; joysticks in neutral")
             self._let_go(now_s)
             self._silent = True
         elif silent:
-            self._sticks, self._centred = {}, False
+            self._joysticks, self._centred = {}, False
         if self._release_at_s is not None and now_s >= self._release_at_s:
             self._release_at_s, self._silent = None, False
             if self.enable:
@@ -140,6 +140,6 @@ class Cab:
                 self._report("enable released")
 
     def _let_go(self, now_s: float) -> None:
-        self._sticks, self._centred, self._silent = {}, False, False
+        self._joysticks, self._centred, self._silent = {}, False, False
         if self.enable and self._release_at_s is None:
             self._release_at_s = now_s + RELEASE_S

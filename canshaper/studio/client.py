@@ -14,13 +14,13 @@ from canshaper.studio.stage import Stage
 
 SHOW_S = 1.0 / 30.0
 MOST_PER_S = 120
-"""Messages a second that a page may send for long; its sticks are 50."""
+"""Messages a second that a page may send for long; its joysticks are 50."""
 BURST = 240
 """Messages at once: what a page sends after a stall."""
 MOST_NONSENSE = 20
 """Refused messages after which a page is closed."""
 MOST_BYTES = 2048
-"""Of one message; sticks take less than 200."""
+"""Of one message; joysticks take less than 200."""
 
 # RFC 6455, 5.5.1 and 7.4.1
 MOST_REASON = 123
@@ -105,10 +105,10 @@ class Client:
         """
         message = parsed(text)
         number = self._number
-        if (sticks := message.get("sticks")) is not None:
-            if not isinstance(sticks, dict):
-                raise PageMessageError("sticks: expected an object, got another value")
-            self._stage.with_cab(lambda cab, now_s: cab.sticks(number, sticks, now_s))
+        if (joysticks := message.get("joysticks")) is not None:
+            if not isinstance(joysticks, dict):
+                raise PageMessageError("joysticks: expected an object, got another value")
+            self._stage.with_cab(lambda cab, now_s: cab.joysticks(number, joysticks, now_s))
         elif (word := message.get("do")) is not None:
             self._stage.with_cab(_action(word, number))
         elif isinstance(on := message.get("antisway"), bool):

@@ -136,7 +136,7 @@ class Stage:
         self._thread.start()
 
     def stop(self) -> None:
-        """End: sticks in neutral, then daemons, cranes and buses.
+        """End: joysticks in neutral, then daemons, cranes and buses.
 
         Raises:
             Exception: the error that has ended the loop.
@@ -234,7 +234,7 @@ class Stage:
         seen.view.check(now_s)
 
     def _rest(self) -> None:
-        """The last thing on the buses: sticks in neutral, enable off."""
+        """The last thing on the buses: joysticks in neutral, enable off."""
         for seen in self.cranes.values():
             if seen.hand:
                 for frame in seen.hand.frames(0, Held()):

@@ -42,7 +42,7 @@ Report = Callable[[str, str], None]
 class AxisView:
     """What is known of an axis; fractions of full, degrees."""
 
-    stick: float | None = None
+    joystick: float | None = None
     valve: float | None = None
     state: int | None = None
     reason: int | None = None
@@ -107,7 +107,7 @@ class CraneView:
         """Take a frame, one that the page's joysticks sent too; what is none of ours is passed."""
         entries = self._handlers.get(frame[:3])
         if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
-            entries = [*(entries or ()), (self._stick, joystick)]
+            entries = [*(entries or ()), (self._joystick, joystick)]
         if entries is None and frame.extended:  # of J1939, from any address
             entries = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         for handler, what in entries or ():
@@ -158,7 +158,7 @@ class CraneView:
         axes = {}
         for name, a in self.axes.items():
             axes[name] = {
-                "stick": _rounded(a.stick),
+                "joystick": _rounded(a.joystick),
                 "valve": _rounded(a.valve),
                 "predicted": _rounded(a.predicted_deg, 2),
                 "state": None if a.state is None else state_words(a.state),
@@ -191,12 +191,12 @@ class CraneView:
 
     # -- messages ------------------------------------------------------------------------------
 
-    def _stick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
+    def _joystick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
         _, commands = joystick.codec.decode(data)
         for name, axis in self._deployment.axes.items():
             if axis.config.command.joystick == joystick.name:
                 command = commands[axis.config.command.signal]
-                self.axes[name].stick = None if isinstance(command, Reason) else command
+                self.axes[name].joystick = None if isinstance(command, Reason) else command
 
     def _valve(self, name: str, data: bytes, now_s: float) -> None:
         axis = self._deployment.axes[name]

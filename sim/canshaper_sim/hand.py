@@ -1,4 +1,4 @@
-"""The joysticks of a deployment as they are held: stick positions in, joystick frames out."""
+"""The joysticks of a deployment as they are held: joystick positions in, joystick frames out."""
 
 import math
 from collections.abc import Mapping
@@ -18,14 +18,14 @@ class Held:
     """What a hand does with the joysticks.
 
     Attributes:
-        sticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.
+        joysticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.
         enable: the enable switch.
         reset: the reset switch.
         anti_sway: the anti-sway switch.
         next_profile: the button for the next profile.
     """
 
-    sticks: Mapping[str, float] = field(default_factory=dict)
+    joysticks: Mapping[str, float] = field(default_factory=dict)
     enable: bool = False
     reset: bool = False
     anti_sway: bool = True
@@ -79,13 +79,13 @@ class _Joystick(_Message):
     def __init__(self, joystick: BoundJoystick, deployment: Deployment) -> None:
         super().__init__(joystick)
         self._config = joystick.config
-        self._sticks = {
+        self._joysticks = {
             name: axis.config.command
             for name, axis in deployment.axes.items()
             if axis.config.command.joystick == joystick.name
         }
         self._full = {s.name: float(s.maximum or 0.0) for s in joystick.message.signals}
-        # Sticks that no axis listens to stand in neutral too.
+        # Joysticks that no axis listens to stand in neutral too.
         self._base = {
             s.name: 0
             for s in joystick.message.signals
@@ -101,18 +101,22 @@ class _Joystick(_Message):
             raw[config.anti_sway_off] = int(not held.anti_sway)
         if config.next_profile:
             raw[config.next_profile] = int(held.next_profile)
-        for axis, stick in self._sticks.items():
-            command = held.sticks.get(axis, 0.0)
-            if flags := stick.flags:
+        for axis, joystick in self._joysticks.items():
+            command = held.joysticks.get(axis, 0.0)
+            if flags := joystick.flags:
                 raw[flags.neutral] = int(command == 0.0)
                 raw[flags.negative] = int(command < 0.0)
                 raw[flags.positive] = int(command > 0.0)
                 command = abs(command)
-            elif stick.negative:  # a rocker with a signal for each direction
+            elif joystick.negative:  # a rocker with a signal for each direction
                 back = max(-command, 0.0)
-                raw[stick.negative] = fields.raw(stick.negative, self._full[stick.negative] * back)
+                raw[joystick.negative] = fields.raw(
+                    joystick.negative, self._full[joystick.negative] * back
+                )
                 command = max(command, 0.0)
-            raw[stick.signal] = fields.raw(stick.signal, self._full[stick.signal] * command)
+            raw[joystick.signal] = fields.raw(
+                joystick.signal, self._full[joystick.signal] * command
+            )
         return raw
 
 

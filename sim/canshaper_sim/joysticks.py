@@ -37,8 +37,8 @@ class JoystickNode:
         """Frames that are due at this time of the script."""
         if time_ms % self.cycle_ms:
             return []
-        sticks = {axis: self.script.stick(axis, time_ms / 1000.0) for axis in self._axes}
-        held = Held(sticks, enable=True, anti_sway=not self._bypass)
+        joysticks = {axis: self.script.command(axis, time_ms / 1000.0) for axis in self._axes}
+        held = Held(joysticks, enable=True, anti_sway=not self._bypass)
         return self._hand.frames(time_ms, held)
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:

@@ -61,7 +61,7 @@ _LARGEST_LEVEL = {
     KNUCKLE: 0.6,
     EXTENSION: 0.8,
 }
-# Share of pauses among the segments that makes the stick neutral 40 % of the time: pauses last
+# Share of pauses among the segments that makes the joystick neutral 40 % of the time: pauses last
 # longer than strokes, and so do the rests at both ends.
 _PAUSE_SHARE = 0.33
 
@@ -77,9 +77,9 @@ def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stro
         duration_s = source.uniform(0.4, 2.5)
         if source.random() < _PAUSE_SHARE:
             ramp_s = source.uniform(0.1, 0.4)
-            start_s += duration_s + 0.4  # the stick first needs the ramp to get to neutral
+            start_s += duration_s + 0.4  # the joystick first needs the ramp to get to neutral
             continue
-        # A fifth of the strokes is full stick.
+        # A fifth of the strokes is full deflection.
         level = _LARGEST_LEVEL[axis] * min(1.0, source.uniform(0.25, 1.2))
         level *= source.choice((-1.0, 1.0))
         if not low_s <= travel_s + level * duration_s <= high_s:

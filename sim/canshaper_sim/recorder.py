@@ -37,7 +37,7 @@ _SWAY_SIGNAL = {
 
 
 class Recorder:
-    """Takes every frame; one row for each sway feedback, from the first stick frame on."""
+    """Takes every frame; one row for each sway feedback, from the first joystick frame on."""
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
         crane = parameters or CraneParameters()
@@ -55,7 +55,7 @@ class Recorder:
         self._handlers: dict[tuple[str, int, bool], Any] = {}
         self._joysticks: dict[str, BoundJoystick] = {}
         for joystick in deployment.joysticks.values():
-            self._handlers[joystick.key] = (self._stick, joystick.message)
+            self._handlers[joystick.key] = (self._joystick, joystick.message)
             self._joysticks[joystick.message.name] = joystick
         self._valves: dict[str, list[str]] = {}
         for name, axis in deployment.axes.items():
@@ -99,8 +99,8 @@ class Recorder:
         traces = {}
         for name, rows in self._rows.items():
             columns = [list(column) for column in zip(*rows, strict=True)] or [[], [], [], []]
-            stick, sent, speed, sway = columns
-            traces[name] = AxisTrace(stick, sent, speed, sway if name in _SWAY_SIGNAL else None)
+            joystick, sent, speed, sway = columns
+            traces[name] = AxisTrace(joystick, sent, speed, sway if name in _SWAY_SIGNAL else None)
         tip, grapple, sway = (
             map(list, zip(*self._crane, strict=True)) if self._crane else ([], [], [])
         )
@@ -110,7 +110,7 @@ class Recorder:
     def _raw(message: Any, data: bytes) -> Any:
         return message.decode(data, decode_choices=False, scaling=False)
 
-    def _stick(self, message: Any, data: bytes, time_s: float) -> None:
+    def _joystick(self, message: Any, data: bytes, time_s: float) -> None:
         if self._start_s is None:
             self._start_s = time_s
         joystick = self._joysticks[message.name]

@@ -10,14 +10,14 @@ class AxisTrace:
     """One axis over a drive; every list is as long as the recording's ``t_s``.
 
     Attributes:
-        stick: operator command, [-1, 1] of full speed.
+        joystick: operator command, [-1, 1] of full speed.
         sent: velocity command carried by the valve frame (deadband compensation undone), [-1, 1].
         speed: speed of the tip in this axis as a fraction of the axis' full speed.
         sway_deg: swing of the grapple in the plane of this axis (slew: theta5, near-far: theta6),
             degrees; None for an axis that excites no swing (lift).
     """
 
-    stick: list[float]
+    joystick: list[float]
     sent: list[float]
     speed: list[float]
     sway_deg: list[float] | None

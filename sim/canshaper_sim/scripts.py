@@ -7,7 +7,7 @@ _PULSE_RAMP_S = 0.10
 
 
 def _pulse(axis: str, level: float = 1.0) -> Script:
-    # 3 s of full stick and 5 s of rest: the test input of the paper's section 4.
+    # 3 s of full deflection and 5 s of rest: the test input of the paper's section 4.
     return Script(f"pulse-{axis}", (Stroke(axis, 0.5, 3.0, level, _PULSE_RAMP_S),), 8.5)
 
 
@@ -58,7 +58,7 @@ _LOADING = Script(
         Stroke(NEAR_FAR, 4.4, 0.6, -0.4),
         Stroke(NEAR_FAR, 5.2, 0.4, 0.3),
         Stroke(LIFT, 5.0, 0.9, -0.5),
-        # Gripping: sticks neutral. Then up, in, and back over the bunk.
+        # Gripping: joysticks neutral. Then up, in, and back over the bunk.
         Stroke(LIFT, 8.0, 2.4, 0.9),
         Stroke(NEAR_FAR, 9.0, 2.2, -0.6),
         Stroke(SLEW, 10.0, 2.8, -0.6),
@@ -117,7 +117,7 @@ _LOADING_JOINTS = Script(
         Stroke(KNUCKLE, 4.2, 0.5, -0.3),
         Stroke(KNUCKLE, 4.9, 0.5, 0.3),
         Stroke(LIFT_CYLINDER, 4.8, 1.2, -0.5),
-        # Gripping: sticks neutral. Then up, in, and back over the bunk.
+        # Gripping: joysticks neutral. Then up, in, and back over the bunk.
         Stroke(LIFT_CYLINDER, 8.5, 2.0, 0.9),
         Stroke(EXTENSION, 9.2, 1.4, -0.7),
         Stroke(KNUCKLE, 9.6, 2.4, -0.6),

@@ -1,6 +1,6 @@
 """Joystick strokes over time, repeatable to the last bit.
 
-A stroke is a trapezoid: the stick leaves neutral at its start, reaches its level one ramp later,
+A stroke is a trapezoid: the joystick leaves neutral at its start, reaches its level one ramp later,
 is let go at start + duration and is neutral one ramp after that. Strokes of one axis add up, so
 two that follow each other without a pause make one straight movement from level to level, a
 reversal included. The area under a stroke is level times duration, whatever the ramp.
@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from canshaper.errors import DesignError
 from canshaper_sim.axes import ALL_AXES
 
-_HUMAN_RAMP_S = 0.12  # a trained hand moves a stick from neutral to full in 0.1 .. 0.15 s
+_HUMAN_RAMP_S = 0.12  # a trained hand moves a joystick from neutral to full in 0.1 .. 0.15 s
 
 # name -> (lowest, highest) value of a stroke.
 _ALLOWED = {
@@ -25,7 +25,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class Stroke:
-    """One movement of one stick axis from neutral to `level` (-1 .. 1) and back."""
+    """One movement of one joystick axis from neutral to `level` (-1 .. 1) and back."""
 
     axis: str
     start_s: float
@@ -48,11 +48,11 @@ class Stroke:
 
     @property
     def end_s(self) -> float:
-        """When the stick is neutral again."""
+        """When the joystick is neutral again."""
         return self.start_s + self.duration_s + self.ramp_s
 
-    def stick(self, time_s: float) -> float:
-        """Stick value of this stroke alone."""
+    def command(self, time_s: float) -> float:
+        """Joystick value of this stroke alone."""
         since_press = time_s - self.start_s
         if since_press < 0.0:
             return 0.0
@@ -97,11 +97,11 @@ class Script:
         moved = {stroke.axis for stroke in self.strokes}
         return tuple(axis for axis in ALL_AXES if axis in moved)
 
-    def stick(self, axis: str, time_s: float) -> float:
-        """Stick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
+    def command(self, axis: str, time_s: float) -> float:
+        """Joystick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
         value = 0.0
         for stroke in self._by_axis.get(axis, ()):
             if time_s < stroke.start_s:
                 break
-            value += stroke.stick(time_s)
+            value += stroke.command(time_s)
         return max(-1.0, min(1.0, value))

@@ -14,13 +14,13 @@ from canshaper.report.style import new_figure, zero_line
 from canshaper.report.table import axis_title
 from studies.paper.runs import METRICS, TRACE_OF, Plane, Run
 from studies.paper.style import (
+    JOYSTICK_COLOUR,
     LEFT,
     MINUS,
     NONE_COLOUR,
     PLANT_COLOUR,
     PLANT_WORDS,
     RIGHT,
-    STICK_COLOUR,
     TEXT_COLOUR,
     change,
     footnote,
@@ -41,7 +41,8 @@ _METRIC_WORDS: Final = {"peak": "peak", "rms": "RMS", "residual": "residual"}
 _COMMAND_TOP, _COMMAND_BOTTOM = 310.0, -210.0
 _BEYOND_PCT = 110.0
 _CONDITIONS = (
-    "Full stick for 3 s, then 5 s of rest; peak and RMS over the whole drive, residual later than"
+    "Full deflection for 3 s, then 5 s of rest; peak and RMS over the whole drive, residual later"
+    " than"
     " 2.5 s after release; assumed grapple"
 )
 # Heights in a panel of a line for each plant, as parts of it.
@@ -211,12 +212,14 @@ def _name_raw(panel: Axes, run: Run, plane: Plane) -> None:
 
 
 def _commands(panel: Axes, runs: Sequence[Run]) -> None:
-    """The stick as a filled step, and what was sent; a command beyond full speed is told."""
+    """The joystick as a filled step, and what was sent; a command beyond full speed is told."""
     raw = runs[0].raw
-    stick = [100.0 * v for v in raw.axes[runs[0].axis].stick]
+    joystick = [100.0 * v for v in raw.axes[runs[0].axis].joystick]
     zero_line(panel)
-    panel.fill_between(raw.t_s, stick, step="post", color=STICK_COLOUR, linewidth=0, zorder=1.5)
-    panel.text(2.3, 12.0, "stick", color="#666666", ha="center")
+    panel.fill_between(
+        raw.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0, zorder=1.5
+    )
+    panel.text(2.3, 12.0, "joystick", color="#666666", ha="center")
     for run in runs:
         sent = [100.0 * v for v in run.shaped.axes[run.axis].sent]
         panel.plot(

@@ -31,7 +31,7 @@ from studies.paper.runs import Run
 LINEAR, REAL = "linear", "real"
 PLANTS: Final = (LINEAR, REAL)
 TICK_S: Final = 0.02  # the paper gives no sampling time; commands are held over it
-# Full stick for 3 s, pressed and released at once, then 5 s of rest: the paper gives no times.
+# Full deflection for 3 s, pressed and released at once, then 5 s of rest: the paper gives no times.
 PRESS_S, HOLD_S, REST_S = 0.5, 3.0, 5.0
 # The linear valve opens this much farther than a full command: no pole pair up to -10, -10 meets
 # its end (12 times the command at l2 = 1.2 m).
@@ -122,18 +122,18 @@ def _linear_drive(
     }
     rows: list[tuple[float, float, float, float, float, float]] = []
     for k in range(round(script.duration_s / TICK_S)):
-        stick = script.stick(axis, k * TICK_S)
-        sent = shaper.wanted(stick) if shaper else stick
+        joystick = script.command(axis, k * TICK_S)
+        sent = shaper.wanted(joystick) if shaper else joystick
         sway.step(sent)
         crane.step(TICK_S, {axis: sent / _HEAD_ROOM})
         state = crane.state
         rate = state.theta1_rate_rad_s if axis == SLEW else state.radius_rate_m_s
         angles = (math.degrees(state.theta5_rad), math.degrees(state.theta6_rad))
-        rows.append(((k + 1) * TICK_S, stick, sent, rate / full[axis], *angles))
-    t_s, sticks, commands, speeds, theta5, theta6 = (list(c) for c in zip(*rows, strict=True))
+        rows.append(((k + 1) * TICK_S, joystick, sent, rate / full[axis], *angles))
+    t_s, joysticks, commands, speeds, theta5, theta6 = (list(c) for c in zip(*rows, strict=True))
     still = [0.0] * len(t_s)
     traces = {
-        name: AxisTrace(sticks, commands, speeds, angle)
+        name: AxisTrace(joysticks, commands, speeds, angle)
         if name == axis
         else AxisTrace(still, still, still, angle)
         for name, angle in ((SLEW, theta5), (NEAR_FAR, theta6))

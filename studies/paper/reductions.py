@@ -176,6 +176,6 @@ def _readings(metrics: list[Metric]) -> str:
 
 
 DRIVE: Final = (
-    f"full stick for {HOLD_S:g} s, pressed at {PRESS_S:g} s, {REST_S:g} s of rest;"
+    f"full deflection for {HOLD_S:g} s, pressed at {PRESS_S:g} s, {REST_S:g} s of rest;"
     " peak and RMS over the whole drive, residual later than 2.5 s after release"
 )

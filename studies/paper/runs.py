@@ -68,7 +68,7 @@ class Run:
         """The swing of a plane.
 
         ``peak``: largest angle of the whole drive; ``rms``: root mean square over the whole drive;
-        ``residual``: largest angle later than 2.5 s after the release of the stick.
+        ``residual``: largest angle later than 2.5 s after the release of the joystick.
         """
         across = TRACE_OF[plane] != self.axis
         # The residual of the plane that the axis does not drive is kept with the axis it follows.

@@ -16,7 +16,7 @@ FIGURES: Final = (3, 4, 6, 7, 8)
 AXIS_OF: Final = {3: SLEW, 4: NEAR_FAR, 7: SLEW, 8: NEAR_FAR}
 PARAMETERS: Final = (
     "the paper publishes no lengths, masses, damping, speeds, times or sampling; taken are"
-    " l1 0.2 m, l2 1.2 m, 40 and 300 kg, 120 N m s/rad in each joint, radius 3 m, full stick"
+    " l1 0.2 m, l2 1.2 m, 40 and 300 kg, 120 N m s/rad in each joint, radius 3 m, full deflection"
     " 0.5 rad/s and 1 m/s, lag 100 ms, commands at 50 Hz"
 )
 

@@ -5,17 +5,17 @@ from collections.abc import Sequence
 from matplotlib.figure import Figure
 
 from canshaper.report.style import (
+    JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     coloured_words,
     plain,
 )
 from canshaper.report.table import change_text
 
-__all__ = ["MINUS", "NONE_COLOUR", "PLANT_COLOUR", "STICK_COLOUR", "TEXT_COLOUR", "plain"]
+__all__ = ["JOYSTICK_COLOUR", "MINUS", "NONE_COLOUR", "PLANT_COLOUR", "TEXT_COLOUR", "plain"]
 
 # No filter: grey. The two plants: vermilion and blue of Okabe and Ito, as in `report.style`.
 NONE_COLOUR = "#8C8C8C"

@@ -91,7 +91,7 @@ def test_nothing_is_imported_before_it_is_used() -> None:
 
 
 SAYS = {
-    "controller_without_io.py": " 0.52 s axis=slew state=ACTIVE from=READY reason=STICK_MOVED",
+    "controller_without_io.py": " 0.52 s axis=slew state=ACTIVE from=READY reason=JOYSTICK_MOVED",
     "plant_on_bus.py": "0x402 {'",
 }
 

@@ -19,7 +19,7 @@ FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder.yaml"
 SLEW = "    filter: { kind: gff, a1: 0.708, a2: 0.12 }\n    limits: {"
 FIXED = "radius_m: 3.0"
 MEASURED = "radius: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100 }"
-# The stick is back after 3.6 s; the impulse response lasts 1.8 s, the valve a little more.
+# The joystick is back after 3.6 s; the impulse response lasts 1.8 s, the valve a little more.
 SETTLED_S = 6.0
 
 

@@ -72,7 +72,7 @@ def test_recommended_deployment_leaves_next_to_nothing_in_both_planes() -> None:
 
 
 def residual_left_pct(deployment: Deployment, prepare: Any = None) -> float:
-    """Of the swing after a full-stick step of 3 s out and back."""
+    """Of the swing after a full-joystick step of 3 s out and back."""
     script = Script("step", (Stroke("near_far", 0.5, 3.0, 1.0, ramp_s=0.0),), 8.5)
     raw = drive(load_deployment(FILE), script, bypass=True)
     shaped = drive(deployment, script, prepare=prepare)

@@ -30,13 +30,13 @@ DBC = """VERSION ""
 BU_: A
 
 BO_ 1 Joystick: 8 A
- SG_ Stick : 0|10@1+ (0.2,-100) [-100|100] "%" A
+ SG_ Joystick : 0|10@1+ (0.2,-100) [-100|100] "%" A
  SG_ Enable : 10|2@1+ (1,0) [0|3] "" A
  SG_ Motorola : 23|12@0- (0.1,0) [-100|100] "%" A
  SG_ Plain : 32|8@1- (1,0) [-100|100] "%" A
 
 BO_ 2 FloatJoystick: 5 A
- SG_ Stick : 0|32@1- (50,0) [-100|100] "%" A
+ SG_ Joystick : 0|32@1- (50,0) [-100|100] "%" A
  SG_ Enable : 32|2@1+ (1,0) [0|3] "" A
 
 BO_ 3 Offset: 8 A
@@ -55,9 +55,9 @@ BA_DEF_ SG_ "GenSigStartValue" FLOAT -100000 100000;
 BA_DEF_DEF_ "GenSigStartValue" 0;
 BA_ "GenSigStartValue" SG_ 3 Unused 255;
 BA_ "GenSigStartValue" SG_ 3 Ratio 1.5;
-VAL_ 1 Stick 1021 "Parameter error" 1022 "Error indicator" 1023 "Not available" ;
+VAL_ 1 Joystick 1021 "Parameter error" 1022 "Error indicator" 1023 "Not available" ;
 VAL_ 1 Plain 0 "Centre" 50 "SNA" 51 "Defective" ;
-SIG_VALTYPE_ 2 Stick : 1;
+SIG_VALTYPE_ 2 Joystick : 1;
 SIG_VALTYPE_ 3 Ratio : 1;
 """
 custom: Any = cantools.database.load_string(DBC, "dbc")
@@ -67,7 +67,7 @@ def signal(message: Message, name: str) -> Any:
     return message.get_signal_by_name(name)
 
 
-def velocity(message: str, name: str = "Stick") -> VelocitySignal:
+def velocity(message: str, name: str = "Joystick") -> VelocitySignal:
     return VelocitySignal.of(signal(custom.get_message_by_name(message), name))
 
 
@@ -88,9 +88,9 @@ def sent(codec: ValveCodec, steps: int) -> Frame:
     return codec.message.frame()
 
 
-def raw_joystick(stick: int) -> bytes:
+def raw_joystick(joystick: int) -> bytes:
     data = custom.get_message_by_name("Joystick").encode(
-        {"Stick": stick, "Enable": 1, "Motorola": 0, "Plain": 0}, scaling=False, strict=False
+        {"Joystick": joystick, "Enable": 1, "Motorola": 0, "Plain": 0}, scaling=False, strict=False
     )
     assert isinstance(data, bytes)
     return data
@@ -106,22 +106,28 @@ def raw_joystick(stick: int) -> bytes:
         (0, -1.0),
         (1000, 1.0),
         (501, 0.002),
-        (1001, Reason.STICK_OUT_OF_RANGE),
-        (1020, Reason.STICK_OUT_OF_RANGE),
-        (1021, Reason.STICK_ERROR),
-        (1022, Reason.STICK_ERROR),  # would be 104.4 % when scaled
-        (1023, Reason.STICK_NOT_AVAILABLE),
+        (1001, Reason.JOYSTICK_OUT_OF_RANGE),
+        (1020, Reason.JOYSTICK_OUT_OF_RANGE),
+        (1021, Reason.JOYSTICK_ERROR),
+        (1022, Reason.JOYSTICK_ERROR),  # would be 104.4 % when scaled
+        (1023, Reason.JOYSTICK_NOT_AVAILABLE),
     ],
 )
 def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None:
     values, commands = joystick("Joystick").decode(raw_joystick(raw))
-    assert values["Stick"] == raw
-    assert commands == {"Stick": pytest.approx(command)}
+    assert values["Joystick"] == raw
+    assert commands == {"Joystick": pytest.approx(command)}
 
 
 @pytest.mark.parametrize(
     ("raw", "command"),
-    [(50, Reason.STICK_NOT_AVAILABLE), (51, Reason.STICK_ERROR), (0, 0.0), (49, 0.49), (52, 0.52)],
+    [
+        (50, Reason.JOYSTICK_NOT_AVAILABLE),
+        (51, Reason.JOYSTICK_ERROR),
+        (0, 0.0),
+        (49, 0.49),
+        (52, 0.52),
+    ],
 )
 def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reason) -> None:
     assert velocity("Joystick", "Plain").read({"Plain": raw}) == command
@@ -130,25 +136,25 @@ def test_codes_within_the_range_are_no_commands(raw: int, command: float | Reaso
 @pytest.mark.parametrize(
     ("name", "reason"),
     [
-        ("Not Available", Reason.STICK_NOT_AVAILABLE),
-        ("NotAvailable", Reason.STICK_NOT_AVAILABLE),
-        ("not_available", Reason.STICK_NOT_AVAILABLE),
-        ("Unavailable", Reason.STICK_NOT_AVAILABLE),
-        ("SNA", Reason.STICK_NOT_AVAILABLE),
-        ("N/A", Reason.STICK_NOT_AVAILABLE),
-        ("Slew_SNA", Reason.STICK_NOT_AVAILABLE),
-        ("Error", Reason.STICK_ERROR),
-        ("Err", Reason.STICK_ERROR),
-        ("ERROR_2", Reason.STICK_ERROR),
-        ("ErrorCode", Reason.STICK_ERROR),
-        ("sensor_error", Reason.STICK_ERROR),
-        ("sensorerr", Reason.STICK_ERROR),
-        ("SensorFault", Reason.STICK_ERROR),
-        ("modefault", Reason.STICK_ERROR),
-        ("Faulty", Reason.STICK_ERROR),
-        ("invalid", Reason.STICK_ERROR),
-        ("Not valid", Reason.STICK_ERROR),
-        ("Reserved", Reason.STICK_ERROR),
+        ("Not Available", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("NotAvailable", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("not_available", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("Unavailable", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("SNA", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("N/A", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("Slew_SNA", Reason.JOYSTICK_NOT_AVAILABLE),
+        ("Error", Reason.JOYSTICK_ERROR),
+        ("Err", Reason.JOYSTICK_ERROR),
+        ("ERROR_2", Reason.JOYSTICK_ERROR),
+        ("ErrorCode", Reason.JOYSTICK_ERROR),
+        ("sensor_error", Reason.JOYSTICK_ERROR),
+        ("sensorerr", Reason.JOYSTICK_ERROR),
+        ("SensorFault", Reason.JOYSTICK_ERROR),
+        ("modefault", Reason.JOYSTICK_ERROR),
+        ("Faulty", Reason.JOYSTICK_ERROR),
+        ("invalid", Reason.JOYSTICK_ERROR),
+        ("Not valid", Reason.JOYSTICK_ERROR),
+        ("Reserved", Reason.JOYSTICK_ERROR),
     ],
 )
 def test_names_that_dbc_files_give_to_codes(name: str, reason: Reason) -> None:
@@ -182,20 +188,20 @@ def test_ordinary_words_are_no_errors(name: str) -> None:
         (0.0, 0.0),
         (2.0, 1.0),
         (-1.0, -0.5),
-        (2.1, Reason.STICK_OUT_OF_RANGE),
-        (float("nan"), Reason.STICK_NOT_A_NUMBER),
-        (float("inf"), Reason.STICK_NOT_A_NUMBER),
-        (float("-inf"), Reason.STICK_NOT_A_NUMBER),
-        (3.4e38, Reason.STICK_OUT_OF_RANGE),
+        (2.1, Reason.JOYSTICK_OUT_OF_RANGE),
+        (float("nan"), Reason.JOYSTICK_NOT_A_NUMBER),
+        (float("inf"), Reason.JOYSTICK_NOT_A_NUMBER),
+        (float("-inf"), Reason.JOYSTICK_NOT_A_NUMBER),
+        (3.4e38, Reason.JOYSTICK_OUT_OF_RANGE),
     ],
 )
-def test_float_sticks(value: float, command: float | Reason) -> None:
+def test_float_joysticks(value: float, command: float | Reason) -> None:
     _, commands = joystick("FloatJoystick").decode(struct.pack("<fB", value, 1))
-    assert commands == {"Stick": command}
+    assert commands == {"Joystick": command}
 
 
 @pytest.mark.parametrize(("raw", "command"), [(3, 1.0), (-3, -1.0)])
-def test_full_stick_is_full_in_spite_of_rounding(raw: int, command: float) -> None:
+def test_full_deflection_is_full_in_spite_of_rounding(raw: int, command: float) -> None:
     """3 steps of 0.1 are a little more than 0.3 in floating point."""
     assert VelocitySignal("S", 0.1, 0.0, 0.3, {}).read({"S": raw}) == command
 
@@ -217,7 +223,7 @@ def test_switches_come_raw(switch: int) -> None:
 @given(data=st.binary(min_size=8, max_size=8))
 def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
     message = custom.get_message_by_name("Joystick")
-    names = ["Stick", "Motorola", "Plain"]
+    names = ["Joystick", "Motorola", "Plain"]
     codec = JoystickCodec(message, [velocity("Joystick", n) for n in names])
     _, commands = codec.decode(data)
     judge = message.decode(data, decode_choices=False)
@@ -307,7 +313,7 @@ def axis_status(*values: Any) -> dict[str, Any]:
 
 
 def test_status_carries_what_it_is_told() -> None:
-    decoded = axis_status(State.ACTIVE, Reason.STICK_MOVED, 0.5, -0.25, 12.34)
+    decoded = axis_status(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, -0.25, 12.34)
     assert decoded == pytest.approx(
         {
             "State": 2,
@@ -339,11 +345,11 @@ def test_counters_stop_at_their_largest_value() -> None:
 def test_a_status_is_decoded_as_it_was_encoded() -> None:
     codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
     values = codec.decode(
-        codec.frame(report(State.ACTIVE, Reason.STICK_MOVED, 0.5, 0.25, 1.5, active_set=3)).data
+        codec.frame(report(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, 0.25, 1.5, active_set=3)).data
     )
     assert values == {
         "State": State.ACTIVE,
-        "Reason": Reason.STICK_MOVED,
+        "Reason": Reason.JOYSTICK_MOVED,
         "RawCommand": 50.0,
         "ShapedCommand": 25.0,
         "PredictedSway": 1.5,

@@ -1,4 +1,4 @@
-"""Sticks with direction flags: every combination, and what a deployment may say of them."""
+"""Joysticks with direction flags: every combination, and what a deployment may say of them."""
 
 import itertools
 import math
@@ -47,8 +47,8 @@ NEUTRAL, NEGATIVE, POSITIVE, NONE = (1, 0, 0), (0, 1, 0), (0, 0, 1), (0, 0, 0)
 def read(flags: tuple[int, int, int], position: float, message: str = "BJM1") -> float | Reason:
     """Command of a frame that cantools has made."""
     definition = custom.get_message_by_name(message)
-    stick = VelocitySignal.of(definition.get_signal_by_name("XPosition"))
-    codec = JoystickCodec(definition, [FlaggedVelocity(stick, "XNeutral", "XNeg", "XPos")])
+    joystick = VelocitySignal.of(definition.get_signal_by_name("XPosition"))
+    codec = JoystickCodec(definition, [FlaggedVelocity(joystick, "XNeutral", "XNeg", "XPos")])
     raw = dict(zip(("XNeutral", "XNeg", "XPos"), flags, strict=True))
     data = definition.encode({**raw, "XPosition": position}, scaling=False, strict=False)
     _, commands = codec.decode(data)
@@ -68,33 +68,33 @@ def read(flags: tuple[int, int, int], position: float, message: str = "BJM1") ->
         # in neutral nothing moves, whatever little the position shows
         (NEUTRAL, 0, 0.0),
         (NEUTRAL, 50, 0.0),
-        (NEUTRAL, 51, Reason.STICK_CONTRADICTORY),
-        (NEUTRAL, 1000, Reason.STICK_CONTRADICTORY),
+        (NEUTRAL, 51, Reason.JOYSTICK_CONTRADICTORY),
+        (NEUTRAL, 1000, Reason.JOYSTICK_CONTRADICTORY),
         # on the way from the neutral switch to the switch of a direction
         (NONE, 0, 0.0),
-        (NONE, 1, Reason.STICK_CONTRADICTORY),
-        (NONE, 1000, Reason.STICK_CONTRADICTORY),
+        (NONE, 1, Reason.JOYSTICK_CONTRADICTORY),
+        (NONE, 1000, Reason.JOYSTICK_CONTRADICTORY),
         # more than one
-        ((0, 1, 1), 0, Reason.STICK_CONTRADICTORY),
-        ((0, 1, 1), 500, Reason.STICK_CONTRADICTORY),
-        ((1, 1, 0), 0, Reason.STICK_CONTRADICTORY),
-        ((1, 0, 1), 0, Reason.STICK_CONTRADICTORY),
-        ((1, 1, 1), 0, Reason.STICK_CONTRADICTORY),
+        ((0, 1, 1), 0, Reason.JOYSTICK_CONTRADICTORY),
+        ((0, 1, 1), 500, Reason.JOYSTICK_CONTRADICTORY),
+        ((1, 1, 0), 0, Reason.JOYSTICK_CONTRADICTORY),
+        ((1, 0, 1), 0, Reason.JOYSTICK_CONTRADICTORY),
+        ((1, 1, 1), 0, Reason.JOYSTICK_CONTRADICTORY),
         # codes of the flags
-        ((2, 0, 1), 500, Reason.STICK_ERROR),
-        ((0, 2, 1), 500, Reason.STICK_ERROR),
-        ((0, 0, 2), 500, Reason.STICK_ERROR),
-        ((3, 0, 1), 500, Reason.STICK_NOT_AVAILABLE),
-        ((0, 3, 1), 500, Reason.STICK_NOT_AVAILABLE),
-        ((1, 0, 3), 0, Reason.STICK_NOT_AVAILABLE),
-        ((3, 2, 3), 0, Reason.STICK_ERROR),
+        ((2, 0, 1), 500, Reason.JOYSTICK_ERROR),
+        ((0, 2, 1), 500, Reason.JOYSTICK_ERROR),
+        ((0, 0, 2), 500, Reason.JOYSTICK_ERROR),
+        ((3, 0, 1), 500, Reason.JOYSTICK_NOT_AVAILABLE),
+        ((0, 3, 1), 500, Reason.JOYSTICK_NOT_AVAILABLE),
+        ((1, 0, 3), 0, Reason.JOYSTICK_NOT_AVAILABLE),
+        ((3, 2, 3), 0, Reason.JOYSTICK_ERROR),
         # codes of the position come first: it is what the joystick says of itself
-        (POSITIVE, 1001, Reason.STICK_OUT_OF_RANGE),
-        (NEUTRAL, 1021, Reason.STICK_OUT_OF_RANGE),
-        (NEUTRAL, 1022, Reason.STICK_ERROR),
-        (POSITIVE, 1023, Reason.STICK_NOT_AVAILABLE),
-        ((3, 3, 3), 1023, Reason.STICK_NOT_AVAILABLE),
-        ((3, 3, 3), 1022, Reason.STICK_ERROR),
+        (POSITIVE, 1001, Reason.JOYSTICK_OUT_OF_RANGE),
+        (NEUTRAL, 1021, Reason.JOYSTICK_OUT_OF_RANGE),
+        (NEUTRAL, 1022, Reason.JOYSTICK_ERROR),
+        (POSITIVE, 1023, Reason.JOYSTICK_NOT_AVAILABLE),
+        ((3, 3, 3), 1023, Reason.JOYSTICK_NOT_AVAILABLE),
+        ((3, 3, 3), 1022, Reason.JOYSTICK_ERROR),
     ],
 )
 def test_position_and_flags(flags: tuple[int, int, int], raw: int, command: float | Reason) -> None:
@@ -124,15 +124,15 @@ def test_zero_has_no_sign(flags: tuple[int, int, int]) -> None:
     ("flags", "position", "command"),
     [
         (NEGATIVE, 50.0, -0.5),
-        ((0, 254, 0), 50.0, Reason.STICK_ERROR),
-        ((0, 0, 255), 50.0, Reason.STICK_ERROR),
-        ((4, 0, 1), 50.0, Reason.STICK_ERROR),
-        (NEGATIVE, -50.0, Reason.STICK_OUT_OF_RANGE),  # would be positive
-        (NEUTRAL, -1.0, Reason.STICK_OUT_OF_RANGE),
-        (POSITIVE, 100.1, Reason.STICK_OUT_OF_RANGE),
-        (NEUTRAL, math.nan, Reason.STICK_NOT_A_NUMBER),
-        (POSITIVE, math.inf, Reason.STICK_NOT_A_NUMBER),
-        (NEGATIVE, -math.inf, Reason.STICK_NOT_A_NUMBER),
+        ((0, 254, 0), 50.0, Reason.JOYSTICK_ERROR),
+        ((0, 0, 255), 50.0, Reason.JOYSTICK_ERROR),
+        ((4, 0, 1), 50.0, Reason.JOYSTICK_ERROR),
+        (NEGATIVE, -50.0, Reason.JOYSTICK_OUT_OF_RANGE),  # would be positive
+        (NEUTRAL, -1.0, Reason.JOYSTICK_OUT_OF_RANGE),
+        (POSITIVE, 100.1, Reason.JOYSTICK_OUT_OF_RANGE),
+        (NEUTRAL, math.nan, Reason.JOYSTICK_NOT_A_NUMBER),
+        (POSITIVE, math.inf, Reason.JOYSTICK_NOT_A_NUMBER),
+        (NEGATIVE, -math.inf, Reason.JOYSTICK_NOT_A_NUMBER),
     ],
 )
 def test_wide_flags_and_a_float_position(
@@ -146,13 +146,13 @@ def test_a_zero_that_is_rounded_is_zero() -> None:
     for flags in (NEUTRAL, NEGATIVE, POSITIVE, NONE):
         assert read(flags, 300, "Offset") == 0.0
     assert read(NEGATIVE, 1300, "Offset") == -1.0
-    assert read(POSITIVE, 299, "Offset") == Reason.STICK_OUT_OF_RANGE
+    assert read(POSITIVE, 299, "Offset") == Reason.JOYSTICK_OUT_OF_RANGE
 
 
 # -- deployment ------------------------------------------------------------------------------------
 
 
-STICK = "signal: Slew, neutral_pct: 2"
+JOYSTICK = "signal: Slew, neutral_pct: 2"
 FLAGS = "{ neutral: SlewNeutral, negative: SlewNegative, positive: SlewPositive }"
 SIGNED = ' SG_ Slew : 0|16@1- (0.1,0) [-100|100] "%" SHAPER\n'
 FLAGGED = """ SG_ SlewNeutral : 0|2@1+ (1,0) [0|3] "" SHAPER
@@ -163,9 +163,9 @@ FLAGGED = """ SG_ SlewNeutral : 0|2@1+ (1,0) [0|3] "" SHAPER
 
 
 def flagged(machine: Machine, flags: str = FLAGS) -> int:
-    """Give slew direction flags; return the line of its stick."""
+    """Give slew direction flags; return the line of its joystick."""
     machine.in_dbc(SIGNED, FLAGGED)
-    return machine.in_yaml(STICK, f"signal: Slew, flags: {flags}")
+    return machine.in_yaml(JOYSTICK, f"signal: Slew, flags: {flags}")
 
 
 def test_flags_bind(machine: Machine) -> None:
@@ -207,7 +207,7 @@ def test_flags_bind(machine: Machine) -> None:
         ),
         (
             FLAGS.replace("SlewNegative", "Slew "),
-            "flags.negative: expected a free signal, got 'Slew', which is the stick of slew"
+            "flags.negative: expected a free signal, got 'Slew', which is the joystick of slew"
             " already",
         ),
         (
@@ -228,18 +228,18 @@ def test_flags_that_do_not_fit(machine: Machine, flags: str, says: str) -> None:
     assert says in problem
 
 
-def test_the_stick_of_another_axis_is_no_flag(machine: Machine) -> None:
+def test_the_joystick_of_another_axis_is_no_flag(machine: Machine) -> None:
     line = flagged(machine, FLAGS.replace("SlewNeutral", "NearFar"))
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 16|16@1+")
     assert any(
         p == f"machine.yaml:{line}: axes.slew.command.flags.neutral:"
-        " expected a free signal, got 'NearFar', which is the stick of near_far already"
+        " expected a free signal, got 'NearFar', which is the joystick of near_far already"
         for p in machine.problems()
     )
 
 
-def test_two_axes_do_not_share_a_stick_with_flags(machine: Machine) -> None:
-    """With other flags it would be another stick, and the one would be lost."""
+def test_two_axes_do_not_share_a_joystick_with_flags(machine: Machine) -> None:
+    """With other flags it would be another joystick, and the one would be lost."""
     flagged(machine)
     machine.in_yaml("    anti_sway_off: AntiSwayOff\n", "")
     line = machine.in_yaml(
@@ -253,7 +253,7 @@ def test_two_axes_do_not_share_a_stick_with_flags(machine: Machine) -> None:
     )
     assert machine.problems() == [
         f"machine.yaml:{line}: axes.near_far.command.signal:"
-        " expected a free signal, got 'Slew', which is the stick of slew already"
+        " expected a free signal, got 'Slew', which is the joystick of slew already"
     ]
 
 
@@ -295,14 +295,14 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
         ),
     ],
 )
-def test_the_range_tells_whether_a_stick_has_flags(
+def test_the_range_tells_whether_a_joystick_has_flags(
     machine: Machine, change: tuple[str, str], flags: bool, says: str
 ) -> None:
     line = machine.in_dbc("BO_ 272 JoystickLeft", "BO_ 272 JoystickLeft")
     machine.in_dbc(*change)
     if flags:
         machine.in_dbc('Reset : 36|2@1+ (1,0) [0|1] "" SHAPER\n', _more_flags())
-        machine.in_yaml(STICK, f"signal: Slew, flags: {FLAGS}")
+        machine.in_yaml(JOYSTICK, f"signal: Slew, flags: {FLAGS}")
     (problem,) = machine.problems()
     assert problem.startswith(f"machine.dbc:{line}: JoystickLeft: Slew")
     assert says in problem

@@ -81,7 +81,9 @@ def test_exclusive_or_with_another_start(data: bytes) -> None:
 @given(data=frames, count=st.integers(0, 14))
 def test_profile_1(mode: str, data: bytes, count: int) -> None:
     profile = Profile1(0x5A7, mode)
-    protected = profile.protect(data, count)  # what the joystick sent; then a stick is made neutral
+    protected = profile.protect(
+        data, count
+    )  # what the joystick sent; then a joystick is made neutral
     changed = protected[:3] + b"\0\0" + protected[5:]
     assert by_the_kernel(profile, changed) == profile.protect(changed, count)
 

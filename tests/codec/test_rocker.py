@@ -37,12 +37,12 @@ def read(left: int, right: int) -> float | Reason:
         (0, 250, -1.0),
         (0, 125, -0.5),
         (12, 12, 0.0),  # noise in neutral
-        (13, 13, Reason.STICK_CONTRADICTORY),
-        (250, 250, Reason.STICK_CONTRADICTORY),
-        (251, 0, Reason.STICK_OUT_OF_RANGE),
-        (0, 251, Reason.STICK_OUT_OF_RANGE),
-        (254, 0, Reason.STICK_ERROR),
-        (0, 255, Reason.STICK_NOT_AVAILABLE),
+        (13, 13, Reason.JOYSTICK_CONTRADICTORY),
+        (250, 250, Reason.JOYSTICK_CONTRADICTORY),
+        (251, 0, Reason.JOYSTICK_OUT_OF_RANGE),
+        (0, 251, Reason.JOYSTICK_OUT_OF_RANGE),
+        (254, 0, Reason.JOYSTICK_ERROR),
+        (0, 255, Reason.JOYSTICK_NOT_AVAILABLE),
     ],
 )
 def test_it_is_one_command(left: int, right: int, command: float | Reason) -> None:
@@ -54,7 +54,7 @@ def test_a_signal_below_its_range_is_no_command() -> None:
     low = VelocitySignal("Low", 0.4, -10.0, 100.0, {})
     assert (
         RockerVelocity(low, VelocitySignal.of(RIGHT)).read({"Low": 0, "RotateRight": 0})
-        is Reason.STICK_OUT_OF_RANGE
+        is Reason.JOYSTICK_OUT_OF_RANGE
     )
 
 
@@ -108,7 +108,10 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
 @pytest.mark.parametrize(
     ("new", "told"),
     [
-        ("signal: RotateLeft, negative: RotateLeft", "which is the stick of front_rotator already"),
+        (
+            "signal: RotateLeft, negative: RotateLeft",
+            "which is the joystick of front_rotator already",
+        ),
         ("signal: RotateLeft, negative: Enable", "which is enable already"),
         ("signal: Enable, negative: RotateRight", "which is enable already"),
         (

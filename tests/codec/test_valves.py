@@ -207,13 +207,13 @@ def test_three_axes_in_one_message(machine: Machine) -> None:
     joystick: Any = {m.name: m for m in deployment.messages.all()}
     moved: list[Any] = []
     for n in range(60):
-        for side, stick in (
+        for side, command in (
             ("Left", {"Slew": 900, "NearFar": -400}),
             ("Right", {"Lift": -600}),
         ):
             message = joystick[f"Joystick{side}"]
             raw = dict.fromkeys((s.name for s in message.signals), 0)
-            raw |= {"Enable": 1, "AliveCounter": n % 256, **(stick if n > 4 else {})}
+            raw |= {"Enable": 1, "AliveCounter": n % 256, **(command if n > 4 else {})}
             data = message.encode(raw, scaling=False)
             controller.receive(Frame("crane", message.frame_id, False, data), n * 20_000_000)
         sent = [f for f in controller.tick(n * 20_000_000) if f.can_id == 0x500]

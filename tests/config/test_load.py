@@ -86,7 +86,11 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
             "rise_per_s: {a: 5}",
             "expected 0.2 to 100 full speeds per s, got {'a': 5}",
         ),
-        ("neutral_pct: 2", "neutral_pct: 20.1", "expected 0.1 to 20 % of full stick, got 20.1"),
+        (
+            "neutral_pct: 2",
+            "neutral_pct: 20.1",
+            "expected 0.1 to 20 % of full deflection, got 20.1",
+        ),
         (
             "period_s: 2.356",
             "period_s: 0.1",

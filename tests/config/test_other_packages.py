@@ -118,7 +118,7 @@ def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> No
     done = python(packages, "-c", WORK, str(file))
     assert done.returncode == 0, done.stderr
     found = json.loads(done.stdout)
-    # The mean over two seconds rises for two seconds, by half a percent of a full stick each tick.
+    # The mean over two seconds rises for two seconds, by half a percent of full each tick.
     sent = found["sent"]
     start = next(i for i, value in enumerate(sent) if value)
     steps = [sent[i + 1] - sent[i] for i in range(start, start + 90)]

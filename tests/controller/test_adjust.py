@@ -49,8 +49,8 @@ def strokes(rig: Rig, *, ticks: int = 400) -> list[int]:
     """Velocity of slew over some quick strokes."""
     sent = []
     for number in range(ticks):
-        stick = (0, 1000, 1000, -600, 0)[number // 40 % 5]
-        sent.append(rig.run(Slew=stick)["SlewCommand"]["Velocity"])
+        joystick = (0, 1000, 1000, -600, 0)[number // 40 % 5]
+        sent.append(rig.run(Slew=joystick)["SlewCommand"]["Velocity"])
     return sent
 
 
@@ -99,9 +99,9 @@ def test_in_motion_nothing_jumps_and_the_new_filter_is_in_force(make: Make, at: 
     rig.run(3)
     first = strokes(rig, ticks=at)
     Adjuster(rig.controller).change({"axes.slew.sway.period_s": 1.8, "axes.slew.filter.a1": 0.9})
-    stick = (0, 1000, 1000, -600, 0)[at // 40 % 5]
+    joystick = (0, 1000, 1000, -600, 0)[at // 40 % 5]
     # The next command is the last one, and from there on it goes over to the new filter.
-    now = rig.run(Slew=stick)["SlewCommand"]["Velocity"]
+    now = rig.run(Slew=joystick)["SlewCommand"]["Velocity"]
     assert abs(now - first[-1]) <= 1
     tuned = rig.controller.axes["slew"].axis.sway
     assert tuned is not None

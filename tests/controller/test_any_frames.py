@@ -1,7 +1,7 @@
 """Whatever comes from the bus: no exception, and no move that no operator asked for.
 
 The judge reads the joysticks' bytes by itself, with ``struct``, and allows a move of an axis only
-after an enabled stick in neutral and then an enabled one out of neutral.
+after an enabled joystick in neutral and then an enabled one out of neutral.
 """
 
 import struct
@@ -20,7 +20,7 @@ TICK_NS = 20_000_000
 TIMEOUT_NS = 100_000_000
 STOP_NS = 2_000_000_000
 MOST_MISSED = 3
-# axis: id of the joystick, byte of the stick, id of the valve
+# axis: id of the joystick, byte of the joystick, id of the valve
 AXES = {"slew": (0x110, 0, 0x200), "near_far": (0x110, 2, 0x201), "lift": (0x111, 0, 0x202)}
 
 
@@ -42,14 +42,14 @@ class Judge:
         if place != ("crane", self.joystick, False, 8) or frame.data[7] == self.alive:
             return
         self.alive, self.heard_ns = frame.data[7], now_ns
-        (stick,) = struct.unpack_from("<h", frame.data, self.byte)
+        (joystick,) = struct.unpack_from("<h", frame.data, self.byte)
         enable = frame.data[4] & 3
         self.released = enable == 0
-        if enable == 1 and abs(stick) <= 20:
+        if enable == 1 and abs(joystick) <= 20:
             self.neutral_seen = True
-        if enable == 1 and 20 < abs(stick) <= 1000 and self.neutral_seen:
+        if enable == 1 and 20 < abs(joystick) <= 1000 and self.neutral_seen:
             self.asked = True
-            self.fastest = max(self.fastest, abs(stick))
+            self.fastest = max(self.fastest, abs(joystick))
 
     def allows(self, raw: int, now_ns: int) -> bool:
         """Whether this raw command of the valve, 0.8 % per bit, may be sent now."""
@@ -63,15 +63,17 @@ class Judge:
         return fast_enough and in_time
 
 
-sticks = st.sampled_from([0, 0, 0, 15, -20, 21, 300, -500, 1000, -1000, 1001, 32766, 32767, -32768])
+joysticks = st.sampled_from(
+    [0, 0, 0, 15, -20, 21, 300, -500, 1000, -1000, 1001, 32766, 32767, -32768]
+)
 
 
 @st.composite
 def joystick_frames(draw: st.DrawFn) -> Frame:
     data = struct.pack(
         "<hhBBBB",
-        draw(sticks),
-        draw(sticks),
+        draw(joysticks),
+        draw(joysticks),
         draw(st.sampled_from([1, 1, 1, 1, 0, 2, 3, 5, 17, 21])),
         0,
         0,
@@ -121,8 +123,8 @@ def drive(script: list[tuple[list[Frame], int, int]]) -> int:
     return moves
 
 
-def left(stick: int, count: int) -> Frame:
-    return Frame("crane", 0x110, False, struct.pack("<hhBBBB", stick, 0, 1, 0, 0, count))
+def left(joystick: int, count: int) -> Frame:
+    return Frame("crane", 0x110, False, struct.pack("<hhBBBB", joystick, 0, 1, 0, 0, count))
 
 
 @settings(max_examples=4 * settings().max_examples)

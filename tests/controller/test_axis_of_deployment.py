@@ -9,7 +9,7 @@ from canshaper.shaping.axis import Axis
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder
-from canshaper.shaping.states import State, StickInput
+from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayModel
 from tests.rigs.forwarder import Rig
 
@@ -29,7 +29,7 @@ def test_the_model_of_an_axis_has_the_cycle_of_its_valve(changed_rig: Make, cycl
     assert sway.tick_s == cycle_ms / 1000.0
 
 
-def test_the_neutral_band_is_that_of_the_stick(changed_rig: Make) -> None:
+def test_the_neutral_band_is_that_of_the_joystick(changed_rig: Make) -> None:
     rig = changed_rig({"signal: Slew, neutral_pct: 2": "signal: Slew, neutral_pct: 5"})
     rig.run(10, Slew=50)
     assert rig.state() is State.READY
@@ -47,9 +47,9 @@ def sent(rig: Rig, axis: Axis) -> tuple[list[float], list[float]]:
     """What slew sends, and what an axis made by hand sends, through a stroke of two seconds."""
     got, wanted = [], []
     for tick in range(200):
-        stick = 1000 if 3 <= tick < 100 else 0
-        rig.run(1, Slew=stick)
-        axis.tick(StickInput(stick / 1000.0))
+        joystick = 1000 if 3 <= tick < 100 else 0
+        rig.run(1, Slew=joystick)
+        axis.tick(CommandInput(joystick / 1000.0))
         got.append(rig.controller.axes["slew"].axis.sent)
         wanted.append(axis.sent)
     return got, wanted
@@ -92,18 +92,18 @@ def test_an_axis_without_sway_tells_none(changed_rig: Make) -> None:
     assert rig.state("lift") is State.ACTIVE
 
 
-def test_an_axis_takes_its_stick_from_where_it_is_told(rig: Rig) -> None:
+def test_an_axis_takes_its_joystick_from_where_it_is_told(rig: Rig) -> None:
     class Elsewhere:
-        command = 0.0
+        deflection = 0.0
         releases = 0
 
-        def stick(self, *_arguments: object) -> StickInput:
-            return StickInput(self.command)
+        def command(self, *_arguments: object) -> CommandInput:
+            return CommandInput(self.deflection)
 
     source = Elsewhere()
     rig.controller.axes["slew"].isolate(source)
     rig.run(3)
-    source.command = 0.5
-    sent = rig.run(120)  # the real stick stands in neutral
+    source.deflection = 0.5
+    sent = rig.run(120)  # the real joystick stands in neutral
     assert sent["SlewCommand"]["Velocity"] > 40
     assert sent["NearFarCommand"]["Velocity"] == 0

@@ -347,7 +347,7 @@ def test_a_stop_that_is_pressed_is_so_for_a_new_axis_too(changed_rig: Make, pres
         assert machine.states() == PRESSED
     else:
         machine.run(2)
-        assert machine.states() == [*PRESSED[:2], (State.READY, "STICK_NEUTRAL")]
+        assert machine.states() == [*PRESSED[:2], (State.READY, "JOYSTICK_NEUTRAL")]
 
 
 def test_a_joysticks_sequence_goes_on(rig: Rig) -> None:

@@ -128,7 +128,7 @@ def test_a_machine_drives_by_it(installed: Installed) -> None:
             assert data[2:] == Crc16AugCcitt.calc(data[:2] + number).to_bytes(2, "little")
     assert {0x110, 0x200} <= {can_id for can_id, _ in seen["frames"]}
     assert seen["faults"] == [8] * 100  # CHECKSUM
-    assert seen["reason"] == "STICK_UNTRUSTED"
+    assert seen["reason"] == "JOYSTICK_UNTRUSTED"
 
 
 def test_schema_and_table_have_it(installed: Installed) -> None:
@@ -146,7 +146,7 @@ def test_the_kernel_is_not_left_alone_with_it(installed: Installed, command: str
     installed.package()
     file = installed.machine(
         "gateway-forwarder.yaml",
-        *((f"signal: {s}, timeout_ms", f"signal: {s}, {CHECKSUM}, timeout_ms") for s in STICKS),
+        *((f"signal: {s}, timeout_ms", f"signal: {s}, {CHECKSUM}, timeout_ms") for s in JOYSTICKS),
     )
     line = [row.strip()[:8] for row in file.read_text().splitlines()].index("fallback") + 1
     says = f"{file}:{line}: gateway.fallback: expected stop or pass, got neutral:"
@@ -157,7 +157,7 @@ def test_the_kernel_is_not_left_alone_with_it(installed: Installed, command: str
     assert "good" in installed.canshaper("check", file)
 
 
-STICKS = ("Slew", "NearFar")
+JOYSTICKS = ("Slew", "NearFar")
 Change = Callable[[Installed], None]
 
 

@@ -32,7 +32,7 @@ def test_every_valve_hears_every_tick_from_the_first(rig: Rig) -> None:
         assert still(sent)
         assert [sent[v]["AliveCounter"] for v in VALVES] == [count % 256] * 3
     assert rig.state() is State.NEUTRAL_WAIT
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
 def test_valve_frames_come_before_status_frames(rig: Rig) -> None:
@@ -41,7 +41,7 @@ def test_valve_frames_come_before_status_frames(rig: Rig) -> None:
     assert {f.bus for f in frames} == {"crane"}
 
 
-def test_a_stick_moves_its_own_axis_only(rig: Rig) -> None:
+def test_a_joystick_moves_its_own_axis_only(rig: Rig) -> None:
     rig.run(3)
     sent = rig.run(50, Slew=-1000)
     assert sent["SlewCommand"]["Velocity"] < -50
@@ -50,9 +50,9 @@ def test_a_stick_moves_its_own_axis_only(rig: Rig) -> None:
     assert sent["LiftCommand"]["Velocity"] == pytest.approx(43, abs=0.8)  # 5 % deadband added
 
 
-def test_a_stick_that_is_out_at_the_start_moves_nothing(rig: Rig) -> None:
+def test_a_joystick_that_is_out_at_the_start_moves_nothing(rig: Rig) -> None:
     assert still(rig.run(100, Slew=1000, Lift=1000))
-    assert rig.reason() == "STICK_NOT_NEUTRAL"
+    assert rig.reason() == "JOYSTICK_NOT_NEUTRAL"
 
 
 def test_a_joystick_that_is_not_enabled_moves_nothing(rig: Rig) -> None:
@@ -82,7 +82,7 @@ def test_silence_stops_the_axis_after_the_timeout(rig: Rig) -> None:
         assert rig.tick()["SlewCommand"]["Velocity"] > 50
         assert rig.state() is State.ACTIVE
     rig.tick()
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_TIMEOUT")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_TIMEOUT")
     for _ in range(STOP_TICKS):
         sent = rig.tick()
     assert still(sent)
@@ -105,21 +105,21 @@ def test_a_joystick_frozen_from_the_start_never_arms(rig: Rig) -> None:
     for _ in range(50):
         rig.receive(rig.joystick(AliveCounter=1, Slew=900))
         assert still(rig.tick())
-    assert rig.reason() == "STICK_UNTRUSTED"
+    assert rig.reason() == "JOYSTICK_UNTRUSTED"
 
 
 @pytest.mark.parametrize(
     ("raw", "reason"),
     [
-        ({"Slew": 32766}, "STICK_ERROR"),
-        ({"Slew": 32767}, "STICK_NOT_AVAILABLE"),
-        ({"Slew": 1001}, "STICK_OUT_OF_RANGE"),
-        ({"Slew": -32768}, "STICK_OUT_OF_RANGE"),
+        ({"Slew": 32766}, "JOYSTICK_ERROR"),
+        ({"Slew": 32767}, "JOYSTICK_NOT_AVAILABLE"),
+        ({"Slew": 1001}, "JOYSTICK_OUT_OF_RANGE"),
+        ({"Slew": -32768}, "JOYSTICK_OUT_OF_RANGE"),
         ({"Slew": 500, "Enable": 2}, "SWITCH_INVALID"),
         ({"Slew": 500, "Enable": 3}, "SWITCH_INVALID"),
     ],
 )
-def test_an_invalid_stick_is_never_a_move(rig: Rig, raw: dict[str, int], reason: str) -> None:
+def test_an_invalid_joystick_is_never_a_move(rig: Rig, raw: dict[str, int], reason: str) -> None:
     assert still(rig.run(20, **raw))
     rig.run(3)
     assert still(rig.run(20, **raw))
@@ -149,16 +149,18 @@ def test_enable_released_in_motion_is_neutral_in_the_next_tick(rig: Rig) -> None
     assert rig.state() is State.READY
 
 
-@pytest.mark.parametrize("stick", [32766, 32767, 1001])
-def test_enable_released_with_a_broken_stick_is_neutral_at_once_too(rig: Rig, stick: int) -> None:
+@pytest.mark.parametrize("joystick", [32766, 32767, 1001])
+def test_enable_released_with_a_broken_joystick_is_neutral_at_once_too(
+    rig: Rig, joystick: int
+) -> None:
     rig.moving()
-    rig.run(2, Slew=stick)
+    rig.run(2, Slew=joystick)
     assert rig.state() is State.STOPPING
-    assert still(rig.run(1, Slew=stick, Enable=0))
+    assert still(rig.run(1, Slew=joystick, Enable=0))
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
-def test_reset_leaves_a_trip_with_a_centred_stick_only(rig: Rig) -> None:
+def test_reset_leaves_a_trip_with_a_centred_joystick_only(rig: Rig) -> None:
     rig.moving()
     rig.run(1, Enable=0, Slew=1000)
     rig.run(2, Slew=1000)
@@ -171,7 +173,7 @@ def test_reset_leaves_a_trip_with_a_centred_stick_only(rig: Rig) -> None:
     assert rig.state() is State.READY
 
 
-def test_anti_sway_off_gives_the_stick_through_the_limits(rig: Rig) -> None:
+def test_anti_sway_off_gives_the_joystick_through_the_limits(rig: Rig) -> None:
     rig.run(3, AntiSwayOff=1)
     sent = rig.run(50, Slew=500, AntiSwayOff=1)
     assert rig.state() is State.BYPASS_ON
@@ -205,7 +207,7 @@ def test_foreign_frames_are_counted_and_never_a_move(
         rig.receive(spoiled(Slew=1000))
         sent = rig.tick()
         assert still(sent)
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
     while "ShaperStatus" not in sent:
         sent = rig.tick()
     assert sent["ShaperStatus"][name] == rig.count(name) == 50
@@ -213,7 +215,7 @@ def test_foreign_frames_are_counted_and_never_a_move(
     assert sum(rig.controller.counters.values.values()) == 50
 
 
-def test_a_wrong_frame_does_not_refresh_the_stick(rig: Rig) -> None:
+def test_a_wrong_frame_does_not_refresh_the_joystick(rig: Rig) -> None:
     rig.moving()
     for _ in range(7):
         frame = rig.joystick(Slew=1000)

@@ -95,13 +95,13 @@ def test_neutral_frames_are_neutral_whatever_moves(rig: Rig) -> None:
 # -- time ------------------------------------------------------------------------------------------
 
 
-def test_a_stall_trips_what_moves_and_forgets_the_sticks(rig: Rig) -> None:
+def test_a_stall_trips_what_moves_and_forgets_the_joysticks(rig: Rig) -> None:
     rig.moving()
     rig.controller.stalled()
     assert still(rig.tick())
     assert (rig.state("slew"), rig.reason("slew")) == (State.TRIPPED, "LOOP_STALLED")
     assert rig.state("near_far") is State.NEUTRAL_WAIT
-    assert rig.reason("near_far") == "STICK_TIMEOUT"
+    assert rig.reason("near_far") == "JOYSTICK_TIMEOUT"
 
 
 def test_after_a_stall_the_last_frame_seen_again_is_no_news(rig: Rig) -> None:
@@ -112,20 +112,20 @@ def test_after_a_stall_the_last_frame_seen_again_is_no_news(rig: Rig) -> None:
     rig.controller.stalled()
     rig.receive(frame)
     rig.tick()
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
     rig.receive(rig.joystick())
     rig.tick()
     assert rig.state() is State.READY
 
 
-def test_after_a_stall_a_fresh_stick_that_is_out_moves_nothing(rig: Rig) -> None:
+def test_after_a_stall_a_fresh_joystick_that_is_out_moves_nothing(rig: Rig) -> None:
     """A frame may come in between the stall and the tick; neutral was seen before the stall."""
     rig.run(3)
     assert rig.state() is State.READY
     rig.controller.stalled()
     for _ in range(20):
         assert still(rig.run(1, Slew=1000))
-    assert rig.reason() == "STICK_NOT_NEUTRAL"
+    assert rig.reason() == "JOYSTICK_NOT_NEUTRAL"
 
 
 @pytest.mark.parametrize("missed", [1, 2, 4])
@@ -229,7 +229,7 @@ def test_status_comes_in_its_cycle_and_with_every_transition(rig: Rig) -> None:
     assert {s for _, s, _ in told} == {State.READY, State.ACTIVE}
 
 
-def test_status_shows_stick_and_valve(rig: Rig) -> None:
+def test_status_shows_joystick_and_valve(rig: Rig) -> None:
     rig.run(3)
     sent: dict[str, dict[str, Any]] = {}
     rig.run(150, Slew=800)

@@ -55,7 +55,7 @@ def test_the_way_back_is_free_neutral_and_then_a_reset(machine: Machine, way: st
     machine.run(2, 1, **on)
     machine.run(2, 0, **on)
     assert machine.states() == PRESSED
-    # nor with a stick that is out
+    # nor with a joystick that is out
     machine.run(2, **off, Slew=500, Lift=500, NearFar=500)
     machine.run(2, **on, Slew=500, Lift=500, NearFar=500)
     assert machine.states() == PRESSED

@@ -19,7 +19,7 @@ def test_without_a_word_of_it_nothing_begins(machine: Machine) -> None:
     for _ in range(20):
         assert still(machine.rig.run(1, Slew=1000))
     machine.run(1, Slew=1000)
-    assert machine.rig.reason() == "STICK_NOT_NEUTRAL"
+    assert machine.rig.reason() == "JOYSTICK_NOT_NEUTRAL"
     machine.run(1)
     assert machine.states() == READY
 

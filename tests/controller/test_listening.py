@@ -66,8 +66,8 @@ def listening_rig(rig: Rig) -> Rig:
 def test_it_reckons_the_same_as_one_that_drives(changed_rig: Callable[..., Rig]) -> None:
     rig, driving = listening_rig(changed_rig()), changed_rig()
     for number in range(300):
-        stick = (0, 1000, -500)[number // 50 % 3]
-        one, other = rig.run(Slew=stick), driving.run(Slew=stick)
+        joystick = (0, 1000, -500)[number // 50 % 3]
+        one, other = rig.run(Slew=joystick), driving.run(Slew=joystick)
         assert [f[""] for f in one.values()] == [f[""] for f in other.values()]
 
 

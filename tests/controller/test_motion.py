@@ -20,7 +20,7 @@ FULL_SPEED_RAD_S = 0.5
 FIXED = "slew: slew, near_far: near_far, radius_m: 3.0, max_pct: 25"
 TIP = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 100"
 MEASURED = f"slew: slew, near_far: near_far, radius: {{ {TIP} }}"
-NEAR_STICK = "command: { joystick: left, signal: NearFar, neutral_pct: 2 }"
+NEAR_JOYSTICK = "command: { joystick: left, signal: NearFar, neutral_pct: 2 }"
 
 
 Make = Callable[..., Rig]
@@ -31,15 +31,15 @@ def moving_as_one(make: Make, text: str = FIXED, **changes: dict[str, str]) -> R
     return make({"axes:\n": section, **changes.get("yaml", {})}, changes.get("dbc"))
 
 
-# Near-far on the joystick that the slew stick is not on, in place of lift.
+# Near-far on the joystick that the slew joystick is not on, in place of lift.
 LIFT_OF_RIGHT = {
     "signal: Lift,": "signal: Rotate,",
-    NEAR_STICK: NEAR_STICK.replace("left", "right").replace("NearFar", "Lift"),
+    NEAR_JOYSTICK: NEAR_JOYSTICK.replace("left", "right").replace("NearFar", "Lift"),
 }
 
 
 def by_two_joysticks(make: Make) -> Rig:
-    """With compensation, and the two sticks on two joysticks."""
+    """With compensation, and the two joysticks on two joysticks."""
     return moving_as_one(make, yaml=LIFT_OF_RIGHT)
 
 
@@ -196,7 +196,7 @@ def test_enable_released_is_neutral_for_both_in_the_same_tick(changed_rig: Make)
     assert sent["SlewCommand"]["Velocity"] == sent["NearFarCommand"]["Velocity"] == 0
     assert (rig.state(), rig.state("near_far")) == (State.TRIPPED, State.TRIPPED)
     rig.run(50, Enable=0)
-    assert set(near_far(rig, 100, Slew=1000)) == {0.0}  # and it takes a neutral stick to go on
+    assert set(near_far(rig, 100, Slew=1000)) == {0.0}  # and it takes a neutral joystick to go on
 
 
 def test_a_released_enable_of_slew_alone_ends_it_in_the_same_tick(changed_rig: Make) -> None:

@@ -9,7 +9,7 @@ import pytest
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import StickInput
+from canshaper.shaping.states import CommandInput
 from tests.rigs.forwarder import Rig
 
 MOTION = "motion: {{ crane: {{ slew: slew, near_far: near_far, radius_m: 6.0, max_pct: {} }} }}\n"
@@ -30,7 +30,7 @@ def test_it_is_bounded_as_configured(changed_rig: Callable[..., Rig], max_pct: f
 
 @pytest.mark.parametrize("seed", range(40))
 def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
-    """Stick and compensation jump about; rates and rounding leave a debt behind."""
+    """Joystick and compensation jump about; rates and rounding leave a debt behind."""
     chance = random.Random(seed)
     most, steps = chance.choice([0.02, 0.05, 0.25]), 125
     limits = OutputLimits(
@@ -41,7 +41,7 @@ def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
     )
     axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=steps)
     axis.allow_added(most, 3600.0)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     command = added = 0.0
     recent: deque[float] = deque([0.0], maxlen=round(limits.tail_s / 0.02) + 1)
     for _ in range(200):
@@ -50,7 +50,7 @@ def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
         if chance.random() < 0.05:
             added = chance.uniform(-most, most)
         before = axis.sent
-        axis.tick(StickInput(command), added)
+        axis.tick(CommandInput(command), added)
         recent.append(command)
         # One step is paid, half of one is rounding; from outside it comes back by the rates.
         room = 1.6 / steps / (1.0 - limits.deadband)

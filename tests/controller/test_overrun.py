@@ -57,7 +57,7 @@ def test_a_late_tick_now_and_then_stops_nothing(rig: Rig) -> None:
     """One in six, the whole day."""
     rig.moving()
     for n in range(3000):
-        late(rig, 1 if n % 6 == 0 else 0, Slew=900 + n % 2)  # the stick is not frozen
+        late(rig, 1 if n % 6 == 0 else 0, Slew=900 + n % 2)  # the joystick is not frozen
         assert rig.state() is State.ACTIVE
 
 
@@ -106,7 +106,7 @@ def test_it_ends_after_fifty_punctual_ticks_and_then_neutral_is_needed(rig: Rig)
     rig.run(1)
     assert rig.state("near_far") is State.READY
     rig.run(STOP_TICKS, Slew=1000)  # out before the stop was over
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_NOT_NEUTRAL")
     rig.run(1)
     assert rig.state() is State.READY
     assert rig.run(50, Slew=1000)["SlewCommand"]["Velocity"] > 50
@@ -158,12 +158,12 @@ def test_a_released_enable_in_the_tick_of_the_overrun_too(rig: Rig) -> None:
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
-def test_the_fault_of_a_stick_is_told_before_that_of_the_loop(rig: Rig) -> None:
+def test_the_fault_of_a_joystick_is_told_before_that_of_the_loop(rig: Rig) -> None:
     rig.moving()
     for _ in range(MANY - 1):
         late(rig, Slew=1000)
     late(rig, Slew=32766)
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_ERROR")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_ERROR")
 
 
 def test_a_trip_comes_before_an_overrun(rig: Rig) -> None:
@@ -200,12 +200,12 @@ def test_bypass_goes_on_and_the_filter_does_not(rig: Rig) -> None:
     assert (rig.state(), rig.reason()) == (State.STOPPING, "LOOP_OVERRUN")
 
 
-def test_bypass_stops_with_its_stick_in_an_overrun_too(rig: Rig) -> None:
+def test_bypass_stops_with_its_joystick_in_an_overrun_too(rig: Rig) -> None:
     rig.run(3, AntiSwayOff=1)
     rig.run(50, Slew=1000, AntiSwayOff=1)
     overrun(rig, Slew=1000, AntiSwayOff=1)
     late(rig, Slew=32766, AntiSwayOff=1)
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_ERROR")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_ERROR")
 
 
 def test_bypass_does_not_begin_in_an_overrun(rig: Rig) -> None:

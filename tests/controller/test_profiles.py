@@ -166,11 +166,11 @@ def test_in_motion_no_output_jumps(after_s: float, presses: int, *, released: bo
         one.run(20)
         if released:
             one.run(200, X=100.0, Y=100.0)
-    stick = {} if released else {"X": 100.0, "Y": 100.0}
+    joystick = {} if released else {"X": 100.0, "Y": 100.0}
     begin = round(after_s / 0.02)
     for tick in range(250):
-        rig.run(1, Button4=int(tick in {begin + 10 * i for i in range(presses)}), **stick)
-        plain.run(1, **stick)
+        rig.run(1, Button4=int(tick in {begin + 10 * i for i in range(presses)}), **joystick)
+        plain.run(1, **joystick)
         for axis in ("slew", "near_far"):
             one, other = (r.controller.axes[axis].axis.sent for r in (rig, plain))
             assert one == pytest.approx(other, abs=0.01)

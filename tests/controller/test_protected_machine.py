@@ -84,7 +84,7 @@ def test_a_joystick_with_another_data_id_never_arms(rig: Rig, included: bytes) -
         rig.frame(STOP, rig.stop())
         assert rig.frame(JOYSTICK, rig.joystick(included=included)) is FrameFault.CHECKSUM
         rig.tick()
-    assert rig.axis == (State.NEUTRAL_WAIT, "STICK_UNTRUSTED")
+    assert rig.axis == (State.NEUTRAL_WAIT, "JOYSTICK_UNTRUSTED")
 
 
 @pytest.mark.parametrize("bit", range(64))

@@ -53,7 +53,7 @@ def test_it_is_latched(rig: Rig) -> None:
 
 
 def reset(rig: Rig) -> None:
-    """A rising edge of the reset switch, stick in neutral."""
+    """A rising edge of the reset switch, joystick in neutral."""
     rig.run(1, Reset=1)
     rig.run(1)
 
@@ -76,7 +76,7 @@ def test_a_reset_counts_after_a_second_of_silence(rig: Rig, silent: int, back: b
     rig.run(1, Reset=1)
     assert (rig.state() is State.NEUTRAL_WAIT) is back
     rig.run(2)
-    assert slew(rig) == ((State.READY, "STICK_NEUTRAL") if back else TRIPPED)
+    assert slew(rig) == ((State.READY, "JOYSTICK_NEUTRAL") if back else TRIPPED)
 
 
 def test_a_reset_during_the_second_is_not_kept_for_later(rig: Rig) -> None:

@@ -33,17 +33,17 @@ class Rig:
         self.released: set[str] = set()
 
     def run(self, ticks: int, **raw: int) -> dict[tuple[str, str], int]:
-        """So many ticks with these sticks on both cranes; the velocities sent last."""
+        """So many ticks with these joysticks on both cranes; the velocities sent last."""
         sent = {}
         for _ in range(ticks):
             self.count = (self.count + 1) % 256
             for bus in (bus for bus in CRANES if bus not in self.silent):
-                for name, sticks in MESSAGES.items():
+                for name, joysticks in MESSAGES.items():
                     message = self.dbc.get_message_by_name(name)
                     on = {"Enable": int(bus not in self.released), "Reset": 0}
-                    moved = {k: v for k, v in raw.items() if k in sticks}
+                    moved = {k: v for k, v in raw.items() if k in joysticks}
                     data = message.encode(
-                        {**sticks, **on, "AliveCounter": self.count, **moved}, scaling=False
+                        {**joysticks, **on, "AliveCounter": self.count, **moved}, scaling=False
                     )
                     frame = Frame(bus, message.frame_id, False, data)
                     self.controller.receive(frame, self.now_ns)
@@ -104,7 +104,7 @@ def test_a_rocker_pressed_both_ways_stops_its_axis(rig: Rig) -> None:
     assert rig.run(60, RotateLeft=250)["front", "RotatorCommand"] > 100
     assert rig.run(60, RotateLeft=250, RotateRight=250)["front", "RotatorCommand"] == 0
     axis = rig.controller.axes["front_rotator"].axis
-    assert (axis.state.name, axis.reason.name) == ("NEUTRAL_WAIT", "STICK_CONTRADICTORY")
+    assert (axis.state.name, axis.reason.name) == ("NEUTRAL_WAIT", "JOYSTICK_CONTRADICTORY")
 
 
 def test_each_crane_is_a_motion_of_its_own(tmp_path: Path) -> None:

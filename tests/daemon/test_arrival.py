@@ -42,7 +42,7 @@ def test_silence_counts_from_the_arrival_of_the_last_frame(rig: Rig, early_ns: i
     while rig.state() is State.ACTIVE:
         found_ns = rig.now_ns
         tick(rig, port)
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
     assert LIMIT_NS < found_ns - arrived_ns <= LIMIT_NS + TICK_NS
 
 

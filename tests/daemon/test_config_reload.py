@@ -40,7 +40,7 @@ def answer(reading: ConfigReload) -> Deployment | str:
 
 
 def drive(deployment: Deployment) -> list[Frame]:
-    """What a controller sends while every stick goes to its end and back."""
+    """What a controller sends while every joystick goes to its end and back."""
     controller = Controller(deployment)
     sent = []
     for tick in range(300):
@@ -50,8 +50,8 @@ def drive(deployment: Deployment) -> list[Frame]:
             assert not isinstance(found, str)
             message = found[1]
             values = dict.fromkeys((s.name for s in message.signals), 0)
-            sticks = {a.command.signal for a in deployment.config.axes.values()}
-            values |= {name: 900 if 50 < tick < 150 else 0 for name in values if name in sticks}
+            joysticks = {a.command.signal for a in deployment.config.axes.values()}
+            values |= {name: 900 if 50 < tick < 150 else 0 for name in values if name in joysticks}
             values |= {"Enable": 1, "AliveCounter": tick % 256}
             data = message.encode(values, scaling=False)
             key = (message.frame_id, message.is_extended_frame)

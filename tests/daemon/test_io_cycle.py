@@ -36,17 +36,17 @@ def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: 
 
 
 def test_what_waited_is_read_to_its_end_and_not_believed(rig: Rig) -> None:
-    """However much it is: neutral is among it, and the stick has been out for long."""
+    """However much it is: neutral is among it, and the joystick has been out for long."""
     rig.run(3)
     port = Waiting(most=10)
     port.wait(*(frame for _ in range(100) for frame in both(rig)))
     tick(rig, port, missed=100)
     assert port.queue == []
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_TIMEOUT")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_TIMEOUT")
     for _ in range(10):
         port.wait(*both(rig, Slew=1000))
         tick(rig, port)
-        assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
+        assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_NOT_NEUTRAL")
 
 
 def test_a_bus_that_never_ends_does_not_hold_up_the_loop_for_ever(rig: Rig) -> None:
@@ -126,13 +126,13 @@ def test_an_emergency_stop_that_was_free_in_a_standstill_is_not_known(changed_ri
 def test_an_axis_with_a_slow_valve_has_seen_the_standstill_too(
     changed_rig: Callable[..., Rig],
 ) -> None:
-    """A valve of 200 ms: the stick is out, and fresh again, before its turn comes."""
+    """A valve of 200 ms: the joystick is out, and fresh again, before its turn comes."""
     rig = changed_rig(dbc=SLOW_VALVE)
     rig.run(31)
     assert rig.state() is State.READY
     rig.controller.stalled()
     rig.run(40, Slew=1000)
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_NOT_NEUTRAL")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_NOT_NEUTRAL")
 
 
 def test_a_frame_that_does_not_go_out_is_a_trip(rig: Rig) -> None:

@@ -202,12 +202,12 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
 def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
     bench: Bench, caplog: pytest.LogCaptureFixture
 ) -> None:
-    """The stick went out meanwhile, and its joystick died."""
+    """The joystick went out meanwhile, and its joystick died."""
 
     def opening(channel: str) -> None:
         if channel == "vcan1":
-            for stick in [0] * 50 + [1000] * 50:
-                bench.joysticks(Slew=stick)
+            for joystick in [0] * 50 + [1000] * 50:
+                bench.joysticks(Slew=joystick)
                 bench.now_ns += TICK_NS
             bench.now_ns += 10**9
             raise BusError("bus two: cannot open: no such adapter")
@@ -216,7 +216,7 @@ def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
         if tick < 10:
             bench.joysticks()
         if tick == 9:
-            assert bench.told() == ("READY", "STICK_NEUTRAL")
+            assert bench.told() == ("READY", "JOYSTICK_NEUTRAL")
             bench.reload(BUS, SECOND)
         if tick == 100:
             bench.stop()
@@ -225,11 +225,11 @@ def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
     bench.run(script)
     assert "reload=refused bus two: cannot open: no such adapter" in caplog.messages
     assert not bench.moved()
-    assert bench.told() == ("NEUTRAL_WAIT", "STICK_TIMEOUT")
+    assert bench.told() == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")
 
 
 def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
-    """On a bus that stays open: what it says is old, and the next frame has the stick out."""
+    """On a bus that stays open: what it says is old, and the next frame has the joystick out."""
     since: list[int] = []
 
     def opening(channel: str) -> None:
@@ -254,7 +254,7 @@ def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
     bench.run(script)
     assert [port.channel for port in bench.ports] == ["vcan0", "vcan1"]
     assert not bench.moved()
-    assert bench.told() == ("NEUTRAL_WAIT", "STICK_NOT_NEUTRAL")
+    assert bench.told() == ("NEUTRAL_WAIT", "JOYSTICK_NOT_NEUTRAL")
 
 
 def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -> None:
@@ -269,7 +269,7 @@ def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -
 
     bench.run(script)
     assert [(port.channel, port.closed) for port in bench.ports] == [("vcan0", True)] * 2
-    assert bench.told() == ("READY", "STICK_NEUTRAL")
+    assert bench.told() == ("READY", "JOYSTICK_NEUTRAL")
 
 
 def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
@@ -339,7 +339,7 @@ def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench)
             bench.stop()
 
     bench.run(script)
-    assert told == [("TRIPPED", "SECOND_SENDER")] * 2 + [("READY", "STICK_NEUTRAL")]
+    assert told == [("TRIPPED", "SECOND_SENDER")] * 2 + [("READY", "JOYSTICK_NEUTRAL")]
 
 
 def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:

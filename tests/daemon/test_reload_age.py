@@ -9,7 +9,7 @@ from canshaper.daemon import daemon as module
 from canshaper.daemon import ports as service_ports
 from tests.daemon.test_reload import Bench
 
-READY = ("READY", "STICK_NEUTRAL")
+READY = ("READY", "JOYSTICK_NEUTRAL")
 
 
 @pytest.fixture
@@ -55,7 +55,7 @@ def test_a_joystick_frame_that_waits_on_a_bus_that_is_opened_again_is_no_news(
     bench.opening = opening
     states = told(bench, 9)
     assert states(8) == READY
-    assert states(12) == ("NEUTRAL_WAIT", "STICK_TIMEOUT")
+    assert states(12) == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")
 
 
 def test_a_reload_that_takes_long_is_a_standstill(
@@ -88,4 +88,4 @@ def test_a_reload_that_takes_long_is_a_standstill(
     bench.run(script)
     assert len(slept) == 2
     assert states[8] == READY
-    assert states[12] == ("NEUTRAL_WAIT", "STICK_TIMEOUT")
+    assert states[12] == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")

@@ -166,7 +166,7 @@ def test_a_joystick_from_any_address_has_to_come_again() -> None:
     rig.tick()
     for _ in range(30):
         rig.tick(bjm("BJM2"))
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_TIMEOUT")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_TIMEOUT")
     assert rig.state("lift") is State.READY
 
 

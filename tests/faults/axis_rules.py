@@ -58,9 +58,9 @@ class AxisRules:
         self._pressed_again = pressed and causes == {RELEASED} and joystick.enable() == 1
         # Silence counts a tick later, when the loop looks.
         faults = joystick.faults(axis, now_ns - self._tick_ns - SLACK_NS) if joystick_works else {0}
-        stick = joystick.sticks[axis.name][0]
+        deflection = joystick.joysticks[axis.name][0]
         healthy = not causes and not faults
-        centred = healthy and abs(stick) <= axis.band and joystick.enable() == 1
+        centred = healthy and abs(deflection) <= axis.band and joystick.enable() == 1
         if faults or joystick.faults(axis, now_ns):  # the loop may take it for silent already
             self.may_stop(now_ns)
         if causes:
@@ -71,15 +71,15 @@ class AxisRules:
         elif faults:
             self.armed = False
         elif centred and (self._stop_until_ns is None or not self.velocity):
-            self.armed = True  # a stop that is not at rest goes on, whatever the stick does
+            self.armed = True  # a stop that is not at rest goes on, whatever the joystick does
         self._why = ", ".join(sorted(causes))
-        usable = healthy and self.armed and not self.latched and abs(stick) > axis.band
-        self._ask(now_ns, stick if usable else 0.0)
-        if self._stop_until_ns is not None:  # in a stop the stick does not count
+        usable = healthy and self.armed and not self.latched and abs(deflection) > axis.band
+        self._ask(now_ns, deflection if usable else 0.0)
+        if self._stop_until_ns is not None:  # in a stop the joystick does not count
             self._command = 0.0
 
     def may_stop(self, now_ns: int) -> None:
-        """The axis stops, or may: until then it runs out, wherever the stick is."""
+        """The axis stops, or may: until then it runs out, wherever the joystick is."""
         if self.armed:  # else there is nothing to stop, or it stops already
             stop_ns = (self.axis.stop * self.axis.period_ticks + 1) * self._tick_ns
             self._stop_until_ns = now_ns + stop_ns + SLACK_NS
@@ -141,9 +141,9 @@ class AxisRules:
         if self._why:
             return f"allowed is neutral: {self._why}"
         if self.latched:
-            return "allowed is neutral: latched, and not reset with the stick in neutral"
+            return "allowed is neutral: latched, and not reset with the joystick in neutral"
         if not self.armed and self._stop_until_ns is None:
-            return "allowed is neutral: no enabled stick seen in neutral"
+            return "allowed is neutral: no enabled joystick seen in neutral"
         return self._too_fast(before, now, ticks)
 
     def _too_fast(self, before: float, now: float, ticks: int) -> str:

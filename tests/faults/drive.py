@@ -66,7 +66,7 @@ class Drive:
         self.joysticks = {v.name: Sender(v, tick_ms, rng) for v in self.machine.joysticks.values()}
         self.stop = Sender(self.machine.stop, tick_ms, rng) if self.machine.stop else None
         self.paths = {
-            name: path(rng, self.ticks, axis.stick.full, int(axis.band * axis.stick.full))
+            name: path(rng, self.ticks, axis.signal.full, int(axis.band * axis.signal.full))
             for name, axis in self.machine.axes.items()
         }
         self.toggles = {
@@ -111,9 +111,9 @@ class Drive:
             for _ in range(passed):
                 self.tick_number += 1
                 last = self.tick_number - 1
-                sticks = {n: p[min(last, self.ticks - 1)] for n, p in self.paths.items()}
+                joysticks = {n: p[min(last, self.ticks - 1)] for n, p in self.paths.items()}
                 switches = {n: self._switches(v, last) for n, v in self.machine.joysticks.items()}
-                self._take(sticks, switches, active)
+                self._take(joysticks, switches, active)
             if stalled:
                 self._tell("stood still")
                 self.judge.stalled()
@@ -163,7 +163,7 @@ class Drive:
 
     def _take(
         self,
-        sticks: dict[str, int],
+        joysticks: dict[str, int],
         switches: dict[str, dict[str, int]],
         active: list[Fault],
     ) -> None:
@@ -176,7 +176,7 @@ class Drive:
             for _ in range(sender.due(self.tick_number)):
                 raw = dict(switches[name])
                 for axis in joystick.axes:
-                    raw |= axis.raw(sticks[axis.name])
+                    raw |= axis.raw(joysticks[axis.name])
                 raw = sender.counted(raw)
                 for fault in mine:
                     if act := inject.RAW.get(fault.kind):
@@ -268,7 +268,7 @@ class Drive:
 
     def _healthy(self, ticks: int, enable: int, reset: int = 0, deflected: int = 0) -> None:
         axes = self.machine.axes.values()
-        sticks = {a.name: deflected * a.stick.full for a in axes}
+        joysticks = {a.name: deflected * a.signal.full for a in axes}
         switches = {}
         for name, joystick in self.machine.joysticks.items():
             switches[name] = {joystick.enable.name: enable}
@@ -276,7 +276,7 @@ class Drive:
                 switches[name][joystick.reset.name] = reset
         for _ in range(ticks):
             self.tick_number += 1
-            self._take(sticks, switches, [])
+            self._take(joysticks, switches, [])
             missed, self._untold = self._untold, 0
             self._step(missed, [])
 

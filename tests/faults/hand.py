@@ -1,16 +1,16 @@
-"""A random operator: where each stick is, tick by tick."""
+"""A random operator: where each joystick is, tick by tick."""
 
 import random
 
 
 def path(rng: random.Random, ticks: int, full: int, band: int) -> list[int]:
-    """Raw values of one stick: deflected, held, reversed, released, in any order.
+    """Raw values of one joystick: deflected, held, reversed, released, in any order.
 
     Args:
         rng: source of randomness.
         ticks: how many.
         full: raw value of full deflection.
-        band: raw value up to which the stick counts as neutral.
+        band: raw value up to which the joystick counts as neutral.
     """
     if rng.random() < 0.2:  # nobody touches this one, or it rests a little beside neutral
         return [rng.choice((0, 0, band, -band))] * ticks

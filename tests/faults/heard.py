@@ -7,7 +7,7 @@ from tests.faults.machine import Axis
 LONG_AGO = -(10**15)
 
 # Reasons by their numbers in docs/states.md.
-STICK_TIMEOUT, SWITCH_INVALID, STICK_FROZEN, STICK_UNTRUSTED = 32, 37, 39, 40
+JOYSTICK_TIMEOUT, SWITCH_INVALID, JOYSTICK_FROZEN, JOYSTICK_UNTRUSTED = 32, 37, 39, 40
 LOOP_OVERRUN, ENABLE_LOST, SEND_FAILED, LOOP_STALLED = 41, 64, 66, 67
 EMERGENCY_STOP, EMERGENCY_STOP_LOST, SECOND_SENDER = 68, 69, 70
 
@@ -121,7 +121,7 @@ class HeardJoystick(Heard):
         self._enabled = {a.name: True for a in source.axes}
         self._still_ns = {a.name: LONG_AGO for a in source.axes}
         # by axis: deflection and reason why it is none, of the last good frame
-        self.sticks: dict[str, tuple[float, int]] = {a.name: (0.0, -1) for a in source.axes}
+        self.joysticks: dict[str, tuple[float, int]] = {a.name: (0.0, -1) for a in source.axes}
         self._reset = 1
 
     def whole(self, word: int) -> None:
@@ -138,34 +138,34 @@ class HeardJoystick(Heard):
             if reset in (0, 1):  # the codes above say nothing
                 self._reset = reset
         for axis in joystick.axes:
-            stick = axis.read(word)
-            if stick != self.sticks[axis.name]:
-                self.sticks[axis.name], self._still_ns[axis.name] = stick, now_ns
-            if enable == 0 or (enable == 1 and not stick[1]):
+            command = axis.read(word)
+            if command != self.joysticks[axis.name]:
+                self.joysticks[axis.name], self._still_ns[axis.name] = command, now_ns
+            if enable == 0 or (enable == 1 and not command[1]):
                 self.presses[axis.name] += enable == 1 and not self._enabled[axis.name]
                 self._enabled[axis.name] = enable == 1
 
     def valid(self) -> bool:
-        return self.enable() in (0, 1) and not any(why for _, why in self.sticks.values())
+        return self.enable() in (0, 1) and not any(why for _, why in self.joysticks.values())
 
     def bypasses(self) -> bool:
         """Whether anti-sway is switched off."""
         return self.joystick.off is not None and self.joystick.off.get(self.word) == 1
 
     def faults(self, axis: Axis, now_ns: int) -> set[int]:
-        """Every reason why the stick of this axis cannot be used now; empty when it can."""
+        """Every reason why the joystick of this axis cannot be used now; empty when it can."""
         if not self.fresh(now_ns):
-            found = {STICK_TIMEOUT}
+            found = {JOYSTICK_TIMEOUT}
             if now_ns - self.refused_ns <= self.source.timeout_ns:
-                found = {STICK_UNTRUSTED}
+                found = {JOYSTICK_UNTRUSTED}
             return found
-        stick, why = self.sticks[axis.name]
+        joystick, why = self.joysticks[axis.name]
         found = {why} if why else set()
         if self.enable() not in (0, 1):
             found.add(SWITCH_INVALID)
         still_ns = now_ns - self._still_ns[axis.name]
-        if not found and still_ns > self.joystick.frozen_ns and abs(stick) > axis.band:
-            found.add(STICK_FROZEN)
+        if not found and still_ns > self.joystick.frozen_ns and abs(joystick) > axis.band:
+            found.add(JOYSTICK_FROZEN)
         return found
 
     def enable(self) -> int:

@@ -47,29 +47,29 @@ class Fault:
 
 def _code(name: str) -> Callable[[Fault, Raw], None]:
     def act(fault: Fault, raw: Raw) -> None:
-        code = fault.axis.stick.code(name)
+        code = fault.axis.signal.code(name)
         if code is not None:
-            raw[fault.axis.stick.name] = code
+            raw[fault.axis.signal.name] = code
 
     return act
 
 
 def _out_of_range(fault: Fault, raw: Raw) -> None:
-    stick, rng = fault.axis.stick, fault.rng
-    least = min(stick.full + 1, stick.high)  # one that fills its bits has no more
-    beyond = (least, -stick.full - 1, stick.low, rng.randint(least, stick.high))
-    raw[stick.name] = rng.choice(beyond)
+    joystick, rng = fault.axis.signal, fault.rng
+    least = min(joystick.full + 1, joystick.high)  # one that fills its bits has no more
+    beyond = (least, -joystick.full - 1, joystick.low, rng.randint(least, joystick.high))
+    raw[joystick.name] = rng.choice(beyond)
 
 
-def _frozen_stick(fault: Fault, raw: Raw) -> None:
+def _frozen_joystick(fault: Fault, raw: Raw) -> None:
     for axis in fault.joystick.axes:
-        for signal in (axis.stick, *(axis.flags or ())):
+        for signal in (axis.signal, *(axis.flags or ())):
             raw[signal.name] = fault.memory.setdefault(signal.name, raw[signal.name])
 
 
-def _jumping_stick(fault: Fault, raw: Raw) -> None:
-    full = fault.axis.stick.full
-    raw[fault.axis.stick.name] = fault.rng.randint(-full, full)
+def _jumping_joystick(fault: Fault, raw: Raw) -> None:
+    full = fault.axis.signal.full
+    raw[fault.axis.signal.name] = fault.rng.randint(-full, full)
 
 
 def _flags(*values: int) -> Callable[[Fault, Raw], None]:
@@ -123,11 +123,11 @@ def _stepping_counter(fault: Fault, raw: Raw) -> None:
 
 
 RAW: dict[str, Callable[[Fault, Raw], None]] = {
-    "stick: error": _code("Error"),
-    "stick: not available": _code("NotAvailable"),
-    "stick: out of range": _out_of_range,
-    "stick: frozen": _frozen_stick,
-    "stick: jumping": _jumping_stick,
+    "joystick: error": _code("Error"),
+    "joystick: not available": _code("NotAvailable"),
+    "joystick: out of range": _out_of_range,
+    "joystick: frozen": _frozen_joystick,
+    "joystick: jumping": _jumping_joystick,
     "flags: contradictory": _flags(0, 1),
     "flags: anything": _flags(0, 1, 2, 3),
     "enable: released": _enable(0),

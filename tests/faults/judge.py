@@ -4,10 +4,10 @@ It knows docs/states.md and docs/deployment.md and nothing of the controller. It
 that came in, the frames that went out and what the loop told the controller, and keeps for every
 axis whether motion is allowed at all:
 
-    WAIT     nothing may move before a fresh, valid, enabled stick in neutral was seen
-    FREE     the stick moves the axis
+    WAIT     nothing may move before a fresh, valid, enabled joystick in neutral was seen
+    FREE     the joystick moves the axis
     STOP     the input was lost or invalid in motion: to zero, within stop_s
-    LATCHED  neutral at once, until enable or reset is pressed with the stick in neutral
+    LATCHED  neutral at once, until enable or reset is pressed with the joystick in neutral
 
 and within which velocities: never faster than was asked within the tail, never against the
 joystick, never quicker than the valve's rates, all on the grid of the valve's frame.
@@ -40,7 +40,7 @@ COUNTERS |= {"InvalidSignals": 255, "SendFailures": 255}
 ROUNDING = 1.5
 # How long another sender of a valve's id must be silent before a trip for it can be reset.
 FOREIGN_NS = 1_000_000_000
-# Ticks after which a filter that answers the last swing of the stick is done with it.
+# Ticks after which a filter that answers the last swing of the joystick is done with it.
 SETTLED = {"off": 3, "first_order": 3, "s_curve": 3}
 SETTLED_OTHERS = 25
 # An overrun of the loop must be one: late ticks among the last ones.
@@ -105,8 +105,8 @@ class AxisJudge:
         if not in_motion:
             causes.discard(heard.SEND_FAILED)
         usable = not faults and not causes and joystick.enable() == 1
-        stick = joystick.sticks[axis.name][0] if usable else 0.0
-        centred = usable and abs(stick) <= axis.band
+        deflection = joystick.joysticks[axis.name][0] if usable else 0.0
+        centred = usable and abs(deflection) <= axis.band
         self.reasons = causes | faults | ({heard.LOOP_OVERRUN} if overrun else set())
         if released:
             self.reasons.add(heard.ENABLE_LOST)
@@ -118,7 +118,9 @@ class AxisJudge:
         elif self.mode == LATCHED:
             # A press among frames that say nothing else, or with enable off, may count later.
             late = self._pressed_since and told == 0 and not faults and not causes
-            if (pressed and centred) or (late and abs(joystick.sticks[axis.name][0]) <= axis.band):
+            if (pressed and centred) or (
+                late and abs(joystick.joysticks[axis.name][0]) <= axis.band
+            ):
                 self._go(WAIT)
         elif causes or released:
             self._go(WAIT)
@@ -136,7 +138,7 @@ class AxisJudge:
         self._pressed_again = released and pressed and self.mode == LATCHED
         if self.mode == began == WAIT and centred:
             self._go(FREE)
-        self._bounds(index, stick if abs(stick) > axis.band else 0.0, slewing)
+        self._bounds(index, deflection if abs(deflection) > axis.band else 0.0, slewing)
         stops = began == FREE and self.mode == STOP and bool(faults)
         self._must_fall = stops and self._settled()
 

@@ -10,7 +10,7 @@ from tests.faults.inputs import Joystick
 from tests.faults.machine import Axis, Machine
 from tests.faults.sequence import Sequence
 
-STICKS = "forwarder"
+JOYSTICKS = "forwarder"
 
 
 def _joystick(machine: Machine, frame: Frame) -> Joystick | None:
@@ -60,9 +60,9 @@ def _no_error(machine: Machine, frame: Frame) -> Frame:
         return frame
     word = int.from_bytes(frame.data, "little")
     for axis in joystick.axes:
-        raw = axis.stick.get(word)
-        if raw in axis.stick.special:
-            word += axis.stick.put(axis.stick.full) - axis.stick.put(raw)
+        raw = axis.signal.get(word)
+        if raw in axis.signal.special:
+            word += axis.signal.put(axis.signal.full) - axis.signal.put(raw)
     return frame._replace(data=word.to_bytes(joystick.length, "little"))
 
 
@@ -121,17 +121,17 @@ def _counter_stands(sequence: Sequence) -> None:
 
 
 LIES: dict[str, tuple[str, Callable[[Sequence], None]]] = {
-    "enable forced": (STICKS, _incoming(_enabled)),
-    "error code unseen": (STICKS, _incoming(_no_error)),
-    "another sender unseen": (STICKS, _incoming(_no_others)),
+    "enable forced": (JOYSTICKS, _incoming(_enabled)),
+    "error code unseen": (JOYSTICKS, _incoming(_no_error)),
+    "another sender unseen": (JOYSTICKS, _incoming(_no_others)),
     "emergency unseen": ("canopen-forwarder", _incoming(_no_emergency)),
     "always operational": ("canopen-forwarder", _incoming(_always_operational)),
     "always active": ("canopen-forwarder", _incoming(_always_active)),
     "claim unseen": ("j1939-forwarder", _incoming(_no_claim)),
-    "neutral late": (STICKS, _holds_on),
-    "counter stands": (STICKS, _counter_stands),
-    "a little too fast": (STICKS, _steps(lambda _, raw: raw + (raw > 0) * 3 - (raw < 0) * 3)),
-    "wrong way": (STICKS, _steps(lambda _, raw: -raw)),
-    "creeps": (STICKS, _steps(lambda axis, raw: raw or round(axis.deadband * axis.steps) + 1)),
-    "never moves": (STICKS, _steps(lambda _, __: 0)),
+    "neutral late": (JOYSTICKS, _holds_on),
+    "counter stands": (JOYSTICKS, _counter_stands),
+    "a little too fast": (JOYSTICKS, _steps(lambda _, raw: raw + (raw > 0) * 3 - (raw < 0) * 3)),
+    "wrong way": (JOYSTICKS, _steps(lambda _, raw: -raw)),
+    "creeps": (JOYSTICKS, _steps(lambda axis, raw: raw or round(axis.deadband * axis.steps) + 1)),
+    "never moves": (JOYSTICKS, _steps(lambda _, __: 0)),
 }

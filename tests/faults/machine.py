@@ -14,8 +14,13 @@ from cantools.database.can import Message
 from tests.faults.fields import Field
 from tests.faults.inputs import Input, Joystick, Key, key_of
 
-# Reasons why a stick is none, by their numbers in docs/states.md.
-STICK_ERROR, STICK_NOT_AVAILABLE, STICK_OUT_OF_RANGE, STICK_CONTRADICTORY = 33, 34, 35, 38
+# Reasons why a joystick is none, by their numbers in docs/states.md.
+JOYSTICK_ERROR, JOYSTICK_NOT_AVAILABLE, JOYSTICK_OUT_OF_RANGE, JOYSTICK_CONTRADICTORY = (
+    33,
+    34,
+    35,
+    38,
+)
 
 # Status frames of which the values are kept.
 MOST_STATUSES = 5000
@@ -43,11 +48,11 @@ class Words:
 
 @dataclass
 class Axis:
-    """One axis: its stick, its valve, its limits, times in ticks of its valve."""
+    """One axis: its joystick, its valve, its limits, times in ticks of its valve."""
 
     name: str
     joystick: Joystick
-    stick: Field
+    signal: Field
     band: float
     valve: Field
     valve_message: Message
@@ -89,44 +94,44 @@ class Axis:
 
     def read(self, word: int) -> tuple[float, int]:
         """Deflection in a frame of the joystick, fraction of full, and 0 or why it is none."""
-        stick = self.stick
-        raw = stick.get(word)
-        if name := stick.special.get(raw):
-            return 0.0, STICK_ERROR if name == "Error" else STICK_NOT_AVAILABLE
-        if abs(raw) > stick.full:
-            return 0.0, STICK_OUT_OF_RANGE
+        joystick = self.signal
+        raw = joystick.get(word)
+        if name := joystick.special.get(raw):
+            return 0.0, JOYSTICK_ERROR if name == "Error" else JOYSTICK_NOT_AVAILABLE
+        if abs(raw) > joystick.full:
+            return 0.0, JOYSTICK_OUT_OF_RANGE
         if self.negative or self.flags is None:
-            return self._rocker(raw, word) if self.negative else (raw / stick.full, 0)
+            return self._rocker(raw, word) if self.negative else (raw / joystick.full, 0)
         neutral, negative, positive = flags = tuple(f.get(word) for f in self.flags)
         codes = {f for f in flags if f > 1}
         if codes:
-            return 0.0, STICK_NOT_AVAILABLE if codes == {3} else STICK_ERROR
-        if sum(flags) > 1 or (raw and not any(flags)) or (neutral and raw > 0.05 * stick.full):
-            return 0.0, STICK_CONTRADICTORY
-        return (positive - negative) * raw / stick.full, 0
+            return 0.0, JOYSTICK_NOT_AVAILABLE if codes == {3} else JOYSTICK_ERROR
+        if sum(flags) > 1 or (raw and not any(flags)) or (neutral and raw > 0.05 * joystick.full):
+            return 0.0, JOYSTICK_CONTRADICTORY
+        return (positive - negative) * raw / joystick.full, 0
 
     def _rocker(self, raw: int, word: int) -> tuple[float, int]:
         """Deflection of a rocker with a signal for each direction."""
         assert self.negative
         other = self.negative.get(word)
         if name := self.negative.special.get(other):
-            return 0.0, STICK_ERROR if name == "Error" else STICK_NOT_AVAILABLE
+            return 0.0, JOYSTICK_ERROR if name == "Error" else JOYSTICK_NOT_AVAILABLE
         if other > self.negative.full:
-            return 0.0, STICK_OUT_OF_RANGE
-        if min(raw, other) > 0.05 * self.stick.full:
-            return 0.0, STICK_CONTRADICTORY
-        return (raw - other) / self.stick.full, 0
+            return 0.0, JOYSTICK_OUT_OF_RANGE
+        if min(raw, other) > 0.05 * self.signal.full:
+            return 0.0, JOYSTICK_CONTRADICTORY
+        return (raw - other) / self.signal.full, 0
 
     def raw(self, value: int) -> dict[str, int]:
         """Raw values that a healthy joystick sends for a signed deflection of so many raw steps."""
         if self.negative:
-            return {self.stick.name: max(0, value), self.negative.name: max(0, -value)}
+            return {self.signal.name: max(0, value), self.negative.name: max(0, -value)}
         if self.flags is None:
-            return {self.stick.name: value}
-        neutral = abs(value) <= self.band * self.stick.full
+            return {self.signal.name: value}
+        neutral = abs(value) <= self.band * self.signal.full
         flags = (neutral, value < 0 and not neutral, value > 0 and not neutral)
         names = (f.name for f in self.flags)
-        return {self.stick.name: abs(value), **dict(zip(names, map(int, flags), strict=True))}
+        return {self.signal.name: abs(value), **dict(zip(names, map(int, flags), strict=True))}
 
     def status(self, data: bytes) -> dict[str, Any]:
         """Values of a status frame as cantools reads them."""
@@ -162,8 +167,8 @@ class Axis:
         return found
 
 
-def _flags(joystick: Joystick, stick: dict[str, Any]) -> tuple[Field, Field, Field] | None:
-    names = stick.get("flags")
+def _flags(joystick: Joystick, command: dict[str, Any]) -> tuple[Field, Field, Field] | None:
+    names = command.get("flags")
     if names is None:
         return None
     field = joystick.fields
@@ -242,8 +247,8 @@ class Machine:
         return key_of(bus, message, self.addresses.get(bus))
 
     def _axis(self, name: str, section: dict[str, Any], messages: dict[str, Message]) -> Axis:
-        stick, valve = section["command"], section["valve"]
-        joystick = self.joysticks[stick["joystick"]]
+        command, valve = section["command"], section["valve"]
+        joystick = self.joysticks[command["joystick"]]
         message = messages[valve["message"]]
         signals = {s.name: s for s in message.signals}
         counter = valve.get("alive_counter")
@@ -252,8 +257,8 @@ class Machine:
         axis = Axis(
             name=name,
             joystick=joystick,
-            stick=joystick.fields[stick["signal"]],
-            band=stick.get("neutral_pct", 2.0) / 100.0,
+            signal=joystick.fields[command["signal"]],
+            band=command.get("neutral_pct", 2.0) / 100.0,
             valve=Field(signals[valve["signal"]]),
             valve_message=message,
             valve_key=self._sent(valve["bus"], message),
@@ -265,8 +270,8 @@ class Machine:
             tick_s=self.tick_ms / 1000.0,
             filter=section["filter"]["kind"] or "off",  # to PyYAML, off is false
             limits=section.get("limits", {}),
-            flags=_flags(joystick, stick),
-            negative=joystick.fields[stick["negative"]] if "negative" in stick else None,
+            flags=_flags(joystick, command),
+            negative=joystick.fields[command["negative"]] if "negative" in command else None,
             direction=_direction(valve.get("direction")),
             words=self._words(valve, message, messages),
         )

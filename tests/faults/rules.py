@@ -3,12 +3,12 @@
 It knows the deployment file, the DBC and every frame that the daemon has read or sent, and neither
 the daemon's states nor what they are called. For every axis, in every frame of its valve:
 
-    no motion unless an enabled, valid stick was seen in neutral since the start, a fault or a trip
+    no motion unless an enabled, valid joystick was seen in neutral since start, fault or trip
     neutral while enable is off, the valve or its node has a fault, somebody else commands it, or
-    our address is another's; and, where it moved, until a press with the stick in neutral
+    our address is another's; and, where it moved, until a press with the joystick in neutral
     neutral and latched after a standstill of the loop
     neutral within ``stop_s`` after the input is lost or invalid
-    never faster than asked within the tail, never against the stick, or on the way back from there
+    never faster than asked within the tail, never against the joystick, or on the way back
     no jump: never quicker than the valve's rates, but to neutral
     the alive counter goes on by one
 

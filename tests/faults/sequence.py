@@ -217,7 +217,7 @@ class Sequence:
         act(self, fault)
 
     def _way_back(self, end_s: float) -> float:
-        """All faults are over: a press with the sticks in neutral, and every axis moves."""
+        """All faults are over: a press with the joysticks in neutral, and every axis moves."""
         world, sign = self.world, self.rng.choice((-1.0, 1.0))
         settle_s = SETTLE_CANOPEN_S if self.machine.nodes else SETTLE_S
         if any(address for address in self.machine.addresses.values()):

@@ -103,7 +103,7 @@ VARIANTS = {
             LIMITS: limits("tail_s: 1.4, stop_s: 1.0, rise_per_s: 3, fall_per_s: 6"),
         },
     ),
-    # A stick of J1939-71: a magnitude, and flags for its direction.
+    # A joystick of J1939-71: a magnitude, and flags for its direction.
     "flags": Variant(
         "forwarder",
         {

@@ -27,7 +27,7 @@ class World:
     Args:
         machine: the deployment.
         rng: source of randomness.
-        ticks: how long faults act and sticks are moved; after that all is as ``healthy`` says.
+        ticks: how long faults act and joysticks are moved; after that all is as ``healthy`` says.
         faults: what goes wrong.
         put: takes every frame as it comes onto its bus.
 
@@ -54,7 +54,7 @@ class World:
             v.name: Sender(v, machine.tick_ms, rng) for v in machine.joysticks.values()
         }
         self._paths = {
-            name: path(rng, ticks, axis.stick.full, int(axis.band * axis.stick.full))
+            name: path(rng, ticks, axis.signal.full, int(axis.band * axis.signal.full))
             for name, axis in machine.axes.items()
         }
         self._toggles = {
@@ -140,7 +140,7 @@ class World:
             self.put(Frame(*joystick.key, data))
 
     def _hand(self, joystick: Joystick) -> dict[str, int]:
-        """Raw values of sticks and switches as the operator has them now."""
+        """Raw values of joysticks and switches as the operator has them now."""
         tick = self.tick
         if tick >= self.ticks:
             enable, reset, deflection = self.healthy
@@ -148,7 +148,7 @@ class World:
             if joystick.reset:
                 raw[joystick.reset.name] = reset
             for axis in joystick.axes:
-                raw |= axis.raw(round(deflection * axis.stick.full))
+                raw |= axis.raw(round(deflection * axis.signal.full))
             return raw
         raw = {joystick.enable.name: 1}
         first, second = self._toggles[joystick.name]

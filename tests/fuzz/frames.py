@@ -41,7 +41,7 @@ class Script:
         self.receive(Frame(*source.key, source.data(raw)))
 
     def healthy(self, deflected: int) -> None:
-        """A frame of every input as it should be, sticks at so many parts of 100."""
+        """A frame of every input as it should be, joysticks at so many parts of 100."""
         for source in self.inputs:
             self.counts[source.key] += 1
             raw = (
@@ -53,7 +53,7 @@ class Script:
                 if joystick is source:
                     raw[joystick.enable.name] = 1
                     for axis in joystick.axes:
-                        raw |= axis.raw(deflected * axis.stick.full // 100)
+                        raw |= axis.raw(deflected * axis.signal.full // 100)
             self.receive(Frame(*source.key, source.data(raw)))
 
     def tick(self, missed: int = 0, late_ns: int = 0) -> None:

@@ -1,7 +1,7 @@
 """The recorded drive: an operator on the simulated crane, with what happens on a machine.
 
 The enable switch is released in motion, the joysticks fall silent for longer than their timeout,
-the anti-sway switch is used, a stick tells an error, and a node sends what nobody knows.
+the anti-sway switch is used, a joystick tells an error, and a node sends what nobody knows.
 """
 
 from canshaper.codec.frame import Frame
@@ -74,7 +74,7 @@ def _changed(frame: Frame, time_s: float) -> Frame | None:
         if 13.4 <= time_s < 14.2:
             data[4] |= 0x04  # AntiSwayOff
     if frame.can_id == RIGHT and 11.0 <= time_s < 11.1:
-        data[0:2] = (32766).to_bytes(2, "little")  # the stick's code for an error
+        data[0:2] = (32766).to_bytes(2, "little")  # the joystick's code for an error
     return frame._replace(data=bytes(data))
 
 

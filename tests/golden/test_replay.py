@@ -38,8 +38,8 @@ def test_the_drive_goes_through_every_state(name: str) -> None:
     statuses = [f.data for f in frames if f.can_id in (0x300, 0x301, 0x302)]
     assert {data[0] & 15 for data in statuses} == {*map(int, State)}
     reasons = {
-        Reason.STICK_TIMEOUT,
-        Reason.STICK_ERROR,
+        Reason.JOYSTICK_TIMEOUT,
+        Reason.JOYSTICK_ERROR,
         Reason.ENABLE_LOST,
         Reason.BYPASS_REQUESTED,
     }

@@ -20,9 +20,9 @@ class Bench:
     def now_ns(self) -> int:
         return self.number * self.tick_ms * 1_000_000
 
-    def joysticks(self, *, enable: bool = True, **sticks: float) -> list[Frame]:
+    def joysticks(self, *, enable: bool = True, **joysticks: float) -> list[Frame]:
         """Their frames of this tick."""
-        return self.hand.frames(self.number * self.tick_ms, Held(sticks, enable=enable))
+        return self.hand.frames(self.number * self.tick_ms, Held(joysticks, enable=enable))
 
     def takes(self, frames: list[Frame]) -> None:
         """They come in."""
@@ -40,13 +40,13 @@ class Bench:
         self.number += 1
         return why
 
-    def sends(self, steps: int, **sticks: float) -> str:
+    def sends(self, steps: int, **joysticks: float) -> str:
         """A tick with joysticks and command; why that may not leave."""
-        self.takes(self.joysticks(**sticks))
+        self.takes(self.joysticks(**joysticks))
         return self.sent(steps)
 
-    def ramp(self, steps: int, **sticks: float) -> None:
+    def ramp(self, steps: int, **joysticks: float) -> None:
         """Up to there by less than the rates, and on for a while."""
         sign = 1 if steps > 0 else -1
         for size in [*range(10, abs(steps), 10), *[abs(steps)] * 10]:
-            assert not self.sends(sign * size, **sticks)
+            assert not self.sends(sign * size, **joysticks)

@@ -13,7 +13,7 @@ def robust() -> Bench:
     return Bench(load_deployment(shipped.CONFIG / "forwarder-robust.yaml"), "near_far")
 
 
-# Before, sticks, and the most that may follow. Velocity of n of 125 steps behind 5 % dead band:
+# Before, joysticks, and the most that may follow. Velocity of n of 125 steps behind 5 % dead band:
 # (n / 125 - 0.05) / 0.95. The rise is 0.1 in a tick, and up to 0.25 is added.
 CASES = {
     "nothing beyond what the own joystick asked": (38, {"near_far": 0.3, "slew": 1.0}, 41),
@@ -27,12 +27,12 @@ CASES = {
 @pytest.mark.parametrize("case", CASES)
 @pytest.mark.parametrize("sign", [1, -1])
 def test_what_may_follow(sign: int, case: str) -> None:
-    before, sticks, most = CASES[case]
-    sticks = {name: sign * value for name, value in sticks.items()}
+    before, joysticks, most = CASES[case]
+    joysticks = {name: sign * value for name, value in joysticks.items()}
     for steps in (most, most + 1):
         bench = robust()
-        bench.ramp(sign * before, **sticks)
-        refusal = bench.sends(sign * steps, **sticks)
+        bench.ramp(sign * before, **joysticks)
+        refusal = bench.sends(sign * steps, **joysticks)
         assert bool(refusal) == (steps > most), (steps, refusal)
 
 

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from canshaper.config.schema import Limits
-from canshaper.guard.bits import CommandBits, StickBits
+from canshaper.guard.bits import CommandBits, JoystickBits
 from canshaper.guard.opening import openings
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.limits import without_deadband
@@ -13,16 +13,16 @@ from tests.faults import shipped
 
 
 @pytest.mark.parametrize("name", shipped.NAMES)
-def test_sticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
+def test_joysticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
     deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
     for axis in deployment.axes.values():
-        stick = axis.config.command
-        joystick = deployment.joysticks[stick.joystick]
-        bits = StickBits(joystick.message, stick)
+        config = axis.config.command
+        joystick = deployment.joysticks[config.joystick]
+        bits = JoystickBits(joystick.message, config)
         for _ in range(300):
             data = rng.randbytes(joystick.message.length)
-            command = joystick.codec.decode(data)[1][stick.signal]
-            if isinstance(command, float) and abs(command) > stick.neutral_pct / 100.0:
+            command = joystick.codec.decode(data)[1][config.signal]
+            if isinstance(command, float) and abs(command) > config.neutral_pct / 100.0:
                 assert bits.ask(data) == command
 
 
@@ -30,8 +30,8 @@ def test_sticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
 def test_commands_are_read_as_the_valve_codec_reads_them(name: str) -> None:
     deployment, rng = load_deployment(shipped.CONFIG / f"{name}.yaml"), random.Random(name)
     for axis in deployment.axes.values():
-        stick = axis.config.command if axis.rewrites else None
-        bits, codec = CommandBits(axis.valve_message, axis.config.valve, stick), axis.valve
+        joystick = axis.config.command if axis.rewrites else None
+        bits, codec = CommandBits(axis.valve_message, axis.config.valve, joystick), axis.valve
         layout = codec.message.sender.fields.layout
         for steps in (0, 1, -1, codec.steps, -codec.steps, rng.randrange(codec.steps)):
             codec.put(steps)

@@ -1,4 +1,4 @@
-"""Signals that no shipped machine has: a float stick, commands in a joystick's own message."""
+"""Signals that no shipped machine has: a float joystick, commands in a joystick's own message."""
 
 import struct
 from pathlib import Path
@@ -8,7 +8,7 @@ import cantools
 import pytest
 
 from canshaper.config.schema import Command, Valve
-from canshaper.guard.bits import MOST_KNOWN, CommandBits, StickBits
+from canshaper.guard.bits import MOST_KNOWN, CommandBits, JoystickBits
 from canshaper.guard.inputs import Asked
 
 DBC = Path(__file__).parents[2] / "dbc"
@@ -17,8 +17,8 @@ NS_ :
 BS_:
 BU_: JOYSTICK SHAPER
 BO_ 2 Joystick: 8 JOYSTICK
- SG_ Stick : 0|32@1- (1,0) [-1|1] "" SHAPER
-SIG_VALTYPE_ 2 Stick : 1;
+ SG_ Joystick : 0|32@1- (1,0) [-1|1] "" SHAPER
+SIG_VALTYPE_ 2 Joystick : 1;
 """
 
 
@@ -34,9 +34,9 @@ def valve(message: str, signal: str) -> Valve:
     ("value", "ask"),
     [(0.5, 0.5), (-1.0, -1.0), (0.0, 0.0), (1.5, 0.0), (float("nan"), 0.0), (float("inf"), 0.0)],
 )
-def test_a_float_stick(value: float, ask: float) -> None:
+def test_a_float_joystick(value: float, ask: float) -> None:
     message = cantools.database.load_string(FLOAT, "dbc").get_message_by_name("Joystick")  # type: ignore[union-attr]
-    bits = StickBits(message, Command(joystick="left", signal="Stick"))
+    bits = JoystickBits(message, Command(joystick="left", signal="Joystick"))
     assert bits.ask(struct.pack("<fI", value, 0)) == ask
 
 
@@ -55,8 +55,8 @@ def test_a_float_stick(value: float, ask: float) -> None:
 def test_a_command_by_flags_of_the_joystick(raw: dict[str, int], steps: int | None) -> None:
     message = network("j1939-bjm-avc.dbc").get_message_by_name("BJM1")
     flags = {"neutral": "XNeutral", "positive": "XPositive", "negative": "XNegative"}
-    stick = Command(joystick="left", signal="XPosition", flags=flags)  # type: ignore[arg-type]
-    bits = CommandBits(message, valve("BJM1", "XPosition"), stick)
+    joystick = Command(joystick="left", signal="XPosition", flags=flags)  # type: ignore[arg-type]
+    bits = CommandBits(message, valve("BJM1", "XPosition"), joystick)
     values = dict.fromkeys((s.name for s in message.signals), 0) | raw
     assert bits.steps(message.encode(values, scaling=False, strict=False, padding=True)) == steps
 
@@ -66,16 +66,16 @@ def test_a_command_by_flags_of_the_joystick(raw: dict[str, int], steps: int | No
 )
 def test_a_command_by_a_rocker_of_the_joystick(left: int, right: int, steps: int | None) -> None:
     message = network("rotator.dbc").get_message_by_name("RotatorRocker")
-    stick = Command(joystick="left", signal="RotateLeft", negative="RotateRight")
-    bits = CommandBits(message, valve("RotatorRocker", "RotateLeft"), stick)
+    joystick = Command(joystick="left", signal="RotateLeft", negative="RotateRight")
+    bits = CommandBits(message, valve("RotatorRocker", "RotateLeft"), joystick)
     values = dict.fromkeys((s.name for s in message.signals), 0)
     values |= {"RotateLeft": left, "RotateRight": right}
     assert bits.steps(message.encode(values, scaling=False, strict=False)) == steps
 
 
-def test_what_is_kept_of_a_stick_is_bounded() -> None:
+def test_what_is_kept_of_a_joystick_is_bounded() -> None:
     message = network("forwarder.dbc").get_message_by_name("JoystickLeft")
-    asked = Asked(StickBits(message, Command(joystick="left", signal="Slew")))
+    asked = Asked(JoystickBits(message, Command(joystick="left", signal="Slew")))
     for raw in range(MOST_KNOWN + 10):
         ask = asked.learn(struct.pack("<hHI", raw - 1000, 0, 0))
         assert ask == pytest.approx((raw - 1000) / 1000 if 20 <= abs(raw - 1000) <= 1000 else 0.0)

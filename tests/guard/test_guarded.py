@@ -96,4 +96,4 @@ def test_what_the_loop_says_reaches_the_controller() -> None:
     wrong.tick()
     wrong.guarded.stalled()
     wrong.tick()
-    assert wrong.controller.axes["slew"].axis.reason is Reason.STICK_TIMEOUT
+    assert wrong.controller.axes["slew"].axis.reason is Reason.JOYSTICK_TIMEOUT

@@ -27,7 +27,7 @@ BEGIN_S, MOVE_S, REST_S = 5.0, 8.0, 7.0
 
 @dataclass
 class Drive:
-    """What comes in, tick by tick, and where its sticks are.
+    """What comes in, tick by tick, and where its joysticks are.
 
     Attributes:
         frames: what comes in before each tick; ``released`` and ``pressed`` are the same frames
@@ -57,22 +57,22 @@ def drive(name: str) -> Drive:
     hands = Hand(deployment), Hand(deployment)
     plant = None if name == "two-cranes" else PlantNode(deployment)
     controller = Controller(deployment)
-    sticks, until = dict.fromkeys(deployment.axes, 0.0), dict.fromkeys(deployment.axes, BEGIN_S)
+    joysticks, until = dict.fromkeys(deployment.axes, 0.0), dict.fromkeys(deployment.axes, BEGIN_S)
     stop = deployment.emergency_stop
     presses = Sender(stop.config.bus, stop.message, None, stop.protection) if stop else None
     feedback: list[Frame] = []
     tick_ms = deployment.config.tick_ms
     for number in range(round((BEGIN_S + MOVE_S + REST_S) * 1000) // tick_ms):
         time_ms, now_ns = number * tick_ms, number * made.tick_ns
-        for axis in sticks:
+        for axis in joysticks:
             if time_ms >= 1000 * until[axis]:
-                sticks[axis] = rng.choice((0.0, rng.uniform(-1, 1), 1.0, -1.0))
+                joysticks[axis] = rng.choice((0.0, rng.uniform(-1, 1), 1.0, -1.0))
                 until[axis] += rng.uniform(0.3, 1.5)
             if time_ms >= 1000 * (BEGIN_S + MOVE_S):
-                sticks[axis] = 0.0
-        frames = [*hands[0].frames(time_ms, Held(sticks, enable=True)), *feedback]
+                joysticks[axis] = 0.0
+        frames = [*hands[0].frames(time_ms, Held(joysticks, enable=True)), *feedback]
         made.frames.append(frames)
-        made.released.append([*hands[1].frames(time_ms, Held(sticks, enable=False)), *feedback])
+        made.released.append([*hands[1].frames(time_ms, Held(joysticks, enable=False)), *feedback])
         others = [f for f in frames if not stop or f.can_id != stop.message.frame_id]
         if presses and stop and len(others) < len(frames):
             others.insert(0, presses.frame({stop.config.signal: 1}))

@@ -18,7 +18,7 @@ INIT, DISABLED, HOLD, ACTIVE, FAULT_HOLD = 0x8, 0x9, 0xB, 0xF, 0x3
 UP = {INIT: DISABLED, DISABLED: HOLD, HOLD: ACTIVE}
 FLOW_COMMAND_LATE = 0x8003
 U8, I16, U16, U32 = 0x05, 0x03, 0x06, 0x07
-STICK_CYCLE_S, STATUS_CYCLE_S = 0.02, 0.1
+JOYSTICK_CYCLE_S, STATUS_CYCLE_S = 0.02, 0.1
 STATES = {name: number for number, name in NMT_STATES.items()}
 
 
@@ -153,7 +153,7 @@ class Machine(threading.Thread):
         super().__init__(daemon=True)
         self.network = canopen.Network()
         self.network.connect(**bus)
-        stick = write_eds(
+        eds = write_eds(
             folder / "joystick.eds",
             {"t1": (0x180, [(0x6401, 1, 16), (0x6401, 2, 16), (0x6000, 1, 8)])},
             {(0x6401, 2): ("Read analogue input", I16), (0x6000, 1): ("Read input", U8)},
@@ -173,7 +173,7 @@ class Machine(threading.Thread):
                 (0x6301, 1): ("Vpoc actual value", I16),
             },
         )
-        self.joysticks = {n: Joystick(self.network, i, stick) for n, i in JOYSTICKS.items()}
+        self.joysticks = {n: Joystick(self.network, i, eds) for n, i in JOYSTICKS.items()}
         for joystick in self.joysticks.values():
             joystick.node.nmt.state = "INITIALISING"
             joystick.node.nmt.state = "PRE-OPERATIONAL"
@@ -182,10 +182,10 @@ class Machine(threading.Thread):
 
     def run(self) -> None:
         passed = 0.0
-        while not self._ended.wait(STICK_CYCLE_S):
+        while not self._ended.wait(JOYSTICK_CYCLE_S):
             for joystick in self.joysticks.values():
                 joystick.cycle()
-            passed += STICK_CYCLE_S
+            passed += JOYSTICK_CYCLE_S
             if passed >= STATUS_CYCLE_S:
                 passed = 0.0
                 for valve in self.valves.values():

@@ -103,34 +103,34 @@ def frame_of(can_id: int) -> Callable[[bytes, bytes], bool]:
 SHAPED = TICKS_OF["stop"] + AT_ONCE
 LOST = TICKS_OF["timeout"] + SHAPED
 FAULTS = {
-    "silent": Fault(silent(LEFT), frame_of(LEFT), "STICK_TIMEOUT", None, LOST),
+    "silent": Fault(silent(LEFT), frame_of(LEFT), "JOYSTICK_TIMEOUT", None, LOST),
     "frozen counter": Fault(
-        freeze_counter, frame_of(LEFT), "STICK_UNTRUSTED", "COUNTER_REPEATED", LOST
+        freeze_counter, frame_of(LEFT), "JOYSTICK_UNTRUSTED", "COUNTER_REPEATED", LOST
     ),
     "jumping counter": Fault(
-        jump_counter, frame_of(LEFT), "STICK_UNTRUSTED", "COUNTER_JUMP", LOST
+        jump_counter, frame_of(LEFT), "JOYSTICK_UNTRUSTED", "COUNTER_JUMP", LOST
     ),
     "wrong checksum": Fault(
         spoil_left(lambda d: [d[:6] + bytes([d[6] ^ 1]) + d[7:]]),
-        frame_of(LEFT), "STICK_UNTRUSTED", "CHECKSUM", LOST,
+        frame_of(LEFT), "JOYSTICK_UNTRUSTED", "CHECKSUM", LOST,
     ),
     "wrong length": Fault(
-        spoil_left(lambda d: [d[:7]]), frame_of(LEFT), "STICK_TIMEOUT", "WRONG_LENGTH", LOST
+        spoil_left(lambda d: [d[:7]]), frame_of(LEFT), "JOYSTICK_TIMEOUT", "WRONG_LENGTH", LOST
     ),
     "error code": Fault(
-        raw_slew(32766), changed(LEFT, 1, 0x7F), "STICK_ERROR", "INVALID_SIGNAL", SHAPED
+        raw_slew(32766), changed(LEFT, 1, 0x7F), "JOYSTICK_ERROR", "INVALID_SIGNAL", SHAPED
     ),
     "not available": Fault(
-        raw_slew(32767), changed(LEFT, 1, 0x7F), "STICK_NOT_AVAILABLE", "INVALID_SIGNAL", SHAPED
+        raw_slew(32767), changed(LEFT, 1, 0x7F), "JOYSTICK_NOT_AVAILABLE", "INVALID_SIGNAL", SHAPED
     ),
     "out of range": Fault(
-        raw_slew(2000), changed(LEFT, 1, 0x07), "STICK_OUT_OF_RANGE", "INVALID_SIGNAL", SHAPED
+        raw_slew(2000), changed(LEFT, 1, 0x07), "JOYSTICK_OUT_OF_RANGE", "INVALID_SIGNAL", SHAPED
     ),
     "enable invalid": Fault(
         set_hand(enable=3), changed(LEFT, 4, 3), "SWITCH_INVALID", "INVALID_SIGNAL", SHAPED
     ),
     "contradictory flags": Fault(
-        contradict, changed(RIGHT, 5, 0x14), "STICK_CONTRADICTORY", "INVALID_SIGNAL", SHAPED,
+        contradict, changed(RIGHT, 5, 0x14), "JOYSTICK_CONTRADICTORY", "INVALID_SIGNAL", SHAPED,
         axis="Lift",
     ),
     "enable lost": Fault(

@@ -92,7 +92,7 @@ class Hand(threading.Thread):
         self.rest()
 
     def rest(self) -> None:
-        """Sticks in neutral, enabled, nothing spoilt."""
+        """Joysticks in neutral, enabled, nothing spoilt."""
         self.slew = self.lift = 0.0
         self.enable, self.reset, self.stop = 1, 0, 0
         self.frozen = False

@@ -105,9 +105,9 @@ class Joysticks(threading.Thread):
                 self._send(count)
 
     def _send(self, count: int) -> None:
-        for name, sticks in JOYSTICKS:
+        for name, joysticks in JOYSTICKS:
             message = DBC.get_message_by_name(name)
-            signals = {s: self.values[s] for s in sticks}
+            signals = {s: self.values[s] for s in joysticks}
             data = message.encode({**signals, **self.switches, "AliveCounter": count})
             self._bus.send(
                 can.Message(arbitration_id=message.frame_id, is_extended_id=False, data=data)

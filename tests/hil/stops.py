@@ -40,8 +40,8 @@ STEPS_MS = range(60, 181, 5)
 def _frame(name: str, **signals: float) -> bytes:
     message = DBC.get_message_by_name(name)
     rest = {"AntiSwayOff": 0, "Reset": 0, "AliveCounter": 0}
-    sticks = {s.name: 0.0 for s in message.signals if s.unit == "%"}
-    return bytes(message.encode({**sticks, **rest, **signals}))
+    joysticks = {s.name: 0.0 for s in message.signals if s.unit == "%"}
+    return bytes(message.encode({**joysticks, **rest, **signals}))
 
 
 class Hand(threading.Thread):

@@ -70,7 +70,7 @@ def test_a_valve_on_the_bus_is_measured(file: Path, tmp_path: Path) -> None:
     assert last_of_each(log) == [0, 0, 0]
 
 
-@pytest.mark.parametrize("end", ["enable", "silence", "stick", "ctrl-c", "hang-up"])
+@pytest.mark.parametrize("end", ["enable", "silence", "joystick", "ctrl-c", "hang-up"])
 def test_however_it_ends_the_valves_are_neutral(file: Path, tmp_path: Path, end: str) -> None:
     log = tmp_path / "bus.log"
     slow = [*QUICK[:2], "--rate", "1", *QUICK[4:], "--write"]
@@ -99,7 +99,7 @@ def make(joysticks: Joysticks, end: str, running: Service) -> None:
         joysticks.switches["Enable"] = 0
     elif end == "silence":
         joysticks.silent = True
-    elif end == "stick":
+    elif end == "joystick":
         joysticks.values["Slew"] = 30.0
     else:
         number = signal.SIGINT if end == "ctrl-c" else signal.SIGHUP

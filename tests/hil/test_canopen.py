@@ -35,7 +35,7 @@ PATIENCE = (
 )
 DBC = cantools.database.load_file(ROOT / "dbc" / "canopen-cia401-cia408.dbc")
 SLEW_STATUS, LIFT_STATUS, SLEW_COMMAND, PROBE = 0x6A0, 0x6A2, 0x220, 0x7FE
-LEFT_STICK = 0x190
+LEFT_JOYSTICK = 0x190
 # Frames of a joystick while the daemon is stopped: 1.2 s, twice as long as any input may be old.
 STOOD_FRAMES = 60
 
@@ -132,7 +132,7 @@ def changes(found: list[tuple[float, int, int]]) -> list[int]:
     return [word for word, _ in groupby(word for _, word, _ in found)]
 
 
-def test_nodes_are_started_and_the_set_point_follows_the_stick(
+def test_nodes_are_started_and_the_set_point_follows_the_joystick(
     machine: Machine, file: Path, tmp_path: Path
 ) -> None:
     log = tmp_path / "drive.log"
@@ -210,7 +210,7 @@ def stand_still(daemon: Service, meanwhile: Callable[[], None]) -> None:
         while frames < STOOD_FRAMES:
             assert time.monotonic() < end, "the joystick sends"
             message = bus.recv(1.0)
-            frames += message is not None and message.arbitration_id == LEFT_STICK
+            frames += message is not None and message.arbitration_id == LEFT_JOYSTICK
         daemon.process.send_signal(signal.SIGCONT)
 
 

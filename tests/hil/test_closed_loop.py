@@ -23,7 +23,7 @@ from tests.hil.machine import (
 )
 
 # What an emulated processor that is late makes the daemon say, rightly.
-LATE = re.compile(r"from=ACTIVE reason=(LOOP_\w+|\w*STICK_TIMEOUT|ENABLE_LOST)")
+LATE = re.compile(r"from=ACTIVE reason=(LOOP_\w+|\w*JOYSTICK_TIMEOUT|ENABLE_LOST)")
 
 
 def test_demo_on_vcan0_and_its_candump_log_decodes(tmp_path: Path) -> None:

@@ -61,12 +61,12 @@ def state(name: str) -> Callable[[dict], bool]:
     return lambda status: str(status["State"]) == name
 
 
-def test_stick_moves_valve_and_everything_ends_neutral(
+def test_joystick_moves_valve_and_everything_ends_neutral(
     bus: can.BusABC, joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
     drive(bus, joysticks)
     status = wait_for(bus, "SlewStatus", state("ACTIVE"))
-    assert str(status["Reason"]) == "STICK_MOVED"
+    assert str(status["Reason"]) == "JOYSTICK_MOVED"
     assert status["RawCommand"] == 100.0
     with candump(tmp_path / "end.log", "vcan0"):
         assert daemon.end(signal.SIGTERM) == 0
@@ -116,7 +116,7 @@ def test_enable_released_in_motion_is_neutral_at_once_and_latched(
     joysticks.switches["Enable"] = 0
     status = wait_for(bus, "SlewStatus", state("TRIPPED"))
     assert (str(status["Reason"]), status["ShapedCommand"]) == ("ENABLE_LOST", 0.0)
-    joysticks.switches["Enable"] = 1  # the stick is still deflected: no way back yet
+    joysticks.switches["Enable"] = 1  # the joystick is still deflected: no way back yet
     status = wait_for(bus, "SlewStatus", lambda s: True)
     assert str(status["State"]) == "TRIPPED"
     joysticks.values["Slew"] = 0.0
@@ -129,7 +129,7 @@ def test_bad_frames_are_counted_and_named_and_move_nothing(
 ) -> None:
     wait_for(bus, "SlewStatus", state("READY"))
     cases = (
-        ("110#E803E803", "WRONG_LENGTH", "WrongLength"),  # full stick in a frame too short
+        ("110#E803E803", "WRONG_LENGTH", "WrongLength"),  # full deflection in a frame too short
         ("555#E803E80301000001", "UNKNOWN_ID", "UnknownId"),
         ("00000110#E803E80301000001", "UNKNOWN_ID", "UnknownId"),  # the number, but 29 bits
         ("20000004#0004000000000000", "ERROR_FRAME", "ErrorFrames"),

@@ -105,7 +105,7 @@ def moving_after(log: Path, axis: str, fault: Fault) -> int:
 
 
 def fault_is_silence(fault: Fault) -> bool:
-    return fault.reason in ("EMERGENCY_STOP_LOST", "STICK_TIMEOUT") and fault.named is None
+    return fault.reason in ("EMERGENCY_STOP_LOST", "JOYSTICK_TIMEOUT") and fault.named is None
 
 
 @pytest.mark.parametrize("name", FAULTS)
@@ -128,7 +128,7 @@ def test_fault(name: str, bus: can.BusABC, hand: Hand, daemon: Service, tmp_path
         assert seen["ShapedCommand"] == 0.0
         if fault.named:
             wait_for(bus, "ShaperStatus", lambda s: str(s["LastFault"]) == fault.named)
-        # It stays so while the fault is there, and with the stick still deflected after it.
+        # It stays so while the fault is there, and with the joystick still deflected after it.
         hand.rest()
         setattr(hand, fault.axis.lower(), 100.0)
         for _ in range(10):
@@ -157,11 +157,11 @@ def moving_after_mark(log: Path, axis: str) -> int:
 
 
 def moving_after_change(log: Path, axis: str) -> int:
-    """Valve frames that moved after the last one of the left stick with another deflection."""
+    """Valve frames that moved after the last one of the left joystick with another deflection."""
     messages = logged(log)
-    sticks = [(i, bytes(m.data[:2])) for i, m in enumerate(messages) if m.arbitration_id == LEFT]
-    changes = [i for (_, before), (i, now) in pairwise(sticks) if now != before]
-    return moving(messages[max(changes, default=sticks[0][0]) :], axis)
+    joysticks = [(i, bytes(m.data[:2])) for i, m in enumerate(messages) if m.arbitration_id == LEFT]
+    changes = [i for (_, before), (i, now) in pairwise(joysticks) if now != before]
+    return moving(messages[max(changes, default=joysticks[0][0]) :], axis)
 
 
 def moving(messages: list[can.Message], axis: str) -> int:
@@ -170,7 +170,7 @@ def moving(messages: list[can.Message], axis: str) -> int:
     return sum(m.arbitration_id == valve and m.data[0] != 0 for m in messages)
 
 
-def test_frozen_stick_with_a_running_counter(
+def test_frozen_joystick_with_a_running_counter(
     bus: can.BusABC, hand: Hand, daemon: Service, tmp_path: Path
 ) -> None:
     log = tmp_path / "frozen.log"
@@ -182,7 +182,7 @@ def test_frozen_stick_with_a_running_counter(
             status = wait_for(bus, "SlewStatus", lambda s: str(s["State"]) in ENDED)
             if str(status["Reason"]) == "LOOP_STALLED":
                 continue
-            assert str(status["Reason"]) == "STICK_FROZEN"
+            assert str(status["Reason"]) == "JOYSTICK_FROZEN"
             wait_for(bus, "SlewStatus", lambda s: str(s["State"]) == "NEUTRAL_WAIT")
             break
     assert str(status["State"]) == "STOPPING"

@@ -204,7 +204,7 @@ def test_killed_the_joystick_is_neutral_until_the_daemon_is_back(tmp_path: Path)
         assert "AND" not in "".join(cangw())
         with service(tmp_path / "log2", "run", str(file)) as daemon:
             daemon.wait_log("gateway=rules-right")
-            wait(far, "SlewStatus", lambda v: v["Reason"] == "STICK_NOT_NEUTRAL")
+            wait(far, "SlewStatus", lambda v: v["Reason"] == "JOYSTICK_NOT_NEUTRAL")
             wait(far, "JoystickLeft", assert_neutral)
             joysticks.values["Slew"] = 0.0
             wait(far, "SlewStatus", lambda v: v["State"] == "READY")

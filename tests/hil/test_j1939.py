@@ -25,7 +25,7 @@ AVC0 = 0x0CFE3000 | OWN
 FIRST_SPN = 520192
 
 
-class Sticks(threading.Thread):
+class Joysticks(threading.Thread):
     """Both joysticks, sent every 20 ms."""
 
     def __init__(self) -> None:
@@ -49,8 +49,8 @@ class Sticks(threading.Thread):
 
 
 @pytest.fixture
-def sticks() -> Iterator[Sticks]:
-    running = Sticks()
+def joysticks() -> Iterator[Joysticks]:
+    running = Joysticks()
     running.start()
     yield running
     running.end()
@@ -78,15 +78,15 @@ def after_the_claim_of(name: int, log: Path) -> list[can.Message]:
     return found[at + 1 :]
 
 
-def moving(daemon: Service, sticks: Sticks) -> None:
+def moving(daemon: Service, joysticks: Joysticks) -> None:
     """Slew in motion, by the commands on the bus; an overrun of an emulated machine may end it."""
     until = time.monotonic() + ANSWER_S
     with open_bus("vcan0") as bus:
         while time.monotonic() < until:
             state = slew_state(daemon)
-            sticks.x = 0.0 if state in ("NEUTRAL_WAIT", "TRIPPED") else 100.0
+            joysticks.x = 0.0 if state in ("NEUTRAL_WAIT", "TRIPPED") else 100.0
             # pressed for half of every second: an emulated machine may stand still, and trip
-            sticks.reset = state == "TRIPPED" and time.monotonic() % 1.0 < 0.5
+            joysticks.reset = state == "TRIPPED" and time.monotonic() % 1.0 < 0.5
             message = bus.recv(1.0)
             if message and message.arbitration_id == AVC0 and message.data[0] > 20:
                 return
@@ -146,7 +146,7 @@ def kernel_has_j1939() -> None:
 
 
 def test_the_kernels_stack_takes_our_commands_our_name_and_our_faults(
-    sticks: Sticks, daemon: Service
+    joysticks: Joysticks, daemon: Service
 ) -> None:
     kernel_has_j1939()
     with socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939) as kernel:
@@ -154,7 +154,7 @@ def test_the_kernels_stack_takes_our_commands_our_name_and_our_faults(
         nothing = socket.J1939_NO_NAME, socket.J1939_NO_PGN, socket.J1939_NO_ADDR
         kernel.bind(("vcan0", *nothing))
         kernel.settimeout(ANSWER_S)
-        moving(daemon, sticks)
+        moving(daemon, joysticks)
         with open_bus("vcan0") as bus:  # our claim may have come before the kernel listened
             bus.send(can.Message(arbitration_id=WHO_HAS_IT, data=b"\x00\xee\x00"))
         commands: set[bytes] = set()
@@ -177,9 +177,9 @@ def test_the_kernels_stack_takes_our_commands_our_name_and_our_faults(
 
 
 def test_a_lower_name_of_another_ecu_silences_us_within_a_tick(
-    sticks: Sticks, daemon: Service, tmp_path: Path
+    joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    moving(daemon, sticks)
+    moving(daemon, joysticks)
     log = tmp_path / "lost.log"
     with candump(log, "vcan0"), another_ecu(NAME - 1) as ecu:
         daemon.wait_log(r"axis=\w+ state=TRIPPED from=\w+ reason=ADDRESS_LOST")
@@ -194,9 +194,9 @@ def test_a_lower_name_of_another_ecu_silences_us_within_a_tick(
 
 
 def test_a_higher_name_of_another_ecu_is_refused_in_motion(
-    sticks: Sticks, daemon: Service, tmp_path: Path
+    joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    moving(daemon, sticks)
+    moving(daemon, joysticks)
     log = tmp_path / "kept.log"
     with candump(log, "vcan0"), another_ecu(NAME + 1) as ecu:
         wait_until(lambda: ecu.state == j1939.ControllerApplication.State.CANNOT_CLAIM)
@@ -208,9 +208,9 @@ def test_a_higher_name_of_another_ecu_is_refused_in_motion(
 
 
 def test_of_twins_with_the_same_name_one_gives_way(
-    sticks: Sticks, daemon: Service, tmp_path: Path
+    joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    moving(daemon, sticks)
+    moving(daemon, joysticks)
     log = tmp_path / "twins.log"
     with candump(log, "vcan0"), service(tmp_path / "twin.log", "run", str(FILE)) as twin:
         # He who hears the other's claim: the first of us, or the twin when we claim anew.
@@ -222,7 +222,7 @@ def test_of_twins_with_the_same_name_one_gives_way(
 
 
 def test_j1939acd_with_a_lower_name_holds_the_address_until_it_ends_and_we_reload(
-    sticks: Sticks, tmp_path: Path
+    joysticks: Joysticks, tmp_path: Path
 ) -> None:
     log = tmp_path / "held.log"
     with (
@@ -245,7 +245,7 @@ def test_j1939acd_with_a_lower_name_holds_the_address_until_it_ends_and_we_reloa
             daemon.process.send_signal(signal.SIGHUP)
             daemon.wait_log("reload=applied")
             daemon.wait_log("bus=crane address=0x9c state=claimed")
-            moving(daemon, sticks)
+            moving(daemon, joysticks)
     rows = logged(log)
     at = next(i for i, m in enumerate(rows) if m.arbitration_id == 0x7FD)
     before = [m for m in rows[:at] if m.is_extended_id and m.arbitration_id & 0xFF == OWN]
@@ -255,9 +255,9 @@ def test_j1939acd_with_a_lower_name_holds_the_address_until_it_ends_and_we_reloa
 
 
 def test_j1939acd_with_a_higher_name_does_not_get_the_address(
-    sticks: Sticks, daemon: Service, tmp_path: Path
+    joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    moving(daemon, sticks)
+    moving(daemon, joysticks)
     log = tmp_path / "kept.log"
     with candump(log, "vcan0"), j1939acd(NAME + 1, tmp_path / "acd.log"), open_bus("vcan0") as bus:
         # It asks who is there before it claims, and hears us.
@@ -270,9 +270,9 @@ def test_j1939acd_with_a_higher_name_does_not_get_the_address(
 
 
 def test_after_an_outage_the_claim_comes_first(
-    sticks: Sticks, daemon: Service, tmp_path: Path
+    joysticks: Joysticks, daemon: Service, tmp_path: Path
 ) -> None:
-    moving(daemon, sticks)
+    moving(daemon, joysticks)
     subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
     try:
         daemon.wait_log("state=waiting")

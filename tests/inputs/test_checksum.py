@@ -56,13 +56,13 @@ def test_a_joystick_with_a_wrong_checksum_never_arms(changed_rig: Make, kind: st
     protected = Protected(changed_rig, kind)
     protected.run(20, error=1)
     rig = protected.rig
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_UNTRUSTED")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_UNTRUSTED")
     assert (rig.count("InvalidSignals"), last_fault(rig)) == (20, FrameFault.CHECKSUM)
     assert rig.state("lift") is State.READY  # the other joystick is right
 
 
 def test_nothing_in_a_frame_with_a_wrong_checksum_is_believed(changed_rig: Make) -> None:
-    """Not the stick, not even a released enable: any bit of it may be the wrong one."""
+    """Not the joystick, not even a released enable: any bit of it may be the wrong one."""
     protected = Protected(changed_rig)
     protected.run(3)
     protected.run(50, Slew=1000)
@@ -72,7 +72,7 @@ def test_nothing_in_a_frame_with_a_wrong_checksum_is_believed(changed_rig: Make)
         assert rig.state() is State.ACTIVE
         assert command(rig) == 1.0
     protected.run(1, error=0x80, Enable=0)
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_UNTRUSTED")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_UNTRUSTED")
 
 
 def test_one_wrong_checksum_costs_one_frame(changed_rig: Make) -> None:

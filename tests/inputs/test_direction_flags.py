@@ -1,4 +1,4 @@
-"""A stick with direction flags at the controller: what moves, and what a contradiction stops."""
+"""A joystick with direction flags at the controller: what moves, and what a contradiction stops."""
 
 from collections.abc import Callable
 
@@ -26,7 +26,7 @@ DBC = {
 }
 
 
-def stick(neutral: int, negative: int, positive: int, position: int) -> dict[str, int]:
+def joystick(neutral: int, negative: int, positive: int, position: int) -> dict[str, int]:
     return {
         "SlewNeutral": neutral,
         "SlewNegative": negative,
@@ -35,13 +35,13 @@ def stick(neutral: int, negative: int, positive: int, position: int) -> dict[str
     }
 
 
-CENTRE = stick(1, 0, 0, 0)
-LEFT, RIGHT = stick(0, 1, 0, 1000), stick(0, 0, 1, 1000)
+CENTRE = joystick(1, 0, 0, 0)
+LEFT, RIGHT = joystick(0, 1, 0, 1000), joystick(0, 0, 1, 1000)
 
 
 @pytest.fixture
 def flagged(changed_rig: Make) -> Rig:
-    """Ready, the stick in neutral."""
+    """Ready, the joystick in neutral."""
     rig = changed_rig(YAML, DBC)
     rig.run(3, **CENTRE)
     assert rig.state() is State.READY
@@ -58,18 +58,18 @@ def test_the_flags_tell_the_way(flagged: Rig) -> None:
 @pytest.mark.parametrize(
     ("raw", "reason"),
     [
-        (stick(0, 1, 1, 1000), "STICK_CONTRADICTORY"),
-        (stick(1, 0, 1, 1000), "STICK_CONTRADICTORY"),
-        (stick(1, 0, 0, 1000), "STICK_CONTRADICTORY"),
-        (stick(0, 0, 0, 1000), "STICK_CONTRADICTORY"),
-        (stick(0, 2, 1, 1000), "STICK_ERROR"),
-        (stick(3, 0, 1, 1000), "STICK_NOT_AVAILABLE"),
-        (stick(0, 0, 1, 1001), "STICK_OUT_OF_RANGE"),
-        (stick(0, 0, 1, 1022), "STICK_ERROR"),
-        (stick(0, 0, 1, 1023), "STICK_NOT_AVAILABLE"),
+        (joystick(0, 1, 1, 1000), "JOYSTICK_CONTRADICTORY"),
+        (joystick(1, 0, 1, 1000), "JOYSTICK_CONTRADICTORY"),
+        (joystick(1, 0, 0, 1000), "JOYSTICK_CONTRADICTORY"),
+        (joystick(0, 0, 0, 1000), "JOYSTICK_CONTRADICTORY"),
+        (joystick(0, 2, 1, 1000), "JOYSTICK_ERROR"),
+        (joystick(3, 0, 1, 1000), "JOYSTICK_NOT_AVAILABLE"),
+        (joystick(0, 0, 1, 1001), "JOYSTICK_OUT_OF_RANGE"),
+        (joystick(0, 0, 1, 1022), "JOYSTICK_ERROR"),
+        (joystick(0, 0, 1, 1023), "JOYSTICK_NOT_AVAILABLE"),
     ],
 )
-def test_what_is_no_stick_stops_through_the_filter_within_its_time(
+def test_what_is_no_joystick_stops_through_the_filter_within_its_time(
     flagged: Rig, raw: dict[str, int], reason: str
 ) -> None:
     flagged.run(100, **RIGHT)
@@ -88,22 +88,22 @@ def test_what_is_no_stick_stops_through_the_filter_within_its_time(
     assert flagged.count("InvalidSignals") == ticks + 20
     # and back only through neutral
     assert velocity(flagged.run(20, **RIGHT)) == 0
-    assert flagged.reason() == "STICK_NOT_NEUTRAL"
+    assert flagged.reason() == "JOYSTICK_NOT_NEUTRAL"
     flagged.run(2, **CENTRE)
     assert flagged.state() is State.READY
 
 
 def test_a_contradiction_keeps_the_axis_from_getting_ready(changed_rig: Make) -> None:
     rig = changed_rig(YAML, DBC)
-    rig.run(20, **stick(1, 1, 0, 0))
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_CONTRADICTORY")
+    rig.run(20, **joystick(1, 1, 0, 0))
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_CONTRADICTORY")
 
 
 def test_a_slow_way_through_neutral_stops_nothing(flagged: Rig) -> None:
     """Neutral switch and direction switches open and close one after the other."""
-    way = [stick(0, 0, 1, p) for p in range(1000, -1, -25)]
-    way += [stick(0, 0, 0, 0), stick(1, 0, 0, 0), stick(1, 0, 0, 40), stick(0, 0, 0, 0)]
-    way += [stick(0, 1, 0, p) for p in range(0, 1001, 25)]
+    way = [joystick(0, 0, 1, p) for p in range(1000, -1, -25)]
+    way += [joystick(0, 0, 0, 0), joystick(1, 0, 0, 0), joystick(1, 0, 0, 40), joystick(0, 0, 0, 0)]
+    way += [joystick(0, 1, 0, p) for p in range(0, 1001, 25)]
     for raw in way:
         flagged.run(2, **raw)
         assert flagged.state() in (State.READY, State.ACTIVE)
@@ -114,11 +114,11 @@ def test_a_slow_way_through_neutral_stops_nothing(flagged: Rig) -> None:
 def test_a_small_position_in_neutral_moves_nothing(flagged: Rig) -> None:
     """Also one above neutral_pct, which is 2 %."""
     for _ in range(20):
-        assert velocity(flagged.run(1, **stick(1, 0, 0, 45))) == 0
+        assert velocity(flagged.run(1, **joystick(1, 0, 0, 45))) == 0
     assert flagged.state() is State.READY
 
 
 def test_a_released_enable_stops_at_once_whatever_the_flags(flagged: Rig) -> None:
     flagged.run(100, **RIGHT)
-    assert velocity(flagged.run(1, **stick(0, 1, 1, 1000), Enable=0)) == 0
+    assert velocity(flagged.run(1, **joystick(0, 1, 1, 1000), Enable=0)) == 0
     assert (flagged.state(), flagged.reason()) == (State.TRIPPED, "ENABLE_LOST")

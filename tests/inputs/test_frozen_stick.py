@@ -1,4 +1,4 @@
-"""A stick that stands still: in neutral for ever, deflected for ``stuck_s`` at most."""
+"""A joystick that stands still: in neutral for ever, deflected for ``stuck_s`` at most."""
 
 from collections.abc import Callable
 
@@ -18,9 +18,9 @@ def test_the_time_is_that_of_the_deployment_to_the_nanosecond(changed_rig: Make)
     deployment = changed_rig(ONE_SECOND).deployment
     joystick = JoystickInput(deployment.joysticks["left"])
     rig = changed_rig(ONE_SECOND)
-    for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.STICK_FROZEN)):
+    for now_ns, fault in ((0, None), (10**9, None), (10**9 + 1, Reason.JOYSTICK_FROZEN)):
         joystick.receive(rig.joystick(Slew=500).data, now_ns)
-        assert joystick.stick("Slew", now_ns, 0, None, 0.02).fault is fault
+        assert joystick.command("Slew", now_ns, 0, None, 0.02).fault is fault
 
 
 ONE_SECOND = {LEFT: LEFT.replace("\n  right", "\n    stuck_s: 1\n  right")}
@@ -28,7 +28,7 @@ SECOND_TICKS = 50
 
 
 @pytest.mark.parametrize("raw", [1000, -1000, 500, 21])
-def test_a_stick_deflected_without_change_for_longer_than_frozen_s_is_broken(
+def test_a_joystick_deflected_without_change_for_longer_than_frozen_s_is_broken(
     changed_rig: Make, raw: int
 ) -> None:
     rig = changed_rig(ONE_SECOND)
@@ -38,11 +38,11 @@ def test_a_stick_deflected_without_change_for_longer_than_frozen_s_is_broken(
         rig.run(1, Slew=raw)
         assert rig.state() is State.ACTIVE
     rig.run(1, Slew=raw)
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_FROZEN")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_FROZEN")
     assert rig.count("InvalidSignals") == 0  # every frame of it is a good one
 
 
-def test_the_stop_of_a_frozen_stick_is_shaped_and_bounded(changed_rig: Make) -> None:
+def test_the_stop_of_a_frozen_joystick_is_shaped_and_bounded(changed_rig: Make) -> None:
     rig = changed_rig(ONE_SECOND).moving()
     while rig.state() is not State.STOPPING:
         sent = rig.run(1, Slew=1000)
@@ -55,22 +55,22 @@ def test_the_stop_of_a_frozen_stick_is_shaped_and_bounded(changed_rig: Make) -> 
     assert velocity(sent) == 0
     for _ in range(100):
         assert velocity(rig.run(1, Slew=1000)) == 0
-    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_FROZEN")
+    assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_FROZEN")
 
 
-def test_a_frozen_stick_works_again_once_it_moves_and_was_in_neutral(changed_rig: Make) -> None:
+def test_a_frozen_joystick_works_again_once_it_moves_and_was_in_neutral(changed_rig: Make) -> None:
     rig = changed_rig(ONE_SECOND).moving()
     rig.run(200, Slew=1000)
-    assert rig.reason() == "STICK_FROZEN"
+    assert rig.reason() == "JOYSTICK_FROZEN"
     assert velocity(rig.run(20, Slew=900)) == 0
-    assert rig.reason() == "STICK_NOT_NEUTRAL"
+    assert rig.reason() == "JOYSTICK_NOT_NEUTRAL"
     rig.run(1)
     assert rig.state() is State.READY
     assert velocity(rig.run(40, Slew=1000)) > 30
 
 
 @pytest.mark.parametrize("raw", [0, 20, -20])
-def test_a_stick_in_neutral_may_stand_still_for_ever(changed_rig: Make, raw: int) -> None:
+def test_a_joystick_in_neutral_may_stand_still_for_ever(changed_rig: Make, raw: int) -> None:
     """neutral_pct is 2 %, 20 raw."""
     rig = changed_rig(ONE_SECOND)
     rig.run(5 * SECOND_TICKS, Slew=raw)
@@ -88,16 +88,16 @@ def test_the_least_change_is_a_change(changed_rig: Make) -> None:
         assert rig.state() is State.ACTIVE
 
 
-def test_another_stick_of_the_joystick_is_no_sign_of_life(changed_rig: Make) -> None:
+def test_another_joystick_of_the_joystick_is_no_sign_of_life(changed_rig: Make) -> None:
     rig = changed_rig(ONE_SECOND)
     rig.run(3)
     for n in range(2 * SECOND_TICKS):
         rig.run(1, Slew=500, NearFar=300 + n)
-    assert (rig.state("slew"), rig.reason("slew")) == (State.STOPPING, "STICK_FROZEN")
+    assert (rig.state("slew"), rig.reason("slew")) == (State.STOPPING, "JOYSTICK_FROZEN")
     assert rig.state("near_far") is State.ACTIVE
 
 
-def test_a_released_enable_stops_a_frozen_stick_at_once(changed_rig: Make) -> None:
+def test_a_released_enable_stops_a_frozen_joystick_at_once(changed_rig: Make) -> None:
     rig = changed_rig(ONE_SECOND).moving()
     while rig.state() is not State.STOPPING:
         rig.run(1, Slew=1000)
@@ -114,7 +114,7 @@ def test_frames_that_do_not_count_are_no_change(changed_rig: Make) -> None:
         rig.receive(rig.joystick(Slew=400 + n, AliveCounter=rig.counts["JoystickLeft"]))  # repeated
         rig.counts["JoystickLeft"] -= 1
         rig.tick()
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_FROZEN")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_FROZEN")
 
 
 def test_without_a_word_it_is_twenty_seconds(rig: Rig) -> None:
@@ -122,4 +122,4 @@ def test_without_a_word_it_is_twenty_seconds(rig: Rig) -> None:
     rig.run(1 + 20 * SECOND_TICKS, Slew=1000)
     assert rig.state() is State.ACTIVE
     rig.run(1, Slew=1000)
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_FROZEN")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_FROZEN")

@@ -41,7 +41,7 @@ def test_a_frozen_counter_never_counts_again_however_long_it_was_silent(
     for _ in range(3):
         for _ in range(15):
             feed(rig, frozen)
-        assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "STICK_UNTRUSTED")
+        assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "JOYSTICK_UNTRUSTED")
         for _ in range(silence):
             feed(rig)
             assert rig.state() is State.NEUTRAL_WAIT
@@ -57,7 +57,7 @@ def test_a_frozen_counter_stops_what_moves_through_the_filter(rig: Rig) -> None:
         assert velocity(feed(rig, frozen)) > 50
         assert rig.state() is State.ACTIVE
     assert velocity(feed(rig, frozen)) > 50
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_UNTRUSTED")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_UNTRUSTED")
     assert last_fault(rig) is FrameFault.COUNTER_REPEATED
     assert rig.count("InvalidSignals") == FRESH_TICKS + 1
 
@@ -69,7 +69,7 @@ def test_a_joystick_that_was_switched_off_may_begin_with_any_counter(
     rig.run(5)
     for _ in range(FRESH_TICKS + 1):
         feed(rig)
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
     rig.counts["JoystickLeft"] = counter - 1
     feed(rig, rig.joystick())
     assert rig.state() is State.READY
@@ -126,7 +126,7 @@ def test_jumps_without_end_are_no_joystick(rig: Rig) -> None:
     for tick in range(FRESH_TICKS + 2):
         rig.counts["JoystickLeft"] = 100 * (tick % 2) + tick
         feed(rig, rig.joystick(Slew=1000))
-    assert (rig.state(), rig.reason()) == (State.STOPPING, "STICK_UNTRUSTED")
+    assert (rig.state(), rig.reason()) == (State.STOPPING, "JOYSTICK_UNTRUSTED")
 
 
 @pytest.mark.parametrize("qualify", [2, 5])
@@ -158,11 +158,11 @@ def test_silence_is_not_distrust(rig: Rig, silent: bool) -> None:
         else:
             feed(rig, frozen)
     for _ in range(FRESH_TICKS):
-        assert rig.reason() == ("STICK_TIMEOUT" if silent else "STICK_UNTRUSTED")
+        assert rig.reason() == ("JOYSTICK_TIMEOUT" if silent else "JOYSTICK_UNTRUSTED")
         feed(rig)
-    assert rig.reason() == ("STICK_TIMEOUT" if silent else "STICK_UNTRUSTED")
+    assert rig.reason() == ("JOYSTICK_TIMEOUT" if silent else "JOYSTICK_UNTRUSTED")
     feed(rig)  # what was refused is forgotten as what was accepted is
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
 # -- an enable seen released -----------------------------------------------------------------------

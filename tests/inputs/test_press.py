@@ -9,7 +9,7 @@ from tests.rigs.forwarder import Rig
 
 
 def tripped(machine: Rig | Machine, **switches: int) -> Rig:
-    """Latched by a frame that was not sent, with the stick back in neutral."""
+    """Latched by a frame that was not sent, with the joystick back in neutral."""
     rig = machine.rig if isinstance(machine, Machine) else machine
     machine.run(3, **switches)
     machine.run(10, Slew=1000, **switches)
@@ -49,13 +49,13 @@ def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
     assert rig.state() is State.TRIPPED
 
 
-def test_a_reset_that_is_stuck_and_an_enable_off_beside_a_broken_stick(rig: Rig) -> None:
+def test_a_reset_that_is_stuck_and_an_enable_off_beside_a_broken_joystick(rig: Rig) -> None:
     tripped(rig, Reset=1).run(1, Slew=32766, Enable=0, Reset=1)
     rig.run(2, Enable=0, Reset=1)
     assert rig.state() is State.TRIPPED
 
 
-def test_an_enable_that_comes_back_with_the_measurement_of_its_stick_is_one(rig: Rig) -> None:
+def test_an_enable_that_comes_back_with_the_measurement_of_its_joystick_is_one(rig: Rig) -> None:
     """A joystick that has no measurement while it is not enabled."""
     tripped(rig).run(5, Slew=32767, Enable=0)
     assert rig.state() is State.TRIPPED

@@ -39,7 +39,7 @@ def test_of_a_joystick_that_is_silent_since_then_silence_is_told(
     for _ in range(10):
         assert rig.reason() == "ENABLE_OFF"
         rig.tick()
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
 def test_a_reset_counts_with_the_enable_released(rig: Rig) -> None:
@@ -51,7 +51,7 @@ def test_a_reset_counts_with_the_enable_released(rig: Rig) -> None:
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
 
 
-def test_a_reset_needs_the_stick_in_neutral_with_the_enable_released_too(rig: Rig) -> None:
+def test_a_reset_needs_the_joystick_in_neutral_with_the_enable_released_too(rig: Rig) -> None:
     rig.run(3)
     rig.run(10, Slew=1000)
     rig.run(2, Enable=0, Slew=1000)
@@ -59,7 +59,7 @@ def test_a_reset_needs_the_stick_in_neutral_with_the_enable_released_too(rig: Ri
     assert rig.state() is State.TRIPPED
 
 
-def test_with_a_broken_stick_and_the_enable_released_a_trip_is_still_told(rig: Rig) -> None:
+def test_with_a_broken_joystick_and_the_enable_released_a_trip_is_still_told(rig: Rig) -> None:
     rig.run(3)
     rig.receive(Frame("crane", 0x200, False, bytes(2)))
     rig.run(1, Slew=32766, Enable=0)

@@ -6,7 +6,7 @@ from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason
 from tests.rigs.files import Machine
 
-SLEW_STICK = "Slew : 0|16@1- (0.1,0) [-100|100]"
+SLEW_JOYSTICK = "Slew : 0|16@1- (0.1,0) [-100|100]"
 SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
 
 
@@ -192,20 +192,25 @@ def test_messages_of_another_kind(
     [
         # full scale
         (
-            SLEW_STICK,
+            SLEW_JOYSTICK,
             "Slew : 0|16@1- (0.1,0) [0|0]",
             "JoystickLeft",
             "Slew has no range in the DBC",
         ),
         (
-            SLEW_STICK,
+            SLEW_JOYSTICK,
             "Slew : 0|16@1- (0.1,0) [-100|102]",
             "JoystickLeft",
             "Slew: expected a symmetrical range, got [-100|102]",
         ),
-        (SLEW_STICK, "Slew : 0|16@1+ (0.1,0) [-100|100]", "JoystickLeft", "Slew cannot reach its"),
         (
-            SLEW_STICK,
+            SLEW_JOYSTICK,
+            "Slew : 0|16@1+ (0.1,0) [-100|100]",
+            "JoystickLeft",
+            "Slew cannot reach its",
+        ),
+        (
+            SLEW_JOYSTICK,
             "Slew : 0|16@1- (0,0) [-100|100]",
             "JoystickLeft",
             "Slew: expected a scale other than 0, got 0",

@@ -151,7 +151,7 @@ HEADER = "its header takes the first 12 bits of"
                     "signal: Crc, flags: { neutral: Top, negative: Seq, positive: Alive } }",
                 )
             ],
-            "stick:",
+            "joystick:",
             "axes.slew.command.signal: expected a free signal, got 'Crc', which is in the header"
             " of e2e already",
         ),

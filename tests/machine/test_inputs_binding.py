@@ -256,8 +256,8 @@ def test_a_step_is_at_most_half_of_the_counters_range(
 
 
 @pytest.mark.parametrize("key", ["checksum", "alive_counter"])
-def test_a_stick_that_is_protection_too(protected: Machine, key: str) -> None:
-    """A stick that counts up with every frame would move the axis by itself."""
+def test_a_joystick_that_is_protection_too(protected: Machine, key: str) -> None:
+    """A joystick that counts up with every frame would move the axis by itself."""
     protected.in_dbc(SIGNALS, ' SG_ Check : 48|8@1- (1,0) [-100|100] "" SHAPER\n')
     use = {"checksum": "checksum: { signal: Check, kind: sum }", "alive_counter": "qualify: 1"}
     joystick(protected, use[key])

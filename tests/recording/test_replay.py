@@ -98,7 +98,7 @@ def test_a_joystick_is_lost_by_the_stamp_of_its_last_frame_or_by_the_tick_before
         tick.now_ns
         for tick, result in replay.run(lambda _part: None)
         for event in result.events
-        if "STICK_TIMEOUT" in event and "axis=slew" in event and tick.now_ns > last_ns
+        if "JOYSTICK_TIMEOUT" in event and "axis=slew" in event and tick.now_ns > last_ns
     ]
     limit_ns = last_ns + deployment.joysticks["left"].config.timeout_ms * 1_000_000
     tick_ns = 20_000_000

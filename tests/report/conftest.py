@@ -19,7 +19,7 @@ def sampled(
     drop: frozenset[int] = frozenset(),
     **axes: tuple[Signal, Signal, Signal, Signal | None],
 ) -> Recording:
-    """Sample (stick, sent, speed, sway) functions of time; ``drop`` are samples that were lost."""
+    """Sample (joystick, sent, speed, sway) functions of time; ``drop`` are lost samples."""
     t_s = [k * dt_s for k in range(round(duration_s / dt_s) + 1) if k not in drop]
     return Recording(
         t_s=t_s,
@@ -33,7 +33,7 @@ def sampled(
     )
 
 
-# (press, release, level) of each stick: single strokes with rests, then both at once.
+# (press, release, level) of each joystick: single strokes with rests, then both at once.
 SCRIPT = {
     "near_far": [(1.0, 4.0, 1.0), (10.0, 13.0, -1.0), (28.0, 31.0, 0.6)],
     "slew": [(19.0, 22.0, 1.0), (28.6, 31.4, -0.7)],
@@ -44,7 +44,7 @@ MODES = {"near_far": (2.859, 0.049, 0.8333, 1.0), "slew": (2.669, 0.038, 2.178, 
 VALVE_LAG_S, VALVE_RATE, STEP_S = 0.1, 5.0, 0.001
 
 
-def stick_at(axis: str, t: float) -> float:
+def joystick_at(axis: str, t: float) -> float:
     for press, release, level in SCRIPT[axis]:
         if press <= t < release:
             return level * min(1.0, (t - press) / 0.1 + 0.2)
@@ -72,17 +72,17 @@ def _simulate(axis: str, shaped: bool, t_s: list[float]) -> AxisTrace:
     k = 0
     for step in range(round(t_s[-1] / STEP_S) + 2):
         t = step * STEP_S
-        stick = stick_at(axis, t)
+        joystick = joystick_at(axis, t)
         if step % 20 == 0:
-            wanted = stick
+            wanted = joystick
             if shaped and gain:
                 # y = u + (2 z / w) f' - (2 / w) f' with f the double pole at w: D = 1
                 y, rate = filtered
                 for _ in range(20):
-                    rate += STEP_S * (omega**2 * (stick - y) - 2 * omega * rate)
+                    rate += STEP_S * (omega**2 * (joystick - y) - 2 * omega * rate)
                     y += STEP_S * rate
                 filtered = (y, rate)
-                bend = omega**2 * (stick - y) - 2 * omega * rate
+                bend = omega**2 * (joystick - y) - 2 * omega * rate
                 wanted = y + 2 * zeta / omega * rate + bend / omega**2
             move = max(-VALVE_RATE * 0.02, min(VALVE_RATE * 0.02, wanted - sent))
             sent = round((sent + move) * 125) / 125
@@ -92,7 +92,7 @@ def _simulate(axis: str, shaped: bool, t_s: list[float]) -> AxisTrace:
         rate += STEP_S * (push - 2 * zeta * omega * rate - omega**2 * angle)
         model = (angle + STEP_S * rate, rate)
         if k < len(t_s) and t >= t_s[k]:
-            values = (stick, sent, speed, round(math.degrees(model[0]), 2))
+            values = (joystick, sent, speed, round(math.degrees(model[0]), 2))
             for column, value in zip(trace, values, strict=True):
                 column.append(value)
             k += 1

@@ -29,7 +29,7 @@ def one_axis(hand_made: HandMade, sway: Signal) -> Recording:
 
 def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade) -> None:
     def drive(late_s: float, scale: float, duration_s: float, dt_s: float) -> Recording:
-        def stick(t: float) -> float:
+        def joystick(t: float) -> float:
             return stroke(t - late_s + 1e-9)
 
         def sway(t: float) -> float:
@@ -37,7 +37,7 @@ def test_compare_known_reductions_over_different_time_bases(hand_made: HandMade)
             return 16.0 * scale * math.exp(-0.1 * rung) * math.sin(2.8 * rung)
 
         lost = frozenset(range(7, 2000, 53))
-        axes = {"near_far": (stick, stick, stick, sway), "lift": (zero, zero, zero, None)}
+        axes = {"near_far": (joystick, joystick, joystick, sway), "lift": (zero, zero, zero, None)}
         return hand_made(duration_s, dt_s=dt_s, drop=lost, **axes)
 
     # The shaped drive was recorded earlier, longer and on a grid of its own.

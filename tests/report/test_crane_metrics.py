@@ -81,8 +81,8 @@ def test_run_on_is_the_farthest_from_where_the_tip_was_at_the_release(
 
 
 def test_a_drive_that_is_never_let_go_has_no_residual_and_no_run_on(hand_made: HandMade) -> None:
-    stick = held(1.0, END_S + 1.0)
-    recording = hand_made(END_S, slew=(stick, stick, stick, still))
+    joystick = held(1.0, END_S + 1.0)
+    recording = hand_made(END_S, slew=(joystick, joystick, joystick, still))
     here = [(3.0, 0.0)] * len(recording.t_s)
     crane = CraneTrace(here, here, [5.0] * len(here))
     found = crane_metrics(recording, crane)

@@ -17,7 +17,7 @@ def zero(_t: float) -> float:
 
 
 def held(*strokes: tuple[float, float, float]) -> Signal:
-    """Stick held at a level from press to release."""
+    """Joystick held at a level from press to release."""
     return lambda t: next((v for on, off, v in strokes if on - 1e-9 <= t < off - 1e-9), 0.0)
 
 
@@ -45,8 +45,8 @@ def ringing(start: float, amplitude: float, decay: float = 0.1, omega: float = 2
 def one_axis(
     hand_made: HandMade, sway: Signal, duration_s: float = 12.0, **kw: object
 ) -> Recording:
-    stick = held((1.0, 4.0, 1.0))
-    return hand_made(duration_s, near_far=(stick, stick, lagging(1.0, 4.0), sway), **kw)
+    joystick = held((1.0, 4.0, 1.0))
+    return hand_made(duration_s, near_far=(joystick, joystick, lagging(1.0, 4.0), sway), **kw)
 
 
 def test_residual_is_the_first_extreme_of_a_decaying_sine_after_the_dwell(
@@ -88,8 +88,8 @@ def test_response_and_run_on_of_a_first_order_tip(hand_made: HandMade) -> None:
 
 
 def test_response_is_asked_of_the_plateau_and_run_on_of_full_speed(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, -0.5))
-    recording = hand_made(12.0, slew=(stick, stick, lagging(1.0, 4.0, -0.5), zero))
+    joystick = held((1.0, 4.0, -0.5))
+    recording = hand_made(12.0, slew=(joystick, joystick, lagging(1.0, 4.0, -0.5), zero))
     metrics = axis_metrics(recording, "slew")
     assert metrics.time_to_95_s == pytest.approx(SETTLE_S, abs=2e-3)
     assert metrics.run_on_s == pytest.approx(LAG_S * math.log(10.0), abs=2e-3)
@@ -97,9 +97,9 @@ def test_response_is_asked_of_the_plateau_and_run_on_of_full_speed(hand_made: Ha
 
 
 def test_worst_stroke_counts_and_a_stroke_too_short_does_not(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0), (8.0, 8.4, 1.0))
+    joystick = held((1.0, 4.0, 1.0), (8.0, 8.4, 1.0))
     long, short = lagging(1.0, 4.0), lagging(8.0, 8.4)
-    recording = hand_made(14.0, lift=(stick, stick, lambda t: long(t) + short(t), None))
+    recording = hand_made(14.0, lift=(joystick, joystick, lambda t: long(t) + short(t), None))
     assert axis_metrics(recording, "lift").time_to_95_s == pytest.approx(SETTLE_S, abs=2e-3)
     only_short = held((8.0, 8.4, 1.0))
     recording = hand_made(14.0, lift=(only_short, only_short, short, None))
@@ -107,47 +107,47 @@ def test_worst_stroke_counts_and_a_stroke_too_short_does_not(hand_made: HandMade
 
 
 def test_speed_that_is_lost_again_was_not_reached(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0))
+    joystick = held((1.0, 4.0, 1.0))
 
     def speed(t: float) -> float:  # a spike to full speed, a dip to 40 %, back by ramp at 3.0
         if t < 1.2 or t >= 4.0:
             return 0.0
         return 1.0 if t < 1.6 else min(1.0, 0.4 + 0.6 * (t - 2.0)) if t >= 2.0 else 0.4
 
-    recording = hand_made(10.0, near_far=(stick, stick, speed, zero))
+    recording = hand_made(10.0, near_far=(joystick, joystick, speed, zero))
     expected = 1.0 + 0.55 / 0.6  # 95 % on the ramp from 40 % at 2.0 s
     assert axis_metrics(recording, "near_far").time_to_95_s == pytest.approx(expected, abs=1e-6)
 
 
 def test_a_tip_that_moves_off_again_has_not_stopped(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0))
+    joystick = held((1.0, 4.0, 1.0))
     speed = held((1.0, 4.2, 1.0), (4.6, 5.0, 0.3))
-    metrics = axis_metrics(hand_made(10.0, slew=(stick, stick, speed, zero)), "slew")
+    metrics = axis_metrics(hand_made(10.0, slew=(joystick, joystick, speed, zero)), "slew")
     assert metrics.run_on_s == pytest.approx(1.0, abs=0.021)
 
 
 def test_a_stop_cut_short_counts_with_the_time_it_had(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0), (4.5, 7.0, 1.0))
-    recording = hand_made(12.0, slew=(stick, stick, held((1.0, 7.1, 1.0)), zero))
+    joystick = held((1.0, 4.0, 1.0), (4.5, 7.0, 1.0))
+    recording = hand_made(12.0, slew=(joystick, joystick, held((1.0, 7.1, 1.0)), zero))
     assert axis_metrics(recording, "slew").run_on_s == pytest.approx(0.48, abs=1e-6)
 
 
 def test_dip_and_re_rise_of_the_sent_command(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0))
+    joystick = held((1.0, 4.0, 1.0))
     sent = held(
         (1.0, 1.4, 0.9), (1.4, 2.0, 0.35), (2.0, 4.0, 1.0), (4.0, 4.4, 0.1), (4.4, 5.0, 0.48)
     )
-    metrics = axis_metrics(hand_made(10.0, slew=(stick, sent, sent, zero)), "slew")
+    metrics = axis_metrics(hand_made(10.0, slew=(joystick, sent, sent, zero)), "slew")
     assert metrics.dip == pytest.approx(0.55)
     assert metrics.re_rise == pytest.approx(0.38)
 
 
-def test_a_stick_moved_by_ramps_and_a_wandering_hand_is_no_dip(hand_made: HandMade) -> None:
-    def stick(t: float) -> float:
+def test_a_joystick_moved_by_ramps_and_a_wandering_hand_is_no_dip(hand_made: HandMade) -> None:
+    def joystick(t: float) -> float:
         ramp = max(0.0, min(1.0, (t - 1.0) / 0.4, (4.0 - t) / 0.4))
         return ramp * (0.98 + 0.02 * math.sin(9.0 * t))
 
-    metrics = axis_metrics(hand_made(10.0, slew=(stick, stick, stick, zero)), "slew")
+    metrics = axis_metrics(hand_made(10.0, slew=(joystick, joystick, joystick, zero)), "slew")
     assert metrics.dip == pytest.approx(0.0, abs=1e-9)
     assert metrics.re_rise == pytest.approx(0.0, abs=0.02)  # what is left in the neutral band
 
@@ -160,10 +160,10 @@ def test_a_stick_moved_by_ramps_and_a_wandering_hand_is_no_dip(hand_made: HandMa
 def test_a_stroke_with_another_axis_has_no_residual(
     hand_made: HandMade, other: tuple[float, float, float]
 ) -> None:
-    stick = held((1.0, 4.0, 1.0))
+    joystick = held((1.0, 4.0, 1.0))
     recording = hand_made(
         12.0,
-        near_far=(stick, stick, stick, ringing(4.0, 10.0)),
+        near_far=(joystick, joystick, joystick, ringing(4.0, 10.0)),
         slew=(held(other), held(other), zero, zero),
     )
     metrics = axis_metrics(recording, "near_far")
@@ -172,11 +172,11 @@ def test_a_stroke_with_another_axis_has_no_residual(
     assert metrics.run_on_s is None
 
 
-def test_a_window_ends_when_any_stick_is_moved(hand_made: HandMade) -> None:
-    stick, other = held((1.0, 4.0, 1.0)), held((9.0, 10.0, 1.0))
+def test_a_window_ends_when_any_joystick_is_moved(hand_made: HandMade) -> None:
+    joystick, other = held((1.0, 4.0, 1.0)), held((9.0, 10.0, 1.0))
     recording = hand_made(
         20.0,
-        near_far=(stick, stick, stick, lambda t: 0.4 if t < 9.0 else 12.0),
+        near_far=(joystick, joystick, joystick, lambda t: 0.4 if t < 9.0 else 12.0),
         lift=(other, other, zero, None),
     )
     assert axis_metrics(recording, "near_far").residual_deg == 0.4
@@ -185,44 +185,48 @@ def test_a_window_ends_when_any_stick_is_moved(hand_made: HandMade) -> None:
 def test_a_rest_shorter_than_half_a_period_after_the_dwell_has_no_residual(
     hand_made: HandMade,
 ) -> None:
-    stick = held((1.0, 4.0, 1.0), (7.4, 8.0, 1.0))
-    recording = hand_made(9.0, near_far=(stick, stick, stick, ringing(4.0, 10.0)))
+    joystick = held((1.0, 4.0, 1.0), (7.4, 8.0, 1.0))
+    recording = hand_made(9.0, near_far=(joystick, joystick, joystick, ringing(4.0, 10.0)))
     assert axis_metrics(recording, "near_far").residual_deg is None
 
 
 def test_cross_residual_is_the_swing_left_in_the_other_plane(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0))
+    joystick = held((1.0, 4.0, 1.0))
     recording = hand_made(
         12.0,
-        slew=(stick, stick, stick, lambda t: -3.0 if t > 4.0 else 0.0),
+        slew=(joystick, joystick, joystick, lambda t: -3.0 if t > 4.0 else 0.0),
         near_far=(zero, zero, zero, lambda t: -7.0 if t > 7.0 else 9.0),
         lift=(zero, zero, zero, None),
     )
     assert axis_metrics(recording, "slew").residual_deg == 3.0
     assert axis_metrics(recording, "slew").cross_residual_deg == 9.0
     assert axis_metrics(recording, "near_far").residual_deg is None
-    alone = hand_made(12.0, slew=(stick, stick, stick, zero), lift=(zero, zero, zero, None))
+    alone = hand_made(
+        12.0, slew=(joystick, joystick, joystick, zero), lift=(zero, zero, zero, None)
+    )
     assert axis_metrics(alone, "slew").cross_residual_deg is None
 
 
 def test_a_reversal_is_two_strokes(hand_made: HandMade) -> None:
-    stick = held((1.0, 4.0, 1.0), (4.0, 7.0, -1.0))
+    joystick = held((1.0, 4.0, 1.0), (4.0, 7.0, -1.0))
     sway = ringing(7.0, 6.0, decay=0.0)
-    metrics = axis_metrics(hand_made(14.0, slew=(stick, stick, stick, sway)), "slew")
+    metrics = axis_metrics(hand_made(14.0, slew=(joystick, joystick, joystick, sway)), "slew")
     assert metrics.residual_deg == pytest.approx(6.0, rel=1e-3)
     assert metrics.run_on_s == 0.0
     assert metrics.dip == 0.0
 
 
 @pytest.mark.parametrize(
-    ("t_s", "stick", "message"),
+    ("t_s", "joystick", "message"),
     [
         ([0.0, 0.02, 0.02], [0.0] * 3, "time of a recording must increase"),
-        ([0.0, 0.02, 0.04], [0.0] * 2, r"slew\.stick has 2 samples"),
-        ([0.0, 0.02, 0.04], [0.0, math.nan, 0.0], r"slew\.stick holds a value"),
+        ([0.0, 0.02, 0.04], [0.0] * 2, r"slew\.joystick has 2 samples"),
+        ([0.0, 0.02, 0.04], [0.0, math.nan, 0.0], r"slew\.joystick holds a value"),
     ],
 )
-def test_a_malformed_recording_is_named(t_s: list[float], stick: list[float], message: str) -> None:
-    recording = Recording(t_s, {"slew": AxisTrace(stick, [0.0] * 3, [0.0] * 3, None)})
+def test_a_malformed_recording_is_named(
+    t_s: list[float], joystick: list[float], message: str
+) -> None:
+    recording = Recording(t_s, {"slew": AxisTrace(joystick, [0.0] * 3, [0.0] * 3, None)})
     with pytest.raises(ValueError, match=message):
         axis_metrics(recording, "slew")

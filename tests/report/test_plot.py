@@ -160,11 +160,11 @@ def test_nothing_drawn_leaves_the_picture(pair: Pair, seen: Pair, *, known: bool
 def test_without_a_residual_window_the_peak_is_told(
     hand_made: Callable[..., Recording], tmp_path: Path
 ) -> None:
-    def stick(t: float) -> float:
+    def joystick(t: float) -> float:
         return 1.0 if 0.5 <= t < 1.5 else 0.0
 
     def drive(swing: float) -> Recording:
-        return hand_made(2.0, slew=(stick, stick, stick, lambda t: swing * (t > 1.0)))
+        return hand_made(2.0, slew=(joystick, joystick, joystick, lambda t: swing * (t > 1.0)))
 
     raw, shaped = drive(-8.0), drive(2.0)
     report = report_dict(raw, shaped, transport="vcan0", missed_deadlines=0)

@@ -19,9 +19,9 @@ def held(*strokes: tuple[float, float, float]) -> Signal:
 
 
 def drive(
-    hand_made: HandMade, duration_s: float = 12.0, dt_s: float = 0.02, **sticks: Signal
+    hand_made: HandMade, duration_s: float = 12.0, dt_s: float = 0.02, **joysticks: Signal
 ) -> Recording:
-    axes = {name: (stick, stick, stick, zero) for name, stick in sticks.items()}
+    axes = {name: (joystick, joystick, joystick, zero) for name, joystick in joysticks.items()}
     return hand_made(duration_s, dt_s=dt_s, **axes)
 
 
@@ -35,25 +35,25 @@ def test_strokes_have_press_release_direction_and_level(hand_made: HandMade) -> 
     assert [bool(s.rest) for s in strokes] == [True, False, True]
 
 
-def test_a_stick_in_the_neutral_band_is_released(hand_made: HandMade) -> None:
+def test_a_joystick_in_the_neutral_band_is_released(hand_made: HandMade) -> None:
     assert find_strokes(drive(hand_made, slew=lambda t: 0.02))["slew"] == []
     (stroke,) = find_strokes(drive(hand_made, slew=lambda t: 0.03))["slew"]
     assert stroke.release is None
     assert not stroke.rest
 
 
-def test_the_plateau_is_where_the_stick_is_held_longest_near_its_largest_deflection(
+def test_the_plateau_is_where_the_joystick_is_held_longest_near_its_largest_deflection(
     hand_made: HandMade,
 ) -> None:
-    stick = held((1.0, 1.2, 1.0), (1.2, 2.0, 0.5), (2.0, 4.0, 0.97), (4.0, 5.0, 0.3))
-    recording = drive(hand_made, slew=stick)
+    joystick = held((1.0, 1.2, 1.0), (1.2, 2.0, 0.5), (2.0, 4.0, 0.97), (4.0, 5.0, 0.3))
+    recording = drive(hand_made, slew=joystick)
     (stroke,) = find_strokes(recording)["slew"]
     first, last = stroke.plateau
     assert (recording.t_s[first], recording.t_s[last]) == pytest.approx((2.0, 3.98))
     assert stroke.level == 0.97
 
 
-def test_a_rest_ends_when_another_stick_is_released(hand_made: HandMade) -> None:
+def test_a_rest_ends_when_another_joystick_is_released(hand_made: HandMade) -> None:
     near_far, slew = held((1.0, 4.0, 1.0)), held((0.5, 6.0, 1.0))
     # Letting go of slew makes the two-axis motion move near-far: not a re-rise of its own stop.
     sent = held((1.0, 4.0, 1.0), (4.0, 4.5, 0.5), (6.2, 7.0, 0.2))
@@ -88,7 +88,7 @@ def test_aligned_drives_press_at_the_same_time_and_cover_the_same_span(
     for d in (a, b):
         assert d.t_s[0] == pytest.approx(0.0, abs=0.021)
         assert d.t_s[-1] == pytest.approx(12.0, abs=0.021)
-        assert len(d.axes["slew"].stick) == len(d.axes["slew"].sway_deg or []) == len(d.t_s)
+        assert len(d.axes["slew"].joystick) == len(d.axes["slew"].sway_deg or []) == len(d.t_s)
 
 
 def test_drives_without_a_press_are_aligned_by_their_starts(hand_made: HandMade) -> None:

@@ -101,7 +101,7 @@ class CanopenRig:
         return found
 
     def run(self, ticks: int = 1, **raw: int) -> dict[str, dict[str, int]]:
-        """Ticks in which every node sends what it has to; sticks and switches raw."""
+        """Ticks in which every node sends what it has to; joysticks and switches raw."""
         told: dict[str, dict[str, int]] = {}
         for _ in range(ticks):
             for name in ("Left", "Right"):

@@ -72,4 +72,4 @@ def still(sent: dict[str, dict[str, Any]]) -> bool:
 
 
 PRESSED = [(State.TRIPPED, "EMERGENCY_STOP")] * 3
-READY = [(State.READY, "STICK_NEUTRAL")] * 3
+READY = [(State.READY, "JOYSTICK_NEUTRAL")] * 3

@@ -17,11 +17,11 @@ TICK_NS = 20_000_000
 
 # What a joystick sends that nobody touches, raw.
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
-STICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
+JOYSTICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
 
 # For the DBC: the slew axis has its turn in every tenth tick.
 SLOW_VALVE = {"BO_ 512 20;": "BO_ 512 200;"}
-NAMES = (*STICKS, "SlewCommand", "NearFarCommand", "LiftCommand", "ShaperStatus")
+NAMES = (*JOYSTICKS, "SlewCommand", "NearFarCommand", "LiftCommand", "ShaperStatus")
 NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus")
 
 
@@ -41,9 +41,9 @@ class Rig:
         return found[1]
 
     def joystick(self, name: str = "JoystickLeft", **raw: int) -> Frame:
-        """The next frame of a joystick; sticks in 0.1 %, centred and enabled unless told."""
+        """The next frame of a joystick; joysticks in 0.1 %, centred and enabled unless told."""
         self.counts[name] = (self.counts[name] + 1) % 256
-        values = {**dict.fromkeys(STICKS[name], 0), **CENTRED, "AliveCounter": self.counts[name]}
+        values = {**dict.fromkeys(JOYSTICKS[name], 0), **CENTRED, "AliveCounter": self.counts[name]}
         message = self.messages[name]
         data = message.encode({**values, **raw}, scaling=False, strict=False)
         bus = next(v.bus for v in self.deployment.config.joysticks.values() if v.message == name)
@@ -74,8 +74,8 @@ class Rig:
         """Both joysticks and a tick, so many times; what the last one sent."""
         sent: dict[str, dict[str, Any]] = {}
         for _ in range(ticks):
-            left = {k: v for k, v in raw.items() if k not in STICKS["JoystickRight"]}
-            right = {k: v for k, v in raw.items() if k not in STICKS["JoystickLeft"]}
+            left = {k: v for k, v in raw.items() if k not in JOYSTICKS["JoystickRight"]}
+            right = {k: v for k, v in raw.items() if k not in JOYSTICKS["JoystickLeft"]}
             self.receive(
                 self.joystick("JoystickLeft", **left), self.joystick("JoystickRight", **right)
             )

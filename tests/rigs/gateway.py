@@ -11,7 +11,7 @@ from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
-STICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
+JOYSTICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rotate")}
 CENTRED = {"Enable": 1, "AntiSwayOff": 0, "Reset": 0}
 
 
@@ -36,14 +36,14 @@ class GatewayRig:
         self.deployment = load_deployment(file)
         self.controller = Controller(self.deployment)
         self.now_ns = 0
-        self.counts = dict.fromkeys(STICKS, 0)
+        self.counts = dict.fromkeys(JOYSTICKS, 0)
         self.left: list[Frame] = []
 
     def joystick(self, name: str = "JoystickLeft", junk: int = 0, **raw: int) -> Frame:
         """The next frame of a joystick; ``junk`` are bits that no signal has."""
         self.counts[name] = (self.counts[name] + 1) % 256
         message = self.dbc.get_message_by_name(name)
-        values = {**dict.fromkeys(STICKS[name], 0), **CENTRED, "AliveCounter": self.counts[name]}
+        values = {**dict.fromkeys(JOYSTICKS[name], 0), **CENTRED, "AliveCounter": self.counts[name]}
         rest = {s.name: 0 for s in message.signals if s.name not in values}
         data = message.encode({**values, **rest, **raw}, scaling=False, strict=False)
         word = int.from_bytes(data, "little") | junk
@@ -69,8 +69,8 @@ class GatewayRig:
     def run(self, ticks: int = 1, **raw: int) -> dict[str, Any]:
         """Both joysticks and a tick, so many times; the last frame of the left one, decoded."""
         for _ in range(ticks):
-            mine = {k: v for k, v in raw.items() if k not in STICKS["JoystickRight"]}
-            other = {k: v for k, v in raw.items() if k not in STICKS["JoystickLeft"]}
+            mine = {k: v for k, v in raw.items() if k not in JOYSTICKS["JoystickRight"]}
+            other = {k: v for k, v in raw.items() if k not in JOYSTICKS["JoystickLeft"]}
             self.receive(self.joystick("JoystickLeft", **mine))
             self.receive(self.joystick("JoystickRight", **other))
             assert self.tick() == []

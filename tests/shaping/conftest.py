@@ -4,7 +4,7 @@ from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
-from canshaper.shaping.states import State, StickInput, Transition
+from canshaper.shaping.states import CommandInput, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -42,25 +42,25 @@ class Drive:
     def state(self) -> State:
         return self.axis.state
 
-    def tick(self, stick: StickInput) -> Transition | None:
-        transition = self.axis.tick(stick)
+    def tick(self, joystick: CommandInput) -> Transition | None:
+        transition = self.axis.tick(joystick)
         self.raw.append(self.axis.raw)
         self.sent.append(self.axis.sent)
         return transition
 
-    def run(self, stick: StickInput, duration_s: float) -> list[Transition]:
+    def run(self, joystick: CommandInput, duration_s: float) -> list[Transition]:
         """Keep an input for a while; what changed meanwhile."""
-        seen = [self.tick(stick) for _ in range(round(duration_s / self.tick_s))]
+        seen = [self.tick(joystick) for _ in range(round(duration_s / self.tick_s))]
         return [transition for transition in seen if transition is not None]
 
     def to_ready(self) -> "Drive":
-        self.run(StickInput(), 2 * self.tick_s)
+        self.run(CommandInput(), 2 * self.tick_s)
         assert self.state is State.READY
         return self
 
     def moving(self, command: float = 0.8, *, bypass: bool = False) -> "Drive":
-        """Half a second of a held stick from rest."""
-        self.to_ready().run(StickInput(command, bypass=bypass), 0.5)
+        """Half a second of a held joystick from rest."""
+        self.to_ready().run(CommandInput(command, bypass=bypass), 0.5)
         assert self.state is (State.BYPASS_ON if bypass else State.ACTIVE)
         assert self.axis.raw != 0
         return self

@@ -13,7 +13,7 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 
 TICK_S = 0.05
 # So fine that rounding does not hide what is added.
@@ -22,11 +22,11 @@ SLACK = 1e-4
 LARGEST, TIME_S = 0.25, 1.5
 SHAPERS: list[Callable[[], Shaper]] = [Off, lambda: Fir([0.3, 0.1, 0.0, 0.2, 0.4])]
 
-sticks = st.sampled_from([0.0, 0.0, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0])
+joysticks = st.sampled_from([0.0, 0.0, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0])
 wishes = st.sampled_from([0.0, 0.01, -0.01, 0.2, -0.2, 1.0, -1.0]) | st.floats(-1.0, 1.0)
 rates = st.sampled_from([0.3, 1.0, 5.0, 20.0])
 steps = st.lists(
-    st.tuples(sticks, wishes, st.integers(1, 12), st.sampled_from([0, 0, 0, 1, 3])),
+    st.tuples(joysticks, wishes, st.integers(1, 12), st.sampled_from([0, 0, 0, 1, 3])),
     min_size=1,
     max_size=25,
 )
@@ -38,8 +38,8 @@ def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Axis
         Axis(TICK_S, limits, sway=None, shaper=shaper(), grid_steps=STEPS) for _ in range(2)
     )
     one.allow_added(LARGEST, TIME_S)
-    one.tick(StickInput())
-    plain.tick(StickInput())
+    one.tick(CommandInput())
+    plain.tick(CommandInput())
     return one, plain
 
 
@@ -101,8 +101,8 @@ def test_whatever_is_asked_speed_and_time_are_bounded(
             now += 1
             alone = 0 if one.commanded or not wish or one.raw == 0 else alone + 1
             before = one.sent
-            one.tick(StickInput(command), wish)
-            plain.tick(StickInput(command))
+            one.tick(CommandInput(command), wish)
+            plain.tick(CommandInput(command))
             if abs(command) > 0.02:
                 asked.append((now, command))
             recent = [c for at, c in asked if now - at <= 8]
@@ -136,21 +136,21 @@ def test_time_counts_while_the_axis_is_moved_and_nobody_commands_it(sign: float)
 def test_when_the_time_is_over_it_falls_and_rests() -> None:
     axis, _ = pair(OutputLimits(fall_per_s=2.0))
     for _ in range(30):
-        axis.tick(StickInput(), 0.2)
+        axis.tick(CommandInput(), 0.2)
         assert axis.state is State.ACTIVE
     sent = []
     for _ in range(4):
-        axis.tick(StickInput(), 0.2)
+        axis.tick(CommandInput(), 0.2)
         sent.append(round(axis.sent, 3))
     assert sent == [0.1, 0.0, 0.0, 0.0]
 
 
 def test_missed_ticks_use_up_time() -> None:
     axis, _ = pair(OutputLimits())
-    axis.tick(StickInput(), 0.2)
+    axis.tick(CommandInput(), 0.2)
     axis.hold(29)
-    axis.tick(StickInput(), 0.2)
-    axis.tick(StickInput(), 0.2)
+    axis.tick(CommandInput(), 0.2)
+    axis.tick(CommandInput(), 0.2)
     assert axis.raw == 0
 
 
@@ -161,15 +161,15 @@ def test_a_joystick_that_is_pushed_the_other_way_ends_it_by_the_rate(
 ) -> None:
     axis, _ = pair(OutputLimits(fall_per_s=fall_per_s))
     for _ in range(10):
-        axis.tick(StickInput(), -sign * 0.2)
+        axis.tick(CommandInput(), -sign * 0.2)
     assert sign * axis.sent < -0.19
     left = 0.2
     for _ in range(20):
-        axis.tick(StickInput(sign * 0.1), -sign * 0.2)
+        axis.tick(CommandInput(sign * 0.1), -sign * 0.2)
         left = max(0.0, left - fall_per_s * TICK_S)
         assert sign * axis.sent == pytest.approx(-left, abs=SLACK)
     for _ in range(5):
-        axis.tick(StickInput(sign * 0.5), -sign * 0.2)
+        axis.tick(CommandInput(sign * 0.5), -sign * 0.2)
     assert sign * axis.sent == pytest.approx(0.3, abs=0.02)
     assert sign * axis.applied == pytest.approx(0.5, abs=0.02)
 
@@ -178,7 +178,7 @@ def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
     """The added part counts as sent whole: the filter makes up for the rest, see the model."""
     axis, _ = pair(OutputLimits())
     for _ in range(10):
-        axis.tick(StickInput(0.1), -0.2)
+        axis.tick(CommandInput(0.1), -0.2)
     assert axis.sent == 0.0
     assert axis.applied == pytest.approx(0.2)
 
@@ -187,8 +187,8 @@ def test_what_is_cut_of_the_sum_is_cut_from_the_own_part() -> None:
 def test_it_makes_no_axis_faster_than_its_operator_asks(sign: float) -> None:
     axis, plain = pair(OutputLimits(), lambda: Fir([0.5] + [0.0] * 20 + [0.5]))
     for _ in range(10):
-        axis.tick(StickInput(sign * 0.3), sign * 0.2)
-        plain.tick(StickInput(sign * 0.3))
+        axis.tick(CommandInput(sign * 0.3), sign * 0.2)
+        plain.tick(CommandInput(sign * 0.3))
     assert sign * plain.sent == pytest.approx(0.15, abs=SLACK)
     assert sign * axis.sent == pytest.approx(0.3, abs=SLACK)
 
@@ -196,8 +196,8 @@ def test_it_makes_no_axis_faster_than_its_operator_asks(sign: float) -> None:
 @pytest.mark.parametrize("bad", [math.nan, math.inf, -math.inf, 1.1, -1.1])
 def test_no_velocity_trips(bad: float) -> None:
     axis, _ = pair(OutputLimits())
-    axis.tick(StickInput(), 0.1)
-    axis.tick(StickInput(), bad)
+    axis.tick(CommandInput(), 0.1)
+    axis.tick(CommandInput(), bad)
     assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
 
 
@@ -207,71 +207,71 @@ def test_who_adds_and_loses_the_right_to_leaves_nothing(
     sign: float, command: float, left: float
 ) -> None:
     axis, _ = pair(OutputLimits(rise_per_s=1.0))
-    axis.tick(StickInput(sign * command and sign))  # it asked for more before
+    axis.tick(CommandInput(sign * command and sign))  # it asked for more before
     for _ in range(20):
-        axis.tick(StickInput(sign * command))
+        axis.tick(CommandInput(sign * command))
     for _ in range(6):
-        axis.tick(StickInput(sign * command), sign * 0.2)
+        axis.tick(CommandInput(sign * command), sign * 0.2)
     assert sign * axis.sent == pytest.approx(left + 0.2, abs=SLACK)
     axis.drop_added()
-    axis.tick(StickInput(sign * command))
+    axis.tick(CommandInput(sign * command))
     assert sign * axis.sent == pytest.approx(left, abs=SLACK)
 
 
 def test_what_was_added_against_the_own_part_ends_by_the_rates() -> None:
     axis, _ = pair(OutputLimits(rise_per_s=1.0))
     for _ in range(20):
-        axis.tick(StickInput(0.5), -0.2)
+        axis.tick(CommandInput(0.5), -0.2)
     assert axis.sent == pytest.approx(0.3, abs=SLACK)
     axis.drop_added()
-    axis.tick(StickInput(0.5))
+    axis.tick(CommandInput(0.5))
     assert axis.sent == pytest.approx(0.35, abs=SLACK)
 
 
-@pytest.mark.parametrize("fault", [Reason.STICK_TIMEOUT, Reason.STICK_ERROR])
+@pytest.mark.parametrize("fault", [Reason.JOYSTICK_TIMEOUT, Reason.JOYSTICK_ERROR])
 def test_what_was_added_falls_by_the_rate_when_the_joystick_is_lost(fault: Reason) -> None:
     axis, _ = pair(OutputLimits(fall_per_s=2.0))
     for _ in range(10):
-        axis.tick(StickInput(), 0.2)
+        axis.tick(CommandInput(), 0.2)
     for left in (0.1, 0.0):
-        axis.tick(StickInput(fault=fault), 0.2)
+        axis.tick(CommandInput(fault=fault), 0.2)
         assert axis.sent == pytest.approx(left, abs=SLACK)
-    axis.tick(StickInput(fault=fault), 0.2)
+    axis.tick(CommandInput(fault=fault), 0.2)
     assert axis.state is State.NEUTRAL_WAIT
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_it_leaves_nothing_at_once_however_slowly_the_valve_may_fall(sign: float) -> None:
     axis, _ = pair(OutputLimits(rise_per_s=5.0, fall_per_s=0.2))
-    axis.tick(StickInput(sign))
+    axis.tick(CommandInput(sign))
     for _ in range(5):
-        axis.tick(StickInput(sign * 0.3), sign * 0.2)
+        axis.tick(CommandInput(sign * 0.3), sign * 0.2)
     assert sign * axis.sent > 0.4
     axis.drop_added()
-    axis.tick(StickInput(sign * 0.3))
+    axis.tick(CommandInput(sign * 0.3))
     assert sign * axis.sent == pytest.approx(0.3, abs=SLACK)
 
 
 def test_nor_while_it_falls_already() -> None:
     axis, _ = pair(OutputLimits(fall_per_s=0.2))
     for _ in range(10):
-        axis.tick(StickInput(), 0.2)
-    axis.tick(StickInput())
+        axis.tick(CommandInput(), 0.2)
+    axis.tick(CommandInput())
     assert axis.sent == pytest.approx(0.19, abs=SLACK)
     axis.drop_added()
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     assert axis.sent == 0.0
 
 
 def test_nor_what_rounding_has_left_out() -> None:
     axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off(), grid_steps=10)
     axis.allow_added(LARGEST, TIME_S)
-    axis.tick(StickInput())
-    axis.tick(StickInput(1.0))
+    axis.tick(CommandInput())
+    axis.tick(CommandInput(1.0))
     for _ in range(10):
-        axis.tick(StickInput(0.3))
+        axis.tick(CommandInput(0.3))
     axis.drop_added()
-    axis.tick(StickInput(0.3), 0.001)
+    axis.tick(CommandInput(0.3), 0.001)
     assert axis.sent == pytest.approx(0.3)
 
 
@@ -279,15 +279,15 @@ def test_nor_what_rounding_has_left_out() -> None:
 def test_what_falls_is_rounded_to_the_side_of_rest(sign: float) -> None:
     axis = Axis(TICK_S, OutputLimits(fall_per_s=0.07), sway=None, shaper=Off(), grid_steps=50)
     axis.allow_added(LARGEST, TIME_S)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     for _ in range(10):
-        axis.tick(StickInput(), sign * 0.2)
+        axis.tick(CommandInput(), sign * 0.2)
     for _ in range(40):
-        axis.tick(StickInput())
+        axis.tick(CommandInput())
         assert 0.0 <= sign * axis.sent <= sign * axis._limited + 1e-12
 
 
 def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:
     axis, _ = pair(OutputLimits())
-    axis.tick(StickInput(bypass=True), 0.2)
+    axis.tick(CommandInput(bypass=True), 0.2)
     assert (axis.state, axis.raw) == (State.READY, 0)

@@ -8,27 +8,27 @@ import pytest
 
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import MOVING, Reason, State, StickInput, Transition
+from canshaper.shaping.states import MOVING, CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayModel
 
 Drive = Any  # the class of conftest.py
 DriveWith = Callable[..., Any]
 
 LOST = (
-    Reason.STICK_TIMEOUT,
-    Reason.STICK_ERROR,
-    Reason.STICK_NOT_AVAILABLE,
-    Reason.STICK_OUT_OF_RANGE,
-    Reason.STICK_NOT_A_NUMBER,
+    Reason.JOYSTICK_TIMEOUT,
+    Reason.JOYSTICK_ERROR,
+    Reason.JOYSTICK_NOT_AVAILABLE,
+    Reason.JOYSTICK_OUT_OF_RANGE,
+    Reason.JOYSTICK_NOT_A_NUMBER,
     Reason.SWITCH_INVALID,
 )
 TRIPS = (Reason.OUTPUT_INVALID, Reason.SEND_FAILED, Reason.LOOP_STALLED)
-PUSHED = StickInput(0.8)
-CENTRED = StickInput()
+PUSHED = CommandInput(0.8)
+CENTRED = CommandInput()
 
 
-def refused_start(drive: Drive, stick: StickInput, waits_for: Reason) -> None:
-    assert drive.run(stick, 0.2) == []
+def refused_start(drive: Drive, joystick: CommandInput, waits_for: Reason) -> None:
+    assert drive.run(joystick, 0.2) == []
     assert (drive.state, drive.axis.reason) == (State.NEUTRAL_WAIT, waits_for)
     assert not any(drive.raw)
 
@@ -36,50 +36,54 @@ def refused_start(drive: Drive, stick: StickInput, waits_for: Reason) -> None:
 # -- from rest to motion ---------------------------------------------------------------------------
 
 
-def test_the_first_move_takes_two_ticks_of_a_centred_stick(drive: Drive) -> None:
+def test_the_first_move_takes_two_ticks_of_a_centred_joystick(drive: Drive) -> None:
     assert (drive.state, drive.axis.reason) == (State.NEUTRAL_WAIT, Reason.START)
-    assert drive.tick(CENTRED) == Transition(State.NEUTRAL_WAIT, State.READY, Reason.STICK_NEUTRAL)
-    assert drive.tick(PUSHED) == Transition(State.READY, State.ACTIVE, Reason.STICK_MOVED)
+    assert drive.tick(CENTRED) == Transition(
+        State.NEUTRAL_WAIT, State.READY, Reason.JOYSTICK_NEUTRAL
+    )
+    assert drive.tick(PUSHED) == Transition(State.READY, State.ACTIVE, Reason.JOYSTICK_MOVED)
     assert drive.axis.raw > 0
     assert drive.axis.command == 0.8
 
 
 @pytest.mark.parametrize("command", [0.021, -0.021, 1.0])
-def test_a_stick_that_was_never_neutral_moves_nothing(drive: Drive, command: float) -> None:
-    refused_start(drive, StickInput(command), Reason.STICK_NOT_NEUTRAL)
+def test_a_joystick_that_was_never_neutral_moves_nothing(drive: Drive, command: float) -> None:
+    refused_start(drive, CommandInput(command), Reason.JOYSTICK_NOT_NEUTRAL)
 
 
-def test_a_stick_that_is_not_enabled_moves_nothing(drive: Drive) -> None:
-    refused_start(drive, StickInput(enabled=False), Reason.ENABLE_OFF)
+def test_a_joystick_that_is_not_enabled_moves_nothing(drive: Drive) -> None:
+    refused_start(drive, CommandInput(enabled=False), Reason.ENABLE_OFF)
 
 
 @pytest.mark.parametrize("fault", LOST)
-def test_a_stick_that_is_not_valid_moves_nothing(drive: Drive, fault: Reason) -> None:
-    refused_start(drive, StickInput(fault=fault), fault)
+def test_a_joystick_that_is_not_valid_moves_nothing(drive: Drive, fault: Reason) -> None:
+    refused_start(drive, CommandInput(fault=fault), fault)
 
 
-def test_enabling_a_stick_that_was_moved_before_moves_nothing(drive: Drive) -> None:
+def test_enabling_a_joystick_that_was_moved_before_moves_nothing(drive: Drive) -> None:
     drive.to_ready()
-    assert drive.run(StickInput(0.8, enabled=False), 0.2) == [
+    assert drive.run(CommandInput(0.8, enabled=False), 0.2) == [
         Transition(State.READY, State.NEUTRAL_WAIT, Reason.ENABLE_OFF)
     ]
-    refused_start(drive, PUSHED, Reason.STICK_NOT_NEUTRAL)
+    refused_start(drive, PUSHED, Reason.JOYSTICK_NOT_NEUTRAL)
     drive.to_ready().tick(PUSHED)
     assert drive.state is State.ACTIVE
 
 
 @pytest.mark.parametrize("fault", LOST)
-def test_a_stick_lost_while_ready_has_to_be_seen_neutral_again(drive: Drive, fault: Reason) -> None:
+def test_a_joystick_lost_while_ready_has_to_be_seen_neutral_again(
+    drive: Drive, fault: Reason
+) -> None:
     drive.to_ready()
-    lost = drive.tick(StickInput(fault=fault))
+    lost = drive.tick(CommandInput(fault=fault))
     assert lost == Transition(State.READY, State.NEUTRAL_WAIT, fault)
-    refused_start(drive, PUSHED, Reason.STICK_NOT_NEUTRAL)
+    refused_start(drive, PUSHED, Reason.JOYSTICK_NOT_NEUTRAL)
 
 
 @pytest.mark.parametrize("command", [0.0, 0.02, -0.02])
 def test_within_the_neutral_band_nothing_moves(drive: Drive, command: float) -> None:
     drive.to_ready()
-    assert drive.run(StickInput(command), 1.0) == []
+    assert drive.run(CommandInput(command), 1.0) == []
     assert not any(drive.raw)
 
 
@@ -94,7 +98,7 @@ def test_after_release_the_run_on_is_bounded(
     limits = OutputLimits(fall_per_s=2.0, tail_s=tail_s)
     drive = drive_with(limits=limits).moving(1.0, bypass=bypass)
     before = len(drive.sent)
-    (ready,) = drive.run(StickInput(bypass=bypass), 5.0)
+    (ready,) = drive.run(CommandInput(bypass=bypass), 5.0)
     assert ready.new is State.READY
     assert ready.reason is Reason.AT_REST
     moved_s = 0.02 * sum(map(bool, drive.raw[before:]))
@@ -104,7 +108,7 @@ def test_after_release_the_run_on_is_bounded(
 
 def test_a_reversal_within_the_run_on_goes_on_at_once(drive: Drive) -> None:
     drive.moving(0.8).run(CENTRED, 0.1)
-    assert drive.run(StickInput(-0.8), 1.5) == []
+    assert drive.run(CommandInput(-0.8), 1.5) == []
     assert drive.axis.sent == pytest.approx(-0.8, abs=0.1)
 
 
@@ -113,12 +117,12 @@ def test_a_reversal_within_the_run_on_goes_on_at_once(drive: Drive) -> None:
 
 @pytest.mark.parametrize("bypass", [False, True])
 @pytest.mark.parametrize("fault", LOST)
-def test_a_lost_stick_gives_a_shaped_stop(drive: Drive, fault: Reason, bypass: bool) -> None:
+def test_a_lost_joystick_gives_a_shaped_stop(drive: Drive, fault: Reason, bypass: bool) -> None:
     drive.moving(bypass=bypass)
     moving, sent = drive.state, drive.axis.sent
-    assert drive.tick(StickInput(fault=fault)) == Transition(moving, State.STOPPING, fault)
+    assert drive.tick(CommandInput(fault=fault)) == Transition(moving, State.STOPPING, fault)
     assert sent - 0.12 < drive.axis.sent < sent  # no faster than the valve's fall
-    (done,) = drive.run(StickInput(fault=fault), 3.0)
+    (done,) = drive.run(CommandInput(fault=fault), 3.0)
     assert done == Transition(State.STOPPING, State.NEUTRAL_WAIT, Reason.STOP_DONE)
     assert drive.axis.raw == 0
     assert drive.axis.reason is fault
@@ -134,34 +138,34 @@ def test_a_stop_is_bounded_in_time_whatever_the_filter_wants(
 
     drive = drive_with(Stubborn(), OutputLimits(tail_s=2.0), stop_s=stop_s).moving()
     before = len(drive.raw)
-    drive.run(StickInput(fault=Reason.STICK_TIMEOUT), 3.0)
+    drive.run(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), 3.0)
     assert sum(map(bool, drive.raw[before:])) == round(stop_s / 0.02)
     assert not any(drive.raw[before + round(stop_s / 0.02) :])
 
 
-def test_a_stick_that_comes_back_in_a_stop_has_to_be_seen_neutral(drive: Drive) -> None:
-    drive.moving().tick(StickInput(fault=Reason.STICK_TIMEOUT))
+def test_a_joystick_that_comes_back_in_a_stop_has_to_be_seen_neutral(drive: Drive) -> None:
+    drive.moving().tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
     (done,) = drive.run(PUSHED, 3.0)
     assert done.new is State.NEUTRAL_WAIT
-    assert drive.axis.reason is Reason.STICK_NOT_NEUTRAL
+    assert drive.axis.reason is Reason.JOYSTICK_NOT_NEUTRAL
     drive.to_ready()
 
 
 def test_a_released_enable_is_more_than_a_lost_frame(drive: Drive) -> None:
     drive.moving()
-    drive.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+    drive.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
     assert drive.state is State.STOPPING
-    drive.tick(StickInput(fault=Reason.STICK_TIMEOUT, enabled=False))
+    drive.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT, enabled=False))
     assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.ENABLE_LOST)
     assert drive.axis.raw == 0
 
 
 def test_enable_released_as_a_stop_ends_is_latched_all_the_same(drive_with: DriveWith) -> None:
     drive = drive_with(stop_s=0.1).moving()
-    assert drive.run(StickInput(fault=Reason.STICK_TIMEOUT), 0.1) == [
-        Transition(State.ACTIVE, State.STOPPING, Reason.STICK_TIMEOUT)
+    assert drive.run(CommandInput(fault=Reason.JOYSTICK_TIMEOUT), 0.1) == [
+        Transition(State.ACTIVE, State.STOPPING, Reason.JOYSTICK_TIMEOUT)
     ]
-    released = drive.tick(StickInput(enabled=False))
+    released = drive.tick(CommandInput(enabled=False))
     assert released == Transition(State.STOPPING, State.TRIPPED, Reason.ENABLE_LOST)
     assert drive.axis.raw == 0
 
@@ -175,16 +179,16 @@ def test_a_released_enable_switch_is_neutral_in_the_same_tick_and_latched(
 ) -> None:
     drive.moving(bypass=bypass)
     moving = drive.state
-    lost = drive.tick(StickInput(0.8, enabled=False, bypass=bypass))
+    lost = drive.tick(CommandInput(0.8, enabled=False, bypass=bypass))
     assert lost == Transition(moving, State.TRIPPED, Reason.ENABLE_LOST)
     assert (drive.axis.raw, drive.axis.sent, drive.axis.command) == (0, 0.0, 0.0)
     before = len(drive.raw)
-    drive.run(StickInput(0.8, enabled=False), 1.0)
-    drive.run(PUSHED, 1.0)  # the edge came with a moved stick: it does not count
+    drive.run(CommandInput(0.8, enabled=False), 1.0)
+    drive.run(PUSHED, 1.0)  # the edge came with a moved joystick: it does not count
     drive.run(CENTRED, 1.0)
     assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.ENABLE_LOST)
     assert not any(drive.raw[before:])
-    drive.tick(StickInput(enabled=False))
+    drive.tick(CommandInput(enabled=False))
     assert drive.tick(CENTRED) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
 
 
@@ -198,43 +202,47 @@ def test_a_trip_is_neutral_in_the_same_tick_from_every_state(
     elif state in MOVING:
         drive.moving(bypass=state is State.BYPASS_ON)
     if state is State.STOPPING:
-        drive.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+        drive.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
     elif state is State.TRIPPED:
-        drive.tick(StickInput(trip=Reason.SEND_FAILED))
+        drive.tick(CommandInput(trip=Reason.SEND_FAILED))
     assert drive.state is state
     expected = None if state is State.TRIPPED else Transition(state, State.TRIPPED, cause)
-    assert drive.tick(StickInput(0.8, trip=cause)) == expected
+    assert drive.tick(CommandInput(0.8, trip=cause)) == expected
     assert (drive.state, drive.axis.raw, drive.axis.sent) == (State.TRIPPED, 0, 0.0)
 
 
-TRIP = StickInput(trip=Reason.SEND_FAILED)
-RESET = StickInput(reset=True)
+TRIP = CommandInput(trip=Reason.SEND_FAILED)
+RESET = CommandInput(reset=True)
 
 
 @pytest.mark.parametrize(
     "inputs",
     [
         [CENTRED] * 5,  # nothing but the cause gone
-        [StickInput(0.8, reset=True)],  # not neutral
-        [StickInput(fault=Reason.STICK_TIMEOUT, reset=True)],  # not known to be neutral
-        [StickInput(reset=True, trip=Reason.SEND_FAILED)],  # the cause is there
-        [StickInput(reset=True, trip=Reason.SEND_FAILED), RESET, RESET],  # held since then
-        [StickInput(0.8, reset=True), RESET, RESET],
+        [CommandInput(0.8, reset=True)],  # not neutral
+        [CommandInput(fault=Reason.JOYSTICK_TIMEOUT, reset=True)],  # not known to be neutral
+        [CommandInput(reset=True, trip=Reason.SEND_FAILED)],  # the cause is there
+        [CommandInput(reset=True, trip=Reason.SEND_FAILED), RESET, RESET],  # held since then
+        [CommandInput(0.8, reset=True), RESET, RESET],
         # held while its frames fail: no new press
-        [StickInput(0.8, reset=True), StickInput(fault=Reason.STICK_TIMEOUT), RESET],
-        [StickInput(fault=Reason.STICK_TIMEOUT, reset=True), RESET, RESET],  # pressed then
-        [StickInput(0.8, enabled=False), StickInput(0.8), CENTRED],
-        [StickInput(fault=Reason.STICK_TIMEOUT, enabled=False), CENTRED],  # enable unknown
-        [StickInput(fault=Reason.STICK_UNTRUSTED, enabled=False), CENTRED],
-        [StickInput(enabled=False), StickInput(fault=Reason.STICK_TIMEOUT), CENTRED],
-        [StickInput(enabled=False), StickInput(fault=Reason.STICK_ERROR), CENTRED],  # held since
-        [StickInput(fault=Reason.SWITCH_INVALID, reset=True), RESET],
+        [CommandInput(0.8, reset=True), CommandInput(fault=Reason.JOYSTICK_TIMEOUT), RESET],
+        [CommandInput(fault=Reason.JOYSTICK_TIMEOUT, reset=True), RESET, RESET],  # pressed then
+        [CommandInput(0.8, enabled=False), CommandInput(0.8), CENTRED],
+        [CommandInput(fault=Reason.JOYSTICK_TIMEOUT, enabled=False), CENTRED],  # enable unknown
+        [CommandInput(fault=Reason.JOYSTICK_UNTRUSTED, enabled=False), CENTRED],
+        [CommandInput(enabled=False), CommandInput(fault=Reason.JOYSTICK_TIMEOUT), CENTRED],
+        [
+            CommandInput(enabled=False),
+            CommandInput(fault=Reason.JOYSTICK_ERROR),
+            CENTRED,
+        ],  # held since
+        [CommandInput(fault=Reason.SWITCH_INVALID, reset=True), RESET],
     ],
 )
-def test_no_way_out_of_a_trip(drive: Drive, inputs: list[StickInput]) -> None:
+def test_no_way_out_of_a_trip(drive: Drive, inputs: list[CommandInput]) -> None:
     drive.moving().tick(TRIP)
-    for stick in inputs:
-        assert drive.tick(stick) is None
+    for joystick in inputs:
+        assert drive.tick(joystick) is None
     assert drive.state is State.TRIPPED
 
 
@@ -242,21 +250,21 @@ def test_no_way_out_of_a_trip(drive: Drive, inputs: list[StickInput]) -> None:
     "inputs",
     [
         [RESET],
-        [StickInput(reset=True, enabled=False)],
-        [StickInput(enabled=False), CENTRED],
-        # off in a frame that tells it, though its stick is not available
-        [StickInput(fault=Reason.STICK_NOT_AVAILABLE, enabled=False), CENTRED],
-        [StickInput(0.8, reset=True), CENTRED, RESET],  # a second edge
-        [StickInput(fault=Reason.STICK_TIMEOUT), CENTRED, RESET],  # off before, seen off after
-        [CENTRED, StickInput(fault=Reason.STICK_TIMEOUT), RESET],
-        [StickInput(reset=True, trip=Reason.SEND_FAILED), CENTRED, RESET],
+        [CommandInput(reset=True, enabled=False)],
+        [CommandInput(enabled=False), CENTRED],
+        # off in a frame that tells it, though its joystick is not available
+        [CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE, enabled=False), CENTRED],
+        [CommandInput(0.8, reset=True), CENTRED, RESET],  # a second edge
+        [CommandInput(fault=Reason.JOYSTICK_TIMEOUT), CENTRED, RESET],  # off before, seen off after
+        [CENTRED, CommandInput(fault=Reason.JOYSTICK_TIMEOUT), RESET],
+        [CommandInput(reset=True, trip=Reason.SEND_FAILED), CENTRED, RESET],
     ],
 )
-def test_the_way_out_of_a_trip_is_an_edge_with_a_centred_stick(
-    drive: Drive, inputs: list[StickInput]
+def test_the_way_out_of_a_trip_is_an_edge_with_a_centred_joystick(
+    drive: Drive, inputs: list[CommandInput]
 ) -> None:
     drive.moving().tick(TRIP)
-    *before, last = [drive.tick(stick) for stick in inputs]
+    *before, last = [drive.tick(joystick) for joystick in inputs]
     assert not any(before)
     assert last == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
     drive.to_ready().tick(PUSHED)
@@ -264,7 +272,7 @@ def test_the_way_out_of_a_trip_is_an_edge_with_a_centred_stick(
 
 
 def test_switches_that_are_on_at_the_start_make_no_edge(drive: Drive) -> None:
-    drive.tick(StickInput(reset=True, trip=Reason.SEND_FAILED))
+    drive.tick(CommandInput(reset=True, trip=Reason.SEND_FAILED))
     drive.run(RESET, 0.2)
     assert drive.state is State.TRIPPED
 
@@ -306,7 +314,7 @@ def test_a_command_that_is_no_number_never_reaches_the_valve(
 ) -> None:
     for shaper in (None, Off()):
         drive = drive_with(shaper).moving()
-        drive.tick(StickInput(bad))
+        drive.tick(CommandInput(bad))
         assert (drive.state, drive.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
         assert (drive.axis.raw, drive.axis.command) == (0, 0.0)
         drive.tick(RESET)

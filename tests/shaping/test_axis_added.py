@@ -15,7 +15,7 @@ from canshaper.shaping.axis import MOST_CARRY, Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 BAND = 0.02
@@ -25,7 +25,7 @@ MODE = SwayMode(2.86, 0.05)
 POLES = (-5.655, -4.112)
 DRIVEN = (State.ACTIVE, State.BYPASS_ON)
 DEAF = (State.NEUTRAL_WAIT, State.TRIPPED, State.STOPPING)
-LOST = (Reason.STICK_TIMEOUT, Reason.STICK_ERROR, Reason.SWITCH_INVALID)
+LOST = (Reason.JOYSTICK_TIMEOUT, Reason.JOYSTICK_ERROR, Reason.SWITCH_INVALID)
 TRIPS = (Reason.SEND_FAILED, Reason.LOOP_STALLED)
 SETUPS = [  # limits, and steps of the frame
     (OutputLimits(tail_s=0.4), 125),
@@ -36,15 +36,15 @@ SETUPS = [  # limits, and steps of the frame
     (OutputLimits(tail_s=0.0, rise_per_s=100.0, fall_per_s=100.0, maximum=0.3), 125),
 ]
 
-sticks = st.sampled_from([0.0, BAND, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0]) | st.floats(-1.0, 1.0)
+joysticks = st.sampled_from([0.0, BAND, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0]) | st.floats(-1.0, 1.0)
 velocities = st.one_of(
     st.sampled_from([0.0, 5e-324, -1e-300, 1e-9, 0.004, -0.004, 0.0041, 0.25, -0.25, 0.5, -0.5]),
     st.floats(-0.5, 0.5),
 )
 durations = st.sampled_from([1, 2, 3, 5, 10, 20])
 anything = st.builds(
-    StickInput,
-    command=sticks,
+    CommandInput,
+    command=joysticks,
     fault=st.none() | st.none() | st.sampled_from(LOST),
     enabled=st.booleans(),
     bypass=st.booleans(),
@@ -54,7 +54,7 @@ anything = st.builds(
 
 
 class AskedByAnother(RuleBasedStateMachine):
-    """Drives an axis with stick and added velocity; checks every tick."""
+    """Drives an axis with joystick and added velocity; checks every tick."""
 
     @initialize(setup=st.sampled_from(SETUPS))
     def build(self, setup: tuple[OutputLimits, int]) -> None:
@@ -77,17 +77,19 @@ class AskedByAnother(RuleBasedStateMachine):
         self.slack = 1.5 / (steps * (1.0 - limits.deadband)) + 1e-12
         self.tail = round(limits.tail_s / TICK_S)
         self.falling = math.ceil(limits.maximum / self.fall)
-        self.stick, self.added = StickInput(), 0.0
+        self.joystick, self.added = CommandInput(), 0.0
         self.now = 0
         self.mixed = False  # something was added since the axis was at rest
         self.armed = False
-        self.asked: list[tuple[int, float]] = []  # when which command was given by a usable stick
+        self.asked: list[
+            tuple[int, float]
+        ] = []  # when which command was given by a usable joystick
         self.idle = 0  # ticks for which nobody has asked for anything
         self.keep(2)
 
-    @rule(command=sticks, added=velocities, ticks=durations)
+    @rule(command=joysticks, added=velocities, ticks=durations)
     def push(self, command: float, added: float, ticks: int) -> None:
-        self.stick, self.added = self.stick._replace(command=command), added
+        self.joystick, self.added = self.joystick._replace(command=command), added
         self.keep(ticks)
 
     @rule(added=st.lists(velocities, min_size=1, max_size=20))
@@ -97,31 +99,31 @@ class AskedByAnother(RuleBasedStateMachine):
 
     @rule(cause=st.sampled_from([*LOST, *TRIPS, None]), bypass=st.booleans(), ticks=durations)
     def fail(self, cause: Reason | None, bypass: bool, ticks: int) -> None:
-        """The stick is lost, the axis trips, or the switch is released; the asking goes on."""
-        before = self.stick
+        """The joystick is lost, the axis trips, or the switch is released; the asking goes on."""
+        before = self.joystick
         name = {"trip": cause} if cause in TRIPS else {"fault": cause}
-        self.stick = before._replace(enabled=cause is not None, bypass=bypass, **name)
+        self.joystick = before._replace(enabled=cause is not None, bypass=bypass, **name)
         self.keep(ticks)
-        self.stick = before
+        self.joystick = before
 
     @rule(inputs=st.lists(st.tuples(anything, velocities), min_size=1, max_size=12))
-    def chaos(self, inputs: list[tuple[StickInput, float]]) -> None:
-        before = self.stick
-        for self.stick, self.added in inputs:
+    def chaos(self, inputs: list[tuple[CommandInput, float]]) -> None:
+        before = self.joystick
+        for self.joystick, self.added in inputs:
             self.tick()
-        self.stick = before
+        self.joystick = before
 
     @rule()
     def recover(self) -> None:
-        self.stick = StickInput(enabled=False)
+        self.joystick = CommandInput(enabled=False)
         self.keep(1)
-        self.stick, self.added = StickInput(), 0.0
+        self.joystick, self.added = CommandInput(), 0.0
         self.keep(2)
 
     @rule()
     def let_go(self) -> None:
         """Nothing asked any more: at rest after the tail and the time to fall from full speed."""
-        self.stick, self.added = StickInput(reset=True), 0.0
+        self.joystick, self.added = CommandInput(reset=True), 0.0
         self.keep(self.tail + self.falling + 10)  # stop_s and the way through the states
         assert self.axis.raw == 0
         assert self.axis.state in (State.READY, State.TRIPPED)
@@ -145,7 +147,7 @@ class AskedByAnother(RuleBasedStateMachine):
         self.added = bad
         before = self.axis.state
         self.tick()
-        if before in (*DRIVEN, State.READY) and self.usable and not self.stick.bypass:
+        if before in (*DRIVEN, State.READY) and self.usable and not self.joystick.bypass:
             assert (self.axis.state, self.axis.reason) == (State.TRIPPED, Reason.OUTPUT_INVALID)
         self.added = 0.0
 
@@ -154,26 +156,26 @@ class AskedByAnother(RuleBasedStateMachine):
             self.tick()
 
     def tick(self) -> None:
-        stick, axis = self.stick, self.axis
+        joystick, axis = self.joystick, self.axis
         old, before = axis.state, axis.sent
-        self.usable = stick.fault is None and stick.trip is None and stick.enabled
-        centred = stick.fault is None and abs(stick.command) <= BAND
-        other = copy.deepcopy(axis) if not self.usable or stick.bypass or old in DEAF else None
-        axis.tick(stick, self.added)
+        self.usable = joystick.fault is None and joystick.trip is None and joystick.enabled
+        centred = joystick.fault is None and abs(joystick.command) <= BAND
+        other = copy.deepcopy(axis) if not self.usable or joystick.bypass or old in DEAF else None
+        axis.tick(joystick, self.added)
         self.now += 1
         if other is not None:  # nothing that may be added to
-            other.tick(stick, 0.0)
+            other.tick(joystick, 0.0)
             assert (axis.state, axis.raw, axis.sent) == (other.state, other.raw, other.sent)
             assert axis.applied == other.applied == axis.sent
 
         # what was asked
         if self.usable and self.armed and not centred:
-            self.asked.append((self.now, stick.command))
+            self.asked.append((self.now, joystick.command))
         self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
         if axis.state not in (*DRIVEN, State.STOPPING):  # at rest: it begins from nothing
             self.asked = []
         self.armed = self.usable and (self.armed or centred)
-        carried = self.added if axis.state is State.ACTIVE and not stick.bypass else 0.0
+        carried = self.added if axis.state is State.ACTIVE and not joystick.bypass else 0.0
         self.idle = 0 if self.asked or carried else self.idle + 1
 
         # what may come of it
@@ -185,7 +187,7 @@ class AskedByAnother(RuleBasedStateMachine):
         if axis.state not in (*DRIVEN, State.STOPPING):
             assert axis.raw == 0
         if axis.raw:
-            assert stick.trip is None
+            assert joystick.trip is None
             assert self.usable or axis.state is State.STOPPING
             assert self.idle <= self.falling
         self.mixed = bool(carried) or (self.mixed and axis.raw != 0)
@@ -206,7 +208,7 @@ class AskedByAnother(RuleBasedStateMachine):
         assert math.isfinite(self.shadow.angle + self.shadow.rate)
 
     def check_speed(self, carried: float, before: float) -> None:
-        """No faster than stick, addition and what is owed of it; except while falling."""
+        """No faster than joystick, addition and what is owed of it; except while falling."""
         for sign in (1.0, -1.0):
             allowed = max([0.0, *(sign * c for _, c in self.asked)])
             if self.axis.state in DRIVEN and sign * self.axis.command < 0.0:
@@ -243,7 +245,7 @@ def axis_with(limits: OutputLimits, steps: int = 125) -> Axis:
     model = SwayModel(MODE, TICK_S)
     axis = Axis(TICK_S, limits, sway=model, shaper=Gff(model, POLES), grid_steps=steps)
     axis.allow_added(1.0, 3600.0)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     assert axis.state is State.READY
     return axis
 
@@ -253,15 +255,15 @@ def axis_with(limits: OutputLimits, steps: int = 125) -> Axis:
 def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> None:
     axis = axis_with(OutputLimits(tail_s=0.4))
     for _ in range(10):
-        axis.tick(StickInput(command), 0.2)
-    axis.tick(StickInput(command), bad)
+        axis.tick(CommandInput(command), 0.2)
+    axis.tick(CommandInput(command), bad)
     assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
     assert axis.sway is not None
     assert (axis.sway.angle, axis.sway.rate, axis.applied) == (0.0, 0.0, 0.0)
-    axis.tick(StickInput(enabled=False))
-    axis.tick(StickInput())
-    axis.tick(StickInput())
-    axis.tick(StickInput(), 0.2)
+    axis.tick(CommandInput(enabled=False))
+    axis.tick(CommandInput())
+    axis.tick(CommandInput())
+    axis.tick(CommandInput(), 0.2)
     assert (axis.state, axis.reason) == (State.ACTIVE, Reason.COMPENSATING)
     assert axis.sent > 0.1
 
@@ -273,7 +275,7 @@ def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
     travel = []
     position = 0.0
     for i in range(200):
-        axis.tick(StickInput(), 0.13 * math.sin(2.0 * math.pi * i / 200.0))
+        axis.tick(CommandInput(), 0.13 * math.sin(2.0 * math.pi * i / 200.0))
         position += axis.sent * TICK_S
         travel.append(position)
     # a coarse grid leaves out the first and last part of either way, below half a step
@@ -284,9 +286,9 @@ def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
 def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:
     axis = axis_with(OutputLimits(minimum=0.1, rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(50):
-        axis.tick(StickInput(), 0.05)
+        axis.tick(CommandInput(), 0.05)
         assert axis.raw == 0
-    axis.tick(StickInput(), 0.2)
+    axis.tick(CommandInput(), 0.2)
     assert axis.sent == pytest.approx(0.2 + 1 / 125, abs=0.005)  # a step of what is owed
 
 
@@ -294,43 +296,45 @@ def test_an_addition_of_less_than_half_a_step_is_not_sent() -> None:
     """What is owed of it waits for a motion: it is no reason to twitch."""
     axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(50):
-        axis.tick(StickInput(), 0.003)
+        axis.tick(CommandInput(), 0.003)
         assert axis.raw == 0
 
 
-@pytest.mark.parametrize(("stick", "added"), [(1 / 3, 0.03), (-0.41, 0.0271), (0.25, -0.05)])
-def test_in_the_long_run_stick_and_addition_are_sent_in_full(stick: float, added: float) -> None:
+@pytest.mark.parametrize(("joystick", "added"), [(1 / 3, 0.03), (-0.41, 0.0271), (0.25, -0.05)])
+def test_in_the_long_run_joystick_and_addition_are_sent_in_full(
+    joystick: float, added: float
+) -> None:
     """Where the operator asked for more within the tail."""
     limits = OutputLimits(rise_per_s=100.0, fall_per_s=100.0, tail_s=20.0)
     axis = Axis(TICK_S, limits, sway=None, shaper=Off())
     axis.allow_added(LARGEST, 1.0)
-    axis.tick(StickInput())
-    axis.tick(StickInput(math.copysign(1.0, stick)))
+    axis.tick(CommandInput())
+    axis.tick(CommandInput(math.copysign(1.0, joystick)))
     sent = 0.0
     for _ in range(200):
-        axis.tick(StickInput(stick), added)
+        axis.tick(CommandInput(joystick), added)
         sent += axis.sent
-    assert sent == pytest.approx(200 * (stick + added), abs=0.02)
+    assert sent == pytest.approx(200 * (joystick + added), abs=0.02)
 
 
 def test_what_was_owed_is_forgotten_at_rest() -> None:
     limits = OutputLimits(rise_per_s=1.0, tail_s=0.0)
     axis, fresh = axis_with(limits), axis_with(limits)
     for added in (0.5, 0.5, 0.0, 0.0):
-        axis.tick(StickInput(), added)
+        axis.tick(CommandInput(), added)
     assert axis.state is State.READY
     for _ in range(5):
-        axis.tick(StickInput(), 0.02)
-        fresh.tick(StickInput(), 0.02)
+        axis.tick(CommandInput(), 0.02)
+        fresh.tick(CommandInput(), 0.02)
         assert axis.raw == fresh.raw
 
 
 def test_a_change_of_filter_in_motion_joins_with_an_addition_too() -> None:
     axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(4):  # after that the filter brakes against its model's swing
-        axis.tick(StickInput(0.8), -0.2)
+        axis.tick(CommandInput(0.8), -0.2)
     before = axis.sent
     assert before == pytest.approx(0.6)
     axis.retune(MODE, lambda model: Gff(model, (-1.5, -1.5)))
-    axis.tick(StickInput(0.8), -0.2)
+    axis.tick(CommandInput(0.8), -0.2)
     assert axis.sent == pytest.approx(before, abs=0.01)

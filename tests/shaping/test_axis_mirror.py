@@ -7,7 +7,7 @@ import pytest
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -24,18 +24,18 @@ def axis_with(limits: OutputLimits) -> Axis:
     return Axis(TICK_S, limits, sway=model, shaper=Gff(model, (-5.655, -4.112)))
 
 
-def busy(seed: int) -> list[tuple[StickInput, float]]:
+def busy(seed: int) -> list[tuple[CommandInput, float]]:
     """Strokes, rests, bypass and lost frames, with velocities asked by another axis."""
     source = random.Random(seed)
-    inputs: list[tuple[StickInput, float]] = [(StickInput(), 0.0)] * 2
+    inputs: list[tuple[CommandInput, float]] = [(CommandInput(), 0.0)] * 2
     while len(inputs) < 1500:
-        stick = StickInput(
+        joystick = CommandInput(
             source.choice([0.0, 0.0, 1.0, 0.02, source.uniform(-1.0, 1.0)]),
-            fault=Reason.STICK_TIMEOUT if source.random() < 0.05 else None,
+            fault=Reason.JOYSTICK_TIMEOUT if source.random() < 0.05 else None,
             bypass=source.random() < 0.1,
         )
         added = source.choice([0.0, 0.0, source.uniform(-0.3, 0.3)])
-        inputs += [(stick, added)] * source.randint(1, 60)
+        inputs += [(joystick, added)] * source.randint(1, 60)
     return inputs
 
 
@@ -44,9 +44,9 @@ def busy(seed: int) -> list[tuple[StickInput, float]]:
 def test_the_mirror_image_of_a_drive(limits: OutputLimits, seed: int) -> None:
     one, other = axis_with(limits), axis_with(limits)
     moved = set()
-    for stick, added in busy(seed):
-        changed = one.tick(stick, added)
-        assert other.tick(stick._replace(command=-stick.command), -added) == changed
+    for joystick, added in busy(seed):
+        changed = one.tick(joystick, added)
+        assert other.tick(joystick._replace(command=-joystick.command), -added) == changed
         assert (other.raw, other.sent, other.applied) == (-one.raw, -one.sent, -one.applied)
         assert (other.commanded, other.neutral) == (one.commanded, one.neutral)
         moved.add(one.raw > 0)
@@ -69,25 +69,29 @@ class Pausing:
 def test_an_axis_at_rest_in_the_middle_of_its_run_on_is_not_done(sign: float) -> None:
     """The filter rests, but may ask for more: the tail decides, not the moment."""
     axis = Axis(TICK_S, OutputLimits(tail_s=1.0), sway=None, shaper=Pausing(sign))
-    for stick in [StickInput(), *[StickInput(sign)] * 20]:
-        axis.tick(stick)
+    for joystick in [CommandInput(), *[CommandInput(sign)] * 20]:
+        axis.tick(joystick)
     sent = []
     for _ in range(50):
-        axis.tick(StickInput())
+        axis.tick(CommandInput())
         assert (axis.state, axis.commanded, axis.neutral) == (State.ACTIVE, True, False)
         sent.append(axis.sent)
     assert sent[25] == 0.0
     assert sent[-1] == pytest.approx(0.4 * sign, abs=0.01)
     for _ in range(20):
-        axis.tick(StickInput())
+        axis.tick(CommandInput())
     assert (axis.state, axis.reason, axis.commanded) == (State.READY, Reason.AT_REST, False)
     assert axis.neutral
 
 
 def test_a_stopping_axis_is_not_neutral_and_a_tripped_one_is() -> None:
     axis = axis_with(LIMITS[0])
-    for stick in [StickInput(), *[StickInput(1.0)] * 20, StickInput(fault=Reason.STICK_TIMEOUT)]:
-        axis.tick(stick)
+    for joystick in [
+        CommandInput(),
+        *[CommandInput(1.0)] * 20,
+        CommandInput(fault=Reason.JOYSTICK_TIMEOUT),
+    ]:
+        axis.tick(joystick)
     assert (axis.state, axis.neutral) == (State.STOPPING, False)
-    axis.tick(StickInput(trip=Reason.SEND_FAILED))
+    axis.tick(CommandInput(trip=Reason.SEND_FAILED))
     assert (axis.state, axis.neutral) == (State.TRIPPED, True)

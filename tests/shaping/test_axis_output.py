@@ -13,7 +13,7 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.transfer import BLEND_S
 
@@ -26,7 +26,7 @@ FREE = OutputLimits(
     rise_per_s=100.0, fall_per_s=100.0, tail_s=2.0, allow_faster=True, allow_reverse=True
 )
 FINE = 1_000_000  # grid steps: rounding far below what is looked at
-LOST = StickInput(fault=Reason.STICK_TIMEOUT)
+LOST = CommandInput(fault=Reason.JOYSTICK_TIMEOUT)
 
 
 class Stubborn:
@@ -53,13 +53,13 @@ def largest_step(sent: Sequence[float]) -> float:
 
 def join(drive: Drive, what: str, after_s: float) -> tuple[float, list[float]]:
     """Bypass on or off or a retune in motion; what was sent last, and what in the 0.1 s after."""
-    drive.to_ready().run(StickInput(0.2, bypass=what == "bypass off"), after_s)
+    drive.to_ready().run(CommandInput(0.2, bypass=what == "bypass off"), after_s)
     if what == "bypass off":  # leave a swing behind, so that the filter wants something else
-        drive.run(StickInput(0.1, bypass=True), 0.2)
+        drive.run(CommandInput(0.1, bypass=True), 0.2)
     elif what == "retune":
         drive.axis.retune(NEW_MODE, new_filter)
     last, before = drive.axis.sent, len(drive.sent)
-    drive.run(StickInput(0.2, bypass=what == "bypass on"), 0.1)
+    drive.run(CommandInput(0.2, bypass=what == "bypass on"), 0.1)
     return last, drive.sent[before:]
 
 
@@ -74,7 +74,7 @@ def test_a_change_in_motion_joins_and_fades(
         last, sent = join(drive, what, after_s)
         assert sent[0] == pytest.approx(last, abs=2e-6)  # nothing jumps,
         steps.append(largest_step([last, *sent]))
-        drive.run(StickInput(0.2, bypass=what == "bypass on"), 12.0)
+        drive.run(CommandInput(0.2, bypass=what == "bypass on"), 12.0)
         assert drive.axis.sent == pytest.approx(0.2, abs=1e-3)  # and nothing stays;
     # continuous: a quarter of the tick, about a quarter of the largest step.
     assert steps[1] < 0.35 * steps[0] + 1e-5
@@ -87,7 +87,7 @@ def test_the_difference_at_a_change_fades_with_its_time_constant(drive_with: Dri
 
     drive = drive_with(Half(), FREE, grid_steps=FINE).moving(0.8)
     for k in range(60):
-        drive.tick(StickInput(0.8, bypass=True))
+        drive.tick(CommandInput(0.8, bypass=True))
         expected = 0.8 - 0.4 * math.exp(-k * TICK_S / BLEND_S)
         assert drive.axis.sent == pytest.approx(expected, abs=2e-6)
 
@@ -96,13 +96,13 @@ def test_the_time_constant_is_the_documented_one() -> None:
     assert BLEND_S == 0.3  # docs/states.md
 
 
-def test_a_bypass_from_rest_gives_the_stick_at_once(drive_with: DriveWith) -> None:
+def test_a_bypass_from_rest_gives_the_joystick_at_once(drive_with: DriveWith) -> None:
     drive = drive_with(limits=FREE, grid_steps=FINE)
     for command in (0.8, -0.6):
-        drive.to_ready().tick(StickInput(command, bypass=True))
+        drive.to_ready().tick(CommandInput(command, bypass=True))
         assert drive.state is State.BYPASS_ON
         assert drive.axis.sent == pytest.approx(command, abs=2e-6)
-        drive.run(StickInput(bypass=True), 3.0)
+        drive.run(CommandInput(bypass=True), 3.0)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -116,7 +116,7 @@ def test_no_change_beats_the_rates(drive_with: DriveWith, seed: int) -> None:
             mode = SwayMode(rng.uniform(1.5, 5.0), rng.uniform(0.0, 0.3))
             pole = -rng.uniform(1.0, 6.0)
             drive.axis.retune(mode, lambda sway, pole=pole: Gff(sway, (pole, pole)))
-        drive.run(StickInput(rng.uniform(-1.0, 1.0), bypass=bypass), 0.1)
+        drive.run(CommandInput(rng.uniform(-1.0, 1.0), bypass=bypass), 0.1)
     assert largest_step(drive.sent) <= 4.0 * TICK_S + 1.0 / 125 + 1e-12
     growth = [abs(b) - abs(a) for a, b in itertools.pairwise(drive.sent)]
     assert max(growth) <= 2.0 * TICK_S + 1.0 / 125 + 1e-12
@@ -136,12 +136,12 @@ def test_a_retune_to_the_same_filter_changes_next_to_nothing(drive_with: DriveWi
     drive, other = (drive_with(grid_steps=FINE) for _ in range(2))
     for each in (drive, other):
         each.axis.retune(each.axis.sway.mode, lagged)
-        each.run(StickInput(), 0.1)
-        each.run(StickInput(0.8), 0.2)
+        each.run(CommandInput(), 0.1)
+        each.run(CommandInput(0.8), 0.2)
     drive.axis.retune(drive.axis.sway.mode, lagged)
     for each in (drive, other):
-        each.run(StickInput(0.8), 1.0)
-        each.run(StickInput(), 2.0)
+        each.run(CommandInput(0.8), 1.0)
+        each.run(CommandInput(), 2.0)
     # The join holds the output for a tick, which fades; nothing is added to that.
     differences = [abs(a - b) for a, b in zip(drive.sent, other.sent, strict=True)]
     held = next(difference for difference in differences if difference)
@@ -150,10 +150,10 @@ def test_a_retune_to_the_same_filter_changes_next_to_nothing(drive_with: DriveWi
 
 def test_an_axis_without_sway_can_be_given_one() -> None:
     axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     axis.hold(3)
     axis.retune(NEW_MODE, new_filter)
-    axis.tick(StickInput(0.8))
+    axis.tick(CommandInput(0.8))
     assert axis.sway is not None
     assert axis.sway.rate != 0.0
 
@@ -164,8 +164,8 @@ def test_a_retune_that_fails_changes_nothing(drive_with: DriveWith, mode: SwayMo
     with pytest.raises(ValueError, match=r"pole: expected .*, got -60 rad/s"):
         drive.axis.retune(mode, lambda sway: Gff(sway, (-60.0, -3.0)))
     for each in (drive, other):
-        each.run(StickInput(0.5), 1.0)
-        each.run(StickInput(), 2.0)
+        each.run(CommandInput(0.5), 1.0)
+        each.run(CommandInput(), 2.0)
     assert drive.raw == other.raw
     assert drive.axis.sway.angle == other.axis.sway.angle
 
@@ -190,11 +190,11 @@ def test_late_ticks_lengthen_neither_a_stop_nor_the_run_on(
     drive_with: DriveWith, missed: int
 ) -> None:
     limits = OutputLimits(rise_per_s=50.0, fall_per_s=50.0, tail_s=1.0)
-    for stick, bound_s in ((LOST, 0.6), (StickInput(), 1.0)):
+    for joystick, bound_s in ((LOST, 0.6), (CommandInput(), 1.0)):
         drive = drive_with(Stubborn(), limits, stop_s=0.6).moving()
         ticks = 0
         while drive.axis.raw and ticks < 200:
-            drive.tick(stick)
+            drive.tick(joystick)
             drive.axis.hold(missed)
             ticks += 1
         # the last output stays until the tick after the bound
@@ -211,9 +211,9 @@ def test_the_model_knows_what_the_frame_carries(
 ) -> None:
     limits = OutputLimits(deadband=deadband, tail_s=1.0, maximum=0.9)
     drive = drive_with(limits=limits, grid_steps=steps).moving(1.0)
-    drive.run(StickInput(0.3), 0.5)
-    drive.run(StickInput(-0.7), 1.0)
-    drive.run(StickInput(), 3.0)
+    drive.run(CommandInput(0.3), 0.5)
+    drive.run(CommandInput(-0.7), 1.0)
+    drive.run(CommandInput(), 3.0)
     assert any(drive.raw)
     valve = SwayModel(drive.model.mode, TICK_S)
     for raw, sent in zip(drive.raw, drive.sent, strict=True):
@@ -229,17 +229,17 @@ def test_a_coarse_frame_does_not_hold_up_a_slow_rate(drive_with: DriveWith) -> N
     """One tick's growth is a fortieth of a step: rounding must not swallow it."""
     limits = OutputLimits(rise_per_s=0.2, fall_per_s=1.0)
     drive = drive_with(Off(), limits, grid_steps=10).to_ready()
-    drive.run(StickInput(1.0), 5.1)
+    drive.run(CommandInput(1.0), 5.1)
     assert drive.axis.raw == 10
 
 
 def test_after_a_trip_nothing_is_left_of_the_command_before_it(drive_with: DriveWith) -> None:
     drive = drive_with(Stubborn(), OutputLimits(tail_s=2.0)).moving(1.0)
-    drive.tick(StickInput(1.0, trip=Reason.SEND_FAILED))
-    drive.tick(StickInput(reset=True))
+    drive.tick(CommandInput(1.0, trip=Reason.SEND_FAILED))
+    drive.tick(CommandInput(reset=True))
     drive.to_ready()
     before = len(drive.sent)
-    drive.run(StickInput(0.2), 1.0)
+    drive.run(CommandInput(0.2), 1.0)
     assert max(drive.sent[before:]) <= 0.2
 
 
@@ -254,11 +254,11 @@ def test_every_stop_has_its_full_time(drive_with: DriveWith) -> None:
 
 def test_below_the_minimum_the_output_is_zero(drive_with: DriveWith) -> None:
     drive = drive_with(Off(), OutputLimits(minimum=0.2)).to_ready()
-    drive.run(StickInput(0.19), 1.0)
+    drive.run(CommandInput(0.19), 1.0)
     assert not any(drive.raw)
-    drive.run(StickInput(0.21), 1.0)
+    drive.run(CommandInput(0.21), 1.0)
     assert drive.axis.sent == pytest.approx(0.21, abs=0.01)
-    drive.run(StickInput(0.19), 1.0)
+    drive.run(CommandInput(0.19), 1.0)
     assert drive.axis.raw == 0
 
 
@@ -267,14 +267,14 @@ def test_the_default_output_stays_between_zero_and_the_recent_command(drive: Dri
     assert min(drive.sent) >= 0.0
     assert max(drive.sent) <= 0.6
     before = len(drive.sent)
-    drive.run(StickInput(-0.4), 1.5)
+    drive.run(CommandInput(-0.4), 1.5)
     falling = [v for v in drive.sent[before:] if v > 0.0]
     assert falling == sorted(falling, reverse=True)
     assert min(drive.sent[before:]) >= -0.4
 
 
 @pytest.mark.parametrize("bypass", [False, True])
-def test_a_stick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -> None:
+def test_a_joystick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -> None:
     """Cut off behind the filter, two thirds of the swing would come back."""
     limits = OutputLimits(maximum=0.4, rise_per_s=5.0, fall_per_s=5.0)
 
@@ -287,7 +287,7 @@ def test_a_stick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -> N
                 new = SwayMode(2.5, 0.03)
                 axis.retune(new, lambda model: Gff(model, (-2.2, -2.7)))
             command = 0.0 if number < 2 else (full, -full, 0.0)[number // 100 % 3]
-            axis.tick(StickInput(command, bypass=bypass))
+            axis.tick(CommandInput(command, bypass=bypass))
             found.append(axis.sent)
         return found
 
@@ -298,11 +298,11 @@ def test_limits_change_in_neutral_and_hold_from_then_on() -> None:
     sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
     axis = Axis(0.02, OutputLimits(), sway=sway, shaper=Off(), grid_steps=10_000)
     slow = OutputLimits(maximum=0.5, rise_per_s=1.0, fall_per_s=2.0)
-    axis.tick(StickInput(0.0))
+    axis.tick(CommandInput(0.0))
     axis.limit(slow)
     sent = []
     for number in range(100):
-        axis.tick(StickInput(1.0 if number < 50 else 0.0))
+        axis.tick(CommandInput(1.0 if number < 50 else 0.0))
         sent.append(axis.sent)
         if number == 10:
             with pytest.raises(ValueError, match=r"^limits change in neutral only$"):
@@ -323,7 +323,7 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
         truth, sway = model.retuned(model.mode, 0.0), model.retuned(model.mode, 0.0)
         shaper = build_shaper(kind, 0.02, sway, valve_rate_per_s=5.0, **options[kind])
         axis = Axis(0.02, OutputLimits(), sway=sway, shaper=shaper)
-        axis.tick(StickInput())
+        axis.tick(CommandInput())
         largest, now = 0.0, 0
         while now < 600:
             if now % 7 == 0 and missed:
@@ -331,7 +331,7 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
                 for _ in range(missed):
                     truth.step(axis.sent)
                 now += missed
-            axis.tick(StickInput(0.7 if now < 200 else 0.0))
+            axis.tick(CommandInput(0.7 if now < 200 else 0.0))
             truth.step(axis.sent)
             now += 1
             if now > 450:
@@ -378,7 +378,7 @@ def test_in_missed_ticks_the_filter_sees_the_last_command(drive_with: DriveWith)
     drive = drive_with(limits=OutputLimits(maximum=0.5))
     drive.moving()
     drive.axis._transfer._shaper = Seen()
-    for stick in (0.3, -0.8):
-        drive.tick(StickInput(stick))
+    for joystick in (0.3, -0.8):
+        drive.tick(CommandInput(joystick))
         drive.axis.hold(2)
     assert commands == [0.3] * 3 + [-0.5] * 3

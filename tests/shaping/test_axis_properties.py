@@ -15,14 +15,19 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput, Transition
+from canshaper.shaping.states import CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 BAND = 0.02
 MODE = SwayMode(2.86, 0.05)
 DRIVEN = (State.ACTIVE, State.BYPASS_ON)
 MAY_MOVE = (*DRIVEN, State.STOPPING)
-LOST = (Reason.STICK_TIMEOUT, Reason.STICK_ERROR, Reason.STICK_NOT_A_NUMBER, Reason.SWITCH_INVALID)
+LOST = (
+    Reason.JOYSTICK_TIMEOUT,
+    Reason.JOYSTICK_ERROR,
+    Reason.JOYSTICK_NOT_A_NUMBER,
+    Reason.SWITCH_INVALID,
+)
 TRIPS = (Reason.SEND_FAILED, Reason.LOOP_STALLED)
 CAUSES = [*(("fault", reason) for reason in LOST), *(("trip", reason) for reason in TRIPS)]
 SWITCHES = ("enabled", "bypass", "reset")
@@ -73,15 +78,15 @@ SETUPS = [
     Setup(OutputLimits(tail_s=0.1, rise_per_s=50.0, fall_per_s=4.0), filter="wild", stop_s=0.1),
 ]
 
-sticks = st.one_of(
+joysticks = st.one_of(
     st.sampled_from([0.0, BAND, -BAND, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0]),
     st.floats(-1.0, 1.0),
 )
 durations = st.sampled_from([1, 2, 3, 5, 10, 20, 40])
 modes = st.builds(SwayMode, st.floats(1.0, 6.0), st.floats(0.0, 0.5))
 anything = st.builds(
-    StickInput,
-    command=sticks,
+    CommandInput,
+    command=joysticks,
     fault=st.none() | st.sampled_from(LOST),
     enabled=st.booleans(),
     bypass=st.booleans(),
@@ -109,11 +114,11 @@ class AxisUnderWatch(RuleBasedStateMachine):
         self.slack = 1.5 / (setup.steps * (1.0 - limits.deadband)) + 1e-12
         self.tail = round(limits.tail_s / setup.tick_s)
         self.stop = max(1, round(setup.stop_s / setup.tick_s))
-        self.stick = StickInput()
+        self.joystick = CommandInput()
         # the oracle's memory
         self.now = 0
-        self.armed = False  # stick seen valid, enabled and neutral since it last was not usable
-        self.asked: list[tuple[int, float]] = []  # when which command was given by such a stick
+        self.armed = False  # joystick seen valid, enabled and neutral since it last was not usable
+        self.asked: list[tuple[int, float]] = []  # when which command was given by such a joystick
         self.overtime = 0  # ticks since the tail after the last of them ended
         self.stop_from = 0
         self.enabled_before = self.reset_before = True
@@ -124,11 +129,11 @@ class AxisUnderWatch(RuleBasedStateMachine):
             return Gff(model, poles)
         return self.wild if self.setup.filter == "wild" else Off()
 
-    @rule(command=sticks, ticks=durations)
+    @rule(command=joysticks, ticks=durations)
     def push(self, command: float, ticks: int) -> None:
-        self.keep(self.stick._replace(command=command), ticks)
+        self.keep(self.joystick._replace(command=command), ticks)
 
-    @rule(command=sticks, ticks=durations, then=durations)
+    @rule(command=joysticks, ticks=durations, then=durations)
     def stroke(self, command: float, ticks: int, then: int) -> None:
         """Get going, if need be, and reverse."""
         if self.axis.state not in (State.READY, *DRIVEN):
@@ -139,27 +144,27 @@ class AxisUnderWatch(RuleBasedStateMachine):
     @rule()
     def recover(self) -> None:
         """What an operator does when nothing moves: let go, switch off and on."""
-        self.stick = StickInput(bypass=self.stick.bypass)
-        self.keep(self.stick._replace(enabled=False), 1)
-        self.keep(self.stick, 2)
+        self.joystick = CommandInput(bypass=self.joystick.bypass)
+        self.keep(self.joystick._replace(enabled=False), 1)
+        self.keep(self.joystick, 2)
 
     @rule(cause=st.sampled_from(CAUSES), ticks=durations, then=st.lists(anything, max_size=5))
-    def fail(self, cause: tuple[str, Reason], ticks: int, then: list[StickInput]) -> None:
+    def fail(self, cause: tuple[str, Reason], ticks: int, then: list[CommandInput]) -> None:
         name, reason = cause
-        self.keep(self.stick._replace(**{name: reason}), ticks)
-        self.stick = self.stick._replace(**{name: None})
+        self.keep(self.joystick._replace(**{name: reason}), ticks)
+        self.joystick = self.joystick._replace(**{name: None})
         self.chaos(then)
 
     @rule(name=st.sampled_from(SWITCHES), on=st.booleans(), ticks=durations)
     def switch(self, name: str, on: bool, ticks: int) -> None:
-        self.keep(self.stick._replace(**{name: on}), ticks)
+        self.keep(self.joystick._replace(**{name: on}), ticks)
 
     @rule(inputs=st.lists(anything, min_size=1, max_size=12))
-    def chaos(self, inputs: list[StickInput]) -> None:
-        before = self.stick
-        for self.stick in inputs:
+    def chaos(self, inputs: list[CommandInput]) -> None:
+        before = self.joystick
+        for self.joystick in inputs:
             self.tick()
-        self.stick = before
+        self.joystick = before
 
     @rule(ticks=st.integers(1, 10))
     def miss(self, ticks: int) -> None:
@@ -174,27 +179,27 @@ class AxisUnderWatch(RuleBasedStateMachine):
         self.axis.retune(mode, lambda model: self.shaper(model, (pole, 1.5 * pole)))
         fresh = SwayModel(mode, self.setup.tick_s)
         self.shadow = self.shadow.retuned(mode, self.axis.sent) if known else fresh
-        self.keep(self.stick, ticks)
+        self.keep(self.joystick, ticks)
 
-    @rule(says=st.one_of(sticks, st.sampled_from([1e300, -1e300, math.nan, math.inf])))
+    @rule(says=st.one_of(joysticks, st.sampled_from([1e300, -1e300, math.nan, math.inf])))
     def filter_says(self, says: float) -> None:
         self.wild.says = says
 
-    def keep(self, stick: StickInput, ticks: int) -> None:
-        self.stick = stick
+    def keep(self, joystick: CommandInput, ticks: int) -> None:
+        self.joystick = joystick
         for _ in range(ticks):
             self.tick()
 
     def tick(self) -> None:
-        stick, axis = self.stick, self.axis
+        joystick, axis = self.joystick, self.axis
         old, sent_before = axis.state, axis.sent
-        transition = axis.tick(stick)
+        transition = axis.tick(joystick)
         self.now += 1
         if axis.state is State.TRIPPED and axis.reason is Reason.OUTPUT_INVALID and transition:
             self.shadow = SwayModel(self.shadow.mode, self.setup.tick_s)
         self.shadow.step(axis.sent)
-        self.usable = stick.fault is None and stick.trip is None and stick.enabled
-        self.centred = stick.fault is None and abs(stick.command) <= BAND
+        self.usable = joystick.fault is None and joystick.trip is None and joystick.enabled
+        self.centred = joystick.fault is None and abs(joystick.command) <= BAND
         self.remember()
         self.check_frame()
         self.check_way(old, transition, sent_before)
@@ -205,7 +210,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def remember(self) -> None:
         """What the operator asked for, by the inputs alone."""
         if self.usable and self.armed and not self.centred:
-            self.asked.append((self.now, self.stick.command))
+            self.asked.append((self.now, self.joystick.command))
         self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
         self.overtime = 0 if self.asked else self.overtime + 1
         self.armed = self.usable and (self.armed or self.centred)
@@ -225,7 +230,7 @@ class AxisUnderWatch(RuleBasedStateMachine):
 
     def check_way(self, old: State, transition: Transition | None, before: float) -> None:
         """The state machine goes only ways it has, and leaves a trip only as it may."""
-        stick, axis = self.stick, self.axis
+        joystick, axis = self.joystick, self.axis
         if axis.state is old:
             assert transition is None
         else:
@@ -237,30 +242,30 @@ class AxisUnderWatch(RuleBasedStateMachine):
             assert old is not State.READY or axis.state not in DRIVEN or not self.centred
         if old is State.TRIPPED and axis.state is not State.TRIPPED:
             assert self.centred
-            assert stick.trip is None
-            reset = stick.reset and not self.reset_before
-            assert reset or (stick.enabled and not self.enabled_before)
-        held = self.reset_before and stick.fault is not None
-        self.reset_before = stick.reset or held
-        unknown = stick.fault in (Reason.STICK_TIMEOUT, Reason.STICK_UNTRUSTED)
-        self.enabled_before = stick.enabled or unknown
+            assert joystick.trip is None
+            reset = joystick.reset and not self.reset_before
+            assert reset or (joystick.enabled and not self.enabled_before)
+        held = self.reset_before and joystick.fault is not None
+        self.reset_before = joystick.reset or held
+        unknown = joystick.fault in (Reason.JOYSTICK_TIMEOUT, Reason.JOYSTICK_UNTRUSTED)
+        self.enabled_before = joystick.enabled or unknown
         self.stop_from = self.stop_from if old is State.STOPPING else self.now
         ended = self.now - self.stop_from >= self.stop
         assert not ended or axis.state is not State.STOPPING
         if old is State.STOPPING and axis.state is State.NEUTRAL_WAIT:
             assert ended or before == 0.0
         driven = axis.state in DRIVEN and not self.centred
-        assert axis.command == (stick.command if driven else 0.0)
+        assert axis.command == (joystick.command if driven else 0.0)
 
     def check_cause(self) -> None:
         """No motion without a fresh, valid, enabled command within the bounded times."""
-        stick, axis = self.stick, self.axis
+        joystick, axis = self.joystick, self.axis
         if axis.raw == 0:
             return
         assert axis.state in MAY_MOVE
-        assert stick.trip is None
-        assert stick.fault is not None or stick.enabled
-        assert stick.fault is None or axis.state is State.STOPPING
+        assert joystick.trip is None
+        assert joystick.fault is not None or joystick.enabled
+        assert joystick.fault is None or axis.state is State.STOPPING
         # after the tail, as long as it takes to fall from full speed
         assert self.overtime <= math.ceil(self.limits.maximum / self.fall)
 

@@ -9,7 +9,7 @@ from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput, Transition
+from canshaper.shaping.states import CommandInput, Reason, State, Transition
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 Drive = Any  # the class of conftest.py
@@ -18,7 +18,7 @@ DriveWith = Callable[..., Any]
 TICK_S = 0.02
 MODE = SwayMode(2.86, 0.05)
 OTHER = SwayMode(2.2, 0.02)
-CENTRED = StickInput()
+CENTRED = CommandInput()
 
 
 class Stubborn:
@@ -57,42 +57,42 @@ def test_a_retune_before_the_first_tick_is_a_start_with_the_new_filter() -> None
     axis.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
     assert axis.sway is not None
     assert (axis.sway.angle, axis.sway.rate) == (0.0, 0.0)
-    for stick in [CENTRED, CENTRED, *[StickInput(0.7)] * 60, *[CENTRED] * 60]:
-        assert axis.tick(stick) == right.tick(stick)
+    for joystick in [CENTRED, CENTRED, *[CommandInput(0.7)] * 60, *[CENTRED] * 60]:
+        assert axis.tick(joystick) == right.tick(joystick)
         assert (axis.raw, axis.applied) == (right.raw, right.applied)
     assert axis.sway.angle == model.angle
     waiting = new_axis()
     waiting.retune(OTHER, lambda sway: Gff(sway, (-2.0, -2.5)))
-    assert waiting.tick(StickInput(0.5)) is None
-    assert (waiting.reason, waiting.raw) == (Reason.STICK_NOT_NEUTRAL, 0)
+    assert waiting.tick(CommandInput(0.5)) is None
+    assert (waiting.reason, waiting.raw) == (Reason.JOYSTICK_NOT_NEUTRAL, 0)
 
 
 def test_a_switch_that_was_never_seen_off_makes_no_edge(drive: Drive) -> None:
     """Tripped before the first valid frame: enabled from the first one on is no rising edge."""
-    drive.tick(StickInput(trip=Reason.SEND_FAILED, fault=Reason.STICK_TIMEOUT))
+    drive.tick(CommandInput(trip=Reason.SEND_FAILED, fault=Reason.JOYSTICK_TIMEOUT))
     drive.run(CENTRED, 0.2)
     assert drive.state is State.TRIPPED
-    assert drive.tick(StickInput(enabled=False)) is None
+    assert drive.tick(CommandInput(enabled=False)) is None
     assert drive.tick(CENTRED) == Transition(State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET)
 
 
 def test_nor_does_a_reset_switch_that_was_pressed_in_the_first_valid_frame(drive: Drive) -> None:
-    drive.tick(StickInput(trip=Reason.SEND_FAILED, fault=Reason.STICK_TIMEOUT))
-    drive.run(StickInput(reset=True), 0.2)
+    drive.tick(CommandInput(trip=Reason.SEND_FAILED, fault=Reason.JOYSTICK_TIMEOUT))
+    drive.run(CommandInput(reset=True), 0.2)
     assert drive.state is State.TRIPPED
     assert drive.tick(CENTRED) is None
-    assert drive.tick(StickInput(reset=True)) == Transition(
+    assert drive.tick(CommandInput(reset=True)) == Transition(
         State.TRIPPED, State.NEUTRAL_WAIT, Reason.RESET
     )
 
 
 def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
     axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn())
-    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
-        axis.tick(stick)
+    for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
+        axis.tick(joystick)
     stopping = 0
     while axis.raw:
-        axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+        axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
         stopping += 1
     assert stopping == round(2.0 / TICK_S) + 1
     assert axis.reason is Reason.STOP_DONE
@@ -100,19 +100,19 @@ def test_a_stop_takes_two_seconds_at_most_where_nothing_else_is_said() -> None:
 
 def test_a_stop_shorter_than_a_tick_is_one_tick() -> None:
     axis = Axis(TICK_S, OutputLimits(tail_s=9.0), sway=None, shaper=Stubborn(), stop_s=0.001)
-    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
-        axis.tick(stick)
-    axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+    for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
+        axis.tick(joystick)
+    axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
     assert (axis.state, axis.raw) == (State.STOPPING, 125)
-    axis.tick(StickInput(fault=Reason.STICK_TIMEOUT))
+    axis.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
     assert (axis.state, axis.raw) == (State.NEUTRAL_WAIT, 0)
 
 
 def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
     """The frame of ISO 11783-7: 125 steps to either side."""
     axis = Axis(TICK_S, OutputLimits(), sway=None, shaper=Off())
-    for stick in [CENTRED, *[StickInput(1.0)] * 20]:
-        axis.tick(stick)
+    for joystick in [CENTRED, *[CommandInput(1.0)] * 20]:
+        axis.tick(joystick)
     assert axis.raw == 125
 
 
@@ -122,10 +122,10 @@ def test_full_speed_is_125_steps_where_nothing_else_is_said() -> None:
 def test_the_anti_sway_switch_is_named_as_the_reason(drive: Drive) -> None:
     drive.to_ready()
     requested, released = Reason.BYPASS_REQUESTED, Reason.BYPASS_RELEASED
-    bypassed = StickInput(0.8, bypass=True)
+    bypassed = CommandInput(0.8, bypass=True)
     assert drive.tick(bypassed) == Transition(State.READY, State.BYPASS_ON, requested)
     assert drive.axis.reason is requested
-    assert drive.tick(StickInput(0.8)) == Transition(State.BYPASS_ON, State.ACTIVE, released)
+    assert drive.tick(CommandInput(0.8)) == Transition(State.BYPASS_ON, State.ACTIVE, released)
     assert drive.tick(bypassed) == Transition(State.ACTIVE, State.BYPASS_ON, requested)
 
 
@@ -141,29 +141,29 @@ def test_full_speed_may_be_added(drive_with: DriveWith, sign: float) -> None:
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: float) -> None:
     """As at rest: nobody can hold an axis in motion where nobody could have started it."""
-    drive.moving(0.8 * sign).tick(StickInput(0.02 * sign))
+    drive.moving(0.8 * sign).tick(CommandInput(0.02 * sign))
     assert drive.axis.command == 0.0
-    drive.tick(StickInput(0.021 * sign))
+    drive.tick(CommandInput(0.021 * sign))
     assert drive.axis.command == 0.021 * sign
-    (ready,) = drive.run(StickInput(0.02 * sign), 3.0)
+    (ready,) = drive.run(CommandInput(0.02 * sign), 3.0)
     assert (ready.new, ready.reason) == (State.READY, Reason.AT_REST)
 
 
 def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(drive: Drive) -> None:
     drive.axis.restore(State.TRIPPED, Reason.EMERGENCY_STOP)
-    drive.run(StickInput(), 0.2)
+    drive.run(CommandInput(), 0.2)
     assert drive.state is State.TRIPPED
 
 
-def test_with_the_enable_off_a_stick_that_tells_nothing_is_no_news(drive: Drive) -> None:
-    drive.tick(StickInput(fault=Reason.STICK_NOT_AVAILABLE, enabled=False))
+def test_with_the_enable_off_a_joystick_that_tells_nothing_is_no_news(drive: Drive) -> None:
+    drive.tick(CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE, enabled=False))
     assert drive.axis.reason is Reason.ENABLE_OFF
-    drive.tick(StickInput(fault=Reason.STICK_NOT_AVAILABLE))
-    assert drive.axis.reason is Reason.STICK_NOT_AVAILABLE
+    drive.tick(CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE))
+    assert drive.axis.reason is Reason.JOYSTICK_NOT_AVAILABLE
 
 
 @pytest.mark.parametrize("state", [State.ACTIVE, State.BYPASS_ON, State.STOPPING])
 def test_no_axis_continues_in_motion(drive: Drive, state: State) -> None:
     with pytest.raises(ValueError, match=f"expected one with neutral output, got {state.name}"):
-        drive.axis.restore(state, Reason.STICK_MOVED)
+        drive.axis.restore(state, Reason.JOYSTICK_MOVED)
     assert (drive.state, drive.axis.reason) == (State.NEUTRAL_WAIT, Reason.START)

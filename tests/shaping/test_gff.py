@@ -133,7 +133,7 @@ def test_a_held_command_is_reached(
 @pytest.mark.parametrize("damping", [0.0, 0.05])
 @pytest.mark.parametrize(
     ("push_s", "order"),
-    # A jump is met to first order in T (the feedthrough depends on the tick), a moving stick to
+    # A jump is met to first order in T (the feedthrough depends on the tick), a moving joystick to
     # second order (matched poles, zeros and gain leave no difference linear in T).
     [(0.0, 1), (0.5, 2)],
 )

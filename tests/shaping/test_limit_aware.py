@@ -13,7 +13,7 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import POLE_PER_OMEGA, LimitAware
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -22,7 +22,7 @@ modes = pytest.mark.parametrize("mode", MODES, ids=lambda m: f"zeta {m.damping_r
 
 
 def restless(seed: int, ticks: int) -> list[float]:
-    """A stick that goes anywhere, turns round, and rests."""
+    """A joystick that goes anywhere, turns round, and rests."""
     source = random.Random(seed)
     commands: list[float] = []
     while len(commands) < ticks:
@@ -68,7 +68,7 @@ def test_residual_swing_where_a_limit_acts(
         # A grid far finer than any valve's: the limits alone are judged.
         axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[kind], grid_steps=100_000)
         for command in [0.0, *commands]:
-            axis.tick(StickInput(command))
+            axis.tick(CommandInput(command))
         assert axis.state is State.READY
         return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
 
@@ -90,7 +90,7 @@ def test_a_slow_valve_gets_feedback_that_it_can_follow(mode: SwayMode, rate: flo
         shaper: Shaper = LimitAware(sway, fir, rate) if aware else fir
         axis = Axis(TICK_S, limits, sway=sway, shaper=shaper, grid_steps=100_000)
         for command in [0.0, *REVERSAL]:
-            axis.tick(StickInput(command))
+            axis.tick(CommandInput(command))
         return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
 
     assert residual(aware=True) < 0.8 * residual(aware=False)
@@ -137,25 +137,25 @@ def test_after_output_invalid_it_starts_anew() -> None:
     broken = Broken(Fir(zv_taps(mode, TICK_S)))
     axis = Axis(TICK_S, RATE, sway=sway, shaper=LimitAware(sway, broken))
     for command in [0.0, *[1.0] * 70]:
-        axis.tick(StickInput(command))
+        axis.tick(CommandInput(command))
     assert axis.sent > 0.5
     broken.broken = True
-    axis.tick(StickInput(1.0))
+    axis.tick(CommandInput(1.0))
     assert (axis.state, axis.reason, axis.raw) == (State.TRIPPED, Reason.OUTPUT_INVALID, 0)
     broken.broken = False
-    axis.tick(StickInput(enabled=False))
+    axis.tick(CommandInput(enabled=False))
     for _ in range(80):  # longer than the impulse response
-        axis.tick(StickInput())
+        axis.tick(CommandInput())
     assert axis.state is State.READY
     # From here on it does what a fresh one does.
     fresh_sway = SwayModel(mode, TICK_S)
     fresh = Axis(
         TICK_S, RATE, sway=fresh_sway, shaper=LimitAware(fresh_sway, Fir(zv_taps(mode, TICK_S)))
     )
-    fresh.tick(StickInput())
+    fresh.tick(CommandInput())
     for command in RELEASE:
-        axis.tick(StickInput(command))
-        fresh.tick(StickInput(command))
+        axis.tick(CommandInput(command))
+        fresh.tick(CommandInput(command))
         assert axis.raw == fresh.raw
     assert fresh.raw == 0
 
@@ -173,7 +173,7 @@ def test_missed_ticks_leave_no_swing(mode: SwayMode) -> None:
         for i, command in enumerate([0.0, *RELEASE]):
             if i in (20, 45, 130):
                 axis.hold(12)
-            axis.tick(StickInput(command))
+            axis.tick(CommandInput(command))
         return math.hypot(mode.omega_rad_s * sway.angle, sway.rate + axis.sent)
 
     bare = residual(known=False)

@@ -16,7 +16,7 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff, poles_from_denominator
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import State, StickInput
+from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode, SwayModel
 
 TICK_S = 0.01
@@ -79,7 +79,7 @@ def busy_hand(seed: int) -> tuple[list[float], int]:
 def sent_by(axis: Axis, commands: list[float]) -> list[float]:
     sent = []
     for command in commands:
-        axis.tick(StickInput(command))
+        axis.tick(CommandInput(command))
         sent.append(axis.sent)
     assert axis.state is State.READY
     return sent

@@ -16,7 +16,7 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
-from canshaper.shaping.states import StickInput
+from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 TICK_S = 0.02
@@ -175,16 +175,16 @@ def make(kind: str, sway: SwayModel) -> Shaper:
 def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
     """Nothing jumps; and where the old filter has left no swing to damp, nothing changes at all."""
     axis = axis_with(old)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     for _ in range(800):
-        axis.tick(StickInput(0.8))
+        axis.tick(CommandInput(0.8))
     before = last = axis.sent
     assert before == pytest.approx(0.8, abs=2e-3)
     assert axis.sway is not None
     swing = math.hypot(axis.sway.angle * EMPTY.omega_rad_s, axis.sway.rate + axis.applied)
     axis.retune(FULL, lambda sway: make(new, sway))
     for _ in range(150):
-        axis.tick(StickInput(0.8))
+        axis.tick(CommandInput(0.8))
         assert abs(axis.sent - last) <= 0.02  # a fifth of the rate of the valve
         assert axis.sent == pytest.approx(before, abs=0.005 + 2.0 * swing)
         last = axis.sent
@@ -194,12 +194,12 @@ def test_a_change_in_steady_motion_is_not_felt(old: str, new: str) -> None:
 def test_a_change_on_the_way_makes_no_jump(kind: str) -> None:
     """Half-way through its rise the output goes on from where it is."""
     axis = axis_with(kind)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     sent = []
     for n in range(150):
         if n == 25:
             axis.retune(FULL, lambda sway: make(kind, sway))
-        axis.tick(StickInput(0.6))
+        axis.tick(CommandInput(0.6))
         sent.append(axis.sent)
     steps = [abs(b - a) for a, b in pairwise(sent)]
     # 5 full speeds a second over a tick is the valve's own rate.
@@ -215,21 +215,21 @@ def test_an_output_that_is_no_number_trips_with_and_without_a_model(sway: bool) 
 
     model = SwayModel(EMPTY, TICK_S) if sway else None
     axis = Axis(TICK_S, OutputLimits(), sway=model, shaper=Broken())
-    axis.tick(StickInput())
-    axis.tick(StickInput(0.5))
+    axis.tick(CommandInput())
+    axis.tick(CommandInput(0.5))
     assert (axis.state.name, axis.reason.name, axis.raw) == ("TRIPPED", "OUTPUT_INVALID", 0)
 
 
 def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
     """Half-way through its taps: without them the output would fall to what is new."""
     axis = axis_with("robust")
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     for _ in range(40):
-        axis.tick(StickInput(0.9))
+        axis.tick(CommandInput(0.9))
     before = axis.sent
     axis.retune(EMPTY, lambda sway: make("robust", sway))
     for _ in range(8):
-        axis.tick(StickInput(0.9))
+        axis.tick(CommandInput(0.9))
         assert axis.sent >= before - 1e-9
 
 

@@ -14,7 +14,7 @@ from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
 from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.small_strokes import SmallStrokes, least_velocity
-from canshaper.shaping.states import Reason, State, StickInput
+from canshaper.shaping.states import CommandInput, Reason, State
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper.shaping.valve_curve import ValveCurve
 
@@ -51,8 +51,8 @@ def axis_with(
         "off": Off(),
     }
     axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[shaper], grid_steps=steps, **changes)
-    axis.tick(StickInput())
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
+    axis.tick(CommandInput())
     assert axis.state is State.READY
     return axis
 
@@ -62,7 +62,7 @@ def tapped(axis: Axis, level: float, duration_s: float, rest_s: float = 3.5) -> 
     held = round(duration_s / TICK_S)
     sent = []
     for tick in range(held + round(rest_s / TICK_S)):
-        axis.tick(StickInput(level if tick < held else 0.0))
+        axis.tick(CommandInput(level if tick < held else 0.0))
         sent.append(axis.sent)
     return sent
 
@@ -157,7 +157,7 @@ def test_missed_ticks_are_travelled_too(ticks: int) -> None:
     axis = axis_with()
     way = 0.0
     for tick in range(160):
-        axis.tick(StickInput(0.1 if tick < 10 else 0.0))
+        axis.tick(CommandInput(0.1 if tick < 10 else 0.0))
         way += axis.sent
         if tick == 30:
             assert axis.sent
@@ -171,8 +171,8 @@ def test_of_what_was_commanded_in_bypass_nothing_is_known() -> None:
     with_rule, without = axis_with(), axis_with(shaper="ruleless")
     for axis in (with_rule, without):
         for _ in range(100):
-            axis.tick(StickInput(0.3, bypass=True))
-        axis.tick(StickInput(0.3))
+            axis.tick(CommandInput(0.3, bypass=True))
+        axis.tick(CommandInput(0.3))
     assert tapped(with_rule, 0.0, 0.0) == tapped(without, 0.0, 0.0)
     assert movements(tapped(with_rule, 0.1, 0.1)) == 1  # from rest it is known again
 
@@ -199,14 +199,14 @@ def test_what_another_axis_wants_in_vain_is_not_due() -> None:
 
 
 @pytest.mark.parametrize(
-    "stick",
-    [StickInput(enabled=False), StickInput(trip=Reason.EMERGENCY_STOP)],
+    "joystick",
+    [CommandInput(enabled=False), CommandInput(trip=Reason.EMERGENCY_STOP)],
     ids=["enable", "trip"],
 )
-def test_a_step_that_is_held_ends_at_once(stick: StickInput) -> None:
+def test_a_step_that_is_held_ends_at_once(joystick: CommandInput) -> None:
     axis = axis_with()
     assert tapped(axis, 0.1, 0.1, rest_s=0.4)[-1]
-    axis.tick(stick)
+    axis.tick(joystick)
     assert axis.raw == 0
 
 
@@ -227,7 +227,7 @@ def test_it_is_never_faster_than_asked_nor_against_the_joystick(seed: int) -> No
     for _ in range(60):
         command = hand.choice([0.0, 0.0, hand.uniform(-0.3, 0.3)])
         for _ in range(hand.randint(1, 12)):
-            axis.tick(StickInput(command))
+            axis.tick(CommandInput(command))
             tail = [*tail[-25:], axis.command]
             low = 0.0 if axis.command > 0.0 else min(0.0, *tail)
             high = 0.0 if axis.command < 0.0 else max(0.0, *tail)

@@ -30,14 +30,14 @@ def test_s_curve_keeps_rate_and_jerk_and_arrives(tick_s: float, rate: float, jer
     assert max(map(abs, changes)) <= 2.0 * jerk * tick_s**2 * 1.001
 
 
-def test_s_curve_on_a_restless_stick_stays_within_the_stick() -> None:
+def test_s_curve_on_a_restless_joystick_stays_within_the_joystick() -> None:
     source = random.Random(2)
     curve = SCurve(0.02, 4.0, 20.0)
     command = 0.0
     for i in range(20_000):
         if i % 17 == 0:
             command = source.uniform(-1.0, 1.0)
-        # a turn of the stick in full motion costs one jerk-limited overshoot of what was asked
+        # a turn of the joystick in full motion costs one jerk-limited overshoot of what was asked
         assert abs(curve.wanted(command)) <= 1.0 + 4.0**2 / (2.0 * 20.0)
 
 
@@ -56,7 +56,7 @@ def test_s_curve_that_has_arrived_is_at_rest() -> None:
     assert [curve.wanted(command) for command in (0.5, 8.0, 8.0)] == [0.5, 1.0, 2.0]
 
 
-def test_s_curve_does_not_stop_dead_where_the_stick_meets_it() -> None:
-    """The stick comes back to just where the output is, in motion: it slows down by the jerk."""
+def test_s_curve_does_not_stop_dead_where_the_joystick_meets_it() -> None:
+    """The joystick comes back to just where the output is, in motion: it slows down by the jerk."""
     curve = SCurve(**EXACT)
     assert [curve.wanted(command) for command in (8.0, 8.0, 1.5)] == [0.5, 1.5, 2.0]

@@ -7,17 +7,17 @@ from canshaper.shaping.state_machine import StateMachine
 from canshaper.shaping.states import (
     REACTION_OF,
     TRANSITIONS,
+    CommandInput,
     Reaction,
     Reason,
     State,
-    StickInput,
 )
 
 STOPS = [reason for reason, one in REACTION_OF.items() if one is Reaction.SHAPED_STOP]
 # ENABLE_LOST comes by the switch.
 TRIPS = [reason for reason, one in REACTION_OF.items() if one is Reaction.NEUTRAL][1:]
 INPUTS = st.builds(
-    StickInput,
+    CommandInput,
     command=st.sampled_from([0.0, 0.0, 1.0]),
     fault=st.sampled_from([None, None, None, *STOPS]),
     enabled=st.sampled_from([True, True, True, False]),
@@ -30,41 +30,41 @@ STEPS = st.lists(st.tuples(INPUTS, st.sampled_from([0.0, 0.0, 0.1]), st.booleans
 
 @given(steps=STEPS)
 def test_every_change_of_state_is_declared(
-    steps: list[tuple[StickInput, float, bool]],
+    steps: list[tuple[CommandInput, float, bool]],
 ) -> None:
     machine = StateMachine(0.02, 5)
-    for given_stick, added, at_rest in steps:
-        stick = given_stick
-        if machine.state is State.BYPASS_ON and stick.fault is Reason.LOOP_OVERRUN:
-            stick = stick._replace(fault=None)  # a controller goes on then
+    for given_joystick, added, at_rest in steps:
+        joystick = given_joystick
+        if machine.state is State.BYPASS_ON and joystick.fault is Reason.LOOP_OVERRUN:
+            joystick = joystick._replace(fault=None)  # a controller goes on then
         old = machine.state
-        new = machine.step(stick, added, at_rest)
+        new = machine.step(joystick, added, at_rest)
         assert new is machine.state
         if new is not old:
             assert machine.reason in TRANSITIONS[old, new]
-            asked = stick.trip or stick.fault
+            asked = joystick.trip or joystick.fault
             assert new is not State.TRIPPED or machine.reason in (asked, Reason.ENABLE_LOST)
 
 
 def in_state(state: State) -> StateMachine:
     machine = StateMachine(0.02, 5)
-    moved = StickInput(1.0, bypass=state is State.BYPASS_ON)
+    moved = CommandInput(1.0, bypass=state is State.BYPASS_ON)
     steps = {
         State.NEUTRAL_WAIT: [],
-        State.READY: [StickInput()],
-        State.STOPPING: [StickInput(), moved, StickInput(fault=Reason.STICK_TIMEOUT)],
-        State.TRIPPED: [StickInput(trip=Reason.SEND_FAILED)],
-    }.get(state, [StickInput(), moved])
-    for stick in steps:
-        machine.step(stick, 0.0, False)
+        State.READY: [CommandInput()],
+        State.STOPPING: [CommandInput(), moved, CommandInput(fault=Reason.JOYSTICK_TIMEOUT)],
+        State.TRIPPED: [CommandInput(trip=Reason.SEND_FAILED)],
+    }.get(state, [CommandInput(), moved])
+    for joystick in steps:
+        machine.step(joystick, 0.0, False)
     assert machine.state is state
     return machine
 
 
 def test_every_declared_reason_is_one_that_an_input_gives() -> None:
     """A row of the table that nothing reaches would be a lie of the page."""
-    sticks = [
-        StickInput(command, fault, enabled, bypass, reset, trip)
+    joysticks = [
+        CommandInput(command, fault, enabled, bypass, reset, trip)
         for command in (0.0, 1.0)
         for fault in (None, *STOPS, Reason.EMERGENCY_STOP_LOST)
         for enabled in (True, False)
@@ -74,18 +74,18 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
     ]
     found: dict[tuple[State, State], set[Reason]] = {}
     for state in State:
-        for stick in sticks:
+        for joystick in joysticks:
             for added, at_rest in ((0.0, False), (0.0, True), (0.1, False)):
                 machine = in_state(state)
                 if state is State.TRIPPED:
-                    machine.step(StickInput(enabled=False), 0.0, True)  # no switch is held
+                    machine.step(CommandInput(enabled=False), 0.0, True)  # no switch is held
                 if state is State.STOPPING and at_rest:
                     machine.hold(5)
-                new = machine.step(stick, added, at_rest)
-                if new is State.TRIPPED is not state and machine.reason is not stick.trip:
+                new = machine.step(joystick, added, at_rest)
+                if new is State.TRIPPED is not state and machine.reason is not joystick.trip:
                     # What a controller never gives to an axis in that state ends here too.
                     never = (Reason.EMERGENCY_STOP_LOST, Reason.LOOP_OVERRUN)
-                    assert machine.reason in (Reason.ENABLE_LOST, *never), (state, stick)
+                    assert machine.reason in (Reason.ENABLE_LOST, *never), (state, joystick)
                 if new is not state:
                     found.setdefault((state, new), set()).add(machine.reason)
     for way, reasons in TRANSITIONS.items():
@@ -95,7 +95,7 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
 def test_a_change_that_is_not_declared_ends_neutral_and_latched() -> None:
     for state in (State.ACTIVE, State.BYPASS_ON, State.READY):
         machine = in_state(state)
-        assert machine.step(StickInput(1.0, fault=Reason.RESET), 0.0, False) is State.TRIPPED
+        assert machine.step(CommandInput(1.0, fault=Reason.RESET), 0.0, False) is State.TRIPPED
         assert machine.reason is Reason.RESET
 
 
@@ -105,5 +105,5 @@ def test_nor_does_a_way_that_no_row_has_lead_anywhere_else() -> None:
     assert (State.TRIPPED, State.ACTIVE) in ways
     for old, new in ways:
         machine = in_state(old)
-        machine._go(new, Reason.STICK_MOVED)
+        machine._go(new, Reason.JOYSTICK_MOVED)
         assert machine.state is State.TRIPPED

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits, on_grid, with_deadband, without_deadband
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import StickInput
+from canshaper.shaping.states import CommandInput
 from canshaper.shaping.valve_curve import ValveCurve
 
 # Opens at 7 % one way and at 4 % the other, where it is slower.
@@ -130,9 +130,9 @@ def test_a_band_that_ends_at_zero_and_a_rounded_full_speed_make_a_curve(
 def driven(command: float, added: float = 0.0) -> Axis:
     limits = OutputLimits(rise_per_s=50.0, fall_per_s=50.0, curve=CURVE)
     axis = Axis(0.02, limits, sway=None, shaper=Off(), grid_steps=1000)
-    axis.tick(StickInput())
+    axis.tick(CommandInput())
     for _ in range(5):
-        axis.tick(StickInput(command), added)
+        axis.tick(CommandInput(command), added)
     return axis
 
 
@@ -151,7 +151,7 @@ def test_an_added_velocity_goes_through_the_curve_too() -> None:
     axis = driven(0.5)
     axis.allow_added(0.25, 1.0)
     for _ in range(5):
-        axis.tick(StickInput(0.3), 0.05)
+        axis.tick(CommandInput(0.3), 0.05)
     assert axis.raw == pytest.approx(400, abs=1)
     assert axis.sent == pytest.approx(0.35, abs=2e-3)
 

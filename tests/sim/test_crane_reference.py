@@ -12,14 +12,14 @@ from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.valve import ValveParameters
 from tests.sim.drives import LINEAR, REAL, TICK_S, all_valves, drive
 
-RUN_S = 14.0  # length of the reference runs, stick from 0.5 to 3.5 s
+RUN_S = 14.0  # length of the reference runs, joystick from 0.5 to 3.5 s
 
 
 def pulse(run_s: float = RUN_S) -> list[float]:
     return [1.0 if 25 <= k < 175 else 0.0 for k in range(round(run_s / TICK_S))]
 
 
-def filtered(stick: Sequence[float], b: Sequence[float], a: Sequence[float]) -> list[float]:
+def filtered(joystick: Sequence[float], b: Sequence[float], a: Sequence[float]) -> list[float]:
     """A second-order filter in direct form, as printed in the reference.
 
     Its gain at rest is 1 by construction, but 1 - 1.6e-7 with coefficients of ten digits: restored.
@@ -28,14 +28,16 @@ def filtered(stick: Sequence[float], b: Sequence[float], a: Sequence[float]) -> 
     b = [value / gain for value in b]
     out: list[float] = []
     u1 = u2 = y1 = y2 = 0.0
-    for u in stick:
+    for u in joystick:
         y = b[0] * u + b[1] * u1 + b[2] * u2 - a[1] * y1 - a[2] * y2
         u1, u2, y1, y2 = u, u1, y, y1
         out.append(y)
     return out
 
 
-def convolved(stick: Sequence[float], amplitudes: Sequence[float], times: Sequence[float]) -> Any:
+def convolved(
+    joystick: Sequence[float], amplitudes: Sequence[float], times: Sequence[float]
+) -> Any:
     """Input shaper; an impulse between two ticks is shared between them."""
     taps: dict[int, float] = {}
     for amplitude, at_s in zip(amplitudes, times, strict=True):
@@ -43,7 +45,10 @@ def convolved(stick: Sequence[float], amplitudes: Sequence[float], times: Sequen
         late = at_s / TICK_S - k
         taps[k] = taps.get(k, 0.0) + amplitude * (1.0 - late)
         taps[k + 1] = taps.get(k + 1, 0.0) + amplitude * late
-    return [sum(w * stick[i - k] for k, w in taps.items() if i - k >= 0) for i in range(len(stick))]
+    return [
+        sum(w * joystick[i - k] for k, w in taps.items() if i - k >= 0)
+        for i in range(len(joystick))
+    ]
 
 
 def sway_numbers(states: Sequence[CraneState], residual_from_s: float) -> dict[str, float]:
@@ -118,7 +123,7 @@ def test_built_in_pulses_show_the_same_sway(
     """Default crane, human ramp: deadband and ramp vanish in the rate limit of the valve."""
     script = SCRIPTS[f"pulse-{axis}"]
     ticks = round(script.duration_s / TICK_S)
-    commands = [script.stick(axis, k * TICK_S) for k in range(ticks)]
+    commands = [script.command(axis, k * TICK_S) for k in range(ticks)]
     found = sway_numbers(drive(Crane(), axis, commands), 3.5 + 2.5)
     assert (found["peak5"], found["peak6"]) == pytest.approx(peaks, abs=0.2)
     assert (found["res5"], found["res6"]) == pytest.approx(residuals, abs=0.2)

@@ -28,8 +28,8 @@ def flagged(directory: Path) -> Deployment:
     return load_deployment(directory / "flags.yaml")
 
 
-def test_a_stick_with_flags_drives_as_a_signed_one(tmp_path: Path) -> None:
+def test_a_joystick_with_flags_drives_as_a_signed_one(tmp_path: Path) -> None:
     script = random_script(3, 20.0)
     signed = drive(load_deployment(ROOT / "config" / "forwarder.yaml"), script)
-    assert min(signed.axes["slew"].stick) < -0.2 < 0.2 < max(signed.axes["slew"].stick)
+    assert min(signed.axes["slew"].joystick) < -0.2 < 0.2 < max(signed.axes["slew"].joystick)
     assert drive(flagged(tmp_path), script) == signed

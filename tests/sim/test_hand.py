@@ -32,8 +32,8 @@ def test_a_daemon_reads_what_the_hand_holds(
     deployment: Deployment, position: float, *, anti_sway: bool
 ) -> None:
     hand = Hand(deployment)
-    sticks = dict.fromkeys(deployment.axes, position)
-    frames = {frame[:3]: frame for frame in hand.frames(0, Held(sticks, anti_sway=anti_sway))}
+    joysticks = dict.fromkeys(deployment.axes, position)
+    frames = {frame[:3]: frame for frame in hand.frames(0, Held(joysticks, anti_sway=anti_sway))}
     moved = {axis.config.command.signal for axis in deployment.axes.values()}
     for joystick in deployment.joysticks.values():
         raw, commands = joystick.codec.decode(_frame_of(frames, joystick.key).data)

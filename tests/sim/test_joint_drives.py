@@ -81,10 +81,10 @@ def test_drive_joint_by_joint_is_recorded() -> None:
     assert boom[0] == boom[1] == boom[2]
     assert found.axes["slew"].sway_deg != boom[0]
     for trace in found.axes.values():
-        assert max(map(abs, trace.stick)) > 0.3
+        assert max(map(abs, trace.joystick)) > 0.3
         assert max(map(abs, trace.sent)) > 0.2
-        # The speed follows what was sent: shaped, it is never faster than the stick asked.
-        assert 0.2 < max(map(abs, trace.speed)) <= max(map(abs, trace.stick)) + 0.02
+        # The speed follows what was sent: shaped, it is never faster than the joystick asked.
+        assert 0.2 < max(map(abs, trace.speed)) <= max(map(abs, trace.joystick)) + 0.02
 
 
 @pytest.mark.parametrize("machine", ["tip", "tip-controller"])
@@ -114,7 +114,7 @@ def test_joint_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
     assert set(script.axes) <= {*JOINT_AXES}
     machine = build_machine("joints")
     for k in range(round(script.duration_s / TICK_S)):
-        machine.step(TICK_S, {axis: script.stick(axis, k * TICK_S) for axis in JOINT_AXES})
+        machine.step(TICK_S, {axis: script.command(axis, k * TICK_S) for axis in JOINT_AXES})
         assert machine.crane.axes_at_stop == ()
     assert not machine.crane.swung_over
 
@@ -126,7 +126,7 @@ def test_tip_scripts_keep_the_joints_off_their_stops(name: str) -> None:
     script = script_named(name)
     machine = build_machine("tip-controller")
     for k in range(round(script.duration_s / TICK_S)):
-        machine.step(TICK_S, {axis: script.stick(axis, k * TICK_S) for axis in script.axes})
+        machine.step(TICK_S, {axis: script.command(axis, k * TICK_S) for axis in script.axes})
         assert machine.crane.axes_at_stop == ()
     assert not machine.crane.swung_over
 

@@ -116,13 +116,13 @@ def test_protection_changes_nothing_of_the_drive(machine: Make) -> None:
     assert drive(machine("crc8_autosar"), script) == plain
 
 
-def test_no_script_holds_a_stick_for_so_long_that_it_counts_as_broken() -> None:
+def test_no_script_holds_a_joystick_for_so_long_that_it_counts_as_broken() -> None:
     """stuck_s is 20 s by default; half of that leaves room."""
     for script in (*SCRIPTS.values(), *(random_script(seed) for seed in range(20))):
         for axis in script.axes:
             last, since_s = 0.0, 0.0
             for tick in range(round(script.duration_s * 50)):
-                stick = script.stick(axis, tick / 50)
-                if stick != last:
-                    last, since_s = stick, tick / 50
-                assert not stick or tick / 50 - since_s < 10.0, (script.name, axis)
+                joystick = script.command(axis, tick / 50)
+                if joystick != last:
+                    last, since_s = joystick, tick / 50
+                assert not joystick or tick / 50 - since_s < 10.0, (script.name, axis)

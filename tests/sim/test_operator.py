@@ -13,7 +13,7 @@ TICK_S = 0.02
 
 
 def samples(script: Script, axis: str, step_s: float = TICK_S) -> list[float]:
-    return [script.stick(axis, i * step_s) for i in range(round(script.duration_s / step_s) + 1)]
+    return [script.command(axis, i * step_s) for i in range(round(script.duration_s / step_s) + 1)]
 
 
 def test_a_stroke_is_a_trapezoid() -> None:
@@ -32,14 +32,14 @@ def test_a_stroke_is_a_trapezoid() -> None:
         99.0: 0.0,
     }
     for time_s, value in expected.items():
-        assert script.stick("slew", time_s) == pytest.approx(value, abs=1e-12)
-    assert script.stick("lift", 2.0) == 0.0
+        assert script.command("slew", time_s) == pytest.approx(value, abs=1e-12)
+    assert script.command("lift", 2.0) == 0.0
     assert script.axes == ("slew",)
 
 
 def test_a_stroke_without_ramp_is_a_step() -> None:
     script = Script("step", (Stroke("lift", 0.5, 1.0, 1.0, 0.0),), 2.0)
-    found = [script.stick("lift", t) for t in (0.4999, 0.5, 1.4999, 1.5)]
+    found = [script.command("lift", t) for t in (0.4999, 0.5, 1.4999, 1.5)]
     assert found == [0.0, 1.0, 1.0, 0.0]
 
 
@@ -54,12 +54,12 @@ def test_adjoining_strokes_make_one_straight_reversal() -> None:
         "reversal", (Stroke("slew", 1.0, 1.0, -1.0, 0.2), Stroke("slew", 0.0, 1.0, 1.0, 0.2)), 3.0
     )
     for i in range(11):
-        assert script.stick("slew", 1.0 + 0.02 * i) == pytest.approx(1.0 - 0.2 * i, abs=1e-12)
+        assert script.command("slew", 1.0 + 0.02 * i) == pytest.approx(1.0 - 0.2 * i, abs=1e-12)
 
 
-def test_overlapping_strokes_stay_within_the_stick_travel() -> None:
+def test_overlapping_strokes_stay_within_the_joystick_travel() -> None:
     strokes = (Stroke("slew", 0.0, 1.0, 0.8), Stroke("slew", 0.5, 1.0, 0.8))
-    assert Script("both", strokes, 2.0).stick("slew", 0.8) == 1.0
+    assert Script("both", strokes, 2.0).command("slew", 0.8) == 1.0
 
 
 @pytest.mark.parametrize(
@@ -88,7 +88,7 @@ def test_a_script_lasts_to_the_end_of_its_strokes() -> None:
         Script("short", (Stroke("slew", 0.5, 1.0, 1.0),), 1.5)
 
 
-def test_pulses_are_three_seconds_of_full_stick_and_five_of_rest() -> None:
+def test_pulses_are_three_seconds_of_full_deflection_and_five_of_rest() -> None:
     for axis in ("near_far", "slew"):
         script = SCRIPTS[f"pulse-{axis}"]
         assert script.axes == (axis,)
@@ -107,7 +107,7 @@ def test_demo_moves_slew_and_boom_at_once_reverses_and_rests(
     name: str, boom: tuple[str, ...]
 ) -> None:
     script = SCRIPTS[name]
-    rows = [{a: script.stick(a, k * TICK_S) for a in script.axes} for k in range(875)]
+    rows = [{a: script.command(a, k * TICK_S) for a in script.axes} for k in range(875)]
     both = [row for row in rows if row["slew"] and any(row[axis] for axis in boom)]
     assert len(both) * TICK_S > 4.0
     for axis in ("slew", boom[-1]):
@@ -125,17 +125,17 @@ def test_one_by_one_is_a_pulse_of_each_axis_and_a_piece_of_work() -> None:
     assert script.duration_s == pytest.approx(19.0, abs=0.5)
     assert script.axes == AXES
 
-    def stick_is(axis: str, low: float, high: float, value: float) -> bool:
+    def joystick_is(axis: str, low: float, high: float, value: float) -> bool:
         times = [low + i * TICK_S for i in range(int((high - low) / TICK_S))]
-        return all(script.stick(axis, t) == value for t in times)
+        return all(script.command(axis, t) == value for t in times)
 
-    assert all(stick_is(axis, 0.0, 0.5, 0.0) for axis in AXES)
-    assert stick_is("slew", 0.62, 3.5, 1.0)
-    assert all(stick_is(axis, 3.64, 8.0, 0.0) for axis in AXES)
-    assert stick_is("near_far", 8.14, 11.0, 1.0)
-    assert all(stick_is(axis, 11.14, 15.0, 0.0) for axis in AXES)
-    assert all(stick_is(axis, 18.5, 19.5, 0.0) for axis in AXES)
-    work = {a: [script.stick(a, 15.0 + i * TICK_S) for i in range(175)] for a in AXES}
+    assert all(joystick_is(axis, 0.0, 0.5, 0.0) for axis in AXES)
+    assert joystick_is("slew", 0.62, 3.5, 1.0)
+    assert all(joystick_is(axis, 3.64, 8.0, 0.0) for axis in AXES)
+    assert joystick_is("near_far", 8.14, 11.0, 1.0)
+    assert all(joystick_is(axis, 11.14, 15.0, 0.0) for axis in AXES)
+    assert all(joystick_is(axis, 18.5, 19.5, 0.0) for axis in AXES)
+    work = {a: [script.command(a, 15.0 + i * TICK_S) for i in range(175)] for a in AXES}
     assert min(work["near_far"]) < -0.5
     overlap = sum(sum(abs(work[a][i]) > 0.05 for a in AXES) >= 2 for i in range(175)) * TICK_S
     assert overlap > 1.0
@@ -148,10 +148,10 @@ def test_scripts_keep_the_default_crane_off_its_stops(name: str) -> None:
     script = script_named(name)
     crane = Crane()
     for i in range(round(script.duration_s / TICK_S)):
-        crane.step(TICK_S, {axis: script.stick(axis, i * TICK_S) for axis in AXES})
+        crane.step(TICK_S, {axis: script.command(axis, i * TICK_S) for axis in AXES})
         assert crane.axes_at_stop == ()
     assert not crane.swung_over
-    # Sticks neutral at the end; the lag of the valve has died away.
+    # Joysticks neutral at the end; the lag of the valve has died away.
     state = crane.state
     rates = (state.theta1_rate_rad_s, state.radius_rate_m_s, state.height_rate_m_s)
     assert rates == pytest.approx((0.0, 0.0, 0.0), abs=1e-3)
@@ -165,7 +165,7 @@ def test_loading_cycle_moves_all_axes_both_ways_and_returns() -> None:
         assert min(values) < -0.2
         assert max(values) > 0.2
         assert 0.3 < sum(v == 0.0 for v in values) / len(values) < 0.85
-    # Partial strokes: most of the moving time is below 90 % of the stick.
+    # Partial strokes: most of the moving time is below 90 % of the joystick.
     moving = [abs(v) for axis in AXES for v in samples(script, axis) if v != 0.0]
     assert sum(v < 0.9 for v in moving) / len(moving) > 0.8
 
@@ -203,7 +203,7 @@ def test_random_scripts_have_the_statistics_of_an_operator() -> None:
             total += len(values)
             signs = [math.copysign(1.0, v) for v in values if abs(v) > 0.05]
             reversals += sum(a != b for a, b in pairwise(signs))
-            # No jump: full stick to full stick in the shortest ramp is 20 per second.
+            # No jump: full deflection to full deflection in the shortest ramp is 20 per second.
             assert max(abs(b - a) for a, b in pairwise(values)) <= 20.0 * TICK_S + 1e-9
     assert neutral / total == pytest.approx(0.4, abs=0.05)
     assert reversals > 2 * 60 * len(AXES)

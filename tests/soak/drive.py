@@ -127,7 +127,7 @@ class Soak:
         else:
             self._others[kind]()
         wait_for(self._bus, f"{axis}Status", lambda s: str(s["State"]) in STOPPED)
-        # The fault goes away with the stick still deflected: nothing may move.
+        # The fault goes away with the joystick still deflected: nothing may move.
         self._hand.spoil = lambda _id, data: [data]
         self._hand.enable, self._hand.stop = 1, 0
         self._frames(axis, self._random.randrange(5, 40))

@@ -109,7 +109,7 @@ class Page:
         self.connection = connection
         self.events: list[list[Any]] = []
         self.refused: list[str] = []
-        self.sticks: dict[str, float] | None = None
+        self.joysticks: dict[str, float] | None = None
         hello = json.loads(connection.recv(timeout=WAIT_S))["hello"]
         self.hello: dict[str, Any] = hello
         self.shown = self.look()
@@ -119,12 +119,12 @@ class Page:
         self.connection.send(json.dumps(message))
 
     def look(self) -> dict[str, Any]:
-        """The next picture; a hand that holds the sticks goes on holding them."""
+        """The next picture; a hand that holds the joysticks goes on holding them."""
         self.shown = json.loads(self.connection.recv(timeout=WAIT_S))
         self.events += self.shown.get("events", [])
         self.refused += self.shown.get("refused", [])
-        if self.sticks is not None:
-            self.send(sticks=self.sticks)
+        if self.joysticks is not None:
+            self.send(joysticks=self.joysticks)
         return self.shown
 
     def until(self, condition: Callable[[dict[str, Any]], bool], what: str = "") -> dict[str, Any]:
@@ -148,10 +148,10 @@ class Page:
         return found
 
     def drive(self) -> None:
-        """Take the sticks and press enable, with the axes ready."""
+        """Take the joysticks and press enable, with the axes ready."""
         self.until(lambda s: all(c["daemon"] and c["crane"] for c in s["cranes"].values()))
         self.send(do="take")
-        self.sticks = dict.fromkeys(self.hello["axes"], 0.0)
+        self.joysticks = dict.fromkeys(self.hello["axes"], 0.0)
         self.until(lambda s: s["driver"] == self.hello["page"], "driver")
         self.until(lambda s: not s["enable"], "enable released by the last one")
         self.send(do="enable")

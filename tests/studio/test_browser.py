@@ -127,7 +127,7 @@ def test_keys_drive_both_cranes_and_the_shaped_one_swings_less(
     assert page.locator("#scene").screenshot() != before
 
 
-def test_the_mouse_moves_a_stick_and_letting_go_stops_it(
+def test_the_mouse_moves_a_joystick_and_letting_go_stops_it(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     page = tab(own())
@@ -219,7 +219,7 @@ def test_a_slider_is_felt_by_the_daemon(
     assert slider.input_value() == "1"
 
 
-def test_a_second_tab_takes_the_sticks(
+def test_a_second_tab_takes_the_joysticks(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     studio = own()

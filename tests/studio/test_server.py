@@ -37,19 +37,19 @@ NONSENSE = [
     '{"do": "go"}',
     '{"do": 1}',
     '{"do": ["take"]}',
-    '{"sticks": 1}',
-    '{"sticks": {"slew": 2}}',
-    '{"sticks": {"slew": NaN}}',
-    '{"sticks": {"slew": 1e999}}',
-    '{"sticks": {"slew": "1"}}',
-    '{"sticks": {"tower": 1}}',
+    '{"joysticks": 1}',
+    '{"joysticks": {"slew": 2}}',
+    '{"joysticks": {"slew": NaN}}',
+    '{"joysticks": {"slew": 1e999}}',
+    '{"joysticks": {"slew": "1"}}',
+    '{"joysticks": {"tower": 1}}',
     '{"antisway": 1}',
     '{"slide": "calm", "to": "fast"}',
     '{"slide": "speed", "to": 1}',
     '{"slide": "calm", "to": NaN}',
     '{"slide": "calm", "to": 1' + "0" * 400 + "}",
-    '{"sticks": {"slew": 1' + "0" * 400 + "}}",
-    '{"sticks": {"\\ud800": 1}}',
+    '{"joysticks": {"slew": 1' + "0" * 400 + "}}",
+    '{"joysticks": {"\\ud800": 1}}',
     '{"do": "\\ud800"}',
     "日本" * 200,
     "[" * 1000,
@@ -92,15 +92,15 @@ def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
     """Half a second of slewing; then the same, with anti-sway switched off on the way."""
     with own().page() as page:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["slew"] = 0.5
+        assert page.joysticks is not None
+        page.joysticks["slew"] = 0.5
         page.for_s(0.8)
-        page.sticks["slew"] = 0.0
+        page.joysticks["slew"] = 0.0
         page.until(lambda _: page.states() == {"ready"}, "at rest")
         swings = {name: crane["swing"] for name, crane in page.for_s(3.0)[-1]["cranes"].items()}
         assert swings["raw"] > 10.0
         assert swings["shaped"] < swings["raw"] / 4
-        page.sticks["slew"] = 0.5
+        page.joysticks["slew"] = 0.5
         page.until(lambda s: s["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, shaped")
         page.send(antisway=False)
         page.until(lambda s: s["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, unshaped")
@@ -113,8 +113,8 @@ def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
 def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> None:
     with own().page() as page:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["slew"] = 0.3
+        assert page.joysticks is not None
+        page.joysticks["slew"] = 0.3
         page.until(lambda s: valves(s, "shaped")[0] > 0.1)
         page.send(slide="calm", to=2.0)
         page.until(lambda s: s["sliders"]["calm"] == 2.0, "slider")
@@ -153,15 +153,15 @@ def test_bytes_are_nonsense(shared: Studio) -> None:
         page.until(lambda _: "expected JSON, got bytes" in page.refused)
 
 
-def test_nonsense_of_the_driver_takes_its_sticks_to_neutral(shared: Studio) -> None:
+def test_nonsense_of_the_driver_takes_its_joysticks_to_neutral(shared: Studio) -> None:
     with shared.page() as page:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["lift"] = 0.5
+        assert page.joysticks is not None
+        page.joysticks["lift"] = 0.5
         page.until(lambda s: valves(s, "shaped")[2] > 0.3)
         page.connection.send("nonsense")
-        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
-        # The stick is still held out, and counts for nothing; then enable goes.
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
+        # The joystick is still held out, and counts for nothing; then enable goes.
         page.until(lambda s: not s["enable"], "enable released")
         assert valves(page.shown, "shaped")[2] == 0.0
 
@@ -177,10 +177,12 @@ def test_too_much_nonsense_closes_the_page_and_the_others_go_on(shared: Studio) 
         other.until(lambda _: any("is closed" in text for text in other.texts()))
 
 
-def test_a_page_that_sends_too_fast_is_closed_and_its_sticks_go_to_neutral(shared: Studio) -> None:
+def test_a_page_that_sends_too_fast_is_closed_and_its_joysticks_go_to_neutral(
+    shared: Studio,
+) -> None:
     with shared.page() as page, shared.page() as other:
         page.drive()
-        message = json.dumps({"sticks": {"slew": 0.0, "near_far": 0.0, "lift": 0.5}})
+        message = json.dumps({"joysticks": {"slew": 0.0, "near_far": 0.0, "lift": 0.5}})
 
         def flood() -> None:
             with suppress(ConnectionClosed, OSError):
@@ -189,7 +191,7 @@ def test_a_page_that_sends_too_fast_is_closed_and_its_sticks_go_to_neutral(share
 
         flooding = threading.Thread(target=flood)
         flooding.start()
-        page.sticks = None
+        page.joysticks = None
         with pytest.raises(ConnectionClosed) as closed:
             page.until(lambda _: False)
         flooding.join(WAIT_S)
@@ -197,7 +199,7 @@ def test_a_page_that_sends_too_fast_is_closed_and_its_sticks_go_to_neutral(share
         assert closed.value.rcvd and closed.value.rcvd.code == 1008
         assert f"expected {MOST_PER_S} messages a second at most" in closed.value.rcvd.reason
         other.now()
-        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
         other.until(lambda s: not s["enable"])
         assert all(crane["daemon"] for crane in other.shown["cranes"].values())
 
@@ -210,44 +212,44 @@ def test_a_huge_message_closes_the_page(shared: Studio) -> None:
         assert closed.value.rcvd and closed.value.rcvd.code == 1009
 
 
-def test_a_silent_page_loses_the_sticks_then_enable(shared: Studio) -> None:
+def test_a_silent_page_loses_the_joysticks_then_enable(shared: Studio) -> None:
     with shared.page() as page:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["lift"] = -0.4
+        assert page.joysticks is not None
+        page.joysticks["lift"] = -0.4
         page.until(lambda s: valves(s, "shaped")[2] < -0.2)
-        page.sticks = None
-        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        page.joysticks = None
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
         assert page.shown["enable"]
         page.until(lambda s: not s["enable"])
         # At rest by then, so it is no trip.
         page.until(lambda _: page.states() == {"wait"}, "enable off")
-        assert any("is silent; sticks in neutral" in text for text in page.texts())
+        assert any("is silent; joysticks in neutral" in text for text in page.texts())
 
 
 def test_a_second_driver_stops_the_first(shared: Studio) -> None:
     with shared.page() as page, shared.page() as other:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["lift"] = 0.4
+        assert page.joysticks is not None
+        page.joysticks["lift"] = 0.4
         page.until(lambda s: valves(s, "shaped")[2] > 0.2)
         other.send(do="take")
         page.until(lambda s: s["driver"] == other.hello["page"])
-        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        page.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
         page.until(lambda s: not s["enable"], "enable released")
-        assert any("takes the sticks from" in text for text in page.texts())
+        assert any("takes the joysticks from" in text for text in page.texts())
 
 
-def test_a_page_that_is_closed_leaves_the_sticks_in_neutral(shared: Studio) -> None:
+def test_a_page_that_is_closed_leaves_the_joysticks_in_neutral(shared: Studio) -> None:
     with shared.page() as other:
         with shared.page() as page:
             page.drive()
-            assert page.sticks is not None
-            page.sticks["lift"] = -0.4
+            assert page.joysticks is not None
+            page.joysticks["lift"] = -0.4
             page.until(lambda s: valves(s, "shaped")[2] < -0.2)
         other.now()
         other.until(lambda s: s["driver"] is None, "no driver")
-        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["stick"] == 0.0)
+        other.until(lambda s: s["cranes"]["shaped"]["axes"]["lift"]["joystick"] == 0.0)
         other.until(lambda s: not s["enable"], "enable released")
 
 
@@ -385,12 +387,12 @@ def test_the_shadow_shows_a_machine_and_never_sends(
         assert page.hello["cranes"] == ["machine"] and not page.hello["drives"]
         page.send(do="take")
         page.send(do="enable")
-        page.send(sticks={"slew": 1.0})
+        page.send(joysticks={"slew": 1.0})
         page.connection.send("nonsense")
         page.send(slide="calm", to=1.0)
         for frame in hand.frames(0, Held({"slew": 0.25})):
             machine.port.send(frame)
-        page.until(lambda s: s["cranes"]["machine"]["axes"]["slew"]["stick"] == 0.25)
+        page.until(lambda s: s["cranes"]["machine"]["axes"]["slew"]["joystick"] == 0.25)
         assert page.shown["driver"] is None
         page.for_s(0.5)
     assert machine.frames() == []
@@ -430,8 +432,8 @@ def test_nothing_is_left_in_the_temporary_directory(
 def test_every_shipped_machine_can_be_driven(own: Callable[..., Studio], file: str) -> None:
     with own(file=f"{file}.yaml").page() as page:
         page.drive()
-        assert page.sticks is not None
-        page.sticks["slew"] = 0.3
+        assert page.joysticks is not None
+        page.joysticks["slew"] = 0.3
         page.until(lambda s: s["cranes"]["shaped"]["pose"][0] > 1.0, "shaped crane")
         page.until(lambda s: s["cranes"]["raw"]["pose"][0] > 1.0, "raw crane")
         assert page.shown["cranes"]["raw"]["axes"]["slew"]["state"] == "moving, unshaped"

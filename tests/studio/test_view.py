@@ -66,12 +66,12 @@ def test_nothing_is_known_at_the_start(watched: Watched) -> None:
 
 
 @pytest.mark.parametrize("name", [*FILES, "two-cranes"])
-def test_sticks_of_every_kind_of_joystick(name: str) -> None:
+def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     watched = Watched(name)
-    sticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0, -0.75), strict=False))
-    shown = watched.take(Hand(watched.deployment).frames(0, Held(sticks)))
-    found = {axis: values["stick"] for axis, values in shown["axes"].items()}
-    assert found == pytest.approx({axis: sticks.get(axis, 0.0) for axis in found}, abs=0.005)
+    joysticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0, -0.75), strict=False))
+    shown = watched.take(Hand(watched.deployment).frames(0, Held(joysticks)))
+    found = {axis: values["joystick"] for axis, values in shown["axes"].items()}
+    assert found == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in found}, abs=0.005)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -103,11 +103,11 @@ def test_states_are_words_and_changes_are_events(watched: Watched) -> None:
     assert shown["axes"]["slew"]["state"] == "waiting for neutral"
     assert shown["axes"]["slew"]["reason"] == "enable is off"
     assert watched.told == []
-    watched.take([watched.status(State.READY, Reason.STICK_NEUTRAL)] * 3)
-    watched.take([watched.status(State.STOPPING, Reason.STICK_TIMEOUT)])
+    watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)] * 3)
+    watched.take([watched.status(State.STOPPING, Reason.JOYSTICK_TIMEOUT)])
     watched.take([watched.status(State.TRIPPED, Reason.ENABLE_LOST)])
     assert watched.told == [
-        ("slew: ready — stick in neutral", "info"),
+        ("slew: ready — joystick in neutral", "info"),
         ("slew: stopping — no joystick message", "warn"),
         ("slew: tripped: neutral — enable released in motion", "bad"),
     ]
@@ -125,8 +125,8 @@ def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -
     """Its lag is counted positive; across the boom the grapple then hangs to the other side."""
     shown = watched.take(
         [
-            watched.status(State.ACTIVE, Reason.STICK_MOVED, 4.0),
-            watched.status(State.ACTIVE, Reason.STICK_MOVED, 3.0, "near_far"),
+            watched.status(State.ACTIVE, Reason.JOYSTICK_MOVED, 4.0),
+            watched.status(State.ACTIVE, Reason.JOYSTICK_MOVED, 3.0, "near_far"),
         ]
     )
     assert not shown["measured"]
@@ -136,7 +136,7 @@ def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -
 
 
 def test_a_daemon_that_falls_silent_is_told_and_its_states_are_forgotten(watched: Watched) -> None:
-    watched.take([watched.status(State.READY, Reason.STICK_NEUTRAL)], 0.0)
+    watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)], 0.0)
     watched.view.report_lateness(120)
     watched.view.check(0.0)
     watched.view.check(SILENT_S - 0.01)
@@ -179,7 +179,7 @@ def test_faults_are_told_once(watched: Watched) -> None:
 def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
     frames = [
         *Hand(watched.deployment).frames(0, Held({"slew": 1.0})),
-        watched.status(State.READY, Reason.STICK_NEUTRAL),
+        watched.status(State.READY, Reason.JOYSTICK_NEUTRAL),
         watched.valve("slew", 50),
         *watched.sway(5.0),
     ]
@@ -188,7 +188,7 @@ def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
             watched.take([frame._replace(data=frame.data[:length])])
     shown = watched.view.values(0.0)
     assert shown["sway"] is shown["pose"] is None
-    assert {axis["stick"] for axis in shown["axes"].values()} == {None}
+    assert {axis["joystick"] for axis in shown["axes"].values()} == {None}
 
 
 def test_every_state_reason_and_fault_has_words() -> None:
@@ -203,4 +203,4 @@ def test_every_state_reason_and_fault_has_words() -> None:
 def test_a_joystick_of_j1939_is_seen_at_every_priority_and_one_at_a_time(priority: int) -> None:
     watched = Watched("j1939-forwarder")
     watched.take([bjm("BJM1", s, priority, X=x) for s, x in ((0x33, 100.0), (0x34, -100.0))])
-    assert watched.view.axes["slew"].stick == pytest.approx(1.0)
+    assert watched.view.axes["slew"].joystick == pytest.approx(1.0)

@@ -49,7 +49,7 @@ def test_rules_before_it_and_the_fallback_after_it(gateway: Unit) -> None:
         gateway.wait_journal("away, 2 rules added", cursor)
         gateway.wait_restart(before)
         assert state(gateway) == "vcan0 vcan1: 40 rules, running"
-        wait_for(far, "SlewStatus", lambda v: v["Reason"] == "STICK_NOT_NEUTRAL")
+        wait_for(far, "SlewStatus", lambda v: v["Reason"] == "JOYSTICK_NOT_NEUTRAL")
         gateway.systemctl("stop")
         assert state(gateway) == "vcan0 vcan1: 42 rules, away"
         while far.recv(0) is not None:

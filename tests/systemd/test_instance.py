@@ -91,7 +91,7 @@ def test_killed_in_motion_it_comes_back_and_waits_for_neutral(
     forwarder.wait(ActiveState="(?!active).*")  # from here on every frame is the next process's
     with open_bus("vcan0") as later, candump(tmp_path / "after.log", "vcan0"):
         forwarder.wait_restart(before)
-        status = wait_for(later, "SlewStatus", lambda s: str(s["Reason"]) == "STICK_NOT_NEUTRAL")
+        status = wait_for(later, "SlewStatus", lambda s: str(s["Reason"]) == "JOYSTICK_NOT_NEUTRAL")
         assert str(status["State"]) == "NEUTRAL_WAIT"
     slew = [m.data[0] for m in logged(tmp_path / "after.log") if message_name(m) == "SlewCommand"]
     assert set(slew) == {0}

@@ -53,8 +53,8 @@ def calibrate(
     Drives one axis slowly up and down, first with positive, then with negative commands, and
     compares with the feedback of its speed. By default on the simulated crane; with --live on the
     machine: stop the service first, keep everybody away, hold the enable switch all the time and
-    leave the stick in neutral. Releasing the enable, moving the stick, Ctrl-C and every fault that
-    stops the daemon end it with neutral valves.
+    leave the joystick in neutral. Releasing the enable, moving the joystick, Ctrl-C and every fault
+    that stops the daemon end it with neutral valves.
 
     Beyond the top of the ramp the curve is a straight line, and says so.
 

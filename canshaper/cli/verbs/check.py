@@ -63,10 +63,10 @@ def check(file: str = FILE) -> None:
         ends, away = " and ".join(gateway.between), FALLBACKS[gateway.fallback]
         echo(f"  gateway between {ends}: others pass by the {gateway.forwarding}, {away}")
     for name, axis in deployment.axes.items():
-        valve, stick = axis.config.valve, axis.config.command
+        valve, joystick = axis.config.valve, axis.config.command
         period_ms = axis.period_ticks * config.tick_ms
         echo(
-            f"  axis {name}: {config.joysticks[stick.joystick].message}.{stick.signal}"
+            f"  axis {name}: {config.joysticks[joystick.joystick].message}.{joystick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
     for motion in config.motion.values():

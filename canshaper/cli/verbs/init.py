@@ -106,7 +106,7 @@ def _machine(messages: "list[Message]", files: Sequence[Path], folder: Path) -> 
     possible = suggest.joysticks(messages)
     if not possible:
         raise UsageError(
-            "no message has a GenMsgCycleTime, a signal with a symmetrical range (a stick) and"
+            "no message has a GenMsgCycleTime, a signal with a symmetrical range (a joystick) and"
             " one of one or two bits (its enable switch); see docs/deployment.md, and"
             " j1939-forwarder.yaml for joysticks with direction flags"
         )
@@ -181,17 +181,17 @@ def _axes(
 
     least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
     found: list[FirstAxis] = []
-    for stick in suggest.sticks(message):
-        where = f"{message.name}.{stick.name}"
+    for command_signal in suggest.axes(message):
+        where = f"{message.name}.{command_signal.name}"
         names = [*taken, *(axis.name for axis in found)]
-        likely = suggest.axis_name(stick.name)
+        likely = suggest.axis_name(command_signal.name)
         default = f"{joystick.name}_{likely}" if likely in names else likely
         axis = asked(f"Axis of {where}, - for none", name(names), default)
         if axis == NONE:
             continue
         possible = [
             m
-            for m in suggest.valves(others, stick.name)
+            for m in suggest.valves(others, command_signal.name)
             if FRAMES_PER_TIMEOUT * (m.cycle_time or 0) <= most
         ]
         commands = [f"{m.name}.{s.name}" for m in possible for s in suggest.commands(m)]
@@ -199,7 +199,7 @@ def _axes(
             echo("  no message is left that can command its valve; axis left out")
             continue
         offered = ", ".join(commands[:MOST_OFFERED])
-        alike = suggest.likeness(possible[0].name, stick.name) >= suggest.LIKELY
+        alike = suggest.likeness(possible[0].name, command_signal.name) >= suggest.LIKELY
         text = f"  {axis}: valve command, such as {offered}, - for none"
         valve = asked(text, one([*commands, NONE]), commands[0] if alike else NONE)
         if valve == NONE:
@@ -217,7 +217,7 @@ def _axes(
             FirstAxis(
                 axis,
                 joystick.name,
-                stick.name,
+                command_signal.name,
                 command,
                 signal,
                 timeout,

@@ -20,7 +20,7 @@ def monitor(
         False, "--plain", help="Lines instead of a picture: every event, and one a second."
     ),
 ) -> None:
-    """Show a running daemon: states and reasons, stick and valve, predicted sway, rates, counters.
+    """Show a running daemon: states, reasons, joystick and valve, predicted sway, rates, counters.
 
     Everything is taken from the frames on the buses of the deployment, which are only listened
     to: the daemon does not notice. It can run on the machine's PC, over ssh, or on another computer

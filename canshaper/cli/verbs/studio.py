@@ -42,7 +42,7 @@ def studio(
     channel: list[str] | None = CHANNEL,
     changes: list[str] | None = SET,
 ) -> None:
-    """Serve a page with a crane to drive: raw and shaped side by side under one stick.
+    """Serve a page with a crane to drive: raw and shaped side by side under one joystick.
 
     Starts the daemon and the simulated crane twice, each pair on a bus of its own, and sends
     nothing but joystick frames; everything shown is read from the buses. Without --channel the
@@ -108,7 +108,7 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
     """Buses of the simulated cranes.
 
     Raises:
-        ValueError: a channel on which the sticks might move a real machine.
+        ValueError: a channel on which the joysticks might move a real machine.
     """
     from canshaper.commissioning.doctor.interfaces import read_link
     from canshaper.design.processes import Transport
@@ -123,7 +123,7 @@ def _transports(interface: str | None, channels: list[str]) -> list["Transport"]
         if link is None:
             raise UsageError(f"there is no interface {one}")
         if link.kind not in ("vcan", "vxcan"):
-            text = f"{one} is no virtual bus; the sticks of the page would move a real machine"
+            text = f"{one} is no virtual bus; the joysticks of the page would move a real machine"
             raise UsageError(f"{text}. --shadow shows it")
     return [Transport("socketcan", one, f"{one} (SocketCAN)") for one in channels[:2]]
 

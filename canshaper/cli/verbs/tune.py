@@ -29,7 +29,7 @@ def tune(
     method: str = typer.Option("optimal", "--method", help="optimal, or the paper's manual rule."),
     q: float = typer.Option(1.0, "--q", help="Weight Q of swing angle and rate."),
     r: float = typer.Option(1.0, "--r", help="Weight R of the rise to 95 %."),
-    s: float = typer.Option(3.0, "--s", help="Weight S of the distance from the stick."),
+    s: float = typer.Option(3.0, "--s", help="Weight S of the distance from the joystick."),
     p: float = typer.Option(1.0, "--p", help="Weight P of changes of the output."),
     states: str = typer.Option(
         "sway", "--states", help="What Q weighs: sway, deviation, companion, none."

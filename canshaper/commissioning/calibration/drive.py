@@ -1,7 +1,7 @@
 """Drives one axis through a ramp with the daemon's own controller, and listens to its speed.
 
 Everything that may stop the daemon stops this too: enable, timeouts, emergency stop, a second
-sender. The stick has to stay in neutral; moving it ends the measurement.
+sender. The joystick has to stay in neutral; moving it ends the measurement.
 """
 
 import statistics
@@ -18,7 +18,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import MOVING, Reason, State, StickInput
+from canshaper.shaping.states import MOVING, CommandInput, Reason, State
 
 # A command below this is neutral: the ramp begins there.
 NEUTRAL_BAND = 1e-4
@@ -27,16 +27,16 @@ FALL_PER_S = 5.0
 
 
 class _RampJoystick:
-    """A joystick that is held in neutral with its enable on; the ramp stands for its stick.
+    """A joystick that is held in neutral with its enable on; the ramp stands for its joystick.
 
     Attributes:
         command: of the ramp; that of an axis which is not measured stays 0.
-        moved: whether the stick itself is not in neutral.
+        moved: whether the joystick itself is not in neutral.
     """
 
     def __init__(self, joystick: JoystickInput) -> None:
         self._joystick = joystick
-        self.command = 0.0
+        self.deflection = 0.0
         self.moved = False
 
     @property
@@ -44,18 +44,18 @@ class _RampJoystick:
         """How often its enable was seen released."""
         return self._joystick.releases
 
-    def stick(
+    def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> StickInput:
+    ) -> CommandInput:
         """What the axis may use now."""
-        found = self._joystick.stick(signal, now_ns, releases, trip, neutral_band)
+        found = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
         usable = found.fault is None and found.enabled
         self.moved = usable and abs(found.command) > neutral_band
         if not usable:
             return found
         if self.moved:  # contradicts the ramp: a fault that stops the axis through its filter
-            return StickInput(fault=Reason.STICK_CONTRADICTORY, trip=found.trip)
-        return found._replace(command=self.command, bypass=False)
+            return CommandInput(fault=Reason.JOYSTICK_CONTRADICTORY, trip=found.trip)
+        return found._replace(command=self.deflection, bypass=False)
 
 
 class CalibrationDrive:
@@ -91,7 +91,7 @@ class CalibrationDrive:
             stop_s=1.0,
             grid_steps=runner.bound.valve.steps,
         )
-        # Nothing moves but this axis: no other one gets its stick, nor moves for another one.
+        # Nothing moves but this axis: no other one gets its joystick, nor moves for another one.
         self._joysticks: dict[str, _RampJoystick] = {}
         for name, one in self._controller.axes.items():
             joystick = _RampJoystick(self._controller.joysticks[one.bound.config.command.joystick])
@@ -111,14 +111,14 @@ class CalibrationDrive:
             return ""
         axis = self._runner.axis
         if self._joystick.moved:
-            return Reason.STICK_NOT_NEUTRAL.name
+            return Reason.JOYSTICK_NOT_NEUTRAL.name
         if axis.state is not State.READY:
             return axis.reason.name
-        return f"the stick of {moved}" if (moved := self._moved) else "feedback"
+        return f"the joystick of {moved}" if (moved := self._moved) else "feedback"
 
     @property
     def _moved(self) -> str:
-        """Axes that are not measured and whose stick is not in neutral."""
+        """Axes that are not measured and whose joystick is not in neutral."""
         return " and ".join(name for name, joystick in self._joysticks.items() if joystick.moved)
 
     @property
@@ -141,18 +141,18 @@ class CalibrationDrive:
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
             self.progress = min(1.0, time_s / self._ramp.duration_s)
-            self._joystick.command = self._ramp.command(time_s)
+            self._joystick.deflection = self._ramp.command(time_s)
             self._sample(time_s)
             if time_s >= self._ramp.duration_s:
                 self.ended = "done"
             elif state not in MOVING and state is not State.READY:
                 self.ended = f"stopped: {axis.reason.name}"
             elif self._moved:
-                self.ended = f"stopped: the stick of {self._moved} was moved"
+                self.ended = f"stopped: the joystick of {self._moved} was moved"
             elif not heard:
                 self.ended = "stopped: the feedback fell silent, or tells an error"
             if self.ended:
-                self._joystick.command = 0.0
+                self._joystick.deflection = 0.0
         yield from self._controller.tick(now_ns, missed)
         self._controller.events.clear()
 

@@ -30,10 +30,10 @@ MOST_CAUGHT_UP = 5
 
 
 class Waving(Script):
-    """A hand that moves every stick of any machine, always."""
+    """A hand that moves every joystick of any machine, always."""
 
-    def stick(self, axis: str, time_s: float) -> float:
-        """Stick value; the same for all axes."""
+    def command(self, axis: str, time_s: float) -> float:
+        """Joystick value; the same for all axes."""
         stroke, at_s = divmod(time_s, NEUTRAL_S + STROKE_S)
         way = (at_s - NEUTRAL_S) / STROKE_S
         if way <= 0.0:

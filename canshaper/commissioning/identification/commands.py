@@ -43,7 +43,7 @@ class Commands:
     def __init__(self, deployment: Deployment | None) -> None:
         self._axes = dict(deployment.axes) if deployment else {}
         self._valves: dict[str, Samples] = {n: Samples() for n in self._axes}
-        self._sticks: dict[str, Samples] = {n: Samples() for n in self._axes}
+        self._joysticks: dict[str, Samples] = {n: Samples() for n in self._axes}
         self._by_valve: dict[tuple[int, bool], list[BoundAxis]] = {}
         self._layouts: dict[tuple[int, bool], tuple[Layout, int]] = {}
         for bound in self._axes.values():
@@ -73,15 +73,15 @@ class Commands:
 
     def _take_joystick(self, joystick: BoundJoystick, time_s: float, data: bytes) -> None:
         try:
-            _, sticks = joystick.codec.decode(data)
+            _, commands = joystick.codec.decode(data)
         except WrongLengthError:
             return
         for name, bound in self._axes.items():
-            stick = bound.config.command
-            value = sticks.get(stick.signal) if stick.joystick == joystick.name else None
+            config = bound.config.command
+            value = commands.get(config.signal) if config.joystick == joystick.name else None
             if type(value) is float:
-                moved = abs(value) > stick.neutral_pct / 100.0
-                self._sticks[name].add(time_s, value if moved else 0.0)
+                moved = abs(value) > config.neutral_pct / 100.0
+                self._joysticks[name].add(time_s, value if moved else 0.0)
 
     def _speed(self, bound: BoundAxis, command: float) -> float:
         """Speed that the valve gives by the limits of its axis, part of full."""
@@ -93,7 +93,7 @@ class Commands:
 
     def of(self, axis: str) -> Command | None:
         """Commands of an axis; None where the log has none."""
-        for samples in (self._valves.get(axis), self._sticks.get(axis)):
+        for samples in (self._valves.get(axis), self._joysticks.get(axis)):
             if samples and samples.value:
                 time, speed = samples.arrays()
                 return Command(time, speed)

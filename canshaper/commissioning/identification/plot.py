@@ -19,9 +19,9 @@ from canshaper.commissioning.identification.report import heading
 from canshaper.commissioning.identification.series import Kind, binned
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.report.style import (
+    JOYSTICK_COLOUR,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     new_figure,
     plain,
@@ -182,7 +182,7 @@ def _draw_driven(panel: Axes, fit: DrivenFit) -> None:
         at = one.start_s + one.time_s
         high = factor * float(np.abs(one.value).max())
         panel.fill_between(
-            at, high * np.sign(one.command), color=STICK_COLOUR, linewidth=0, step="post"
+            at, high * np.sign(one.command), color=JOYSTICK_COLOUR, linewidth=0, step="post"
         )
         panel.plot(at, factor * one.value, ".", color=_DATA, markersize=3.0)
         panel.plot(at, factor * one.fitted, color=SHAPED_COLOUR, linewidth=1.8)

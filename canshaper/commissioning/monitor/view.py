@@ -121,7 +121,7 @@ IN_ROWS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway", "A
 
 
 def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[Text]:
-    """Two lines: state and stick, reason and what is sent."""
+    """Two lines: state and joystick, reason and what is sent."""
     status = monitor.history.axes.get(name)
     if status is None:
         has_status = monitor.deployment.axes[name].status is not None
@@ -131,7 +131,7 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
         return
     stale_s = monitor.stale_s(name, now_ns)
     style = DIM if stale_s is not None else ""
-    first = _row(name, status.state, "stick", status.values["RawCommand"], style, plain=plain)
+    first = _row(name, status.state, "joystick", status.values["RawCommand"], style, plain=plain)
     number = status.values.get("ActiveSet")
     yield first.append(f"  set {number}" if number else "", style)
     reason = status.reason if stale_s is None else f"STALE {stale_s:.1f} s"

@@ -18,7 +18,7 @@ from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.off import Off
-from canshaper.shaping.states import StickInput
+from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 ShaperFor = Callable[[SwayModel], Shaper]
@@ -37,7 +37,7 @@ class Machine:
 
     Attributes:
         limits: output limits of the axis.
-        neutral_band: |stick| that counts as neutral.
+        neutral_band: |joystick| that counts as neutral.
         stop_s: longest shaped stop of the axis.
         grid_steps: raw steps of the valve frame from zero to full command.
         lag_s: time constant of valve and actuator.
@@ -216,13 +216,13 @@ def _press_and_release(
         stop_s=machine.stop_s,
         grid_steps=machine.grid_steps,
     )
-    axis.tick(StickInput(0.0))  # seen in neutral: ready
+    axis.tick(CommandInput(0.0))  # seen in neutral: ready
     count = round(hold_s / tick_s)
     moves = []
     for command in (1.0, 0.0):
         before, sent = axis.sent, []
         for _ in range(count):
-            axis.tick(StickInput(command))
+            axis.tick(CommandInput(command))
             sent.append(axis.sent)
         moves.append((before, sent))
     return moves

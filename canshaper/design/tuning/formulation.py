@@ -3,8 +3,8 @@
     minimise   1/N sum_k  x'Q x + R (y - 0.95)^2 + S (y - 1)^2 + P (y_k - y_(k-1))^2        (Eq. 15)
     over       the real poles of G_FF (14d), at a distance from the imaginary axis (14e)
 
-for a unit step on the stick, k = 0 ... N-1, y_(-1) = 0, so that the first jump counts. Commands are
-fractions of full speed; u_max cancels, because the cost grows with its square.
+for a unit step on the joystick, k = 0 ... N-1, y_(-1) = 0, so that the first jump counts. Commands
+are fractions of full speed; u_max cancels, because the cost grows with its square.
 """
 
 import math

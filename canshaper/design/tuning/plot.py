@@ -12,10 +12,10 @@ from matplotlib.axes import Axes
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
 from canshaper.report.style import (
+    JOYSTICK_COLOUR,
     MINUS,
     RAW_COLOUR,
     SHAPED_COLOUR,
-    STICK_COLOUR,
     TEXT_COLOUR,
     new_figure,
     plain,
@@ -96,7 +96,7 @@ def _draw_command(panel: Axes, traces: Traces, measures: Evaluation) -> None:
     lead = 0.06 * traces.t_s[-1]
     time = [-lead, 0.0, *traces.t_s]
     sent = [0.0, 0.0, *traces.sent]
-    panel.fill_between([0.0, traces.t_s[-1]], [100.0, 100.0], color=STICK_COLOUR, linewidth=0)
+    panel.fill_between([0.0, traces.t_s[-1]], [100.0, 100.0], color=JOYSTICK_COLOUR, linewidth=0)
     panel.plot(
         time, [100.0 * v for v in sent], color=SHAPED_COLOUR, linewidth=2.2, drawstyle="steps-post"
     )
@@ -104,7 +104,7 @@ def _draw_command(panel: Axes, traces: Traces, measures: Evaluation) -> None:
     panel.set_xlim(-lead, traces.t_s[-1])
     panel.set_ylabel("speed, % of full", **_LABEL)
     panel.tick_params(labelbottom=False)
-    panel.text(traces.t_s[-1], 102.0, "stick", ha="right", va="bottom", color="#666666")
+    panel.text(traces.t_s[-1], 102.0, "joystick", ha="right", va="bottom", color="#666666")
     panel.text(
         measures.run_on_s,
         55.0,

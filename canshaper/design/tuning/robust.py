@@ -51,7 +51,7 @@ class RobustShaper:
         residual: largest |H(p)| over the range of lengths, fraction of the unshaped swing.
         second_residual: that of the second mode; 0 without one.
         duration_s: from the first to the last tap.
-        mean_delay_s: centre of the taps: how far the crane lags behind the stick.
+        mean_delay_s: centre of the taps: how far the crane lags behind the joystick.
     """
 
     taps: tuple[float, ...]
@@ -182,7 +182,7 @@ def time_optimal_s(
 ) -> float:
     """Shortest time to change the speed by one with no swing left, output within [low, high].
 
-    Not a shaper for moving sticks (it may step back and forth): the limit that none can pass.
+    Not a shaper for moving joysticks (it may step back and forth): the limit that none can pass.
     """
     n_low, n_high = 1, round(3.0 * mode.period_s / tick_s)
 

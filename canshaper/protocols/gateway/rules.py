@@ -107,7 +107,7 @@ def channels(deployment: Deployment) -> tuple[str, str]:
 
 
 def _neutral(message: RewrittenMessage) -> tuple[tuple[int, bytes], ...]:
-    """Changes that make a frame of a joystick one with all its sticks in neutral."""
+    """Changes that make a frame of a joystick one with all its axes in neutral."""
     length = message.sender.fields.message.length
     checks, clear = kernel_check(message.sender.protection, length)
     return (

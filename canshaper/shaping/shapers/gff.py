@@ -23,7 +23,7 @@ class Gff:
         sway: the sway model of the axis; whoever owns it steps it with what was really sent.
         poles_rad_s: the two poles of the filter, real and negative.
         third_pole_rad_s: a third real pole, as a first-order lag on the command: without it a step
-            on the stick comes out at once as 1/(a2 w^2) times the command.
+            on the joystick comes out at once as 1/(a2 w^2) times the command.
 
     Raises:
         ValueError: a pole is not negative or too fast for the tick.

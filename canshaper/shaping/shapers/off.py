@@ -4,7 +4,7 @@ from canshaper.shaping.shapers.kind import ShaperKind
 
 
 class Off:
-    """No shaping: the output limits alone stand between stick and valve."""
+    """No shaping: the output limits alone stand between joystick and valve."""
 
     __slots__ = ()
 

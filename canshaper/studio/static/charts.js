@@ -13,7 +13,7 @@ export class Charts {
     this.hello = hello;
     this.axis = hello.axes[0];
     this.drawn = 0;
-    this.rows = []; // [t, {axis: {stick, [crane]: {valve, sway, predicted}}}]
+    this.rows = []; // [t, {axis: {joystick, [crane]: {valve, sway, predicted}}}]
     this.main = hello.cranes[0];
     this.build();
   }
@@ -23,7 +23,7 @@ export class Charts {
     this.sway?.destroy();
     const { cranes } = this.hello;
     const color = (name) => css({ raw: "--raw" }[name] ?? "--shaped");
-    const lines = [{ label: "stick", stroke: css("--stick"), get: (v) => v.stick, dash: [5, 4] },
+    const lines = [{ label: "joystick", stroke: css("--joystick"), get: (v) => v.joystick, dash: [5, 4] },
       ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), get: (v) => v[c]?.valve, width: 2 })).reverse()];
     const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), get: (v) => v[c]?.sway, width: 2 })).reverse(),
       { label: "model", stroke: css("--predicted"), get: (v) => v[this.main]?.predicted, dash: [3, 3] }];
@@ -64,7 +64,7 @@ export class Charts {
   add(shown) {
     const row = {};
     for (const axis of this.hello.axes) {
-      row[axis] = { stick: shown.cranes[this.main]?.axes[axis].stick };
+      row[axis] = { joystick: shown.cranes[this.main]?.axes[axis].joystick };
       for (const [name, crane] of Object.entries(shown.cranes)) {
         const way = this.hello.sway_of[axis];
         row[axis][name] = {

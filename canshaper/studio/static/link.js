@@ -45,7 +45,7 @@ export class Link {
     if (this.up) this.socket.send(JSON.stringify(message));
   }
 
-  /** Send where the sticks are; what cannot go out now is out of date later. */
+  /** Send where the joysticks are; what cannot go out now is out of date later. */
   sendNow(message) {
     if (this.up && this.socket.bufferedAmount === 0) this.socket.send(JSON.stringify(message));
   }

@@ -1,16 +1,16 @@
-// The page: it sends where the sticks are and shows what is on the buses, nothing else.
+// The page: it sends where the joysticks are and shows what is on the buses, nothing else.
 import { Charts } from "/static/charts.js";
 import { Link } from "/static/link.js";
 import { Panel } from "/static/panel.js";
 import { Scene } from "/static/scene.js";
-import { Sticks } from "/static/sticks.js";
+import { Joysticks } from "/static/joysticks.js";
 
 const SEND_MS = 20;
 const SLIDE_MS = 100;
 const byId = (id) => document.getElementById(id);
 
-let hello, panel, charts, scene, sticks, shown, link;
-let taken = false; // whether this page has asked for the sticks on this connection
+let hello, panel, charts, scene, joysticks, shown, link;
+let taken = false; // whether this page has asked for the joysticks on this connection
 const slides = {};
 
 function begin(found) {
@@ -29,7 +29,7 @@ function begin(found) {
     return;
   }
   panel = new Panel(hello, (name, factor) => { slides[name] = factor; });
-  sticks = new Sticks(hello.drives ? hello.axes : [], byId("pads"), byId("keys"));
+  joysticks = new Joysticks(hello.drives ? hello.axes : [], byId("pads"), byId("keys"));
   charts?.command.destroy();
   charts?.sway.destroy();
   charts = new Charts(hello);
@@ -87,7 +87,7 @@ function lost(reason) {
   pill("link", "no connection", "bad");
   byId("banner").textContent = reason
     ? `The studio has closed the connection: ${reason}. Trying again.`
-    : "No connection to the studio; sticks are in neutral there. Trying again.";
+    : "No connection to the studio; joysticks are in neutral there. Trying again.";
   byId("banner").hidden = false;
   byId("seat").hidden = true;
 }
@@ -114,19 +114,19 @@ function overlay(on) {
 }
 
 addEventListener("keydown", (event) => {
-  if (event.ctrlKey || event.altKey || event.metaKey || !sticks) return;
+  if (event.ctrlKey || event.altKey || event.metaKey || !joysticks) return;
   const key = event.key.toLowerCase();
   const onSlider = event.target.type === "range" && key.startsWith("arrow");
   if (onSlider) return;
-  if (sticks.press(key, true)) event.preventDefault();
+  if (joysticks.press(key, true)) event.preventDefault();
   else if (actions[key] && !event.repeat) {
     event.preventDefault();
     actions[key]();
   }
 });
-addEventListener("keyup", (event) => sticks?.press(event.key.toLowerCase(), false));
-addEventListener("blur", () => sticks?.release());
-document.addEventListener("visibilitychange", () => sticks?.release());
+addEventListener("keyup", (event) => joysticks?.press(event.key.toLowerCase(), false));
+addEventListener("blur", () => joysticks?.release());
+document.addEventListener("visibilitychange", () => joysticks?.release());
 
 byId("take").onclick = () => link.send({ do: "take" });
 byId("enable").onclick = actions.e;
@@ -144,9 +144,9 @@ function theme(name) {
 theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
 
 setInterval(() => {
-  if (!sticks || !hello?.drives) return;
-  const read = sticks.read();
-  if (shown?.driver === hello.page) link.sendNow({ sticks: read });
+  if (!joysticks || !hello?.drives) return;
+  const read = joysticks.read();
+  if (shown?.driver === hello.page) link.sendNow({ joysticks: read });
 }, SEND_MS);
 setInterval(() => {
   for (const [name, to] of Object.entries(slides)) {
@@ -165,7 +165,7 @@ function draw(now) {
   if (!hello) return;
   scene?.draw(now);
   charts.draw(now);
-  sticks.draw(shown && Object.values(shown.cranes)[0]?.axes);
+  joysticks.draw(shown && Object.values(shown.cranes)[0]?.axes);
   pictures += 1;
   if (now - counted >= 1000) {
     byId("fps").textContent = Math.round((1000 * pictures) / (now - counted));

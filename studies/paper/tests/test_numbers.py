@@ -136,7 +136,7 @@ def test_slower_poles_swing_less_and_run_on_longer(numbers: dict[int, dict[str, 
     assert numbers[3]["runs"][-2]["swing"]["perpendicular"]["peak"]["reduction_pct"] < 1.0
 
 
-def test_the_real_plant_is_never_asked_for_more_than_the_stick(
+def test_the_real_plant_is_never_asked_for_more_than_the_joystick(
     numbers: dict[int, dict[str, Any]],
 ) -> None:
     for figure in (3, 4, 7, 8):

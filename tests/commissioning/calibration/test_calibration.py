@@ -153,7 +153,7 @@ def test_what_stops_the_daemon_ends_it_in_neutral(
         drive.result()
 
 
-def test_a_stick_that_is_moved_before_the_start_is_waited_for(deployment: Deployment) -> None:
+def test_a_joystick_that_is_moved_before_the_start_is_waited_for(deployment: Deployment) -> None:
     """Also one that was in neutral before: READY ends without a trip, and comes back."""
     waiting = CalibrationDrive(deployment, "slew", SPEED, RAMP)
     seen = set()
@@ -163,7 +163,7 @@ def test_a_stick_that_is_moved_before_the_start_is_waited_for(deployment: Deploy
             waiting.receive(frame, tick * TICK_NS)
         assert not any(f.data[0] for f in waiting.tick(tick * TICK_NS) if f.can_id == 0x200)
         seen.add(waiting.waiting_for)
-    assert seen >= {"STICK_NOT_NEUTRAL", "feedback"}
+    assert seen >= {"JOYSTICK_NOT_NEUTRAL", "feedback"}
     assert (waiting.waiting_for, waiting.ended) == ("feedback", "")
 
 

@@ -109,23 +109,23 @@ def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why
         CalibrationDrive(with_messages(tmp_path), "slew", (message, "Speed"), RAMP)
 
 
-def test_the_stick_of_another_axis_ends_it_and_moves_nothing() -> None:
+def test_the_joystick_of_another_axis_ends_it_and_moves_nothing() -> None:
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
     hand, sent = Hand(deployment), []
     for tick in range(300):
-        sticks = {"near_far": 1.0} if tick > 200 else {}
-        for frame in hand.frames(tick * 20, Held(sticks, enable=True)):
+        joysticks = {"near_far": 1.0} if tick > 200 else {}
+        for frame in hand.frames(tick * 20, Held(joysticks, enable=True)):
             drive.receive(frame, tick * TICK_NS)
         drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
         sent += [f for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201)]
-    assert drive.ended == "stopped: the stick of near_far was moved"
+    assert drive.ended == "stopped: the joystick of near_far was moved"
     assert any(f.data[0] for f in sent if f.can_id == 0x200)
     assert not any(f.data[0] for f in sent if f.can_id == 0x201)
     assert [f.data[0] for f in sent[-40:]] == [0] * 40
 
 
-def test_it_waits_for_every_stick() -> None:
+def test_it_waits_for_every_joystick() -> None:
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "SlewRate"), RAMP)
     hand = Hand(deployment)
@@ -134,7 +134,7 @@ def test_it_waits_for_every_stick() -> None:
             drive.receive(frame, tick * TICK_NS)
         drive.receive(Frame("crane", 0x402, False, bytes(6)), tick * TICK_NS)
         assert not any(f.data[0] for f in drive.tick(tick * TICK_NS) if f.can_id in (0x200, 0x201))
-    assert drive.waiting_for == "the stick of near_far"
+    assert drive.waiting_for == "the joystick of near_far"
 
 
 def test_in_a_gateway_the_frames_of_the_joystick_move_the_crane() -> None:

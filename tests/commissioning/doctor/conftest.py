@@ -67,7 +67,7 @@ def run() -> Callable[..., Run]:
             "tick_ns": [400_000] * 1000,
             "joystick_ns": [10_000_000] * 1000,
             "missed": 0,
-            "events": [("slew", "ACTIVE", "STICK_MOVED")],
+            "events": [("slew", "ACTIVE", "JOYSTICK_MOVED")],
             "moved": ["lift", "near_far", "slew"],
             "faults": {},
             "policy": None,

@@ -79,7 +79,7 @@ def test_buses_and_slow_valves_are_kept_apart(two_buses: Path) -> None:
 
 def test_the_hand() -> None:
     times = [i / 1000 for i in range(10_000)]
-    values = [WAVING.stick("any axis", t) for t in times]
+    values = [WAVING.command("any axis", t) for t in times]
     assert all(v == 0.0 for v in values[: round(1000 * NEUTRAL_S)])
     assert max(values) == pytest.approx(LARGEST, abs=0.01)
     assert min(values) == pytest.approx(-LARGEST, abs=0.01)

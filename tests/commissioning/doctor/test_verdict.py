@@ -104,9 +104,9 @@ def test_no_answer_is_not_fit(run: Make) -> None:
         ({"events": [("slew", "TRIPPED", "LOOP_STALLED")]}, Level.BAD, "slew TRIPPED LOOP_STALLED"),
         ({"events": [("lift", "STOPPING", "LOOP_OVERRUN")]}, Level.BAD, "lift STOPPING"),
         (
-            {"events": [("lift", "STOPPING", "STICK_TIMEOUT")] * 2},
+            {"events": [("lift", "STOPPING", "JOYSTICK_TIMEOUT")] * 2},
             Level.WARNING,
-            "lift STOPPING STICK_TIMEOUT (2)",
+            "lift STOPPING JOYSTICK_TIMEOUT (2)",
         ),
         ({"moved": ["slew", "lift"]}, Level.WARNING, "not in motion: near_far"),
         ({"events": [("slew", "READY", "AT_REST")]}, Level.OK, "all in motion"),

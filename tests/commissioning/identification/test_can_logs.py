@@ -85,8 +85,8 @@ def test_joysticks_tell_the_commands_where_no_valve_does(
     log = candump(tmp_path / "a.log", TOLD, valves=False)
     lines = log.read_text().splitlines()
     for tick in range(600):
-        stick = 500 if 100 <= tick < 150 else 15  # 1.5 %, still neutral
-        data = stick.to_bytes(2, "little", signed=True) + bytes(6)
+        joystick = 500 if 100 <= tick < 150 else 15  # 1.5 %, still neutral
+        data = joystick.to_bytes(2, "little", signed=True) + bytes(6)
         lines.append(f"({1.7e9 + 0.02 * tick + 0.001:.6f}) can0 110#{data.hex().upper()}")
     write(log, sorted(lines))
     slew = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]

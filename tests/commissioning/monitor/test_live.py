@@ -99,7 +99,7 @@ def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
             rows = picture.splitlines()
             assert len(rows) <= 24
             assert max(len(row.rstrip()) for row in rows) <= 80
-            terminal.wait_for("STICK_TIMEOUT")
+            terminal.wait_for("JOYSTICK_TIMEOUT")
         terminal.wait_for("STALE")
     finally:
         code = terminal.end()
@@ -118,7 +118,7 @@ def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
             assert all("slew=no-status near_far=no-status" in line for line in lines)
             from_our_bus = [m for m in iter(lambda: bus.recv(0), None) if m.arbitration_id != 0]
             with running("run", log=tmp_path / "run"):
-                while "slew=NEUTRAL_WAIT(STICK_TIMEOUT)" not in lines[-1]:
+                while "slew=NEUTRAL_WAIT(JOYSTICK_TIMEOUT)" not in lines[-1]:
                     lines.append(monitor.stdout.readline())
                     assert lines[-1], lines
         finally:

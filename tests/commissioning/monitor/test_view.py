@@ -44,7 +44,7 @@ def told(
     deployment: Deployment,
     time_ns: int = NOW,
     state: State = State.ACTIVE,
-    reason: Reason = Reason.STICK_MOVED,
+    reason: Reason = Reason.JOYSTICK_MOVED,
 ) -> list[Heard]:
     """Status of all axes and of the service."""
     frames = [
@@ -95,9 +95,11 @@ def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
     for frame in told(deployment):
         monitor.take(frame)
     lines = text(monitor, NOW + 100 * MS)
-    assert lines[1].startswith("slew        ACTIVE               stick ··········│█████·····  +50%")
+    assert lines[1].startswith(
+        "slew        ACTIVE               joystick ··········│█████·····  +50%"
+    )
     assert lines[2].startswith(
-        "            STICK_MOVED          valve ········██│··········  -25%  sway +3.4"
+        "            JOYSTICK_MOVED          valve ········██│··········  -25%  sway +3.4"
     )
     assert "sway" not in lines[6]  # lifting swings nothing
     assert any("missed 3" in line for line in lines)
@@ -107,7 +109,7 @@ def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
 def test_it_fits_the_terminal(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for i in range(300):
-        reason = Reason.EMERGENCY_STOP_LOST if i % 2 else Reason.STICK_CONTRADICTORY
+        reason = Reason.EMERGENCY_STOP_LOST if i % 2 else Reason.JOYSTICK_CONTRADICTORY
         for frame in told(deployment, NOW + i * 100 * MS, State(i % 6), reason):
             monitor.take(frame)
     for width, height in ((80, 24), (60, 12), (200, 60), (40, 8)):
@@ -153,7 +155,7 @@ def test_rates_are_told_beside_those_of_the_dbc(deployment: Deployment) -> None:
 
 def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment, state=State.READY, reason=Reason.STICK_NEUTRAL):
+    for frame in told(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL):
         monitor.take(frame)
     for frame in told(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
         monitor.take(frame)
@@ -197,7 +199,7 @@ def test_a_line_for_pipes(deployment: Deployment) -> None:
     for frame in told(deployment):
         monitor.take(frame)
     line = status_line(monitor, NOW)
-    assert "slew=ACTIVE(STICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
+    assert "slew=ACTIVE(JOYSTICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
     assert "missed=3" in line
     assert "crane=2/s" in line
     assert not math.isnan(float(line.split("sway=")[1].split("deg")[0]))

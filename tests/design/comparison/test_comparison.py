@@ -73,7 +73,7 @@ def test_manoeuvres_end_in_rest_and_cover_what_they_should() -> None:
 def test_the_load_is_picked_up_while_the_joysticks_are_neutral() -> None:
     load = task("load picked up")
     assert load.load_s is not None
-    assert all(load.script.stick(axis, load.load_s) == 0.0 for axis in load.script.axes)
+    assert all(load.script.command(axis, load.load_s) == 0.0 for axis in load.script.axes)
     before, after = (
         [s for s in load.script.strokes if (s.start_s < load.load_s) is first]
         for first in (True, False)

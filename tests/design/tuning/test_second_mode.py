@@ -24,7 +24,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
-from canshaper.shaping.states import StickInput
+from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
 
 ROOT = Path(__file__).parents[3]
@@ -138,10 +138,10 @@ def pulse(bound: BoundAxis, hold_s: float) -> list[float]:
         "robust", TICK_S, sway, valve_rate_per_s=5.0, **bound.config.filter.parameters()
     )
     axis = Axis(TICK_S, machine.limits, sway=sway, shaper=shaper, neutral_band=0.02, stop_s=2.0)
-    axis.tick(StickInput(0.0))
+    axis.tick(CommandInput(0.0))
     sent = []
     for tick in range(round((hold_s + 2.0) / TICK_S)):
-        axis.tick(StickInput(1.0 if tick * TICK_S < hold_s else 0.0))
+        axis.tick(CommandInput(1.0 if tick * TICK_S < hold_s else 0.0))
         sent.append(axis.sent)
     return sent
 

@@ -44,7 +44,7 @@ def test_a_valve_is_brought_to_work_in_four_steps_50_ms_apart(rig: CanopenRig) -
     steps = words(rig, 60)
     assert [word for word, _ in steps] == [INIT, DISABLED, HOLD, ACTIVE]
     assert min(passed for _, passed in steps[1:]) >= STEP_NS
-    assert rig.axis() == ("READY", "STICK_NEUTRAL")
+    assert rig.axis() == ("READY", "JOYSTICK_NEUTRAL")
 
 
 def test_the_first_word_is_init_before_and_at_the_first_tick(rig: CanopenRig) -> None:
@@ -206,20 +206,20 @@ def test_stall_forgets_what_the_valve_said(rig: CanopenRig) -> None:
         max_size=80,
     )
 )
-def test_whatever_valve_and_stick_say_float_is_never_sent(
+def test_whatever_valve_and_joystick_say_float_is_never_sent(
     drive: list[tuple[int | None, int, int | None]],
 ) -> None:
     """And nothing but 0 to a valve that has not said that it is active."""
     rig = CanopenRig().ready()
     rig.valves["slew"].silent = True
     rig.states["slew"] = -1
-    for state, stick, node in drive:
+    for state, joystick, node in drive:
         for _ in range(3):
             if state is not None:
                 rig.status("slew", state)
             if node is not None:
                 rig.heartbeat("slew", node)
-            told = rig.run(Slew=stick)["slew"]
+            told = rig.run(Slew=joystick)["slew"]
             assert -0x4000 <= told["SetPoint"] <= 0x4000
             if told["SetPoint"]:
                 assert told["ControlWord"] == ACTIVE

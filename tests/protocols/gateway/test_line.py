@@ -40,8 +40,10 @@ def quick(tmp_path_factory: pytest.TempPathFactory) -> GatewayRig:
 
 
 @given(st.integers(0, 2**64 - 1), st.integers(-1000, 1000), st.integers(0, 1))
-def test_every_other_bit_is_untouched(quick: GatewayRig, bits: int, stick: int, reset: int) -> None:
-    frame = quick.joystick(junk=bits & FREE, NearFar=stick, Reset=reset)
+def test_every_other_bit_is_untouched(
+    quick: GatewayRig, bits: int, joystick: int, reset: int
+) -> None:
+    frame = quick.joystick(junk=bits & FREE, NearFar=joystick, Reset=reset)
     passed = quick.receive(frame)
     assert passed is not None
     mine = VELOCITIES | COUNTER
@@ -115,7 +117,7 @@ def test_a_lost_joystick_ends_in_a_shaped_stop_of_our_own_and_then_silence(
 
 
 def test_nothing_in_our_own_frames_is_older_than_the_axes(rig: GatewayRig) -> None:
-    """A stick that no axis has, a pressed reset: of a lost joystick nothing is held."""
+    """A joystick that no axis has, a pressed reset: of a lost joystick nothing is held."""
     rig.run(3)
     rig.run(60, Lift=1000, Rotate=500)
     while not (own := rig.tick()):
@@ -125,7 +127,7 @@ def test_nothing_in_our_own_frames_is_older_than_the_axes(rig: GatewayRig) -> No
     assert values["Rotate"] == 32767  # "not available": its start value
 
 
-def test_a_stick_without_a_start_value_is_neutral_in_our_own_frames(tmp_path: Path) -> None:
+def test_a_joystick_without_a_start_value_is_neutral_in_our_own_frames(tmp_path: Path) -> None:
     """Raw 0 of an unsigned signal with an offset would be full speed."""
     rig = GatewayRig(
         tmp_path,
@@ -151,7 +153,7 @@ def test_a_joystick_that_comes_back_is_passed_on_in_the_stop(rig: GatewayRig) ->
     assert rig.state()[0] == "STOPPING"
     assert rig.tick() == []  # there is one of the joystick
     assert rig.run(100, Slew=1000)["Slew"] == 0
-    assert rig.state() == ("NEUTRAL_WAIT", "STICK_NOT_NEUTRAL")
+    assert rig.state() == ("NEUTRAL_WAIT", "JOYSTICK_NOT_NEUTRAL")
 
 
 def test_enable_off_leaves_with_its_frame_and_neutral_in_the_same(rig: GatewayRig) -> None:
@@ -249,18 +251,18 @@ def test_the_checksum_is_made_anew(tmp_path: Path) -> None:
     rig = GatewayRig(tmp_path, yaml=PROTECTED, dbc=(CHECKSUM,))
     bad = rig.joystick()
     assert rig.receive(bad) is None
-    for stick in (0, 0, 1000, 1000, 1000):
-        frame = rig.joystick(Slew=stick)
+    for joystick in (0, 0, 1000, 1000, 1000):
+        frame = rig.joystick(Slew=joystick)
         right = frame.data[:6] + bytes((crc(frame.data),)) + frame.data[7:]
         passed = rig.receive(frame._replace(data=right))
         assert passed is not None
         assert passed.data[6] == crc(passed.data)
-        assert passed.data != right or stick == 0
+        assert passed.data != right or joystick == 0
         rig.tick()
 
 
 def test_e2e_is_made_anew(tmp_path: Path) -> None:
-    """Its header fills the first 12 bits, so the sticks move up by two bytes."""
+    """Its header fills the first 12 bits, so the joysticks move up by two bytes."""
     ids = list(range(1, 17))
     profile = Profile2(ids)
     e2e = f"e2e: {{ profile: p02, data_ids: {ids} }}"
@@ -291,8 +293,8 @@ def test_e2e_is_made_anew(tmp_path: Path) -> None:
 
 def test_ten_late_frames_in_one_tick_leave_in_their_order(rig: GatewayRig) -> None:
     rig.run(3)
-    for stick in range(10):
-        rig.receive(rig.joystick(Reset=stick % 2))
+    for joystick in range(10):
+        rig.receive(rig.joystick(Reset=joystick % 2))
     assert [rig.decoded(f)["Reset"] for f in rig.left[-10:]] == [0, 1] * 5
     assert rig.now_ns == 3 * TICK_NS
 

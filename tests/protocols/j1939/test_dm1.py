@@ -136,7 +136,7 @@ def test_every_code_is_read_back(faults: list[Fault]) -> None:
 
 
 def test_every_reason_for_a_stop_is_a_fault_or_is_known_to_be_none() -> None:
-    stops = {r.name for r in Reason if r >= Reason.STICK_TIMEOUT}
+    stops = {r.name for r in Reason if r >= Reason.JOYSTICK_TIMEOUT}
     told = {r.name for r in FMI_OF}
     assert not told & NO_FAULTS
     assert stops - told - NO_FAULTS <= {"VALVE_NOT_READY"}
@@ -150,7 +150,7 @@ def test_the_machine_tells_which_axes_cannot_move_and_why() -> None:
     data = b"".join(f.data[1:] for f in frames if f.can_id == PACKET)
     (head,) = [f for f in frames if f.can_id == BROADCAST]
     found = codes(data[: head.data[1]])
-    # lift is the third axis: stick lost; its valve and those of the other two are not heard of
+    # lift is the third axis: joystick lost; its valve and those of the other two are not heard of
     assert found == [(FIRST + 1, 9, 1), (FIRST + 3, 9, 1), (FIRST + 4, 9, 1), (FIRST + 5, 9, 1)]
 
 

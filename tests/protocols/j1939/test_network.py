@@ -55,7 +55,7 @@ def test_the_other_joystick_takes_over_after_silence_and_never_in_motion(rig: Ri
     for _ in range(200):
         sent = rig.tick(bjm("BJM1", 0x34, X=100.0), bjm("BJM2"))
     assert flow(sent) == 0.0
-    assert rig.reason() == "STICK_NOT_NEUTRAL"  # it has to be seen in neutral first
+    assert rig.reason() == "JOYSTICK_NOT_NEUTRAL"  # it has to be seen in neutral first
     for x in (0.0, 100.0):
         for _ in range(40):
             sent = rig.tick(bjm("BJM1", 0x34, X=x), bjm("BJM2"))
@@ -90,7 +90,7 @@ def test_a_second_joystick_without_an_address_of_its_own(rig: Rig, source: int) 
 def test_nobody_else_may_use_our_address(rig: Rig) -> None:
     for _ in range(30):
         rig.tick(bjm("BJM1", OWN), bjm("BJM2"))
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
 
 
 def test_a_joystick_of_one_address_and_no_other(tmp_path: Path) -> None:
@@ -100,7 +100,7 @@ def test_a_joystick_of_one_address_and_no_other(tmp_path: Path) -> None:
     )
     for _ in range(20):
         rig.tick(bjm("BJM1"), bjm("BJM2"))
-    assert rig.reason() == "STICK_TIMEOUT"
+    assert rig.reason() == "JOYSTICK_TIMEOUT"
     assert rig.fault != "SECOND_SENDER"  # other traffic
     for _ in range(20):
         rig.tick(bjm("BJM1"), bjm("BJM1", 0x34, 6), bjm("BJM2"))
@@ -193,9 +193,9 @@ def test_a_bus_that_is_only_listened_to_needs_no_address(tmp_path: Path) -> None
         ("buses:\n", "buses:\n  joy: { interface: socketcan, channel: can7 }\n"),
         ("    bus: crane\n    message: BJM", "    bus: joy\n    message: BJM"),
     )
-    sticks = [frame._replace(bus="joy") for frame in (bjm("BJM1"), bjm("BJM2"))]
+    joysticks = [frame._replace(bus="joy") for frame in (bjm("BJM1"), bjm("BJM2"))]
     for _ in range(20):
-        rig.tick(*sticks, Frame("joy", 0x18FEEE00, True, bytes(8)))
+        rig.tick(*joysticks, Frame("joy", 0x18FEEE00, True, bytes(8)))
     assert rig.state() is State.READY
     assert rig.controller.counters.values["UnknownId"] == 0
 

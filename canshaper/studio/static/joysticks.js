@@ -1,6 +1,6 @@
-// Where the sticks are: mouse on two pads, keyboard, gamepad. The largest deflection counts.
+// Where the joysticks are: mouse on two pads, keyboard, gamepad. The largest deflection counts.
 
-const RAMP_S = 0.12; // a hand moves a stick from neutral to full in that time
+const RAMP_S = 0.12; // a hand moves a joystick from neutral to full in that time
 const FINE = 0.4; // with Shift
 const GAMEPAD_DEAD = 0.1;
 const SVG = "http://www.w3.org/2000/svg";
@@ -15,7 +15,7 @@ const WAYS = [
 const NAMES = { slew: ["right", "left"], near_far: ["out", "in"], lift: ["up", "down"],
   lift_cylinder: ["up", "down"], knuckle: ["out", "in"], extension: ["out", "in"] };
 
-export class Sticks {
+export class Joysticks {
   /** @param axes names of the axes, in the order of the deployment. */
   constructor(axes, pads, keys) {
     this.ways = axes.slice(0, 4).map((axis, i) => ({
@@ -48,7 +48,7 @@ export class Sticks {
     const svg = document.createElementNS(SVG, "svg");
     svg.setAttribute("viewBox", "-60 -60 120 120");
     svg.setAttribute("role", "application");
-    svg.setAttribute("aria-label", `Stick for ${ways.map((w) => w.axis).join(" and ")}; keys as shown`);
+    svg.setAttribute("aria-label", `Joystick for ${ways.map((w) => w.axis).join(" and ")}; keys as shown`);
     svg.id = `pad${number}`;
     const add = (name, attributes) => {
       const element = document.createElementNS(SVG, name);
@@ -86,7 +86,7 @@ export class Sticks {
     return box;
   }
 
-  /** Take a key; whether it moves a stick. */
+  /** Take a key; whether it moves a joystick. */
   press(key, isDown) {
     const known = this.ways.some((w) => w.keys.includes(key));
     if (isDown && (known || key === "shift")) this.down.add(key);
@@ -125,7 +125,7 @@ export class Sticks {
     for (const { ways, knob, sent } of this.pads) {
       for (const w of ways) {
         const own = (w.now ?? 0) * 46;
-        const there = (counted?.[w.axis]?.stick ?? 0) * w.sign * 46;
+        const there = (counted?.[w.axis]?.joystick ?? 0) * w.sign * 46;
         const key = w.way === "x" ? "cx" : "cy";
         place(knob, key, w.way === "x" ? own : -own);
         place(sent, key, w.way === "x" ? there : -there);
