@@ -120,6 +120,7 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/large_dbc.py
 	.venv/bin/python benchmarks/lockstep.py
 	.venv/bin/python benchmarks/replay.py
+	.venv/bin/python benchmarks/identify.py
 	.venv/bin/python benchmarks/tune.py
 	.venv/bin/python benchmarks/frames.py
 	.venv/bin/python benchmarks/hostile.py

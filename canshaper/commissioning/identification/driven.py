@@ -11,11 +11,11 @@ its own, which are eliminated; V is common to all, and its sign, which is that o
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Final
+from typing import Any, Final
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import cont2discrete, lfilter
+from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from canshaper.commissioning.identification.decay import (
@@ -38,6 +38,10 @@ from canshaper.shaping.sway import GRAVITY_M_S2
 # Longest delay and lag of a valve that are looked for, s.
 LONGEST_DELAY_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.6
+SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
+# Stretches of a long log, spread over it, that are tried first from every start; all of them then
+# from the best one.
+FIRST_STRETCHES: Final = 16
 # What a linear model with a delay and a lag leaves wrong of the full speed of a real valve: on the
 # simulated crane, with a rate limit, it comes out up to 11 % too low.
 MODEL_PART = 0.12
@@ -90,18 +94,31 @@ class DrivenFit:
 
 
 def fit_driven(
-    series: Sequence[Series], period_s: float, free: DecayFit | None
+    series: Sequence[Series], periods: Sequence[float], free: DecayFit | None
 ) -> DrivenFit | None:
     """Fit the driven swing of an axis.
 
     Args:
         series: its signals, of which those count that have commands.
-        period_s: period, about.
+        periods: periods that it may have, about, s; the one that explains most counts.
         free: period and damping as the free swings show them; None looks for them here.
 
     Returns:
         None where no axis was driven, or no command is known.
     """
+    found = [f for period in periods if (f := _first_fit(series, period, free))]
+    if not found:
+        return None
+    problem, x, low, high, _ = max(found, key=lambda f: f[-1])
+    if len(problem.data) > FIRST_STRETCHES:
+        x = _solved(problem, x, low, high).x
+    return problem.result(x)
+
+
+def _first_fit(
+    series: Sequence[Series], period_s: float, free: DecayFit | None
+) -> tuple["_Problem", Array, list[float], list[float], float] | None:
+    """The problem of a period, its solution on a part of the stretches, bounds, part explained."""
     data = [part for one in series for part in stretches(one, period_s)]
     if not data:
         return None
@@ -115,14 +132,16 @@ def fit_driven(
         low = [0.0, 0.0, 0.75 * omega, 0.0]
         high = [LONGEST_DELAY_S, LONGEST_LAG_S, 1.35 * omega, 0.6 * omega]
     problem = _Problem(data, known)
+    every = -(-len(data) // FIRST_STRETCHES)
+    first = _Problem(data[::every], known) if every > 1 else problem
     # A delay and a lag of the valve do nearly the same; from two starts the better one.
-    starts = [start, [0.3, 0.02, *start[2:]]]
-    found = [
-        least_squares(problem.residual, s, bounds=(low, high), x_scale=high, max_nfev=60)
-        for s in starts
-    ]
-    x = min(found, key=lambda f: float(f.cost)).x
-    return problem.result(x)
+    starts = [np.array(start), np.array([0.3, 0.02, *start[2:]])]
+    found = min((_solved(first, s, low, high) for s in starts), key=lambda f: float(f.cost))
+    return problem, found.x, low, high, first.explained(found.x)
+
+
+def _solved(problem: "_Problem", start: Array, low: list[float], high: list[float]) -> Any:
+    return least_squares(problem.residual, start, bounds=(low, high), x_scale=high, max_nfev=60)
 
 
 def _pole(period_s: float, ratio: float) -> tuple[float, float]:
@@ -137,26 +156,24 @@ class _Problem:
     def __init__(self, data: Sequence[Driven], known: tuple[float, float] | None) -> None:
         self.data = data
         self.known = known
+        self._known_bases = _bases(data, *known) if known else None
 
     def parts(self, x: Array) -> list[tuple[Array, Array, Array]]:
         """Of each stretch: swing by commands at unit speed, free columns, commanded speed."""
         omega, sigma = self.known or (float(x[2]), float(x[3]))
-        result = []
-        for one in self.data:
-            driven, speed = _response(one, omega, sigma, float(x[0]), float(x[1]))
-            t = one.time_s
-            decay = np.exp(-sigma * t)
-            free = [decay * np.cos(omega * t), decay * np.sin(omega * t), np.ones_like(t), t]
-            result.append((driven, np.stack(free, axis=1), speed))
-        return result
+        driven = _responses(self.data, omega, sigma, float(x[0]), float(x[1]))
+        columns = [_free_columns(one, omega, sigma) for one in self.data]
+        return [(swing, free, speed) for (swing, speed), free in zip(driven, columns, strict=True)]
 
     def projected(self, x: Array) -> list[tuple[Array, Array]]:
         """Of each stretch: unit swing and data, both without what free swings explain."""
-        result = []
-        for one, (driven, free, _) in zip(self.data, self.parts(x), strict=True):
-            q, _r = np.linalg.qr(free)
-            result.append((driven - q @ (q.T @ driven), one.value - q @ (q.T @ one.value)))
-        return result
+        omega, sigma = self.known or (float(x[2]), float(x[3]))
+        driven = _responses(self.data, omega, sigma, float(x[0]), float(x[1]))
+        bases = self._known_bases or _bases(self.data, omega, sigma)
+        return [
+            (swing - q @ (q.T @ swing), rest)
+            for (swing, _), (q, rest) in zip(driven, bases, strict=True)
+        ]
 
     @staticmethod
     def speed(projected: Sequence[tuple[Array, Array]]) -> float:
@@ -170,12 +187,18 @@ class _Problem:
         gain = self.speed(projected)
         return np.concatenate([y - gain * h for h, y in projected])
 
-    def result(self, x: Array) -> DrivenFit:
-        """What was found."""
+    def explained(self, x: Array) -> float:
+        """Part of what the commands could have made that they explain."""
         projected = self.projected(x)
         gain = self.speed(projected)
         total = sum(float(y @ y) for _, y in projected)
         left = sum(float(np.sum((y - gain * h) ** 2)) for h, y in projected)
+        return 1.0 - left / max(total, 1e-30)
+
+    def result(self, x: Array) -> DrivenFit:
+        """What was found."""
+        projected = self.projected(x)
+        gain = self.speed(projected)
         omega, sigma = self.known or (float(x[2]), float(x[3]))
         deviation = self._gain_deviation(projected, gain, omega)
         factor = float(student.ppf(0.5 + CONFIDENCE / 2.0, max(3, 4 * len(self.data))))
@@ -200,7 +223,7 @@ class _Problem:
             Value(abs(gain), math.hypot(factor * deviation, MODEL_PART * gain)) if angles else None,
             period,
             ratio,
-            1.0 - left / max(total, 1e-30),
+            self.explained(x),
             float(x[0] + x[1]),
             stretches,
         )
@@ -240,22 +263,58 @@ class _Problem:
         return deviations(x[2:4], covariance[2:4, 2:4])
 
 
-def _response(
-    one: Driven, omega: float, sigma: float, delay: float, lag: float
-) -> tuple[Array, Array]:
-    """Swing of a stretch by its commands at a full speed of 1 m/s, and the commanded speed."""
-    start = one.start_s - 1.0
+def _free_columns(one: Driven, omega: float, sigma: float) -> Array:
+    """What a stretch may show without a command: a free swing, an offset, a drift."""
+    t = one.time_s
+    decay = np.exp(-sigma * t)
+    return np.stack(
+        [decay * np.cos(omega * t), decay * np.sin(omega * t), np.ones_like(t), t], axis=1
+    )
+
+
+def _bases(data: Sequence[Driven], omega: float, sigma: float) -> list[tuple[Array, Array]]:
+    """Of each stretch: an orthonormal basis of the free columns, and the data without them."""
+    found = []
+    for one in data:
+        q, _ = np.linalg.qr(_free_columns(one, omega, sigma))
+        found.append((q, one.value - q @ (q.T @ one.value)))
+    return found
+
+
+def _responses(
+    data: Sequence[Driven], omega: float, sigma: float, delay: float, lag: float
+) -> list[tuple[Array, Array]]:
+    """Of each stretch: swing by its commands at a full speed of 1 m/s, and the commanded speed."""
+    filters = {
+        kind: _swing_filter(omega, sigma, max(lag, SHORTEST_LAG_S), kind)
+        for kind in {one.kind for one in data}
+    }
+    return [_response(one, filters[one.kind], delay) for one in data]
+
+
+def _response(one: Driven, swing_filter: tuple[Array, Array], delay: float) -> tuple[Array, Array]:
     grid = np.arange(0.0, float(one.time_s[-1]) + 1.0 + 2.0 * BIN_S, BIN_S)
-    at = np.searchsorted(one.command.time_s, start + grid - delay, side="right") - 1
+    at = np.searchsorted(one.command.time_s, one.start_s - 1.0 + grid - delay, side="right") - 1
     speed = np.where(at >= 0, one.command.speed[np.maximum(at, 0)], 0.0)
-    square = omega**2 + sigma**2
-    zeros = [square / GRAVITY_M_S2, 0.0]
-    if one.kind is Kind.RATE:
-        zeros.append(0.0)
-    poles = np.polymul([max(lag, 0.005), 1.0], [1.0, 2.0 * sigma, square])
-    b, a, _ = cont2discrete((zeros, poles), BIN_S, method="zoh")
     # From rest at the first command's level; a swing before it is a free one.
-    swing = lfilter(b.ravel(), a, speed - speed[0])
+    swing = lfilter(*swing_filter, speed - speed[0])
     time = one.time_s + 1.0
-    driven = np.interp(time, grid, speed)
-    return np.interp(time, grid, swing), driven
+    return np.interp(time, grid, swing), np.interp(time, grid, speed)
+
+
+def _swing_filter(omega: float, sigma: float, lag: float, kind: Kind) -> tuple[Array, Array]:
+    """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
+
+    By partial fractions of the step response, as a matrix exponential for every try of the solver
+    takes most of its time. The three poles differ: one is real, two are not.
+    """
+    square = omega**2 + sigma**2
+    poles = np.array([-1.0 / lag, complex(-sigma, omega), complex(-sigma, -omega)])
+    apart = np.array([np.prod(pole - np.delete(poles, i)) for i, pole in enumerate(poles)])
+    residues = square / (GRAVITY_M_S2 * lag * apart)
+    if kind is Kind.RATE:
+        residues = residues * poles
+    decays = np.exp(poles * BIN_S)
+    parts = [residue * np.poly(np.delete(decays, i)) for i, residue in enumerate(residues)]
+    b = np.convolve([1.0, -1.0], np.sum(parts, axis=0)).real
+    return b, np.asarray(np.poly(decays).real, dtype=np.float64)

@@ -11,6 +11,9 @@ from canshaper.commissioning.identification.series import Array, Command, Kind, 
 BEFORE, AFTER, LONGEST = 1.0, 2.0, 8.0
 # Commands, part of full speed, below which an axis stands.
 STANDS = 0.01
+# So much earlier than a stretch a command may still matter: a second of the filter's past, and the
+# longest delay of a valve.
+EARLIER_S = 2.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -54,5 +57,13 @@ def stretches(series: Series, period: float) -> list[Driven]:
         t, v = time[inside], value[inside]
         if len(t) > 20 and t[-1] - t[0] > period and np.diff(t).max() < period / 3.0:
             start = float(t[0])
-            result.append(Driven(series.source, start, t - start, v, series.unit.kind, command))
+            its = _between(command, start - EARLIER_S, start + float(t[-1]))
+            result.append(Driven(series.source, start, t - start, v, series.unit.kind, its))
     return result
+
+
+def _between(command: Command, first_s: float, last_s: float) -> Command:
+    """What is commanded in a time, with the command that holds at its start."""
+    low = max(0, int(np.searchsorted(command.time_s, first_s, side="right")) - 1)
+    part = slice(low, int(np.searchsorted(command.time_s, last_s, side="right")))
+    return Command(command.time_s[part], command.speed[part])

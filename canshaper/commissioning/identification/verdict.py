@@ -163,10 +163,9 @@ def _driven(finding: Finding, series: Sequence[Series], about_s: float | None) -
     trusted = finding.free if finding.free and not _faults(finding) else None
     starts = (about_s,) if about_s else STARTS_S
     periods = (trusted.period_s.value,) if trusted else starts
-    fits = [f for p in periods if (f := fit_driven(series, p, trusted))]
-    if not fits:
+    fit = fit_driven(series, periods, trusted)
+    if fit is None:
         return
-    fit = max(fits, key=lambda f: f.explained)
     finding.driven = fit
     if fit.explained < LEAST_EXPLAINED:
         finding.notes.append(

@@ -1,0 +1,68 @@
+"""CPU time of ``canshaper identify`` on long logs, beside python-can only reading them.
+
+The log is a drive of both axes with random strokes, hardly ever left alone: the solver has hundreds
+of stretches, and some free swings to find between them.
+
+    python benchmarks/identify.py [--lines 100000 1000000]
+"""
+
+import argparse
+import random
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from resource import RUSAGE_CHILDREN, getrusage
+
+from tests.commissioning.identification.machine import FILE, Push, candump, driven
+
+LINES_S = 200.0
+READ = "import can, sys\nfor _ in can.LogReader(sys.argv[1]): pass"
+
+
+def strokes(seconds: float, seed: int) -> list[Push]:
+    """Strokes of slew and near-far, one in ten with a longer pause behind it."""
+    chance, found = random.Random(seed), []
+    for axis in ("slew", "near_far"):
+        at = 2.0
+        while at < seconds - 10.0:
+            long, level = (
+                chance.uniform(0.3, 3.0),
+                chance.choice((-1, 1)) * chance.uniform(0.2, 1.0),
+            )
+            found.append(Push(axis, at, long, level))
+            at += long + chance.uniform(0.3, 4.0 if chance.random() < 0.9 else 25.0)
+    return found
+
+
+def cpu_s(*command: object) -> float:
+    """CPU time of a process that may find the data too poor."""
+
+    def used() -> float:
+        usage = getrusage(RUSAGE_CHILDREN)
+        return usage.ru_utime + usage.ru_stime
+
+    before = used()
+    words = [sys.executable, *map(str, command)]
+    done = subprocess.run(words, stdout=subprocess.DEVNULL, check=False)
+    if done.returncode not in (0, 1):
+        raise SystemExit(done.returncode)
+    return used() - before
+
+
+def main() -> None:
+    """Print a line for each length."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
+    parser.add_argument("--lines", type=int, nargs="+", default=[100_000])
+    for lines in parser.parse_args().lines:
+        with tempfile.TemporaryDirectory() as folder:
+            log = candump(
+                Path(folder) / "drive.log", driven(lines / LINES_S, strokes(lines / LINES_S, 1))
+            )
+            read = cpu_s("-c", READ, log)
+            ours = cpu_s("-m", "canshaper", "identify", log, "--file", FILE, "--out", folder)
+        print(f"{lines} lines: identify {ours:.1f} s, {ours / read:.1f} x of python-can's reading")
+
+
+if __name__ == "__main__":
+    main()
