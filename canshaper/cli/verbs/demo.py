@@ -11,7 +11,10 @@ from canshaper.cli.common import CRANE, SET, echo, fail, loader, picture, pictur
 from canshaper.errors import DriveError
 
 if TYPE_CHECKING:
+    from canshaper.design.processes import Transport
+    from canshaper.machine.deployment import Deployment
     from canshaper_sim.recording import Recording
+    from canshaper_sim.strokes import Script
 
 # What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
@@ -54,9 +57,8 @@ def demo(
 
       canshaper demo --set grapple.l2_m=1.5
     """
-    from canshaper.design.lockstep import drive
-    from canshaper.design.processes import choose_transport, drive_on_bus
-    from canshaper.report.console import SafeConsole, progress_bar
+    from canshaper.design.processes import choose_transport
+    from canshaper.report.console import SafeConsole
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
     from canshaper_sim.axes import ALL_AXES
@@ -65,7 +67,7 @@ def demo(
     from canshaper_sim.parameters import changed_parameters
 
     console = SafeConsole()
-    parameters = changed_parameters(changes or [])
+    changed_parameters(changes or [])  # wrong ones are named before anything begins
     deployment = loader(file)()
     # A drive on a bus needs Linux' scheduler and sockets.
     way = None if lockstep or sys.platform != "linux" else choose_transport(transport, deployment)
@@ -78,26 +80,14 @@ def demo(
         console.print(f"Crane: {crane} (of {', '.join(several)})")
     console.print(f"Transport: {way.description if way else LOCKSTEP}")
 
-    recordings: list[Recording] = []
-    missed = 0
     try:
-        for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
-            with progress_bar(name, played.duration_s) as on_progress:
-                options: Any = {"bypass": bypass, "on_progress": on_progress}
-                if way is None:
-                    options |= {"parameters": parameters, "crane": crane}
-                    recordings += [drive(deployment, played, **options)]
-                else:
-                    run = drive_on_bus(deployment, way, played, changes or [], **options)
-                    recordings += [run.recording]
-                    missed += run.missed_deadlines
+        (raw, shaped), missed = _drive_twice(deployment, way, played, crane, changes or [])
     except DriveError as error:
         raise fail(error, EXIT_NOT_DRIVEN) from None
     except KeyboardInterrupt:
         echo("interrupted; every process was stopped, valves neutral", err=True)
         raise typer.Exit(130) from None
 
-    raw, shaped = recordings
     report = report_dict(
         raw,
         shaped,
@@ -116,3 +106,38 @@ def demo(
 
     console.print(picture_line(picture(out / "demo.png", draw)))
     console.print(f"Report: {out / 'report.json'}")
+
+
+def _drive_twice(
+    deployment: "Deployment",
+    way: "Transport | None",
+    played: "Script",
+    crane: str | None,
+    changes: list[str],
+) -> tuple[list["Recording"], int]:
+    """Drives with anti-sway off and on, and the deadlines that the daemon missed in both.
+
+    Args:
+        deployment: the machine.
+        way: the bus to drive on; None for lock-step.
+        played: what the operator does.
+        crane: which one, where there are several.
+        changes: parameters of the crane, NAME=VALUE.
+    """
+    from canshaper.design.lockstep import drive
+    from canshaper.design.processes import drive_on_bus
+    from canshaper.report.console import progress_bar
+    from canshaper_sim.parameters import changed_parameters
+
+    recordings, missed = [], 0
+    for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
+        with progress_bar(name, played.duration_s) as on_progress:
+            options: Any = {"bypass": bypass, "on_progress": on_progress}
+            if way is None:
+                options |= {"parameters": changed_parameters(changes), "crane": crane}
+                recordings.append(drive(deployment, played, **options))
+            else:
+                run = drive_on_bus(deployment, way, played, changes, **options)
+                recordings.append(run.recording)
+                missed += run.missed_deadlines
+    return recordings, missed
