@@ -1,6 +1,7 @@
 """``canshaper identify``: period, damping and full speed of the swing, from what a person has."""
 
 import json
+import os
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -74,6 +75,8 @@ def identify(
       canshaper identify --swings 10 --seconds 23.6 --first 20 --last 5 --file machine.yaml \\
         --axis slew --write
     """
+    # Its matrices are small: threads of the linear algebra would only wait for each other.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     from canshaper.cli.identify_data import (
         axis_named,
         logged,
