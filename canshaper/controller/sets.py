@@ -99,6 +99,13 @@ class SetChooser:
         )
 
 
+def profile_by_number(bound: BoundAxis) -> list[str]:
+    """Name of the profile that each set of an axis belongs to, by its number."""
+    if not bound.config.profiles:
+        return []
+    return [name for name, (_, sets) in programs(bound).items() for _ in range(1 + len(sets))]
+
+
 def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[ParameterSet]]]:
     """What an axis can run, by the name of the profile ("" without one)."""
     config = bound.config

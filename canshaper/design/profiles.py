@@ -6,14 +6,12 @@ from dataclasses import dataclass, replace
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.errors import DesignError
-from canshaper.inputs.profile import profile_names
+from canshaper.inputs.profile import OWN, profile_names
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.operator import Script, Stroke
 
-OWN = "normal"
-"""What the axes' own filters are called, which no profile names."""
 # Of the pendulum length; the profiles are compared where the sway data is as wrong as is usual.
 LENGTH_PCT = 15
 _PRESS = (0.5, 3.0, 1.0, 0.1)  # start, duration, level, ramp

@@ -7,6 +7,9 @@ from canshaper.config.schema import DeploymentConfig
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.value import ValueInput
 
+OWN = "normal"
+"""What people read for the axes' own filters, whose name is ""."""
+
 
 class ProfileChoice(Protocol):
     """Says which profile is chosen."""

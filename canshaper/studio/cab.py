@@ -7,6 +7,7 @@ page that was silent and comes back in time, with its joysticks in neutral, keep
 """
 
 import math
+from collections import deque
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeGuard
 
@@ -19,6 +20,10 @@ RELEASE_S = 3.0
 """From joysticks in neutral to enable released: the longest usual run-on after release."""
 RESET_S = 0.3
 """How long the reset switch is held: some messages of a joystick."""
+PRESS_S, PAUSE_S = 0.1, 0.1
+"""The same of the button for the next profile, and how long it is let go of after that."""
+MOST_PRESSES = 5
+"""Presses of it that may wait for those before."""
 NEUTRAL = 0.02
 """Below it a joystick of the page counts as neutral."""
 
@@ -50,6 +55,7 @@ class Cab:
         self._release_at_s: float | None = None
         self._silent = False  # why enable is about to be released
         self._reset_until_s = -math.inf
+        self._presses_s = deque([-math.inf], maxlen=MOST_PRESSES)  # when each begins
 
     def take(self, page: int, now_s: float) -> None:
         """Let a page drive; a driver that is there loses the joysticks, and enable is released."""
@@ -112,6 +118,13 @@ class Cab:
         if page == self.driver:
             self._reset_until_s = now_s + RESET_S
 
+    def press_next_profile(self, page: int, now_s: float) -> None:
+        """Press the button for the next profile for a moment."""
+        if page == self.driver:
+            begin_s = max(now_s, self._presses_s[-1] + PRESS_S + PAUSE_S)
+            if begin_s < now_s + MOST_PRESSES * (PRESS_S + PAUSE_S):
+                self._presses_s.append(begin_s)
+
     def switch_anti_sway(self, page: int, on: bool) -> None:
         """Move the anti-sway switch."""
         if page == self.driver and on is not self.anti_sway:
@@ -122,7 +135,8 @@ class Cab:
         """What the hand does now."""
         self._watch(now_s)
         reset = now_s < self._reset_until_s
-        return Held(dict(self._joysticks), self.enable, reset, self.anti_sway)
+        pressed = any(0.0 <= now_s - begin_s < PRESS_S for begin_s in self._presses_s)
+        return Held(dict(self._joysticks), self.enable, reset, self.anti_sway, pressed)
 
     def _watch(self, now_s: float) -> None:
         """Let go when the driver is silent; release enable when it is time."""

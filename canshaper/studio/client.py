@@ -189,6 +189,7 @@ def _action(word: object, number: int) -> Action:
         "enable": lambda cab, now_s: cab.press_enable(number, True, now_s),
         "release": lambda cab, now_s: cab.press_enable(number, False, now_s),
         "reset": lambda cab, now_s: cab.press_reset(number, now_s),
+        "profile": lambda cab, now_s: cab.press_next_profile(number, now_s),
     }
     if not isinstance(word, str) or word not in actions:
         raise PageMessageError(

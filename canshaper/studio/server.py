@@ -129,6 +129,7 @@ def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
         "cranes": list(stage.cranes),
         "drives": stage.cab is not None,
         "machine": MACHINE in stage.cranes,
+        "profiles": any(j.next_profile for j in stage.deployment.config.joysticks.values()),
         "boom": joints.boom._asdict(),
         "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
         "sliders": {

@@ -12,6 +12,8 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
 from canshaper.codec.status import StatusCodec
 from canshaper.controller.finder import InputFinder
+from canshaper.controller.sets import profile_by_number
+from canshaper.inputs.profile import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband
@@ -47,6 +49,7 @@ class AxisView:
     state: int | None = None
     reason: int | None = None
     predicted_deg: float | None = None
+    profile: str | None = None
 
 
 class CraneView:
@@ -61,6 +64,7 @@ class CraneView:
         self._deployment = deployment
         self._report = report
         self.axes = {name: AxisView() for name in deployment.axes}
+        self._profiles = {name: profile_by_number(axis) for name, axis in deployment.axes.items()}
         self.sway_deg: tuple[float, float] | None = None
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
@@ -137,7 +141,7 @@ class CraneView:
                 self._report("the daemon is silent; valves close by their own timeout", "bad")
                 self.late_us = None
                 for axis in self.axes.values():
-                    axis.state = axis.reason = axis.valve = None
+                    axis.state = axis.reason = axis.valve = axis.profile = None
 
     def daemon_there(self, now_s: float) -> bool:
         """Whether the daemon has been heard lately."""
@@ -164,6 +168,7 @@ class CraneView:
                 "state": None if a.state is None else state_words(a.state),
                 "level": _level(a.state),
                 "reason": None if a.reason is None else reason_words(a.reason),
+                "profile": a.profile,
             }
         return {
             "daemon": self.daemon_there(now_s),
@@ -223,7 +228,14 @@ class CraneView:
             level = {"bad": "bad", "stop": "warn"}.get(_level(state), "info")
             self._report(f"{name}: {state_words(state)} — {reason_words(reason)}", level)
         view.state, view.reason = state, reason
+        view.profile = self._profile(name, values.get("ActiveSet"))
         self._daemon_s = now_s
+
+    def _profile(self, name: str, number: float | None) -> str | None:
+        names = self._profiles[name]
+        if number is None or not 0 <= number < len(names):
+            return None
+        return names[int(number)] or OWN
 
     def _service_status(self, codec: StatusCodec[Any], data: bytes, now_s: float) -> None:
         if (values := codec.decode(data)) is None:

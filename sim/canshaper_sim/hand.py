@@ -22,7 +22,7 @@ class Held:
         enable: the enable switch.
         reset: the reset switch.
         anti_sway: the anti-sway switch.
-        next_profile: the button for the next profile.
+        next_profile: the button for the next profile, of the first joystick that has one.
     """
 
     joysticks: Mapping[str, float] = field(default_factory=dict)
@@ -43,9 +43,10 @@ class Hand:
     """
 
     def __init__(self, deployment: Deployment) -> None:
-        self._messages: list[_Message] = [
-            _Joystick(joystick, deployment) for joystick in deployment.joysticks.values()
-        ]
+        joysticks = [_Joystick(one, deployment) for one in deployment.joysticks.values()]
+        for behind in [one for one in joysticks if one.next_profile][1:]:
+            behind.next_profile = None  # pressed on both it would be two presses
+        self._messages: list[_Message] = [*joysticks]
         if deployment.emergency_stop:
             self._messages.append(_Stop(deployment.emergency_stop))
         self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
@@ -79,6 +80,7 @@ class _Joystick(_Message):
     def __init__(self, joystick: BoundJoystick, deployment: Deployment) -> None:
         super().__init__(joystick)
         self._config = joystick.config
+        self.next_profile = joystick.config.next_profile
         self._joysticks = {
             name: axis.config.command
             for name, axis in deployment.axes.items()
@@ -99,8 +101,8 @@ class _Joystick(_Message):
             raw[config.reset] = int(held.reset)
         if config.anti_sway_off:
             raw[config.anti_sway_off] = int(not held.anti_sway)
-        if config.next_profile:
-            raw[config.next_profile] = int(held.next_profile)
+        if self.next_profile:
+            raw[self.next_profile] = int(held.next_profile)
         for axis, joystick in self._joysticks.items():
             command = held.joysticks.get(axis, 0.0)
             if flags := joystick.flags:

@@ -73,3 +73,13 @@ def _frame_of(frames: dict[Any, Frame], key: tuple[str, int, bool]) -> Frame:
     same = [f for f in frames.values() if f.bus == key[0] and _fits(f, key[1:])]
     assert len(same) == 1
     return same[0]
+
+
+def test_the_button_for_the_next_profile_is_pressed_on_one_joystick() -> None:
+    deployment = load_deployment(CONFIG / "j1939-profiles.yaml")
+    frames = {f[1] & 0xFFFF00: f for f in Hand(deployment).frames(0, Held(next_profile=True))}
+    pressed = {
+        name: joystick.codec.decode(frames[joystick.message.frame_id & 0xFFFF00].data)[0]["Button4"]
+        for name, joystick in deployment.joysticks.items()
+    }
+    assert pressed == {"left": 1, "right": 3}  # not available

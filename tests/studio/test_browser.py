@@ -268,3 +268,21 @@ def test_nothing_can_be_driven_in_the_shadow(
         expect(page.locator(hidden)).to_be_hidden()
     expect(page.locator("#axes .state")).to_have_text(["daemon silent"] * 3)
     expect(page.locator("#note")).to_contain_text("not on the bus")
+
+
+def test_the_button_says_which_profile_is_chosen(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own(file="j1939-profiles.yaml"))
+    button = page.locator("#profile")
+    expect(button).to_have_text("P Profile normal")
+    button.click()
+    expect(button).to_have_text("P Profile quick")
+    page.keyboard.press("p")
+    expect(button).to_have_text("P Profile fine")
+
+
+def test_without_profiles_there_is_no_button(shared: Studio, tab: Callable[..., Page]) -> None:
+    page = tab(shared)
+    expect(page.locator("#reset")).to_be_visible()
+    expect(page.locator("#profile")).to_be_hidden()

@@ -1,6 +1,7 @@
 """The driver's seat: what a page may do to the joysticks, and when it loses them."""
 
 import math
+from itertools import pairwise
 from typing import Any
 
 import pytest
@@ -8,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.errors import PageMessageError
-from canshaper.studio.cab import RELEASE_S, RESET_S, SILENT_S, Cab
+from canshaper.studio.cab import MOST_PRESSES, PRESS_S, RELEASE_S, RESET_S, SILENT_S, Cab
 from canshaper_sim.hand import Held
 
 AXES = ("slew", "near_far", "lift")
@@ -138,6 +139,21 @@ def test_release_is_at_once(seat: Seat) -> None:
     seat.cab.press_enable(1, False, 1.0)
     held = seat.cab.held(1.0)
     assert (deflected(held), held.enable) == ({}, False)
+
+
+def test_each_press_for_the_next_profile_is_a_press_of_its_own(seat: Seat) -> None:
+    seat.cab.press_next_profile(2, 1.0)
+    assert not seat.cab.held(1.0).next_profile
+    for _ in range(3 * MOST_PRESSES):
+        seat.cab.press_next_profile(1, 1.0)
+    held = [seat.cab.held(1.0 + 0.02 * tick).next_profile for tick in range(200)]
+    presses = sum(one and not before for before, one in pairwise([False, *held]))
+    assert presses == MOST_PRESSES
+    assert held[:5] == [True] * 5
+    assert held[5:10] == [False] * 5
+    seat.cab.press_next_profile(1, 5.0)
+    assert seat.cab.held(5.0).next_profile
+    assert not seat.cab.held(5.0 + 1.1 * PRESS_S).next_profile
 
 
 def test_reset_is_held_for_a_moment(seat: Seat) -> None:

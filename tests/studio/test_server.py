@@ -110,6 +110,33 @@ def test_a_drive_swings_less_shaped_and_the_switch_acts_in_motion(
         assert "anti-sway switched off" in page.texts()
 
 
+def test_the_page_chooses_a_profile_through_the_joystick(own: Callable[..., Studio]) -> None:
+    with own(file="j1939-profiles.yaml").page() as page:
+        page.drive()
+        assert page.hello["profiles"] is True
+
+        def profile(shown: dict[str, Any], axis: str = "slew") -> str:
+            return str(shown["cranes"]["shaped"]["axes"][axis]["profile"])
+
+        page.until(lambda s: profile(s) == "normal")
+        for name in ("quick", "fine", "normal"):
+            page.send(do="profile")
+            page.until(lambda s, name=name: profile(s) == profile(s, "near_far") == name)  # type: ignore[misc]
+        assert page.joysticks is not None
+        page.joysticks["slew"] = 0.4
+        page.until(lambda s: valves(s, "shaped")[0] > 0.1)
+        page.send(do="profile")
+        page.until(lambda s: profile(s) == "quick")
+        assert valves(page.shown, "shaped")[0] == pytest.approx(0.4, abs=0.03)
+        assert page.shown["cranes"]["shaped"]["axes"]["lift"]["profile"] is None
+
+
+def test_without_profiles_there_is_no_button(shared: Studio) -> None:
+    with shared.page() as page:
+        assert page.hello["profiles"] is False
+        assert page.shown["cranes"]["shaped"]["axes"]["slew"]["profile"] is None
+
+
 def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> None:
     with own().page() as page:
         page.drive()

@@ -21,6 +21,7 @@ from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
 
 CONFIG = Path(__file__).parents[2] / "config"
+PROFILES = ["normal", "quick", "fine", None]
 FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
 
 
@@ -204,3 +205,14 @@ def test_a_joystick_of_j1939_is_seen_at_every_priority_and_one_at_a_time(priorit
     watched = Watched("j1939-forwarder")
     watched.take([bjm("BJM1", s, priority, X=x) for s, x in ((0x33, 100.0), (0x34, -100.0))])
     assert watched.view.axes["slew"].joystick == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(("number", "name"), list(enumerate(PROFILES)))
+def test_the_set_in_force_says_which_profile(number: int, name: str | None) -> None:
+    watched = Watched("j1939-profiles")
+    codec = watched.deployment.axes["slew"].status
+    assert codec
+    one = report(State.READY, Reason.JOYSTICK_NEUTRAL, active_set=number)
+    axes = watched.take([codec.frame(one)])["axes"]
+    assert axes["slew"]["profile"] == name
+    assert axes["near_far"]["profile"] is axes["lift"]["profile"] is None

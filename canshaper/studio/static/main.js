@@ -20,6 +20,7 @@ function begin(found) {
   byId("file").textContent = hello.machine ? `${hello.file} — listening only` : hello.file;
   byId("controls").hidden = !hello.drives;
   byId("hands").hidden = !hello.drives;
+  byId("profile").hidden = !hello.profiles;
   byId("view").hidden = hello.cranes.length < 2;
   pill("link", "connected", "ok");
   byId("banner").hidden = true;
@@ -78,7 +79,9 @@ function show(message) {
   if (mine) pill("seat", message.enable ? "you drive" : "you drive: press enable", message.enable ? "ok" : "warn");
   else pill("seat", message.driver === null ? "nobody drives" : "another page drives", "warn");
   byId("take").hidden = mine;
-  for (const id of ["enable", "antisway", "reset"]) byId(id).disabled = !mine;
+  for (const id of ["enable", "antisway", "reset", "profile"]) byId(id).disabled = !mine;
+  const profiles = Object.values(Object.values(message.cranes)[0].axes).map((axis) => axis.profile);
+  byId("profile").querySelector("b").textContent = [...new Set(profiles.filter(Boolean))].join(" / ");
   byId("enable").setAttribute("aria-pressed", message.enable);
   byId("antisway").setAttribute("aria-pressed", message.antisway);
 }
@@ -105,6 +108,7 @@ const actions = {
   " ": () => link.send({ do: "release" }),
   n: () => link.send({ antisway: !shown?.antisway }),
   x: () => link.send({ do: "reset" }),
+  p: () => hello?.profiles && link.send({ do: "profile" }),
   v: () => overlay(!scene?.overlay),
 };
 
@@ -132,6 +136,7 @@ byId("take").onclick = () => link.send({ do: "take" });
 byId("enable").onclick = actions.e;
 byId("antisway").onclick = actions.n;
 byId("reset").onclick = actions.x;
+byId("profile").onclick = actions.p;
 byId("view").onclick = actions.v;
 byId("theme").onclick = () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light");
 
