@@ -13,11 +13,15 @@ class ReasonText(NamedTuple):
         words: a few, for a display.
         cause: when the axis has this reason.
         remedy: what helps; the way back.
+        fmi: failure mode of SAE J1939-73 that DM1 names; None where it is no fault, such as what
+            the operator does: 2 erratic, 9 abnormal update rate, 12 bad device, 14 special
+            instructions, 19 received network data in error.
     """
 
     words: str
     cause: str
     remedy: str = ""
+    fmi: int | None = None
 
 
 class StateText(NamedTuple):
@@ -88,52 +92,62 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "no joystick message",
         "no joystick message within `timeout_ms`",
         "bus, joystick",
+        fmi=9,
     ),
     Reason.JOYSTICK_ERROR: ReasonText(
         "the joystick reports an error",
         "the signal carries its error code",
         "joystick",
+        fmi=19,
     ),
     Reason.JOYSTICK_NOT_AVAILABLE: ReasonText(
         "the joystick is not available",
         "the signal carries its not-available code",
         "joystick, DBC",
+        fmi=19,
     ),
     Reason.JOYSTICK_OUT_OF_RANGE: ReasonText(
         "the joystick is out of range",
         "beyond the range of the DBC",
         "joystick, DBC",
+        fmi=2,
     ),
     Reason.JOYSTICK_NOT_A_NUMBER: ReasonText(
         "the joystick is no number",
         "a float signal without a number",
         "joystick",
+        fmi=2,
     ),
     Reason.SWITCH_INVALID: ReasonText(
         "a switch is invalid",
         "enable is neither 0 nor 1",
         "joystick",
+        fmi=2,
     ),
     Reason.JOYSTICK_CONTRADICTORY: ReasonText(
         "flags and joystick do not agree",
         "direction flags and position do not agree, or a rocker is pressed both ways",
         "joystick, DBC",
+        fmi=2,
     ),
     Reason.JOYSTICK_FROZEN: ReasonText(
         "the joystick has not changed for too long",
         "the joystick is deflected and has not changed for longer than `stuck_s`",
         "move the joystick, then neutral; joystick",
+        fmi=2,
     ),
     Reason.JOYSTICK_UNTRUSTED: ReasonText(
         "joystick messages are not right",
         "wrong checksum, repeated or jumping alive counter, or too few good ones for `qualify`",
         "joystick, a gateway that repeats, two senders of one id",
+        fmi=2,
     ),
     Reason.LOOP_OVERRUN: ReasonText(
         "the daemon is too late",
         "ten ticks in a row missed a deadline, or more than one in six for long; over "
         "after fifty punctual ones. An axis in BYPASS_ON goes on",
         "load of the PC",
+        fmi=12,
     ),
     Reason.ADDRESS_NOT_CLAIMED: ReasonText(
         "our address is being claimed",
@@ -145,6 +159,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "CANopen: the node of the joystick or, at rest, of the valve is not "
         "operational, silent, or sends an emergency",
         "the log names node and code; see [canopen.md](canopen.md)",
+        fmi=9,
     ),
     Reason.VALVE_NOT_READY: ReasonText(
         "the valve is not ready",
@@ -160,17 +175,20 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "the filter gave no number",
         "the filter gave no number",
         "report it; reset",
+        fmi=12,
     ),
     Reason.SEND_FAILED: ReasonText(
         "a valve frame did not go out",
         "the valve frame did not go out in motion",
         "bus, queue; reset",
+        fmi=9,
     ),
     Reason.LOOP_STALLED: ReasonText(
         "the daemon stood still",
         "the loop stood still for longer than the shortest `timeout_ms` of a joystick, the "
         "emergency stop, or a valve (less the ticks that it may have waited for its frame)",
         "load of the PC; reset",
+        fmi=12,
     ),
     Reason.EMERGENCY_STOP: ReasonText(
         "emergency stop",
@@ -182,11 +200,13 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "no accepted message of the emergency stop within its `timeout_ms`. In motion "
         "latched; at rest the axis waits for it",
         "its sender, bus; reset",
+        fmi=9,
     ),
     Reason.SECOND_SENDER: ReasonText(
         "somebody else commands this valve",
         "a frame with the id of this axis' valve, in J1939 with its group, came from another node",
         "end the other one; reset after 1 s without its frames",
+        fmi=14,
     ),
     Reason.ADDRESS_LOST: ReasonText(
         "another node has our address",
@@ -198,12 +218,14 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "a valve of CANopen in motion left its state active, sent an emergency, "
         "restarted, or was silent",
         "the valve, see [canopen.md](canopen.md); reset",
+        fmi=12,
     ),
     Reason.OUTPUT_REFUSED: ReasonText(
         "the output guard refused a command",
         "the output guard refused a frame of this valve: beyond a limit, or not "
         "commanded; the log says which",
         "report it with the log; reset",
+        fmi=12,
     ),
 }
 

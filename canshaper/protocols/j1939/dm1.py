@@ -10,7 +10,7 @@ from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import DEFAULT_PRIORITY, LOWEST_PRIORITY, identifier
 from canshaper.codec.j1939 import DM1, TRANSPORT, TRANSPORT_DATA
 from canshaper.inputs.feedback import Following
-from canshaper.shaping.states import Reason
+from canshaper.shaping.reasons import REASON_TEXTS
 
 CYCLE_NS = 1_000_000_000
 # A change is sent at once, but not again and again.
@@ -22,28 +22,8 @@ AMBER_LAMP = 0x04
 NO_LAMP_FLASHES = 0xFF
 
 # Failure mode identifiers of SAE J1939-73.
-ERRATIC, ABNORMAL_RATE, BAD_DEVICE, SPECIAL, RECEIVED_IN_ERROR = 2, 9, 12, 14, 19
-NOT_RESPONDING = 7
-FMI_OF = {
-    Reason.JOYSTICK_TIMEOUT: ABNORMAL_RATE,
-    Reason.JOYSTICK_ERROR: RECEIVED_IN_ERROR,
-    Reason.JOYSTICK_NOT_AVAILABLE: RECEIVED_IN_ERROR,
-    Reason.JOYSTICK_OUT_OF_RANGE: ERRATIC,
-    Reason.JOYSTICK_NOT_A_NUMBER: ERRATIC,
-    Reason.SWITCH_INVALID: ERRATIC,
-    Reason.JOYSTICK_CONTRADICTORY: ERRATIC,
-    Reason.JOYSTICK_FROZEN: ERRATIC,
-    Reason.JOYSTICK_UNTRUSTED: ERRATIC,
-    Reason.LOOP_OVERRUN: BAD_DEVICE,
-    Reason.OUTPUT_INVALID: BAD_DEVICE,
-    Reason.SEND_FAILED: ABNORMAL_RATE,
-    Reason.LOOP_STALLED: BAD_DEVICE,
-    Reason.EMERGENCY_STOP_LOST: ABNORMAL_RATE,
-    Reason.SECOND_SENDER: SPECIAL,
-    Reason.NODE_FAULT: ABNORMAL_RATE,
-    Reason.VALVE_FAULT: BAD_DEVICE,
-    Reason.OUTPUT_REFUSED: BAD_DEVICE,
-}
+NOT_RESPONDING, ABNORMAL_RATE = 7, 9
+FMI_OF = {reason: text.fmi for reason, text in REASON_TEXTS.items() if text.fmi is not None}
 """Failure mode of an axis by its reason; what the operator does is no fault."""
 
 FMI_OF_FOLLOWING = {Following.NO: NOT_RESPONDING, Following.LOST: ABNORMAL_RATE}
