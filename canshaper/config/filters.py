@@ -132,7 +132,9 @@ class FilterSection(Section):
 
 def _section(kind: ShaperKind) -> type[FilterSection]:
     """The section of a kind, such as ``TwoModeFilter``."""
-    fields: dict[str, Any] = {"kind": (Literal[kind.name], Field(description=kind.summary))}
+    extra = _or_false if kind.name == "off" else None
+    name = Field(description=kind.summary, json_schema_extra=extra)
+    fields: dict[str, Any] = {"kind": (Literal[kind.name], name)}
     fields |= {p.name: _field(p) for p in kind.parameters}
     if kind.designed_by:
         text = f"what canshaper {kind.designed_by} designed it for"
@@ -168,6 +170,12 @@ def _with_runs(schema: dict[str, Any]) -> None:
     text = "so many equal numbers"
     run = {"type": "string", "pattern": f"^{RUN}$", "description": text}
     schema["items"] = {"anyOf": [schema["items"], run]}
+
+
+def _or_false(schema: dict[str, Any]) -> None:
+    """What a reader of YAML 1.1 makes of ``off``, into the JSON schema; see ``_named_off``."""
+    schema["enum"] = [schema.pop("const"), False]
+    del schema["type"]
 
 
 SECTIONS = {name: _section(kind) for name, kind in KINDS.items()}

@@ -49,6 +49,15 @@ def test_it_accepts_the_shipped_deployment(schema: dict[str, Any], machine: dict
     assert faults(schema, machine) == []
 
 
+def test_it_accepts_off_as_yaml_1_1_reads_it(
+    schema: dict[str, Any], machine: dict[str, Any]
+) -> None:
+    assert machine["axes"]["lift"]["filter"] == {"kind": "off"}
+    for kind, good in ((False, True), (True, False), ("Off", False), (0, False)):
+        machine["axes"]["lift"]["filter"]["kind"] = kind
+        assert (faults(schema, machine) == []) is good, kind
+
+
 @pytest.mark.parametrize(
     "place",
     [
