@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from typing import Any
 
-from canshaper.config.adjust import Key, faults
+from canshaper.config.adjust import Key, adjusted, faults
 from canshaper.config.filters import Filter
 from canshaper.config.schedule import Breakpoint, Profile
 from canshaper.config.schema import AxisConfig, DeploymentConfig
@@ -30,6 +30,8 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
     for at, part in () if any(wrong.values()) else parts:
         if fault := _fault_between(part.gain_schedule, period_s, rate):
             add((*at, "gain_schedule"), fault)
+    if not any(wrong.values()):
+        _check_ends(lookup, axis, str(place[-1]), period_s)
     if len(filters) > 1 and axis.sway is None:
         add(place, "expected sway data of its own with profiles or a gain schedule, got none")
     codes = lookup.config.profile.codes if lookup.config.profile else {}
@@ -38,6 +40,25 @@ def check_filters(lookup: Lookup, place: Place, axis: AxisConfig, period_s: floa
         if name not in codes and not buttons:
             names = ", ".join(codes) or "none: there is no profile at the top level"
             add((*place, "profiles", name), f"expected a profile, got {name!r}; there are {names}")
+
+
+def _check_ends(lookup: Lookup, axis: AxisConfig, name: str, period_s: float) -> None:
+    """At each end of an adjustable number of the swing the filter, scaled to it, has to run."""
+    control, rate = lookup.config.control, axis.limits.slowest_per_s
+    for text, ends in (control.adjustable if control else {}).items():
+        key = Key.parsed(text)
+        if key is None or (key.axis, key.section) != (name, "sway") or [*faults(key, axis, *ends)]:
+            continue
+        for end in ends:
+            try:
+                then = adjusted(axis, {key: end}, axis)
+                fault = filter_fault(then.filter, then.sway, period_s, rate)
+            except ValueError as error:
+                # Whether two numbers of the swing go together is known when both are changed.
+                fault = str(error) if str(error).startswith("filter") else None
+            if fault:
+                place = ("control", "adjustable", text)
+                lookup.diagnostics.add(place, f"at {end:g}: {fault}")
 
 
 def _parts(place: Place, axis: AxisConfig) -> list[tuple[Place, AxisConfig | Profile]]:

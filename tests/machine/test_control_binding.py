@@ -127,3 +127,15 @@ def test_the_mode_is_octal_and_in_quotes(machine: Machine) -> None:
         else:
             assert "control.mode: " in machine.problems()[0]
         machine.in_yaml(text, "")
+
+
+def test_the_filter_scaled_to_each_end_has_to_run(machine: Machine) -> None:
+    machine.in_yaml("kind: gff, a1: 0.708, a2: 0.12", "kind: robust, tick_ms: 20, taps: [0.5, 0.5]")
+    line = adjustable(machine, "axes.slew.sway.period_s: [0.16, 3]")
+    (problem,) = machine.problems()
+    assert problem.startswith(
+        f"machine.yaml:{line}: control.adjustable.axes.slew.sway.period_s: at 0.16: natural"
+        " frequency: expected up to 35.7143 rad/s for this filter at a tick of 0.02 s, got 39.2"
+    )
+    machine.in_yaml("[0.16, 3]", "[0.2, 3]")
+    machine.load()
