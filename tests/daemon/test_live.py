@@ -153,9 +153,9 @@ def test_one_that_listens_tells_its_status_and_no_valve(tmp_path: Path) -> None:
         begin = time.monotonic()
         mine: list[bytes] = []
         for number in range(10_000):
-            joystick = 100.0 if number > 50 else 0.0
+            deflection = 100.0 if number > 50 else 0.0
             values = {s.name: 0 for s in joystick.signals}
-            values |= {"Slew": joystick, "Enable": 1, "AliveCounter": number % 256}
+            values |= {"Slew": deflection, "Enable": 1, "AliveCounter": number % 256}
             for message, fields in (
                 (joystick, values),
                 (command, {"Velocity": 0, "AliveCounter": 0}),
