@@ -91,7 +91,7 @@ def compare(
     if as_json:
         echo(json.dumps(data, indent=2))
     else:
-        for drawn in (_residuals(table), _feel(table), _worst(table), _limits(limits)):
+        for drawn in (_residuals(table), _felt(table), _worst(table), _limits(limits)):
             console.print(drawn)
         for _, why in advice.values():
             console.print(f"- {why}.")
@@ -121,7 +121,7 @@ def _residuals(table: "list[Row]") -> "Table":
     return drawn
 
 
-def _feel(table: "list[Row]") -> "Table":
+def _felt(table: "list[Row]") -> "Table":
     """What the operator feels of each filter."""
     from canshaper.report.console import new_table
 

@@ -35,7 +35,7 @@ class Outcome:
         path: way of the tip on both axes, to and fro, in s of full speed.
         travel: of a tap: way of the tip along the axis, in s of full speed.
         movements: of a tap: how often the tip began to move.
-        rise_s: of a pulse: time to 95 % of the asked speed.
+        rise_s: of a pulse: time to 95 % of the commanded speed.
         stop_s: of a pulse: run-on after release until the tip stays below 5 % of full speed.
         run_on_m: of a pulse: travel after release; of slew on the largest radius.
         dip: of a pulse: largest fall of the command while the joystick is held.

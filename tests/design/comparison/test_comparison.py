@@ -13,14 +13,16 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.cli.verbs.compare import _felt, _limits, _residuals, _worst
 from canshaper.design.comparison.candidates import Candidate, candidates, with_candidate
-from canshaper.design.comparison.limits import least, limits_for
+from canshaper.design.comparison.limits import Least, least, limits_for
 from canshaper.design.comparison.manoeuvres import RANDOM_SEEDS, Manoeuvre, manoeuvres
 from canshaper.design.comparison.measure import Outcome, measure, measure_all
 from canshaper.design.comparison.summary import Row, beaten_by, recommendations, rows
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.report.console import SafeConsole
 from canshaper.report.pareto import Limits, Point, draw, figure
 from canshaper.shaping.registry import KINDS
 from canshaper_sim.operator import SCRIPTS
@@ -172,7 +174,9 @@ def made(name: str, stop_s: float, residual_deg: float, dip: float = 0.0) -> lis
         tap,
         *(replace(pulse, length_pct=p, residual_deg=residual_deg * 2) for p in (-15, 15)),
         *(replace(pulse, length_pct=p, residual_deg=residual_deg * 3) for p in (-30, 30)),
+        replace(pulse, work="reversal"),
         replace(pulse, work="both", peak_deg=20.0),
+        replace(pulse, work="cycle", path=0.0),
         replace(pulse, manoeuvre="random 1", work="random", path=10.0 - stop_s),
         replace(pulse, manoeuvre="random 2", work="random", residual_deg=residual_deg * 1.5),
         *(replace(pulse, work=w, residual_deg=residual_deg * 9) for w in ("load", "gain", "start")),
@@ -208,6 +212,23 @@ def test_rows_and_recommendations(deployment: Deployment) -> None:
     better = beaten_by(replace(zv, stop_s=1.9), table)
     assert better is not None
     assert better.name == ROBUST
+
+
+def test_the_tables_fit_80_columns(
+    deployment: Deployment, capsys: pytest.CaptureFixture[str]
+) -> None:
+    names = ("off", "ZV", "G_FF near-far poles", ROBUST)
+    table = table_of(deployment, *((name, 2.0, 10.5, 0.5) for name in names))
+    worst = replace(table[0], worst_case="both at once out -30 %", stop_s=12.3, slew_run_on_m=12.3)
+    table.append(worst)
+    limits = [Least(1.2, 0.5, 0.25, 0.125, 0.9)]
+    console = SafeConsole(width=80)
+    for drawn in (_residuals(table), _felt(table), _worst(table), _limits(limits)):
+        console.print(drawn)
+    printed = capsys.readouterr().out
+    assert "…" not in printed
+    assert printed.count("G_FF near-far poles") == 3
+    assert " 1.2 s               50.0    25.0   12.5    90.0" in printed
 
 
 def test_limits_lie_below_what_was_measured(
