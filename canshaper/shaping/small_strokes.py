@@ -4,16 +4,17 @@ A filter that spreads a tap over a second or two wants less in a tick than the l
 valve's frame. Rounded to steps that is a row of twitches, and limit-aware feedback adds its own for
 what rounding leaves out. So while the joystick is back in neutral after a small stroke, the travel
 still due decides: the axis moves by the least step where less is wanted, never further than is due,
-and then rests.
+and then rests. Of a large stroke that would cut the feedback which damps its swing: what was
+commanded since the axis was at rest has to be small altogether.
 """
 
 import math
 
 from canshaper.shaping.limits import OutputLimits, without_deadband
 
-# A stroke is small when the least step would take no longer than this for what is due, seconds. In
-# steps of 1/125 that is 0.4 s of full speed; of larger strokes single steps are no movement.
-SMALL_S = 60.0
+# Strokes are small when the least step would take no longer than this for all of them, seconds. In
+# steps of 1/125 that is 0.6 s of full speed; of larger strokes single steps are no movement.
+SMALL_S = 90.0
 # Ticks at the least step that may be left: to travel them would be as much too far.
 LEFT = 0.5
 
@@ -27,26 +28,27 @@ class SmallStrokes:
         tick_s: time between two ticks.
     """
 
-    __slots__ = ("_due", "_least", "_maximum", "_most", "_small")
+    __slots__ = ("_due", "_least", "_left", "_maximum", "_most")
 
     def __init__(self, limits: OutputLimits, grid_steps: int, tick_s: float) -> None:
         self._least = least_velocity(limits, grid_steps)
         self._maximum = limits.maximum
         self._most = SMALL_S / tick_s * self._least
-        self._due = 0.0  # full speed times ticks; without end where it is not known
-        self._small = False
+        self._due = 0.0  # full speed times ticks
+        self._left = self._most  # until what was commanded is no longer small; the same
 
     def clear(self) -> None:
         """The axis rests: nothing is due."""
-        self._due = 0.0
+        self._due, self._left = 0.0, self._most
 
     def lose(self) -> None:
         """The filter goes on with what was commanded past it: until the axis rests, none counts."""
-        self._due, self._small = math.inf, False
+        self._left = -math.inf
 
     def hold(self, command: float, applied: float, ticks: int) -> None:
         """Ticks were missed, with this command, and this velocity of the axis' own."""
         self._due += ticks * (command - applied)
+        self._left -= ticks * abs(command)
 
     def output(
         self, command: float, applied: float, target: float, low: float, high: float
@@ -66,14 +68,14 @@ class SmallStrokes:
         if command:
             maximum = self._maximum
             asked = min(max(command, -maximum), maximum)
-            due = self._due = self._due + asked - applied
-            self._small = -self._most <= due <= self._most
+            self._due += asked - applied
+            self._left -= abs(asked)
             return target
         if low == 0.0 == high:  # nothing was commanded within the tail
-            self._due = 0.0
+            self.clear()
             return target
         due = self._due = self._due - applied
-        if not self._small or low < 0.0 < high:  # after a reversal there is travel both ways
+        if self._left < 0.0 or low < 0.0 < high:  # after a reversal there is travel both ways
             return target
         if low < 0.0:
             return -self._forth(-target, -due, -low)

@@ -133,6 +133,16 @@ def test_a_large_stroke_is_what_the_filter_makes_of_it() -> None:
     assert tapped(with_rule, 0.1, 0.1) != tapped(without, 0.1, 0.1)
 
 
+def test_after_a_large_stroke_a_small_one_may_damp_its_swing() -> None:
+    """By travel that no one asked for: limits have cut the large one short."""
+    limits = OutputLimits(deadband=0.05, tail_s=2.2)  # not along the filter after a reversal
+    with_rule, without = axis_with(limits), axis_with(limits, shaper="ruleless")
+    for axis in (with_rule, without):
+        tapped(axis, 1.0, 1.0, rest_s=0.0)
+        tapped(axis, -0.6, 0.3, rest_s=1.0)
+    assert tapped(with_rule, -0.3, 0.2) == tapped(without, -0.3, 0.2)
+
+
 def test_after_a_reversal_there_is_travel_both_ways() -> None:
     """They cancel out in what is due: the filter goes its way."""
     with_rule, without = axis_with(), axis_with(shaper="ruleless")
