@@ -5,6 +5,7 @@ from pathlib import Path
 
 import pytest
 
+from canshaper.cli.verbs.compare import _WORKS
 from canshaper.design.comparison.candidates import candidates
 from canshaper.design.comparison.limits import least
 from canshaper.design.comparison.manoeuvres import manoeuvres
@@ -36,18 +37,16 @@ def deployment() -> Deployment:
 
 @pytest.fixture(scope="module")
 def outcomes(deployment: Deployment) -> list[Outcome]:
-    """Of the works of one and both axes, at the right length."""
+    """Of every manoeuvre, at the right length."""
     robust = next(c for c in candidates(deployment) if c.name == ROBUST)
-    works = ("pulse", "tap", "reversal", "both")
-    return [measure(deployment, robust, t, 0) for t in manoeuvres() if t.work in works]
+    return [measure(deployment, robust, task, 0) for task in manoeuvres()]
 
 
 def test_residuals(outcomes: list[Outcome]) -> None:
-    worst = [
-        max(o.residual_deg for o in outcomes if o.work == work)
-        for work in ("pulse", "tap", "reversal", "both")
-    ]
-    assert cells("left, deg", ROBUST)[:4] == [f"{deg:.2f}" for deg in worst]
+    works = dict.fromkeys(o.work for o in outcomes)
+    worst = [max(o.residual_deg for o in outcomes if o.work == work) for work in works]
+    given = dict(zip(_WORKS.values(), cells("left, deg", ROBUST), strict=True))
+    assert given == dict(zip(works, (f"{deg:.2f}" for deg in worst), strict=True))
 
 
 def test_what_is_felt(outcomes: list[Outcome]) -> None:
