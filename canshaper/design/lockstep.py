@@ -163,11 +163,10 @@ def drive(
     recorder = Recorder(driven, parameters)
     lock_step = LockStep(deployment, guarded, plant, hands, recorder.receive)
     end_ms = round(script.duration_s * 1000.0)
-    picked_up = load is None
     while (time_ms := lock_step.time_ms) < end_ms:
-        if load and not picked_up and time_ms >= 1000.0 * load[0]:
-            picked_up = True
+        if load and time_ms >= 1000.0 * load[0]:
             plant.crane.pick_up(load[1])
+            load = None
         lock_step.step()
         controller.events.clear()
         if on_progress and time_ms % 1000 == 0:
