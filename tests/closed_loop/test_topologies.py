@@ -53,5 +53,5 @@ def test_a_crane_is_the_first_part_of_the_names_of_its_axes() -> None:
 def test_the_axes_of_one_crane_are_no_names_of_several(file: str) -> None:
     deployment = load_deployment(CONFIG / file)
     assert cranes(deployment) == []
-    with pytest.raises(DriveError, match="none: there is one"):
+    with pytest.raises(DriveError, match="expected none, there is one, got"):
         drive(deployment, SCRIPTS["one-by-one"], crane="front")
