@@ -78,7 +78,7 @@ def build_shaper(
         >>> from canshaper import SwayMode, SwayModel, build_shaper
         >>> sway = SwayModel(SwayMode.from_period(2.4, 0.02), tick_s=0.02)
         >>> shaper = build_shaper("first_order", 0.02, sway, time_constant_s=0.1)
-        >>> [round(shaper.wanted(1.0), 2) for _ in range(4)]
+        >>> [round(shaper.step(1.0), 2) for _ in range(4)]
         [0.18, 0.33, 0.45, 0.55]
     """
     declared = KINDS[kind]

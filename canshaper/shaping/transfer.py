@@ -47,7 +47,7 @@ class BumplessTransfer:
         """
         if abs(command) > maximum:
             command = math.copysign(maximum, command)
-        output = self._shaper.wanted(command)
+        output = self._shaper.step(command)
         if self._bypassed:
             output = command
         if self._joins:
@@ -61,7 +61,7 @@ class BumplessTransfer:
 
     def hold(self, command: float) -> None:
         """A tick was missed, with this command."""
-        self._shaper.wanted(command)
+        self._shaper.step(command)
 
     def replace(self, shaper: Shaper, command: float) -> None:
         """Go on with another filter; ``command`` is the one that is in force."""

@@ -123,7 +123,7 @@ def _linear_drive(
     rows: list[tuple[float, float, float, float, float, float]] = []
     for k in range(round(script.duration_s / TICK_S)):
         joystick = script.command(axis, k * TICK_S)
-        sent = shaper.wanted(joystick) if shaper else joystick
+        sent = shaper.step(joystick) if shaper else joystick
         sway.step(sent)
         crane.step(TICK_S, {axis: sent / _HEAD_ROOM})
         state = crane.state

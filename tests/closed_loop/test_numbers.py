@@ -32,7 +32,7 @@ class OrdinaryGff:
         self._b = [gain * b for b in numerator]
         self._u = self._y = (0.0, 0.0)
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         b, a, u, y = self._b, self._a, self._u, self._y
         out = b[0] * command + b[1] * u[0] + b[2] * u[1] - a[0] * y[0] - a[1] * y[1]
         self._u, self._y = (command, u[0]), (out, y[0])

@@ -74,7 +74,7 @@ def test_it_loads_with_its_parameters_and_builds(
         left = residual_left(shaper.taps, SwayMode(sway.mode.omega_rad_s, 0.0), TICK_S)
         assert 100.0 * left == pytest.approx(parameters["residual_pct"], abs=1.5)
     for _ in range(2000):  # gain one, whatever the kind
-        sway.step(wanted := shaper.wanted(0.6))
+        sway.step(wanted := shaper.step(0.6))
     assert wanted == pytest.approx(0.6, abs=1e-6)
 
 

@@ -133,7 +133,7 @@ def test_a_stop_is_bounded_in_time_whatever_the_filter_wants(
     drive_with: DriveWith, stop_s: float
 ) -> None:
     class Stubborn:
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             return 1.0
 
     drive = drive_with(Stubborn(), OutputLimits(tail_s=2.0), stop_s=stop_s).moving()
@@ -288,7 +288,7 @@ def test_a_filter_without_a_number_trips_and_can_recover(drive_with: DriveWith, 
     class Broken:
         broken = False
 
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             if self.broken:
                 if isinstance(bad, type):
                     raise bad

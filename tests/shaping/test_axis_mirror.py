@@ -60,7 +60,7 @@ class Pausing:
         self._push = 0.4 * sign
         self._released = 0
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         self._released = 0 if command else self._released + 1
         return self._push if self._released > 30 else command
 

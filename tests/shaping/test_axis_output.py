@@ -32,7 +32,7 @@ LOST = CommandInput(fault=Reason.JOYSTICK_TIMEOUT)
 class Stubborn:
     """A filter that never lets go."""
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         return 1.0
 
 
@@ -82,7 +82,7 @@ def test_a_change_in_motion_joins_and_fades(
 
 def test_the_difference_at_a_change_fades_with_its_time_constant(drive_with: DriveWith) -> None:
     class Half:
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             return 0.5 * command
 
     drive = drive_with(Half(), FREE, grid_steps=FINE).moving(0.8)
@@ -344,7 +344,7 @@ def test_late_ticks_leave_no_more_swing(kind: str) -> None:
 @pytest.mark.parametrize("error", [ArithmeticError, LookupError])
 def test_a_filter_that_breaks_in_a_missed_tick_trips(drive: Drive, error: type[Exception]) -> None:
     class Broken:
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             raise error
 
     drive.moving()
@@ -358,7 +358,7 @@ def test_of_a_long_standstill_not_every_tick_is_gone_through(drive: Drive) -> No
     class Counted:
         times = 0
 
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             self.times += 1
             return 0.0
 
@@ -371,7 +371,7 @@ def test_in_missed_ticks_the_filter_sees_the_last_command(drive_with: DriveWith)
     commands = []
 
     class Seen:
-        def wanted(self, command: float) -> float:
+        def step(self, command: float) -> float:
             commands.append(command)
             return command
 

@@ -46,7 +46,7 @@ class Wild:
 
     says = 1.0
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         return self.says
 
 

@@ -24,7 +24,7 @@ CENTRED = CommandInput()
 class Stubborn:
     """A filter that never lets go."""
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         return 1.0
 
 

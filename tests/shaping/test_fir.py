@@ -30,7 +30,7 @@ def test_zv_on_the_pendulum_itself(mode: SwayMode) -> None:
     fir, model = Fir(zv_taps(mode, tick_s)), SwayModel(mode, tick_s)
     swing = [0.0]
     for _ in range(400):
-        model.step(fir.wanted(1.0))
+        model.step(fir.step(1.0))
         swing.append(abs(model.angle))
     assert max(swing) > 0.05
     assert max(swing[len(fir.taps) :]) < 1e-11
@@ -96,7 +96,7 @@ def test_fir_is_the_convolution_of_the_newest_commands() -> None:
     taps = [t / math.fsum(taps) for t in taps]
     commands = [source.uniform(-1.0, 1.0) for _ in range(200)]
     fir = Fir(taps)
-    out = [fir.wanted(c) for c in commands]
+    out = [fir.step(c) for c in commands]
     assert out == pytest.approx(np.convolve(commands, taps)[:200].tolist(), abs=1e-12)
     assert max(map(abs, out)) <= max(map(abs, commands))
 
@@ -111,17 +111,17 @@ def test_taps_that_are_no_shaper_are_refused(taps: list[float]) -> None:
 def test_taps_rounded_in_a_file_still_reach_the_command(taps: list[float]) -> None:
     fir = Fir(taps)
     assert math.fsum(fir.taps) == pytest.approx(1.0, abs=1e-15)
-    assert [fir.wanted(1.0) for _ in range(2)][-1] == pytest.approx(1.0, abs=1e-15)
+    assert [fir.step(1.0) for _ in range(2)][-1] == pytest.approx(1.0, abs=1e-15)
     assert fir.taps == pytest.approx([tap / math.fsum(taps) for tap in taps], abs=1e-15)
 
 
 def test_a_long_day_takes_no_memory() -> None:
     fir = Fir([0.25] * 4)
-    fir.wanted(0.5)
+    fir.step(0.5)
     tracemalloc.start()
     try:
         for _ in range(20_000):
-            fir.wanted(0.5)
+            fir.step(0.5)
         grown, _ = tracemalloc.get_traced_memory()
     finally:
         tracemalloc.stop()

@@ -24,7 +24,7 @@ Matrix = list[list[Fraction]]
 
 def step(gff: Gff, sway: SwayModel, command: float) -> float:
     """One tick without any limit: what is wanted is sent."""
-    sent = gff.wanted(command)
+    sent = gff.step(command)
     sway.step(sent)
     return sent
 
@@ -126,7 +126,7 @@ def test_a_held_command_is_reached(
     for _ in range(round(60.0 / tick_s) if tick_s >= 0.01 else 0):
         step(gff, sway, 0.7)
     sway.angle, sway.rate = (sway.angle, sway.rate) if tick_s >= 0.01 else (0.0, -0.7)
-    assert gff.wanted(0.7) == pytest.approx(0.7, abs=1e-9)
+    assert gff.step(0.7) == pytest.approx(0.7, abs=1e-9)
 
 
 @pytest.mark.parametrize("poles", POLES.values(), ids=POLES.keys())
@@ -181,7 +181,7 @@ def test_ten_million_steps_stay_bounded() -> None:
     linear = Gff(probe, SLEW)
     response = [step(linear, probe, float(k == 0)) for k in range(10_000)]
     bound = sum(map(abs, response))
-    wanted, advance = gff.wanted, sway.step
+    wanted, advance = gff.step, sway.step
     seed, sent = 12345, 0.0
     for _ in range(1000):
         for _ in range(200):

@@ -36,8 +36,8 @@ def test_without_a_limit_it_is_the_shaper_itself(mode: SwayMode) -> None:
     sway, taps = SwayModel(mode, TICK_S), zv_taps(mode, TICK_S)
     bare, aware = Fir(taps), LimitAware(sway, Fir(taps))
     for command in restless(1, 20_000):
-        out = aware.wanted(command)
-        assert out == pytest.approx(bare.wanted(command), abs=1e-12)
+        out = aware.step(command)
+        assert out == pytest.approx(bare.step(command), abs=1e-12)
         sway.step(out)
 
 
@@ -106,14 +106,14 @@ def test_a_million_restless_ticks_stay_bounded(mode: SwayMode) -> None:
     for i in range(1_000_000):
         if i % 37 == 0:
             command = source.uniform(-1.0, 1.0)
-        wanted = aware.wanted(command)
+        wanted = aware.step(command)
         step = min(max(wanted - sent, -0.05), 0.05)
         sent = round(125.0 * min(max(sent + step, -0.7), 0.7)) / 125.0
         sway.step(sent)
         # A command that the valve cannot follow may ask for several times full speed, not more.
         assert abs(wanted) < 6.0
     for _ in range(3000):
-        sent = aware.wanted(0.0)
+        sent = aware.step(0.0)
         sway.step(sent)
     assert abs(sent) < 1e-9
     assert math.hypot(mode.omega_rad_s * sway.angle, sway.rate + sent) < 1e-9
@@ -126,8 +126,8 @@ class Broken:
         self.shaper = shaper
         self.broken = False
 
-    def wanted(self, command: float) -> float:
-        wanted = self.shaper.wanted(command)
+    def step(self, command: float) -> float:
+        wanted = self.shaper.step(command)
         return math.nan if self.broken else wanted
 
 
@@ -210,4 +210,4 @@ def test_made_in_full_swing_it_damps_from_the_first_tick(
     pole = -times_omega * mode.omega_rad_s
     gff = Gff(sway, (pole, pole))
     aware = LimitAware(sway, Fir([1.0]), rate)
-    assert aware.wanted(0.0) == pytest.approx(-gff.k1 * 0.3 + gff.k2 * 0.2, rel=2e-3)
+    assert aware.step(0.0) == pytest.approx(-gff.k1 * 0.3 + gff.k2 * 0.2, rel=2e-3)

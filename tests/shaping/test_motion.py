@@ -26,7 +26,7 @@ class Axis:
         self.sent = 0.0
 
     def run(self, command: float) -> None:
-        self.moving.applied = self.filter.wanted(command)
+        self.moving.applied = self.filter.step(command)
         self.sent = self.moving.applied + self.moving.added
         self.sway.step(self.moving.applied)
 

@@ -33,7 +33,7 @@ def answer(shaper: Shaper, sway: SwayModel, rate_per_tick: float = math.inf) -> 
     """What a filter asks for, and a valve of limited rate that the model is told of."""
     out, sent = [], 0.0
     for command in COMMANDS:
-        out.append(shaper.wanted(command))
+        out.append(shaper.step(command))
         sent += min(max(out[-1] - sent, -rate_per_tick), rate_per_tick)
         sway.step(sent)
     return out

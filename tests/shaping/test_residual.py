@@ -41,7 +41,7 @@ class OrdinaryGff:
         self._b = [gain * b for b in numerator]
         self._past = [(0.0, 0.0), (0.0, 0.0)]
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         (u1, y1), (u2, y2) = self._past
         b, a = self._b, self._a
         output = b[0] * command + b[1] * u1 + b[2] * u2 - a[1] * y1 - a[2] * y2
@@ -126,6 +126,6 @@ def test_without_limits_both_realisations_are_one_filter(length_m: float) -> Non
     model = SwayModel(mode, TICK_S)
     aware, ordinary = Gff(model, PAPER_SLEW), OrdinaryGff(mode, PAPER_SLEW)
     for command in busy_hand(1)[0]:
-        output = aware.wanted(command)
+        output = aware.step(command)
         model.step(output)
-        assert ordinary.wanted(command) == pytest.approx(output, abs=1e-8)
+        assert ordinary.step(command) == pytest.approx(output, abs=1e-8)

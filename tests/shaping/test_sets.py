@@ -210,7 +210,7 @@ def test_a_change_on_the_way_makes_no_jump(kind: str) -> None:
 @pytest.mark.parametrize("sway", [True, False])
 def test_an_output_that_is_no_number_trips_with_and_without_a_model(sway: bool) -> None:
     class Broken:
-        def wanted(self, _command: float) -> float:
+        def step(self, _command: float) -> float:
             return math.nan
 
     model = SwayModel(EMPTY, TICK_S) if sway else None
@@ -236,30 +236,30 @@ def test_a_robust_shaper_keeps_its_history_through_a_change() -> None:
 def test_inherited_history_gives_the_same_output() -> None:
     old = Fir(zv_taps(EMPTY, TICK_S))
     for n in range(200):
-        old.wanted(math.sin(n / 10))
+        old.step(math.sin(n / 10))
     new = Fir(old.taps)
-    new.inherit(old)
-    assert [new.wanted(0.3) for _ in range(60)] == [old.wanted(0.3) for _ in range(60)]
+    new.copy_state(old)
+    assert [new.step(0.3) for _ in range(60)] == [old.step(0.3) for _ in range(60)]
 
 
 def test_a_limit_aware_shaper_goes_on_with_its_history() -> None:
     old, new = (LimitAware(SwayModel(EMPTY, TICK_S), Fir([0.1] * 10)) for _ in range(2))
     for n in range(30):
-        old.wanted(0.02 * n)
-    new.inherit(old)
-    assert [new.wanted(0.6) for _ in range(12)] == [old.wanted(0.6) for _ in range(12)]
+        old.step(0.02 * n)
+    new.copy_state(old)
+    assert [new.step(0.6) for _ in range(12)] == [old.step(0.6) for _ in range(12)]
 
 
 def test_a_longer_shaper_takes_the_oldest_command_for_older_ones() -> None:
     old = Fir([0.5, 0.5])
-    old.wanted(0.2)
-    old.wanted(0.8)
+    old.step(0.2)
+    old.step(0.8)
     new = Fir([0.25] * 4)
-    new.inherit(old)
-    assert new.wanted(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
+    new.copy_state(old)
+    assert new.step(1.0) == pytest.approx((1.0 + 0.8 + 0.2 + 0.2) / 4)
     shorter = Fir([1.0])
-    shorter.inherit(old)
-    assert shorter.wanted(0.4) == 0.4
+    shorter.copy_state(old)
+    assert shorter.step(0.4) == 0.4
 
 
 def test_every_shaper_begins_at_a_command() -> None:
@@ -273,5 +273,5 @@ def test_every_shaper_begins_at_a_command() -> None:
         LimitAware(sway, Fir([0.5, 0.5])),
     ]
     for shaper in shapers:
-        shaper.begin_at(0.7)
-        assert shaper.wanted(0.7) == pytest.approx(0.7, abs=1e-9)
+        shaper.reset_to_steady_state(0.7)
+        assert shaper.step(0.7) == pytest.approx(0.7, abs=1e-9)

@@ -29,7 +29,7 @@ class Ruleless:
     """A shaper of which an axis does not know that it spreads."""
 
     def __init__(self, shaper: Shaper) -> None:
-        self.wanted = shaper.wanted
+        self.step = shaper.step
 
 
 LEVELS = (0.1, 0.13, 0.2, 0.34, 0.55, 0.79, 1.0)

@@ -9,7 +9,7 @@ from canshaper.shaping.shapers.smoothing import FirstOrder, SCurve
 
 def test_first_order_reaches_63_percent_after_its_time_constant() -> None:
     lag = FirstOrder(0.02, 0.5)
-    out = [lag.wanted(1.0) for _ in range(25)]
+    out = [lag.step(1.0) for _ in range(25)]
     assert out[-1] == pytest.approx(1.0 - math.exp(-1.0))
 
 
@@ -19,7 +19,7 @@ def test_s_curve_keeps_rate_and_jerk_and_arrives(tick_s: float, rate: float, jer
     curve = SCurve(tick_s, rate, jerk)
     out = [0.0]
     for command in (1.0, -1.0, 0.3, 0.0):
-        out += [curve.wanted(command) for _ in range(round(5.0 / tick_s))]
+        out += [curve.step(command) for _ in range(round(5.0 / tick_s))]
         assert out[-1] == pytest.approx(command, abs=1e-9)
     steps = [b - a for a, b in pairwise(out)]
     assert max(map(abs, steps)) <= rate * tick_s * 1.001
@@ -38,7 +38,7 @@ def test_s_curve_on_a_restless_joystick_stays_within_the_joystick() -> None:
         if i % 17 == 0:
             command = source.uniform(-1.0, 1.0)
         # a turn of the joystick in full motion costs one jerk-limited overshoot of what was asked
-        assert abs(curve.wanted(command)) <= 1.0 + 4.0**2 / (2.0 * 20.0)
+        assert abs(curve.step(command)) <= 1.0 + 4.0**2 / (2.0 * 20.0)
 
 
 # Numbers that a float holds exactly: a step of the slope is 1, a tick at that slope moves by 0.5.
@@ -47,16 +47,16 @@ EXACT = {"tick_s": 0.5, "rate_per_s": 8.0, "jerk_per_s2": 2.0}
 
 def test_s_curve_from_rest_begins_with_one_step_of_the_slope() -> None:
     curve = SCurve(**EXACT)
-    assert [curve.wanted(8.0) for _ in range(3)] == [0.5, 1.5, 3.0]
+    assert [curve.step(8.0) for _ in range(3)] == [0.5, 1.5, 3.0]
 
 
 def test_s_curve_that_has_arrived_is_at_rest() -> None:
     """The next move begins from rest again, not with what the arrival was made with."""
     curve = SCurve(**EXACT)
-    assert [curve.wanted(command) for command in (0.5, 8.0, 8.0)] == [0.5, 1.0, 2.0]
+    assert [curve.step(command) for command in (0.5, 8.0, 8.0)] == [0.5, 1.0, 2.0]
 
 
 def test_s_curve_does_not_stop_dead_where_the_joystick_meets_it() -> None:
     """The joystick comes back to just where the output is, in motion: it slows down by the jerk."""
     curve = SCurve(**EXACT)
-    assert [curve.wanted(command) for command in (8.0, 8.0, 1.5)] == [0.5, 1.5, 2.0]
+    assert [curve.step(command) for command in (8.0, 8.0, 1.5)] == [0.5, 1.5, 2.0]

@@ -20,7 +20,7 @@ QUICKEST = math.sqrt(2.0 + math.sqrt(5.0))
 def response(gff: Gff, sway: SwayModel, commands: list[float]) -> list[float]:
     out = []
     for command in commands:
-        out.append(gff.wanted(command))
+        out.append(gff.step(command))
         sway.step(out[-1])
     return out
 
@@ -68,9 +68,9 @@ def test_the_first_jump_is_small(mode: SwayMode, tick_s: float) -> None:
     poles = (-5.655, -4.112)
     sway, other = SwayModel(mode, tick_s), SwayModel(mode, tick_s)
     without, lagged = Gff(sway, poles), Gff(other, poles, -5.0)
-    jump = without.wanted(1.0)
+    jump = without.step(1.0)
     assert jump > 2.0
-    assert lagged.wanted(1.0) == pytest.approx(-math.expm1(-5.0 * tick_s) * jump)
+    assert lagged.step(1.0) == pytest.approx(-math.expm1(-5.0 * tick_s) * jump)
 
 
 @ticks

@@ -36,16 +36,16 @@ class Fir:
         self.taps = tuple(tap / total for tap in taps)
         self._history: deque[float] = deque([0.0] * len(self.taps), maxlen=len(self.taps))
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Output for this tick's command."""
         self._history.appendleft(command)
         return math.fsum(map(mul, self.taps, self._history))
 
-    def begin_at(self, command: float) -> None:
+    def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
         self._history.extend([command] * len(self.taps))
 
-    def inherit(self, old: "Fir") -> None:
+    def copy_state(self, old: "Fir") -> None:
         """Go on with the commands that another one has seen; of older ones its oldest is taken."""
         count = len(self.taps)
         seen = [*old._history, *[old._history[-1]] * count]

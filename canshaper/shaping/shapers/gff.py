@@ -71,18 +71,18 @@ class Gff:
         """Gains from the denominator a2 s^2 + a1 s + 1 of Eq. 13 (a1 in s, a2 in s^2)."""
         return cls(sway, poles_from_denominator(a1, a2), third_pole_rad_s)
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Output the filter asks for, before limits; ``command`` in [-1, 1]."""
         sway = self._sway
         self._command += self._share * (command - self._command)
         command = self._command
         return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
 
-    def inherit(self, old: "Gff") -> None:
+    def copy_state(self, old: "Gff") -> None:
         """Go on from where another one stands; the swing is in the model."""
         self._command = old._command
 
-    def begin_at(self, command: float) -> None:
+    def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
         self._command = command
 

@@ -22,12 +22,12 @@ _RESERVED = {"kind", "parameters", "sway", "tick_s", "valve_rate_per_s"}
 class Shaper(Protocol):
     """What the axis asks of a filter.
 
-    A filter with a memory also has ``begin_at(command)``: as if the command had long been there;
-    and, where it can go on from another one of its class, ``inherit(old)``. One whose output is the
-    command spread over time, with the same travel, has ``spreads = True``.
+    A filter with a memory also has ``reset_to_steady_state(command)``: as if the command had long
+    been there; and, where it can go on from another one of its class, ``copy_state(old)``. One
+    whose output is the command spread over time, with the same travel, has ``spreads = True``.
     """
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Return the output the filter asks for, before limits; ``command`` in [-1, 1].
 
         Called once a tick, also while the axis is neutral (then with command 0).
@@ -111,7 +111,7 @@ class ShaperKind:
         ...     (Parameter("first", 0.0, 1.0, "", "part that comes at once"),),
         ... )
         >>> shaper = kind.build(0.02, first=0.5)
-        >>> [shaper.wanted(command) for command in (1.0, 1.0, 0.0)]
+        >>> [shaper.step(command) for command in (1.0, 1.0, 0.0)]
         [0.5, 1.0, 0.5]
     """
 
@@ -143,10 +143,10 @@ def carry_over(old: Shaper, new: Shaper, command: float) -> None:
         new: the new one.
         command: the command now; without a better memory it counts as the one for long.
     """
-    if type(old) is type(new) and hasattr(new, "inherit"):
-        new.inherit(old)
-    elif hasattr(new, "begin_at"):
-        new.begin_at(command)
+    if type(old) is type(new) and hasattr(new, "copy_state"):
+        new.copy_state(old)
+    elif hasattr(new, "reset_to_steady_state"):
+        new.reset_to_steady_state(command)
 
 
 def spreads(shaper: Shaper) -> bool:

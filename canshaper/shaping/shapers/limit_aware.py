@@ -54,25 +54,25 @@ class LimitAware:
         self._shaper = shaper
         self._asked = 0.0
 
-    def inherit(self, old: "LimitAware") -> None:
+    def copy_state(self, old: "LimitAware") -> None:
         """Go on from where another one stands."""
         self._twin = old._twin.retuned(self._sway.mode, old._asked)
         self._asked = old._asked
-        self._shaper.inherit(old._shaper)
+        self._shaper.copy_state(old._shaper)
 
-    def begin_at(self, command: float) -> None:
+    def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there, and no swing that limits have made."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
         self._asked = command
-        self._shaper.begin_at(command)
+        self._shaper.reset_to_steady_state(command)
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Output for this tick's command, before limits."""
         sway, twin = self._sway, self._twin
         twin.step(self._asked)
         if sway.angle == 0.0 == sway.rate:  # never moved, or started anew after a fault
             twin.angle = twin.rate = 0.0
-        self._asked = asked = self._shaper.wanted(command)
+        self._asked = asked = self._shaper.step(command)
         return (
             asked
             - self._gff.k1 * (sway.angle - twin.angle)

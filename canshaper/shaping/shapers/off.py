@@ -8,7 +8,7 @@ class Off:
 
     __slots__ = ()
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Return the command itself."""
         return command
 

@@ -19,16 +19,16 @@ class FirstOrder:
         self._share = -math.expm1(-tick_s / time_constant_s)
         self._value = 0.0
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Output for this tick's command."""
         self._value += self._share * (command - self._value)
         return self._value
 
-    def begin_at(self, command: float) -> None:
+    def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
         self._value = command
 
-    def inherit(self, old: "FirstOrder") -> None:
+    def copy_state(self, old: "FirstOrder") -> None:
         """Go on from where another one stands."""
         self._value = old._value
 
@@ -51,7 +51,7 @@ class SCurve:
         self._value = 0.0
         self._slope = 0.0
 
-    def wanted(self, command: float) -> float:
+    def step(self, command: float) -> float:
         """Output for this tick's command."""
         left = command - self._value
         change = self._jerk * self._tick_s
@@ -67,11 +67,11 @@ class SCurve:
         self._value += step
         return self._value
 
-    def begin_at(self, command: float) -> None:
+    def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there."""
         self._value, self._slope = command, 0.0
 
-    def inherit(self, old: "SCurve") -> None:
+    def copy_state(self, old: "SCurve") -> None:
         """Go on from where another one stands."""
         self._value, self._slope = old._value, old._slope
 
