@@ -4,6 +4,7 @@ import ast
 import doctest
 import importlib
 import inspect
+import re
 import subprocess
 import sys
 from pathlib import Path
@@ -114,12 +115,13 @@ def test_every_example_is_short_and_is_run_by_a_test() -> None:
         assert 10 <= len((ROOT / "examples" / file).read_text().splitlines()) <= 40, file
 
 
-def test_the_page_about_checksums_shows_the_example() -> None:
-    page = (ROOT / "docs" / "checksums.md").read_text(encoding="utf-8")
-    example = ROOT / "examples" / "own_checksum"
-    assert (example / "acme_checksum.py").read_text(encoding="utf-8") in page
-    points = (example / "pyproject.toml").read_text(encoding="utf-8")
-    assert (
-        '[project.entry-points."canshaper.checksums"]\ncrc16_id = "acme_checksum:CRC16_ID"'
-        in points
-    )
+def test_the_page_of_the_api_names_all_of_it_and_its_program_runs(
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    page = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    named = {*re.findall(r"`(\w+)`", page)}
+    kinds = {"FeedbackEvent", "MotionEvent", "RefusalEvent", "StateEvent"}  # "its kinds"
+    assert {*canshaper.__all__} - kinds <= named
+    (program,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    exec(program, {})
+    assert f"`{capsys.readouterr().out.strip()}`" in page

@@ -15,6 +15,7 @@ from crccheck.crc import Crc16AugCcitt
 pytestmark = pytest.mark.processes
 
 ROOT = Path(__file__).parents[2]
+EXAMPLE = ROOT / "examples" / "own_checksum"
 PAGE = (ROOT / "docs" / "checksums.md").read_text(encoding="utf-8")
 COUNTER = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n'
 # In the joystick of Motorola, in the valve of Intel, which has room behind its two bytes.
@@ -61,9 +62,11 @@ class Installed:
     def __init__(self, folder: Path) -> None:
         self.folder, self.site = folder, folder / "site"
         self.site.mkdir()
-        self.program = str(re.search(r"```python\n(.*?)```", PAGE, re.DOTALL)[1])  # type: ignore[index]
-        self.entry_points = str(re.search(r"```toml\n(.*?)```", PAGE, re.DOTALL)[1])  # type: ignore[index]
-        self.entry_points = self.entry_points.replace('project.entry-points."', "")
+        self.program = (EXAMPLE / "acme_checksum.py").read_text(encoding="utf-8")
+        points = (EXAMPLE / "pyproject.toml").read_text(encoding="utf-8")
+        rows = re.search(r"\[project\.entry-points.*?\n\n", points, re.DOTALL)
+        assert rows
+        self.entry_points = rows[0].replace('project.entry-points."', "")
         self.entry_points = self.entry_points.replace('"]', "]").replace('"', "")
 
     def package(self, name: str = "acme-can", entry_points: str = "") -> None:
