@@ -53,7 +53,7 @@ def _reload(what: str) -> Act:
 
 def _set(sequence: "Sequence", fault: Fault) -> None:
     ranges = sequence.shipped.ranges
-    keys = fault.rng.sample(list(ranges), fault.rng.randint(1, 2))
+    keys = fault.rng.sample(list(ranges), min(fault.rng.randint(1, 2), len(ranges)))
     sequence.bench.requests.append({key: fault.rng.uniform(*ranges[key]) for key in keys})
 
 

@@ -5,6 +5,7 @@ import tempfile
 from dataclasses import dataclass
 from pathlib import Path
 
+from canshaper.config.load import load_config
 from tests.faults.machine import Machine
 from tests.faults.variants import ROOT
 
@@ -14,6 +15,7 @@ NAMES = (
     "forwarder-robust",
     "forwarder-joints",
     "j1939-forwarder",
+    "j1939-profiles",
     "canopen-forwarder",
     "gateway-forwarder",
     "two-cranes",
@@ -62,9 +64,14 @@ def shipped(name: str) -> Shipped:
 
 
 def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
-    """Numbers of every axis, and ranges in which it never moves quicker than by its file."""
+    """Numbers of every axis, and ranges in which it never moves quicker than by its file.
+
+    Profiles choose the numbers of an axis that has some.
+    """
     found: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
+        if load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name].profiles:
+            continue
         found[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
         if axis.filter == "gff":
             found[f"axes.{name}.filter.a1"] = (0.6, 0.8)

@@ -16,6 +16,7 @@ FILES = [
     "forwarder-joints",
     "forwarder-robust",
     "j1939-forwarder",
+    "j1939-profiles",
     "canopen-forwarder",
     "gateway-forwarder",
 ]

@@ -22,7 +22,7 @@ from tests.rigs.reports import report
 
 CONFIG = Path(__file__).parents[2] / "config"
 PROFILES = ["normal", "quick", "fine", None]
-FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
+FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "j1939-profiles", "canopen-forwarder"]
 
 
 class Watched:
