@@ -131,7 +131,7 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
         return
     stale_s = monitor.stale_s(name, now_ns)
     style = DIM if stale_s is not None else ""
-    first = _row(name, status.state, "joystick", status.values["RawCommand"], style, plain=plain)
+    first = _row(name, status.state, "input", status.values["RawCommand"], style, plain=plain)
     number = status.values.get("ActiveSet")
     yield first.append(f"  set {number}" if number else "", style)
     reason = status.reason if stale_s is None else f"STALE {stale_s:.1f} s"
@@ -146,7 +146,7 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
 
 def _row(name: str, word: str, of: str, percent: float, style: str, *, plain: bool) -> Text:
     text = Text(f"{name:{NAME}.{NAME}} ", style or "bold")
-    text.append(f"{word:20.20} ", style or STYLES.get(word, ""))
+    text.append(f"{word:22.22} ", style or STYLES.get(word, ""))
     return text.append(f"{of} {bar(percent, plain=plain)} {percent:+4.0f}%", style)
 
 

@@ -96,10 +96,10 @@ def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
         monitor.take(frame)
     lines = text(monitor, NOW + 100 * MS)
     assert lines[1].startswith(
-        "slew        ACTIVE               joystick ··········│█████·····  +50%"
+        "slew        ACTIVE                 input ··········│█████·····  +50%"
     )
     assert lines[2].startswith(
-        "            JOYSTICK_MOVED          valve ········██│··········  -25%  sway +3.4"
+        "            JOYSTICK_MOVED         valve ········██│··········  -25%  sway +3.4"
     )
     assert "sway" not in lines[6]  # lifting swings nothing
     assert any("missed 3" in line for line in lines)
