@@ -45,8 +45,9 @@ FIRST_STRETCHES: Final = 16
 # What a linear model with a delay and a lag leaves wrong of the full speed of a real valve: on the
 # simulated crane, with a rate limit, it comes out up to 11 % too low.
 MODEL_PART = 0.12
-# The same of the period and of the damping ratio, as large swings are slower.
-MODEL_PERIOD, MODEL_RATIO = 0.006, 0.06
+# The same of the period, and of the damping ratio itself, as large swings are slower and the other
+# direction swings too: as in canshaper.commissioning.identification.decay.
+MODEL_PERIOD, MODEL_RATIO_ABS = 0.013, 0.009
 
 
 @dataclass(frozen=True, slots=True)
@@ -207,10 +208,10 @@ class _Problem:
         if self.known is None:
             halves = [factor * d for d in self._swing_deviations(x)]
             values = swing_values(np.array([omega, sigma]))
-            parts = MODEL_PERIOD, MODEL_RATIO
+            parts = MODEL_PERIOD * values[0], MODEL_RATIO_ABS
             period, ratio = (
-                Value(v, math.hypot(h, p * v))
-                for v, h, p in zip(values, halves, parts, strict=True)
+                Value(v, math.hypot(h, part))
+                for v, h, part in zip(values, halves, parts, strict=True)
             )
         stretches = []
         for one, (driven, free, speed) in zip(self.data, self.parts(x), strict=True):

@@ -9,6 +9,8 @@ from scipy.signal import cont2discrete, lfilter
 from canshaper.commissioning.identification import driven
 from canshaper.commissioning.identification.series import BIN_S, Kind
 from canshaper.shaping.sway import GRAVITY_M_S2
+from canshaper_sim.grapple import Grapple
+from tests.commissioning.identification.coverage import BOTH, cases
 from tests.commissioning.identification.machine import Push
 from tests.commissioning.identification.test_accuracy import drive
 
@@ -48,3 +50,13 @@ def test_a_part_of_the_stretches_first_finds_what_all_of_them_do(
     assert fewer.explained == pytest.approx(every.explained, abs=0.01)
     assert fewer.period_s.value == pytest.approx(every.period_s.value, rel=1e-3)
     assert fewer.period_s.half == pytest.approx(every.period_s.half, rel=0.1)
+
+
+def test_driven_motion_of_two_directions_tells_no_damping_that_it_cannot_know() -> None:
+    """A heavy tool that is hardly damped takes swing from the other direction and gives it back."""
+    heavy = Grapple(l2_m=2.2, m2_kg=900.0, c5_n_m_s_rad=125.0, c6_n_m_s_rad=125.0)
+    _, case = cases(heavy, BOTH, 0.15, 0.1, seed=2)
+    ratio = case.found.damping_ratio
+    assert ratio
+    assert abs(ratio.value - case.mode.zeta) < ratio.half
+    assert any("no decay is seen" in why for why in case.found.poor)
