@@ -101,23 +101,7 @@ def least_residual(
         rows = np.vstack(
             [rows, _disc_rows(second_responses(second, tick_s, count), _SECOND_COUNTS)]
         )
-    # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
-    delay = np.arange(count) * tick_s
-    objective = np.append(1e-6 * delay, 1.0)
-    bounds = [(least_tap / count, rate_per_s * tick_s)] * count + [(0.0, None)]
-    solution = linprog(
-        objective,
-        A_ub=np.hstack([rows, -np.ones((len(rows), 1))]),
-        b_ub=np.zeros(len(rows)),
-        A_eq=np.append(np.ones(count), 0.0)[None, :],
-        b_eq=[1.0],
-        bounds=bounds,
-        method="highs",
-    )
-    if not solution.success:
-        raise DesignError(f"no impulse response found: {solution.message}")
-    taps = np.clip(solution.x[:count], 0.0, None)
-    taps /= taps.sum()
+    taps = _least_taps(rows, tick_s, least_tap / count, rate_per_s * tick_s)
     left = np.abs(responses_of(mode, range_pct, tick_s, count, FINE) @ taps)
     used = np.flatnonzero(taps > 1e-9)
     return RobustShaper(
@@ -127,6 +111,31 @@ def least_residual(
         float((used[-1] - used[0]) * tick_s),
         float(np.sum(np.arange(count) * taps) * tick_s),
     )
+
+
+def _least_taps(
+    rows: NDArray[np.float64], tick_s: float, least: float, most: float
+) -> NDArray[np.float64]:
+    """Taps with the least largest row, each between two bounds, 1 in sum.
+
+    Raises:
+        DesignError: the solver finds none.
+    """
+    # Variables h_0 ... h_(n-1), r. A little weight on the delay picks the quicker of equals.
+    count = rows.shape[1]
+    solution = linprog(
+        np.append(1e-6 * np.arange(count) * tick_s, 1.0),
+        A_ub=np.hstack([rows, -np.ones((len(rows), 1))]),
+        b_ub=np.zeros(len(rows)),
+        A_eq=np.append(np.ones(count), 0.0)[None, :],
+        b_eq=[1.0],
+        bounds=[(least, most)] * count + [(0.0, None)],
+        method="highs",
+    )
+    if not solution.success:
+        raise DesignError(f"no impulse response found: {solution.message}")
+    taps = np.clip(solution.x[:count], 0.0, None)
+    return np.asarray(taps / taps.sum(), dtype=np.float64)
 
 
 def shortest(
