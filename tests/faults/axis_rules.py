@@ -26,6 +26,7 @@ class AxisRules:
         self._stop_until_ns: int | None = None
         self._asks: deque[tuple[int, float]] = deque()
         self._low = self._high = self._command = 0.0
+        self._asks_down = self._asks_up = False
         self._why = ""
         self._releases = 0
         self._presses = 0
@@ -94,6 +95,10 @@ class AxisRules:
             asks.popleft()
         commands = [c for _, c in asks]
         self._low, self._high = min(0.0, *commands), max(0.0, *commands)
+        # And what it counts for certain: an added part waits until this is nothing.
+        certain_ns = tail_ns - 4 * axis.period_ticks * self._tick_ns - 2 * SLACK_NS
+        still = [c for since_ns, c in asks if since_ns >= now_ns - certain_ns]
+        self._asks_down, self._asks_up = min(0.0, *still) < 0.0, max(0.0, *still) > 0.0
 
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
@@ -158,10 +163,10 @@ class AxisRules:
             low = low if self._command <= 0.0 else 0.0
             high = high if self._command >= 0.0 else 0.0
         # Where its operator asked for nothing and holds nothing against it, another one may.
-        if axis.largest_added and not self._low and self._command <= 0.0:
-            low = -axis.largest_added
-        if axis.largest_added and not self._high and self._command >= 0.0:
-            high = axis.largest_added
+        if axis.largest_added and not self._asks_down and self._command <= 0.0:
+            low = min(low, -axis.largest_added)
+        if axis.largest_added and not self._asks_up and self._command >= 0.0:
+            high = max(high, axis.largest_added)
         fall = ticks * axis.fall - slack
         low, high = max(low, -axis.maximum), min(high, axis.maximum)
         low, high = min(low - slack, before + fall), max(high + slack, before - fall)
