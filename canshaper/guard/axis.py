@@ -92,7 +92,7 @@ class GuardedAxis(Asked):
         self.part = b""
         self.at = -1, -1
         self._joystick, self._stop = joystick, stop
-        self._adding: list[GuardedAxis] = []
+        self._adding: tuple[GuardedAxis, ...] = ()
         self._added = 0.0
         if stop is not None:
             stop.stops.append(self)
@@ -189,7 +189,7 @@ class GuardedAxis(Asked):
             return 0.0, 0
         free_ns = heard_ns + self._silent_ns
         if self._stop is not None:
-            free_ns = min(free_ns, self._stop.free_ns())
+            free_ns = min(free_ns, self._stop.free_ns)
             if free_ns < now_ns:
                 return 0.0, 0
         if direction == FORTH:
@@ -203,7 +203,7 @@ class GuardedAxis(Asked):
         reach, until_ns = min(reach, self._maximum), min(from_ns + self._kept_ns, free_ns)
         self.sure[direction] = min(reach, self._full), until_ns
         if self._more:  # for this moment
-            reach, until_ns = self._reach(reach, now_ns, direction), now_ns
+            reach, until_ns = self._reach(reach, now_ns), now_ns
         return reach, until_ns
 
     def _learn(self, data: bytes) -> Command:
@@ -224,7 +224,7 @@ class GuardedAxis(Asked):
     def _why(self, command: Command, reach: float, allowed: float, now_ns: int) -> str:
         """What a frame is beyond, for the log."""
         direction, size, _, _ = command
-        if self._stop is not None and now_ns > self._stop.free_ns():
+        if self._stop is not None and now_ns > self._stop.free_ns:
             limit = "emergency-stop"
         elif self._joystick.released:
             limit = "enable"
@@ -238,12 +238,12 @@ class GuardedAxis(Asked):
         speed = size if direction == FORTH else -size
         return f"axis={self.name} limit={limit} speed={speed:.3f} allowed={allowed:.3f}"
 
-    def _reach(self, reach: float, now_ns: int, direction: int) -> float:
+    def _reach(self, reach: float, now_ns: int) -> float:
         """What may be, beyond what was asked in the direction of the output."""
         if self._reverse:
             reach = max(reach, self._most(now_ns))
         if self._faster and reach:
-            reach = 1.0
+            reach = self._maximum
         # Another operator may move it. Not against a joystick that is held: but which of its frames
         # count is not known here.
         if any(axis._most(now_ns) for axis in self._adding):
@@ -258,8 +258,7 @@ class GuardedAxis(Asked):
             most: up to this part of full speed, where the operator of this axis asked for nothing.
         """
         self._more = True
-        self._adding += [other, self]
-        self._added = max(self._added, most)
+        self._adding, self._added = (other, self), most
 
     def _most(self, now_ns: int) -> float:
         """Speed that was asked for in any direction within the tail."""

@@ -15,6 +15,7 @@ NEVER, FOREVER = -(10**18), 10**19  # ns
 NEUTRAL, FORTH, BACK = range(3)
 Sizes = deque[tuple[float, int]]
 """Each with the time when it was asked for last, the largest first, each later one smaller."""
+NOTHING_SURE = ((0.0, NEVER),) * 3
 
 
 class Asked:
@@ -46,8 +47,8 @@ class Asked:
         self.now = 0.0
         self.positive: Sizes = deque()
         self.negative: Sizes = deque()
-        self.sure: list[tuple[float, int]] = [(0.0, 0)] * 3
-        self.good_ns = 0
+        self.sure = list(NOTHING_SURE)
+        self.good_ns = NEVER
 
     def learn(self, data: bytes) -> float:
         """Read what a frame asks."""
@@ -58,8 +59,8 @@ class Asked:
 
     def forbid(self) -> None:
         """Nothing holds that was looked up before."""
-        self.good_ns = 0
-        self.sure = [(0.0, 0)] * 3
+        self.good_ns = NEVER
+        self.sure = list(NOTHING_SURE)
 
     def clear(self) -> None:
         """Nothing was asked."""
@@ -119,31 +120,29 @@ class GuardedStop(GuardedInput):
     """The emergency stop.
 
     Attributes:
-        pressed: as its last frame says.
+        free_ns: until when something may move: it is not pressed, and was heard within its timeout.
         stops: what it forbids.
     """
 
-    __slots__ = ("_bits", "pressed", "stops")
+    __slots__ = ("_bits", "free_ns", "stops")
 
     def __init__(self, bound: BoundInput, signal: str) -> None:
         super().__init__(bound)
         message = bound.message
         self._bits = Field(message.get_signal_by_name(signal), message.length).bits
-        self.pressed = False
+        self.free_ns = NEVER
         self.stops: list[Asked] = []
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
         if len(data) == self._length and not (self._check and not self._check.verify(data)):
             self.heard_ns = now_ns
-            self.pressed = int.from_bytes(data, "little") & self._bits != 0
-            if self.pressed:
+            if int.from_bytes(data, "little") & self._bits:
+                self.free_ns = NEVER
                 for asked in self.stops:
                     asked.forbid()
-
-    def free_ns(self) -> int:
-        """Until when something may move: it is free, and was heard within its timeout."""
-        return NEVER if self.pressed else self.heard_ns + self.timeout_ns
+            else:
+                self.free_ns = now_ns + self.timeout_ns
 
 
 class GuardedJoystick(GuardedInput):

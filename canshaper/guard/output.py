@@ -18,7 +18,7 @@ from collections.abc import Sequence
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import group_of
 from canshaper.guard.axis import At, GuardedAxis
-from canshaper.guard.inputs import GuardedInput, GuardedJoystick, GuardedStop
+from canshaper.guard.inputs import NEVER, GuardedInput, GuardedJoystick, GuardedStop
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 
@@ -30,11 +30,11 @@ class GuardedAxes:
 
     span = slice(0, 0)
     part = None
-    good_ns = 0
+    good_ns = NEVER
+    at: At = (-1, -1)
 
     def __init__(self, axes: Sequence[GuardedAxis]) -> None:
         self._axes = axes
-        self.at = -1, -1
 
     def moves(self, data: bytes) -> bool:
         """Whether a frame is anything but neutral."""

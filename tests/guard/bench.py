@@ -1,9 +1,20 @@
 """The output guard alone: joystick frames in, one command of one axis in every tick."""
 
+from dataclasses import replace
+from typing import Any
+
 from canshaper.codec.frame import Frame
 from canshaper.guard.output import OutputGuard
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
+
+
+def limited(deployment: Deployment, axis: str, **limits: Any) -> Deployment:
+    """The deployment with other limits of an axis."""
+    bound = deployment.axes[axis]
+    changed = bound.config.limits.model_copy(update=limits)
+    config = bound.config.model_copy(update={"limits": changed})
+    return replace(deployment, axes={**deployment.axes, axis: replace(bound, config=config)})
 
 
 class Bench:
@@ -29,21 +40,28 @@ class Bench:
         for frame in frames:
             self.guard.inputs[frame[:3]].note(frame.data, self.now_ns)
 
-    def sent(self, steps: int) -> str:
-        """The command of this tick; why it may not leave."""
-        self.guard.begin(0)
+    def sent(self, steps: int, missed: int = 0, cut: int = 0) -> str:
+        """The command of this tick; why it may not leave.
+
+        Args:
+            steps: the command.
+            missed: so many deadlines were missed before it.
+            cut: so many bytes are missing at its end.
+        """
+        self.guard.begin(missed)
         self.valve.put(steps)
         frame = self.valve.message.frame()
         self.valve.put(0)
-        valve, data = self.guard.valves[frame[:3]], frame.data
+        valve, data = self.guard.valves[frame[:3]], frame.data[: len(frame.data) - cut]
         why = valve.refusal(data, data[valve.span], self.now_ns, self.guard.at)
         self.number += 1
         return why
 
-    def sends(self, steps: int, **joysticks: float) -> str:
+    def sends(self, steps: int, missed: int = 0, **joysticks: float) -> str:
         """A tick with joysticks and command; why that may not leave."""
+        self.number += missed
         self.takes(self.joysticks(**joysticks))
-        return self.sent(steps)
+        return self.sent(steps, missed)
 
     def ramp(self, steps: int, **joysticks: float) -> None:
         """Up to there by less than the rates, and on for a while."""

@@ -20,6 +20,13 @@ BO_ 2 Joystick: 8 JOYSTICK
  SG_ Joystick : 0|32@1- (1,0) [-1|1] "" SHAPER
 SIG_VALTYPE_ 2 Joystick : 1;
 """
+OFFSET = """VERSION ""
+NS_ :
+BS_:
+BU_: JOYSTICK SHAPER
+BO_ 2 Joystick: 2 JOYSTICK
+ SG_ Joystick : 0|16@1+ (0.1,-100) [-100|100] "%" SHAPER
+"""
 
 
 def network(name: str) -> Any:
@@ -38,6 +45,15 @@ def test_a_float_joystick(value: float, ask: float) -> None:
     message = cantools.database.load_string(FLOAT, "dbc").get_message_by_name("Joystick")  # type: ignore[union-attr]
     bits = JoystickBits(message, Command(joystick="left", signal="Joystick"))
     assert bits.ask(struct.pack("<fI", value, 0)) == ask
+
+
+@pytest.mark.parametrize(
+    ("raw", "ask"), [(0, -1.0), (500, -0.5), (1000, 0.0), (1250, 0.25), (2000, 1.0), (2001, 0.0)]
+)
+def test_a_joystick_whose_zero_is_in_the_middle(raw: int, ask: float) -> None:
+    message = cantools.database.load_string(OFFSET, "dbc").get_message_by_name("Joystick")  # type: ignore[union-attr]
+    bits = JoystickBits(message, Command(joystick="left", signal="Joystick"))
+    assert bits.ask(struct.pack("<H", raw)) == pytest.approx(ask)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,198 @@
+"""What one axis may be sent at a moment, and what the log says where it may not.
+
+Full command is 125 steps without a dead band here, a step 0.008 of full speed. A command may be
+half a step above its limit, and the one after it one step more.
+"""
+
+from typing import Any
+
+import pytest
+
+from canshaper.guard.axis import GuardedAxis
+from canshaper.machine.binding import load_deployment
+from tests.faults import shipped, variants
+from tests.guard.bench import Bench, limited
+
+TICK_NS = 20_000_000
+# timeout_ms, the longest standstill and three periods
+LATE_NS = (100 + 100 + 60) * 1_000_000
+signs = pytest.mark.parametrize("sign", [1, -1])
+
+
+def bench(**limits: Any) -> Bench:
+    """The forwarder with other limits of near-far, which without them are no limits."""
+    free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
+    deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+    return Bench(limited(deployment, "near_far", **(free | limits)), "near_far")
+
+
+def axis(one: Bench) -> GuardedAxis:
+    valve = one.guard.valves[one.valve.message.sender.key]
+    assert isinstance(valve, GuardedAxis)
+    return valve
+
+
+@signs
+def test_beyond_what_was_asked(sign: int) -> None:
+    one = bench()
+    assert not one.sends(sign * 25, near_far=sign * 0.2)
+    why = one.sends(sign * 50, near_far=sign * 0.2)
+    assert why == f"axis=near_far limit=asked speed={sign * 0.4:.3f} allowed=0.200"
+
+
+@signs
+def test_beyond_the_maximum(sign: int) -> None:
+    one = bench(max_pct=80.0)
+    assert not one.sends(sign * 100, near_far=sign * 1.0)
+    why = one.sends(sign * 110, near_far=sign * 1.0)
+    assert why == f"axis=near_far limit=maximum speed={sign * 0.88:.3f} allowed=0.800"
+
+
+@signs
+def test_beyond_the_rates(sign: int) -> None:
+    one = bench(rise_per_s=5.0)
+    why = one.sends(sign * 50, near_far=float(sign))
+    assert why == f"axis=near_far limit=rate speed={sign * 0.4:.3f} allowed=0.112"
+
+
+@signs
+@pytest.mark.parametrize(("steps", "passes"), [(36, True), (37, False)])
+def test_faster_than_the_last_by_the_rise(sign: int, steps: int, passes: bool) -> None:
+    one = bench(rise_per_s=4.0, fall_per_s=2.0)  # 0.08 and 0.04 in a tick
+    one.ramp(sign * 25, near_far=float(sign))
+    why = one.sends(sign * steps, near_far=float(sign))
+    # 0.2, a step, the rise, and half a step
+    assert (why == "") is passes, why
+    if why:
+        assert why.endswith(f"limit=rate speed={sign * 0.296:.3f} allowed=0.292")
+
+
+@signs
+@pytest.mark.parametrize(
+    ("missed", "allowed"),
+    [
+        (0, 0.004),  # not at zero yet: what is rounded to
+        (4, 0.012),  # (5 ticks - 0.196 / 0.04) * 0.08 and half a step
+        (9, 0.412),
+    ],
+)
+def test_the_other_way_by_way_of_zero(sign: int, missed: int, allowed: float) -> None:
+    one = bench(rise_per_s=4.0, fall_per_s=2.0)
+    one.ramp(sign * 25, near_far=float(sign))
+    why = one.sends(-sign * 125, missed=missed, near_far=-float(sign))
+    assert why == f"axis=near_far limit=rate speed={-sign:.3f} allowed={allowed:.3f}"
+
+
+@signs
+def test_a_command_of_another_length_is_none(sign: int) -> None:
+    one = bench()
+    one.ramp(sign * 25, near_far=sign * 0.2)
+    one.takes(one.joysticks(near_far=sign * 0.2))
+    speed = sign * float("inf")
+    assert one.sent(0, cut=1) == f"axis=near_far limit=command speed={speed} allowed=0.200"
+
+
+@signs
+def test_against_the_joystick(sign: int) -> None:
+    one = bench()
+    one.ramp(0, near_far=-sign * 0.5)
+    why = one.sends(sign * 25, near_far=-sign * 0.5)
+    assert why == f"axis=near_far limit=asked speed={sign * 0.2:.3f} allowed=0.000"
+
+
+@signs
+def test_released_it_may_not_even_fall(sign: int) -> None:
+    one = bench(fall_per_s=2.0)
+    one.ramp(sign * 100, near_far=float(sign))
+    one.takes(one.joysticks(enable=False, near_far=float(sign)))
+    why = one.sent(sign * 25)
+    assert why == f"axis=near_far limit=enable speed={sign * 0.2:.3f} allowed=0.000"
+
+
+@signs
+def test_silent_it_may_not_even_fall(sign: int) -> None:
+    one = bench(fall_per_s=2.0, stop_s=0.5)
+    one.ramp(sign * 100, near_far=float(sign))
+    last = (LATE_NS + 500_000_000) // TICK_NS
+    assert not any(one.sent(sign * 100) for _ in range(last))
+    why = one.sent(sign * 25)
+    assert why == f"axis=near_far limit=silence speed={sign * 0.2:.3f} allowed=0.000"
+
+
+def test_at_the_very_end_of_the_silence_it_is_not_what_stops() -> None:
+    one = bench(stop_s=0.5, max_pct=80.0)
+    one.ramp(100, near_far=1.0)
+    for _ in range((LATE_NS + 500_000_000) // TICK_NS - 1):
+        one.sent(100)
+    assert "limit=maximum" in one.sent(125)
+    assert "limit=silence" in one.sent(125)
+
+
+class TestEmergencyStop:
+    """Of a machine that has one, 140 ms of silence and it counts as pressed."""
+
+    def moving(self) -> Bench:
+        one = Bench(variants.machine("protected")[1], "near_far")
+        one.ramp(60, near_far=1.0)
+        return one
+
+    def test_pressed_it_may_not_even_fall(self) -> None:
+        one = self.moving()
+        bound = one.deployment.emergency_stop
+        assert bound is not None
+        check = bound.protection.check
+        assert check is not None
+        one.takes(one.joysticks(near_far=1.0))
+        pressed = next(d for d in (bytes([1, 0, c]) for c in range(256)) if check.verify(d))
+        one.guard.inputs[bound.key].note(pressed, one.now_ns)
+        assert "limit=emergency-stop speed=0.284 allowed=0.000" in one.sent(40)
+
+    def test_at_the_very_end_of_its_silence_it_is_not_what_stops(self) -> None:
+        one = self.moving()
+        bound = one.deployment.emergency_stop
+        assert bound is not None
+        stop = one.guard.inputs[bound.key]
+        while one.now_ns < stop.heard_ns + stop.timeout_ns:
+            one.takes([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
+            assert not one.sent(60)
+        assert one.now_ns == stop.heard_ns + stop.timeout_ns
+        assert "limit=rate" in one.sent(125)
+        assert "limit=emergency-stop" in one.sent(60)
+
+
+@signs
+def test_the_same_command_may_leave_again_for_the_tail(sign: int) -> None:
+    one = bench(stop_s=5.0, tail_s=1.0)
+    one.sends(sign * 50, near_far=sign * 0.5)
+    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+    one.sends(sign * 50, near_far=sign * 0.2)  # the one before counts
+    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+
+
+@signs
+def test_after_a_standstill_the_largest_of_before_is_forgotten(sign: int) -> None:
+    one = bench(fall_per_s=2.0)
+    one.ramp(sign * 100, near_far=float(sign))
+    one.sends(sign * 100, near_far=sign * 0.5)
+    one.guard.stalled()
+    one.sent(0, cut=1)
+    assert one.sends(sign * 100, near_far=sign * 0.5)
+
+
+@signs
+def test_the_other_way_as_fast_as_was_asked_of_late(sign: int) -> None:
+    one = bench(allow_reverse=True)
+    for now in (0.4, 0.3, 0.0):
+        assert not one.sends(0, near_far=sign * now)
+    assert not one.sends(-sign * 50)
+    why = one.sends(-sign * 51)
+    assert why == f"axis=near_far limit=asked speed={-sign * 0.408:.3f} allowed=0.400"
+
+
+@signs
+def test_the_other_way_for_the_tail_only(sign: int) -> None:
+    one = bench(allow_reverse=True, tail_s=0.0, stop_s=5.0)
+    one.sends(0, near_far=sign * 0.4)
+    held = [one.sent(-sign * 50) for _ in range(LATE_NS // TICK_NS + 1)]
+    assert not any(held[:-1])
+    assert held[-1] == f"axis=near_far limit=asked speed={-sign * 0.4:.3f} allowed=0.000"
