@@ -25,6 +25,7 @@ UP, DOWN = 0.5, 1.0
 # and a compensation follows what asks for it.
 LATE_PERIODS = 3
 At = tuple[int, int]
+BEFORE: At = (-1, -1)  # the first deadline and the first tick
 Command = tuple[int, float, float, float]
 """Direction, size, that at most before it was rounded, and the size that may follow at once."""
 
@@ -57,7 +58,6 @@ class GuardedAxis(Asked):
         "_more",
         "_openings",
         "_period",
-        "_period_ns",
         "_reverse",
         "_rise",
         "_silent_ns",
@@ -90,7 +90,7 @@ class GuardedAxis(Asked):
         )
         self._length, self.span = bound.valve_message.length, self.bits.span
         self.part = b""
-        self.at = -1, -1
+        self.at = BEFORE
         self._joystick, self._stop = joystick, stop
         self._adding: tuple[GuardedAxis, ...] = ()
         self._added = 0.0
@@ -115,7 +115,7 @@ class GuardedAxis(Asked):
         full = self.bits.full
         self._full = min(one.velocity(full) for one in self._openings) - EPSILON
         self._commands: dict[bytes, Command] = {}
-        self._period, self._period_ns = bound.period_ticks, period_ns
+        self._period = bound.period_ticks
         self._last: Command = NEUTRAL, 0.0, self._down, self._down + self._step
 
     def moves(self, data: bytes) -> bool:

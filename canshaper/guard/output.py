@@ -17,7 +17,7 @@ from collections.abc import Sequence
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import group_of
-from canshaper.guard.axis import At, GuardedAxis
+from canshaper.guard.axis import BEFORE, At, GuardedAxis
 from canshaper.guard.inputs import NEVER, GuardedInput, GuardedJoystick, GuardedStop
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
@@ -31,7 +31,7 @@ class GuardedAxes:
     span = slice(0, 0)
     part = None
     good_ns = NEVER
-    at: At = (-1, -1)
+    at = BEFORE
 
     def __init__(self, axes: Sequence[GuardedAxis]) -> None:
         self._axes = axes
@@ -66,7 +66,7 @@ class OutputGuard:
         if button := deployment.emergency_stop:
             stop = GuardedStop(button, button.config.signal)
             inputs.append((button, stop))
-        self.at = -1, -1
+        self.at = BEFORE
         self._stood_still = False
         self._joysticks = list(joysticks.values())
         self.inputs: dict[Key, GuardedInput] = {}

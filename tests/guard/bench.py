@@ -63,6 +63,12 @@ class Bench:
         self.takes(self.joysticks(**joysticks))
         return self.sent(steps, missed)
 
+    def waits(self, ticks: int) -> None:
+        """So many ticks of the loop in which the axis is not due."""
+        for _ in range(ticks):
+            self.guard.begin(0)
+            self.number += 1
+
     def ramp(self, steps: int, **joysticks: float) -> None:
         """Up to there by less than the rates, and on for a while."""
         sign = 1 if steps > 0 else -1

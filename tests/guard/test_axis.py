@@ -170,6 +170,52 @@ def test_the_same_command_may_leave_again_for_the_tail(sign: int) -> None:
 
 
 @signs
+def test_the_same_command_may_leave_again_until_a_stop_were_over(sign: int) -> None:
+    one = bench(stop_s=1.0, tail_s=5.0)
+    one.sends(sign * 50, near_far=sign * 0.5)
+    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+
+
+@signs
+@pytest.mark.parametrize("missed", [0, 4])  # which give no time to fall
+def test_what_is_no_longer_asked_falls_by_the_rate(sign: int, missed: int) -> None:
+    one = bench(tail_s=0.0, stop_s=5.0, fall_per_s=2.0)  # 0.04 in a tick
+    one.ramp(sign * 100, near_far=float(sign))
+    for _ in range(LATE_NS // TICK_NS):
+        assert not one.sends(sign * 100)
+    # From the smaller of what was sent, with the step of rounding, and its bound.
+    for steps in (96, 91, 80):
+        one.number += missed
+        one.takes(one.joysticks())
+        assert not one.sent(sign * steps, missed)
+    one.takes(one.joysticks())
+    why = one.sent(sign * 90)
+    assert why == f"axis=near_far limit=rate speed={sign * 0.72:.3f} allowed=0.608"
+
+
+@signs
+@pytest.mark.parametrize(("steps", "passes"), [(64, True), (65, False)])
+def test_a_valve_of_three_ticks_rises_by_three_ticks(sign: int, steps: int, passes: bool) -> None:
+    slow = limited(variants.machine("slow-valves")[1], "near_far", deadband_pct=0.0)
+    one = Bench(slow, "near_far")
+    for size in (0, 25):
+        one.waits(2)
+        assert not one.sends(sign * size, near_far=float(sign))
+    one.waits(2)
+    # 0.2, a step, 5 per second in 60 ms, and half a step
+    assert (one.sends(sign * steps, near_far=float(sign)) == "") is passes
+
+
+@signs
+def test_by_a_curve_rounding_is_as_coarse_as_its_steepest_part(sign: int) -> None:
+    curve = {"curve_command_pct": [-100, -50, 0, 50, 100]}
+    one = bench(**curve, curve_speed_pct=[-100, -20, 0, 20, 100], rise_per_s=5.0)
+    why = one.sends(sign * 100, near_far=float(sign))
+    # 1.6 / 125 of full speed in a step: one and a half of them, and the rise
+    assert why == f"axis=near_far limit=rate speed={sign * 0.68:.3f} allowed=0.119"
+
+
+@signs
 def test_after_a_standstill_the_largest_of_before_is_forgotten(sign: int) -> None:
     one = bench(fall_per_s=2.0)
     one.ramp(sign * 100, near_far=float(sign))
