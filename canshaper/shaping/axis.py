@@ -16,6 +16,7 @@ from canshaper.shaping.limits import (
     rate_limited,
     within,
 )
+from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.kind import Shaper, spreads
 from canshaper.shaping.small_strokes import SmallStrokes
 from canshaper.shaping.state_machine import ACTIVE, BYPASS_ON, TRIPPED, StateMachine
@@ -47,6 +48,7 @@ class Axis:
         sent: the velocity that gives, [-1, 1].
         applied: what the sway model was driven by: ``sent`` without the added part.
         command: the operator's command that was in force at the last tick, [-1, 1].
+        sensed: what a sway sensor makes of the swing, where there is one.
     """
 
     def __init__(
@@ -65,6 +67,7 @@ class Axis:
         self.applied = 0.0
         self.command = 0.0
         self.sway = sway
+        self.sensed: SensedSway | None = None
         self._largest_added = 0.0
         self._added_time = AddedTime(0)
         self._transfer = BumplessTransfer(shaper, tick_s)
@@ -160,6 +163,8 @@ class Axis:
         """Let the model swing with what ``act`` found: work that can wait until that is sent."""
         if self.sway is not None:
             self.sway.step(self.applied)
+        if self.sensed is not None:
+            self.sensed.step(self.applied, self.command, self._added)
 
     def hold(self, ticks: int) -> None:
         """Tell the axis that the last output was held for ``ticks`` missed ticks.
@@ -199,6 +204,8 @@ class Axis:
         self._spreads = spreads(shaper)
         self._small.lose()
         self.sway = sway
+        if self.sensed is not None:
+            self.sensed.retune(sway)
 
     def allow_added(self, largest: float, time_s: float) -> None:
         """Let a motion add velocity where no one commands this axis.
@@ -244,7 +251,9 @@ class Axis:
         low, high = allowed_range(command, recent.low, recent.high, limits)
         target = within(unlimited, low, high, limits.minimum)
         if self._spreads:
-            target = self._small.output(command, self.applied, target, low, high)
+            one_movement = self._small.output(command, self.applied, target, low, high)
+            if self.sensed is None or not self.sensed.weight:  # else there is swing to damp
+                target = one_movement
         self._added = added
         if added or self._own != self._limited:
             low, high, wish = self._drive_both(command, target)
@@ -305,4 +314,6 @@ class Axis:
         self.command = 0.0
         if self.sway is not None:
             self.sway.angle = self.sway.rate = 0.0
+        if self.sensed is not None:
+            self.sensed.restart()
         return TRIPPED

@@ -110,6 +110,23 @@ class SwayMode:
         return self.omega_rad_s**2 / GRAVITY_M_S2
 
 
+def swing_over(mode: SwayMode, time_s: float) -> tuple[float, float, float, float]:
+    """What an undriven swing changes by: F = Ad - I of (angle, rate), row by row."""
+    pole = mode.pole
+    decay = math.exp(pole.real * time_s)
+    sine = decay * math.sin(pole.imag * time_s) / pole.imag
+    # decay * cos(wd T) - 1 without cancellation
+    cosine_1 = (
+        math.expm1(pole.real * time_s) - 2.0 * decay * math.sin(0.5 * pole.imag * time_s) ** 2
+    )
+    return (
+        cosine_1 - pole.real * sine,
+        sine,
+        -(mode.omega_rad_s**2) * sine,
+        cosine_1 + pole.real * sine,
+    )
+
+
 class SwayModel:
     """Exactly sampled sway of one axis, driven by the velocity that is really sent.
 
@@ -120,11 +137,27 @@ class SwayModel:
 
     One step is x += F (angle, rate + v) with F = Ad - I: docs/decisions/0002-sway-in-increments.md.
 
+    Attributes:
+        free_angle: swing that the velocity does not explain, as a sensor shows it; 0 without one.
+            It is no part of the model: filters add it where they feed the swing back.
+        free_rate: the rate of that.
+
     Raises:
         ValueError: the tick is outside 0.1 to 200 ms, or too long for the mode.
     """
 
-    __slots__ = ("angle", "f11", "f12", "f21", "f22", "mode", "rate", "tick_s")
+    __slots__ = (
+        "angle",
+        "f11",
+        "f12",
+        "f21",
+        "f22",
+        "free_angle",
+        "free_rate",
+        "mode",
+        "rate",
+        "tick_s",
+    )
 
     def __init__(self, mode: SwayMode, tick_s: float) -> None:
         self.mode = mode
@@ -132,19 +165,9 @@ class SwayModel:
         # Six samples to a swing; near two, f12 vanishes and with it every feedback from the model.
         name = f"natural frequency at a tick of {tick_s:g} s"
         _require(name, mode.omega_rad_s, 0.0, 1.0 / tick_s, "rad/s")
-        self.angle = 0.0
-        self.rate = 0.0
-        pole = mode.pole
-        decay = math.exp(pole.real * tick_s)
-        sine = decay * math.sin(pole.imag * tick_s) / pole.imag
-        # decay * cos(wd T) - 1 without cancellation
-        cosine_1 = (
-            math.expm1(pole.real * tick_s) - 2.0 * decay * math.sin(0.5 * pole.imag * tick_s) ** 2
-        )
-        self.f11 = cosine_1 - pole.real * sine
-        self.f12 = sine
-        self.f21 = -(mode.omega_rad_s**2) * sine
-        self.f22 = cosine_1 + pole.real * sine
+        self.angle = self.free_angle = 0.0
+        self.rate = self.free_rate = 0.0
+        self.f11, self.f12, self.f21, self.f22 = swing_over(mode, tick_s)
 
     def step(self, velocity: float) -> None:
         """Advance one tick in which ``velocity`` in [-1, 1] was held."""
@@ -164,6 +187,7 @@ class SwayModel:
         scale = self.mode.angle_per_speed_rad / mode.angle_per_speed_rad
         model.angle = self.angle * scale
         model.rate = (self.rate + velocity) * scale - velocity
+        model.free_angle, model.free_rate = self.free_angle * scale, self.free_rate * scale
         return model
 
     def sway_rad(self, full_speed_m_s: float) -> float:

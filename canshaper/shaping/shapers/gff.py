@@ -76,7 +76,8 @@ class Gff:
         sway = self._sway
         self._command += self._share * (command - self._command)
         command = self._command
-        return command - self.k1 * sway.angle - self.k2 * (sway.rate + command)
+        angle, rate = sway.angle + sway.free_angle, sway.rate + sway.free_rate
+        return command - self.k1 * angle - self.k2 * (rate + command)
 
     def copy_state(self, old: "Gff") -> None:
         """Go on from where another one stands; the swing is in the model."""

@@ -75,8 +75,8 @@ class LimitAware:
         self._asked = asked = self._shaper.step(command)
         return (
             asked
-            - self._gff.k1 * (sway.angle - twin.angle)
-            - self._gff.k2 * (sway.rate - twin.rate)
+            - self._gff.k1 * (sway.angle + sway.free_angle - twin.angle)
+            - self._gff.k2 * (sway.rate + sway.free_rate - twin.rate)
         )
 
 

@@ -1,0 +1,168 @@
+"""A sway sensor at work on one axis: what it adds to the sway model, as far as it is trusted."""
+
+from canshaper.shaping.observer import FreeSwing, SensorTiming, SwayObserver
+from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.trust import (
+    LATCHED,
+    PROVED,
+    PROVED_AGAIN,
+    SURPRISE_PER_S,
+    Evidence,
+    Restlessness,
+    SensorLimits,
+    Standstill,
+    Trust,
+    largest_jump,
+)
+
+# Time in which what the sensor adds comes in and fades.
+FADE_S = 0.6
+# The same where the grapple leans on something: what it shows there drives the crane.
+CONTACT_FADE_S = 0.15
+
+# These are seen in the measurements themselves: they replace what was thought of their sense.
+UNDOUBTED = (Trust.LOST, Trust.JUMP, Trust.UNPROVED)
+
+
+class SensedSway:
+    """Observer and trust of one axis.
+
+    Args:
+        sway: sway model of the axis; gets the free swing as far as it is trusted.
+        timing: when the sensor measures what.
+        limits: what it may show.
+        damps: the free swing is fed back; else it is only watched.
+
+    Attributes:
+        state: what is thought of the sensor.
+        weight: how much of the free swing is fed back, 0 to 1.
+    """
+
+    def __init__(
+        self, sway: SwayModel, timing: SensorTiming, limits: SensorLimits, *, damps: bool
+    ) -> None:
+        measured, tick_s = timing.measured, sway.tick_s
+        self.state = Trust.NO_DATA
+        self.weight = 0.0
+        self._sway, self._damps, self._limits = sway, damps, limits
+        self._observer = SwayObserver(sway, timing)
+        self._evidence = Evidence(measured, limits.noise, timing.period_s)
+        self._standstill = Standstill(measured, limits.noise, timing.period_s, sway.mode.period_s)
+        self._restlessness = Restlessness(tick_s)
+        self._jump = largest_jump(measured, limits.noise, timing.period_s)
+        self._tick_s = tick_s
+        self._lost_s = timing.lost_s
+        self._age_s = 0.0  # since the last measurement
+        self._begun = False
+        self._needed = PROVED
+        # The free swing that is fed back; after trust is lost it swings on as it was.
+        self._fading = FreeSwing(measured, (0.0, 0.0, 0.0))
+        self._left = 0.0  # what the last measurement left unexplained
+
+    def measure(self, value: float | None, scale: float, *, commanded: bool) -> None:
+        """Take what has come for this tick, before the filter runs.
+
+        Args:
+            value: a new measurement, rad or rad/s, with the sign of the model; None without one.
+            scale: rad per normalised angle of the model.
+            commanded: the operator asked for motion within the tail. Else nothing is fed back to
+                the valve, and swing that another axis makes says nothing about the sensor.
+        """
+        if not commanded and self.state is not Trust.CONTACT:
+            self._needed = PROVED
+        if value is not None:
+            passed_s, self._age_s = self._age_s, 0.0
+            if self._begun:
+                self._compare(value, scale, passed_s, commanded)
+            elif not commanded or self.state not in LATCHED:
+                self._begin(value, scale)
+        elif self._age_s > self._lost_s and self.state not in (Trust.NO_DATA, Trust.LOST):
+            self._doubt(Trust.LOST, again=True)
+        self._feed_back(scale)
+
+    def step(self, velocity: float, command: float, added: float = 0.0) -> None:
+        """Advance a tick.
+
+        Args:
+            velocity: what was sent in it, [-1, 1], without the added part.
+            command: what the operator asked for, [-1, 1].
+            added: what a motion of two axes added.
+        """
+        self._age_s += self._tick_s
+        if self._restlessness.add(velocity, command) and self.state is Trust.TRUSTED:
+            self._doubt(Trust.RESTLESS, again=True)
+        self._observer.step(velocity, added)
+        if self.weight:
+            self._observer.swing(self._fading)
+
+    def retune(self, sway: SwayModel) -> None:
+        """Go on with another model of the axis."""
+        self._sway = sway
+        self._observer.retune(sway)
+
+    def restart(self) -> None:
+        """The model has started again, and does not know its swing: nothing is fed back."""
+        self._observer.restart()
+        self.weight = 0.0
+        self._sway.free_angle = self._sway.free_rate = 0.0
+        self._doubt(Trust.UNPROVED, again=True)
+
+    def _begin(self, value: float, scale: float) -> None:
+        observer = self._observer
+        observer.begin(value, scale)
+        self._evidence.clear()
+        self._standstill.clear(value)
+        self._left = 0.0
+        self._begun = True
+        if self.state in (Trust.NO_DATA, Trust.LOST):
+            self.state = Trust.UNPROVED
+
+    def _compare(self, value: float, scale: float, passed_s: float, commanded: bool) -> None:
+        observer, evidence, trusted = self._observer, self._evidence, self.state is Trust.TRUSTED
+        errors = observer.errors(value, scale)
+        if not abs(errors[0] - self._left) <= self._jump:
+            self._doubt(Trust.JUMP, again=True)
+            return
+        before = observer.free.rate
+        observer.correct(errors)
+        bent = observer.free.rate - before
+        self._left = observer.free.error(value - observer.own(scale))
+        if not commanded:
+            self._standstill.clear(value)
+            return
+        evidence.add(errors)
+        if fault := self._standstill.check(value, bent, passed_s):
+            self._doubt(fault, again=True)
+        elif fault := evidence.fault(0.0 if trusted else -PROVED):
+            self._doubt(fault)
+        elif observer.acceleration(evidence.surprise) > SURPRISE_PER_S * scale:
+            self._doubt(Trust.CONTACT)
+        elif evidence.proved(self._needed):
+            if abs(observer.free.offset) > self._limits.offset:
+                self._doubt(Trust.OFFSET, again=True)
+            elif not trusted and not self.weight:
+                self.state = Trust.TRUSTED
+
+    def _doubt(self, why: Trust, *, again: bool = False) -> None:
+        """It is trusted no longer, or not yet; perhaps the observer has to begin again."""
+        if self.state is Trust.TRUSTED:
+            self._needed = PROVED_AGAIN
+            self._evidence.clear()
+        if why in UNDOUBTED or self.state in (Trust.UNPROVED, Trust.TRUSTED):
+            self.state = why
+        self._begun = self._begun and not again
+
+    def _feed_back(self, scale: float) -> None:
+        sway, free, fading = self._sway, self._observer.free, self._fading
+        fade = self._tick_s / (CONTACT_FADE_S if self.state is Trust.CONTACT else FADE_S)
+        if self.state is Trust.TRUSTED:
+            fading.angle, fading.rate = free.angle, free.rate
+        else:
+            fade = -fade
+        weight = self.weight = min(max(self.weight + fade, 0.0), 1.0) if self._damps else 0.0
+        if weight:
+            angle, rate = self._observer.ahead(fading)
+            part = weight / scale
+            sway.free_angle, sway.free_rate = part * angle, part * rate
+        else:
+            sway.free_angle = sway.free_rate = 0.0
