@@ -30,7 +30,13 @@ if TYPE_CHECKING:
     from canshaper.api import AxisState, Controller, load_machine
     from canshaper.checksums import Checksum, ChecksumKind, Crc8, Xor
     from canshaper.codec.frame import Frame
-    from canshaper.controller.events import FeedbackEvent, MotionEvent, RefusalEvent, StateEvent
+    from canshaper.controller.events import (
+        FeedbackEvent,
+        MotionEvent,
+        RefusalEvent,
+        StateEvent,
+        SwaySensorEvent,
+    )
     from canshaper.machine.deployment import Deployment
     from canshaper.protocols.interface import Event
     from canshaper.shaping.registry import build_shaper
@@ -62,6 +68,7 @@ __all__ = [
     "StateEvent",
     "SwayMode",
     "SwayModel",
+    "SwaySensorEvent",
     "Xor",
     "build_shaper",
     "errors",
@@ -72,7 +79,13 @@ _HOMES = {
     "api": ("AxisState", "Controller", "load_machine"),
     "checksums": ("Checksum", "ChecksumKind", "Crc8", "Xor"),
     "codec.frame": ("Frame",),
-    "controller.events": ("FeedbackEvent", "MotionEvent", "RefusalEvent", "StateEvent"),
+    "controller.events": (
+        "FeedbackEvent",
+        "MotionEvent",
+        "RefusalEvent",
+        "StateEvent",
+        "SwaySensorEvent",
+    ),
     "machine.deployment": ("Deployment",),
     "protocols.interface": ("Event",),
     "shaping.registry": ("build_shaper",),

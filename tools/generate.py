@@ -1,7 +1,7 @@
 """Write what is declared in the program into the files that repeat it: ``make generate``.
 
 Value tables of the DBC files and the tables of docs/states.md come from the enumerations of states,
-reasons and faults, from their texts and from the transitions.
+reasons, faults and trust, from their texts and from the transitions.
 """
 
 import re
@@ -13,10 +13,16 @@ from typing import TypeVar
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+from canshaper.shaping.trust import Trust
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]
-TABLES: Mapping[str, type[IntEnum]] = {"State": State, "Reason": Reason, "LastFault": FrameFault}
+TABLES: Mapping[str, type[IntEnum]] = {
+    "State": State,
+    "Reason": Reason,
+    "LastFault": FrameFault,
+    "SwaySensor": Trust,
+}
 
 
 def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:

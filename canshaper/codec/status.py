@@ -18,6 +18,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.codec.signals import raw_limits
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.states import Reason, State
+from canshaper.shaping.trust import Trust
 
 DIGEST_BITS = 16
 
@@ -81,6 +82,10 @@ class ReportedAxis(Protocol):
     def active_set(self) -> int:
         """Number of the parameter set that is chosen; 0 where there is no choice."""
 
+    @property
+    def trust(self) -> Trust:
+        """What is thought of the sway sensor."""
+
 
 def _command_pct(one: ReportedAxis) -> float:
     return 100.0 * one.axis.command
@@ -98,6 +103,7 @@ AXIS_STATUS: list[StatusField[ReportedAxis]] = [
     StatusField("ShapedCommand", _applied_pct, required=True),
     StatusField("PredictedSway", attrgetter("sway_deg"), required=True),
     StatusField("ActiveSet", attrgetter("active_set"), int),
+    StatusField("SwaySensor", attrgetter("trust"), _Code(Trust), largest=max(Trust)),
 ]
 LAST_FAULT: StatusField[dict[str, int]] = StatusField(
     "LastFault", itemgetter("LastFault"), _Code(FrameFault), True, max(FrameFault)

@@ -14,6 +14,7 @@ from canshaper.config.protection import Protected
 from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
 from canshaper.config.sway import Sway
+from canshaper.config.sway_sensor import SwaySensor
 from canshaper.config.version import VERSION
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS
@@ -240,6 +241,8 @@ class AxisConfig(Section):
     """Message with the status of the axis."""
     sway: Sway | None = None
     """Swing of the tool on this axis."""
+    sway_sensor: SwaySensor | None = None
+    """What measures that swing."""
     slewing: Slewing | None = None
     """Of an axis that turns: what its full speed is in angle."""
     filter: Filter = Field(description="filter of the axis")

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
-from canshaper.controller.events import FeedbackEvent, StateEvent
+from canshaper.controller.events import FeedbackEvent, StateEvent, SwaySensorEvent
 from canshaper.controller.inputs import MachineInputs, received_by
 from canshaper.controller.motion import MotionRunner
 from canshaper.controller.outputs import ValveOutputs
@@ -16,7 +16,6 @@ from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
 from canshaper.controller.status import status_frames
 from canshaper.inputs.carry_over import Key, Part, carry_over
-from canshaper.inputs.feedback import Feedback
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
@@ -186,8 +185,8 @@ class Controller:
                 elif message is not None and message.bus not in silent:
                     yield message.frame()
                 runner.axis.advance()
-                if runner.feedback is not None:
-                    self._compare(name, runner, runner.feedback, now_ns)
+                if runner.feedback is not None or runner.axis.sensed is not None:
+                    self._report(name, runner, now_ns)
                 if transition is not None:
                     self._changed(name, runner, transition)
                     changed.append(runner)
@@ -224,25 +223,30 @@ class Controller:
                 self.events.append(event)
 
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
-        """Let load state and operator choose filters, and axes move as one."""
+        """Let load state and operator choose filters, sensors show sway, and axes move as one."""
         for runner in self.axes.values():
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
                 runner.add_chooser(inputs.load_state, inputs.profile)
+        for name, message in inputs.sway_sensors.items():
+            self.axes[name].add_sway_sensor(message)
         for name, bound in self.deployment.motions.items():
             motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None
             slew, radius = self.axes[motion.slew], inputs.radii.get(name)
+            slew.radius = radius
             one = MotionRunner(name, motion, slew, near_far, radius, tick_s=tick_s)
             self.motions.append(one)
 
-    def _compare(self, name: str, runner: AxisRunner, feedback: Feedback, now_ns: int) -> None:
-        """Report when the valve no longer follows its command, and when it does again."""
-        sent = runner.axis.sent
-        if feedback.check(sent, now_ns):
+    def _report(self, name: str, runner: AxisRunner, now_ns: int) -> None:
+        """Report when valve or sway sensor say something else than before."""
+        sent, feedback = runner.axis.sent, runner.feedback
+        if feedback is not None and feedback.check(sent, now_ns):
             event = FeedbackEvent(name, feedback.following, feedback.part, sent)
             self.events.append(event)
             if event.fault:
                 self.counters.add(event.fault)
+        if (trust := runner.changed_trust()) is not None:
+            self.events.append(SwaySensorEvent(name, trust))
 
     def _overruns(self, missed: int) -> bool:
         if missed:

@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Transition
+from canshaper.shaping.trust import Trust
 
 FAULT_OF = {
     Following.NO: FrameFault.NOT_FOLLOWING,
@@ -64,6 +65,19 @@ class MotionEvent:
     def text(self) -> str:
         """For the log."""
         return f"motion={self.motion} axes=" + (f"single {self.why}" if self.why else "together")
+
+
+@dataclass(frozen=True, slots=True)
+class SwaySensorEvent:
+    """A sway sensor is trusted, or no longer, or something else is thought of it."""
+
+    axis: str
+    trust: Trust
+
+    @property
+    def text(self) -> str:
+        """For the log."""
+        return f"axis={self.axis} sway_sensor={self.trust.name}"
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,6 +6,7 @@ from canshaper.inputs.input import EmergencyStopInput, MessageInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.profile import ProfileButtons, ProfileChoice, ProfileSwitch, profile_names
 from canshaper.inputs.radius import radius_input
+from canshaper.inputs.sway_sensor import SwaySensorInput
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundSwitch
@@ -23,6 +24,7 @@ class MachineInputs:
         stop: the emergency stop, where there is one.
         load_state: says what hangs on the crane, where there is a signal for it.
         profile: the operator's choice, where there is one.
+        sway_sensors: measurements of sway, by the name of each axis that reads them.
         radii: measured radius of the tip, by the name of its two-axis motion.
         bound: all of them that receive frames, with their messages.
     """
@@ -43,6 +45,16 @@ class MachineInputs:
             if motion.radius is not None:
                 self.radii[name] = radius_input(motion.radius)
                 self.bound.append((motion.radius, self.radii[name]))
+
+        self.sway_sensors: dict[str, SwaySensorInput] = {}
+        messages: dict[int, SwaySensorInput] = {}
+        for name, axis in deployment.axes.items():
+            if sensor := axis.sway_sensor:
+                message = messages.get(id(sensor.message)) or SwaySensorInput(sensor.message)
+                if id(sensor.message) not in messages:
+                    messages[id(sensor.message)] = message
+                    self.bound.append((sensor.message, message))
+                self.sway_sensors[name] = message
 
     def _profile(self, deployment: Deployment) -> ProfileChoice | None:
         config = deployment.config

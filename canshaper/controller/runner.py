@@ -10,17 +10,22 @@ from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.profile import ProfileChoice
+from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
 from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.trust import SensorLimits, Trust
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
 FOREIGN_NS = 1_000_000_000
+# Least radius for the speed of a tip: at the pillar it has none, and shows no swing.
+LEAST_RADIUS_M = 0.5
 
 
 class CommandSource(Protocol):
@@ -46,6 +51,7 @@ class AxisRunner:
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
+        radius: measured radius of the tip, of an axis that turns: its speed is by that.
     """
 
     def __init__(self, bound: BoundAxis, tick_s: float, joystick: CommandSource) -> None:
@@ -82,6 +88,9 @@ class AxisRunner:
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
+        self.radius: ValueInput | None = None
+        self._sway_signal: SwaySignal | None = None
+        self._reported_trust = Trust.NO_DATA
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
     @property
@@ -119,6 +128,20 @@ class AxisRunner:
     def add_chooser(self, load_state: ValueInput | None, profile: ProfileChoice | None) -> None:
         """Let load state and operator choose sway data and filter."""
         self.chooser = SetChooser(self.bound, self.axis, load_state, profile)
+
+    def add_sway_sensor(self, message: SwaySensorInput) -> None:
+        """Let a sensor show the swing."""
+        bound, sway = self.bound.sway_sensor, self.axis.sway
+        assert bound is not None
+        assert sway is not None  # checked with the deployment
+        noise, offset = bound.config.noise, bound.config.offset_max_deg
+        self._sway_signal = SwaySignal(message, bound)
+        self.axis.sensed = SensedSway(
+            sway,
+            bound.timing(self.period_s),
+            SensorLimits(math.radians(noise), math.radians(offset)),
+            damps=bound.config.use == "damp",
+        )
 
     def isolate(self, joystick: CommandSource, axis: Axis | None = None) -> None:
         """For a measurement: another joystick, perhaps another ``Axis``, nothing of other axes.
@@ -212,6 +235,9 @@ class AxisRunner:
             )
         if self.chooser is not None:
             self.chooser.update(now_ns)
+        if self._sway_signal is not None and axis.sensed is not None:
+            value, scale = self._sway_signal.take(), self._scale(now_ns)
+            axis.sensed.measure(value, scale, commanded=axis.commanded)
         transition = axis.act(command, self.added)
         self._put(axis.raw)
         return transition
@@ -244,6 +270,15 @@ class AxisRunner:
         self._trip = trip
         return fault
 
+    def _scale(self, now_ns: int) -> float:
+        """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
+        if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
+            slewing = self.bound.config.slewing
+            assert slewing is not None  # checked with the deployment
+            self._full_speed_m_s = max(radius_m, LEAST_RADIUS_M) * slewing.full_speed_rad_s
+        assert self.axis.sway is not None
+        return self.axis.sway.mode.angle_per_speed_rad * self._full_speed_m_s
+
     def status_frame(self) -> Frame | None:
         """Status of the axis, where it has a message for it."""
         return self.bound.status.frame(self) if self.bound.status else None
@@ -253,6 +288,19 @@ class AxisRunner:
         """Predicted swing of the load."""
         sway = self.axis.sway
         return math.degrees(sway.sway_rad(self._full_speed_m_s)) if sway else 0.0
+
+    @property
+    def trust(self) -> Trust:
+        """What is thought of the sway sensor."""
+        return self.axis.sensed.state if self.axis.sensed else Trust.NO_DATA
+
+    def changed_trust(self) -> Trust | None:
+        """What is thought of the sway sensor, where that has changed since the last call."""
+        trust = self.trust
+        if trust is self._reported_trust:
+            return None
+        self._reported_trust = trust
+        return trust
 
     @property
     def active_set(self) -> int:

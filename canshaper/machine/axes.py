@@ -1,5 +1,7 @@
 """Axes of a deployment, bound to the DBC: valve, filters, status, and what they ask of others."""
 
+from dataclasses import replace
+
 from canshaper.codec.status import AXIS_STATUS
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
@@ -9,6 +11,7 @@ from canshaper.machine.inputs import bind_feedback, bind_status_word
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.statuses import bind_status
 from canshaper.machine.stopping import stated_fault
+from canshaper.machine.sway_sensor import bind_sway_sensors
 from canshaper.machine.valves import SharedValves, bind_valve
 
 
@@ -19,7 +22,8 @@ def bind_axes(lookup: Lookup) -> dict[str, BoundAxis]:
     slewing = {motion.slew for motion in lookup.config.motion.values()}
     order = sorted(lookup.config.axes.items(), key=lambda item: item[0] not in slewing)
     axes = {n: _bind_axis(lookup, shared_valves, n, a) for n, a in order}
-    return {name: axis for name, axis in axes.items() if axis}
+    sensors = bind_sway_sensors(lookup)
+    return {n: replace(axis, sway_sensor=sensors.get(n)) for n, axis in axes.items() if axis}
 
 
 def _bind_axis(

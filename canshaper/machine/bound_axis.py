@@ -9,6 +9,7 @@ from canshaper.codec.status import ReportedAxis, StatusCodec
 from canshaper.codec.valve import ValveCodec
 from canshaper.config.schema import AxisConfig
 from canshaper.machine.inputs import BoundFeedback, BoundStatusWord
+from canshaper.machine.sway_sensor import BoundSwaySensor
 
 
 @dataclass(frozen=True)
@@ -24,6 +25,7 @@ class BoundAxis:
     status_ticks: int
     feedback: BoundFeedback | None = None
     status_word: BoundStatusWord | None = None
+    sway_sensor: BoundSwaySensor | None = None
 
     @property
     def rewrites(self) -> bool:

@@ -64,11 +64,13 @@ class Deployment:
         )
 
     def inputs(self) -> list[BoundInput]:
-        """Joysticks, switches, measured radii, feedback and status words of the valves."""
+        """Joysticks, switches, radii, sway sensors, feedback and status words of the valves."""
         axes = self.axes.values()
         reports = [i for axis in axes for i in (axis.feedback, axis.status_word)]
         radii = [motion.radius for motion in self.motions.values()]
-        others = (self.emergency_stop, self.load_state, self.profile, *reports, *radii)
+        # Several axes may read one message.
+        sensors = {s.message.key: s.message for axis in axes if (s := axis.sway_sensor)}.values()
+        others = (self.emergency_stop, self.load_state, self.profile, *reports, *radii, *sensors)
         return [*self.joysticks.values(), *(i for i in others if i)]
 
     def senders(self) -> list[Sender]:
@@ -80,16 +82,19 @@ class Deployment:
     def listening(self) -> "Deployment":
         """The same machine for one who only listens, and tells what it would do.
 
-        What valves say of themselves answers another controller's commands, so it is not compared
-        with ours. A node of ours on J1939 stays where a status message needs its address, which it
-        gives up to whoever has it.
+        What valves say of themselves, and a swing, answers another controller's commands, so it is
+        not compared with ours. A node of ours on J1939 stays where a status message needs its
+        address, which it gives up to whoever has it.
         """
         reporting = {s.sender.key[0] for s in self._statuses()}
         buses = {
             name: bus if name in reporting else bus.model_copy(update={"j1939": None})
             for name, bus in self.config.buses.items()
         }
-        axes = {n: replace(a, feedback=None, status_word=None) for n, a in self.axes.items()}
+        axes = {
+            name: replace(axis, feedback=None, status_word=None, sway_sensor=None)
+            for name, axis in self.axes.items()
+        }
         config = self.config.model_copy(update={"buses": buses})
         return replace(self, config=config, axes=axes, listen_only=True)
 

@@ -155,7 +155,7 @@ def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> BoundStop | No
     if (result := bind_input(lookup, BoundStop, ("emergency_stop",), config, ("signal",))) is None:
         return None
     used, bound = result
-    _check_source(used, "the emergency stop")
+    check_source(used, "the emergency stop")
     return bound
 
 
@@ -167,7 +167,7 @@ def bind_radius(lookup: Lookup, place: Place, config: Radius) -> BoundRadius | N
     used, bound = result
     if signal := used.find((*place, "signal"), config.signal):
         used.add_fault(radius_range(signal))
-    _check_source(used, "the radius")
+    check_source(used, "the radius")
     return bound
 
 
@@ -205,7 +205,7 @@ def bind_feedback(lookup: Lookup, place: Place, config: Feedback) -> BoundFeedba
     return bound
 
 
-def _check_source(used: UsedMessage, what: str) -> None:
+def check_source(used: UsedMessage, what: str) -> None:
     """From any source address the first that is received would count, and no other."""
     if used.any_source:
         text = f"missing: in the DBC {used.message.name} may come from any source address"

@@ -17,6 +17,7 @@ from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.grapple import Grapple, Sway, TipMotion, advance
 from canshaper_sim.joints import JointBoom, JointParameters
 from canshaper_sim.ranges import check_ranges
+from canshaper_sim.sway_sensor import SwaySensorParameters
 from canshaper_sim.tip_controller import TipControllerParameters
 from canshaper_sim.valve import ValveParameters
 
@@ -52,7 +53,7 @@ _ALLOWED = {
 
 @dataclass(frozen=True, slots=True)
 class CraneParameters:
-    """Grapple, valves, full speeds, end stops and start pose of one crane.
+    """Grapple, valves, full speeds, end stops, start pose and sway sensors of one crane.
 
     Full speed is the speed of the tip (slew: of theta1) when the valve lets full flow through.
     """
@@ -74,6 +75,7 @@ class CraneParameters:
     # The boom of a crane driven by its joints, and the controller that drives them by the tip.
     joints: JointParameters = field(default_factory=JointParameters)
     tip_controller: TipControllerParameters = field(default_factory=TipControllerParameters)
+    sway_sensor: SwaySensorParameters = field(default_factory=SwaySensorParameters)
 
     def __post_init__(self) -> None:
         start = {

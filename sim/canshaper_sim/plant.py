@@ -18,6 +18,7 @@ from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.machines import AXES_OF, JOINTS, TIP, build_machine, machine_for
+from canshaper_sim.sensor_messages import sensor_messages
 
 # Feedback messages and their signals, in the order they are sent; they close with the sway.
 FEEDBACK: Mapping[str, tuple[str, ...]] = {
@@ -140,6 +141,8 @@ class PlantNode:
             for axis, bound in deployment.axes.items()
             if bound.feedback
         ]
+        sensors = (parameters or CraneParameters()).sway_sensor
+        self._sway_sensors = sensor_messages(deployment, sensors)
         self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
         inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
@@ -193,6 +196,8 @@ class PlantNode:
             frames.append(sender.frame(raw))
         for valve in self._valve_feedback:
             frames += valve.frames(self.crane, self._passed_s)
+        for sensors in self._sway_sensors:
+            frames += sensors.frames(state, self._passed_s)
         frames += self._canopen.frames(self._passed_s)
         self._passed_s = 0.0
         return frames

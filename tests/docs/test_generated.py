@@ -11,6 +11,7 @@ import pytest
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
+from canshaper.shaping.trust import Trust
 
 ROOT = Path(__file__).parents[2]
 generate: dict[str, Any] = runpy.run_path(str(ROOT / "tools/generate.py"))
@@ -33,6 +34,8 @@ def test_every_status_of_a_dbc_has_the_tables_of_the_program(path: Path) -> None
             kinds |= {"State": State, "Reason": Reason}
         if "LastFault" in names:
             kinds |= {"LastFault": FrameFault}
+        if "SwaySensor" in names:
+            kinds |= {"SwaySensor": Trust}
         for name, kind in kinds.items():
             table = {number: str(text) for number, text in names[name].choices.items()}
             assert table == {int(one): one.name for one in kind}

@@ -69,6 +69,9 @@ def check(file: str = FILE) -> None:
             f"  axis {name}: {config.joysticks[joystick.joystick].message}.{joystick.signal}"
             f" -> {axis.config.filter.kind} -> {valve.message}.{valve.signal} every {period_ms} ms"
         )
+        if sensor := axis.config.sway_sensor:
+            does = "damps" if sensor.use == "damp" else "is watched"
+            echo(f"    sway sensor {sensor.message}.{sensor.signal} {does}")
     for motion in config.motion.values():
         echo(_motion(deployment, motion))
     moved = {motion.slew for motion in config.motion.values()}

@@ -1,0 +1,77 @@
+"""Frames of the sway sensors that a deployment reads."""
+
+import math
+from collections.abc import Iterator, Mapping
+
+from canshaper.codec.codecs import Sender
+from canshaper.codec.frame import Frame
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.sway_sensor import BoundSwaySensor
+from canshaper.shaping.observer import Measured
+from canshaper_sim.axes import SLEW
+from canshaper_sim.crane import CraneState
+from canshaper_sim.grapple import Sway
+from canshaper_sim.sway_sensor import SwaySensor, SwaySensorParameters
+
+
+class SensorMessage:
+    """A message with the measurements of one sensor or several, sent each cycle.
+
+    Args:
+        axes: the sensors of the deployment that are read from it, by axis.
+        parameters: what they make of the swing.
+    """
+
+    def __init__(
+        self, axes: Mapping[str, BoundSwaySensor], parameters: SwaySensorParameters
+    ) -> None:
+        first = next(iter(axes.values()))
+        message = first.message
+        self._sender = Sender(
+            message.config.bus, message.message, message.key[1] & 0xFF, message.protection
+        )
+        self._cycle_s = self._left_s = first.cycle_s
+        self._lost_s = parameters.lost_s
+        self._sensors = {
+            bound.signal.name: (
+                abs(bound.factor),
+                SwaySensor(
+                    parameters,
+                    name,
+                    across=name == SLEW,
+                    rate=bound.config.measured is Measured.RATE,
+                ),
+            )
+            for name, bound in axes.items()
+        }
+
+    def frames(self, state: CraneState, passed_s: float) -> Iterator[Frame]:
+        """The frame, when it is due after so much more time."""
+        time_s = state.time_s
+        sway = Sway(
+            state.theta5_rad, state.theta6_rad, state.theta5_rate_rad_s, state.theta6_rate_rad_s
+        )
+        for _, sensor in self._sensors.values():
+            sensor.swing(time_s, sway)
+        self._left_s -= passed_s
+        if self._left_s > 1e-9:
+            return
+        self._left_s += self._cycle_s
+        if time_s < self._lost_s:
+            fields = self._sender.fields
+            raw = {
+                name: fields.raw(name, math.radians(sensor.value(time_s)) / unit)
+                for name, (unit, sensor) in self._sensors.items()
+            }
+            yield self._sender.frame(raw)
+
+
+def sensor_messages(
+    deployment: Deployment, parameters: SwaySensorParameters
+) -> list[SensorMessage]:
+    """Every message with sway that the deployment reads."""
+    messages: dict[tuple[str, int, bool], dict[str, BoundSwaySensor]] = {}
+    for name, axis in deployment.axes.items():
+        if bound := axis.sway_sensor:
+            messages.setdefault(bound.message.key, {})[name] = bound
+    return [SensorMessage(axes, parameters) for axes in messages.values()]

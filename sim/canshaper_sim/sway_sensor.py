@@ -1,0 +1,96 @@
+"""A sway sensor on the simulated grapple: noise, offset, delay, and what can go wrong with it."""
+
+import math
+import random
+from collections import deque
+from dataclasses import dataclass
+from typing import Final
+
+from canshaper_sim.grapple import Sway
+from canshaper_sim.ranges import check_ranges
+
+_SAME_TIME_S: Final = 1e-9
+
+# name -> (lowest, highest) value.
+_ALLOWED = {
+    "noise_deg": (0.0, 20.0),
+    "offset_deg": (-90.0, 90.0),
+    "delay_s": (0.0, 1.0),
+    "gain": (-5.0, 5.0),
+    "resolution_deg": (0.0, 10.0),
+    "seed": (0.0, 1e9),
+    "lost_s": (0.0, math.inf),
+    "stuck_s": (0.0, math.inf),
+    "reversed_s": (0.0, math.inf),
+    "jump_s": (0.0, math.inf),
+    "jump_deg": (-90.0, 90.0),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class SwaySensorParameters:
+    """What every sway sensor makes of the swing; of a rate in degrees per second.
+
+    A fault begins at its time, seconds from the start; by default never.
+    """
+
+    noise_deg: float = 0.1  # standard deviation
+    offset_deg: float = 0.0
+    delay_s: float = 0.02
+    gain: float = 1.0  # -1: mounted the wrong way round
+    resolution_deg: float = 0.0  # 0: that of the signal
+    seed: float = 1
+    lost_s: float = math.inf  # no frame comes any more
+    stuck_s: float = math.inf  # the same value for ever
+    reversed_s: float = math.inf  # the sign turns
+    jump_s: float = math.inf  # the offset changes by jump_deg
+    jump_deg: float = 5.0
+
+    def __post_init__(self) -> None:
+        check_ranges("sway sensor", self, _ALLOWED)
+
+
+class SwaySensor:
+    """One sensor.
+
+    Args:
+        parameters: what it makes of the swing.
+        name: of its own, for noise of its own.
+        across: it measures across the boom (theta5), else along it (theta6).
+        rate: it measures the rate, else the angle.
+    """
+
+    def __init__(
+        self, parameters: SwaySensorParameters, name: str, *, across: bool, rate: bool
+    ) -> None:
+        self._parameters, self._across, self._rate = parameters, across, rate
+        self._noise = random.Random(f"{parameters.seed:g} {name}")
+        self._past: deque[tuple[float, float]] = deque()
+        self._stuck: float | None = None
+
+    def swing(self, time_s: float, sway: Sway) -> None:
+        """The grapple has moved on."""
+        if self._across:
+            swing = sway.theta5_rate_rad_s if self._rate else sway.theta5_rad
+        else:
+            swing = sway.theta6_rate_rad_s if self._rate else sway.theta6_rad
+        past = self._past
+        if not past:  # it has long swung like that
+            past.append((-math.inf, math.degrees(swing)))
+        past.append((time_s, math.degrees(swing)))
+        before_s = time_s - self._parameters.delay_s + _SAME_TIME_S
+        while len(past) > 1 and past[1][0] <= before_s:
+            past.popleft()
+
+    def value(self, time_s: float) -> float:
+        """What it shows, degrees or degrees per second."""
+        p = self._parameters
+        gain = -p.gain if time_s >= p.reversed_s else p.gain
+        value = gain * self._past[0][1] + p.offset_deg + self._noise.gauss(0.0, p.noise_deg)
+        if time_s >= p.jump_s:
+            value += p.jump_deg
+        if p.resolution_deg:
+            value = p.resolution_deg * round(value / p.resolution_deg)
+        if time_s >= p.stuck_s:
+            value = self._stuck = value if self._stuck is None else self._stuck
+        return value

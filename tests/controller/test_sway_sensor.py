@@ -1,0 +1,174 @@
+"""A sway sensor on frames: what the controller makes of it, says of it, and sends."""
+
+import math
+import re
+from pathlib import Path
+
+import pytest
+
+from canshaper.codec.frame import Frame, FrameFault
+from canshaper.controller.controller import Controller
+from canshaper.design.lockstep import LockStep, drive
+from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.shaping.trust import Trust
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.joysticks import JoystickNode
+from canshaper_sim.operator import SCRIPTS
+from canshaper_sim.plant import PlantNode
+from canshaper_sim.recording import Recording
+from canshaper_sim.strokes import Script, Stroke
+from canshaper_sim.sway_sensor import SwaySensorParameters
+
+ROOT = Path(__file__).parents[2]
+FILE = ROOT / "config" / "forwarder-sensor.yaml"
+NS = 1_000_000_000
+PULSE = SCRIPTS["pulse-near_far"]
+
+
+def changed(tmp_path: Path, *changes: tuple[str, str]) -> Deployment:
+    """The shipped deployment, changed."""
+    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    for old, new in changes:
+        assert re.search(old, text), old
+        text = re.sub(old, new, text)
+    path = tmp_path / "machine.yaml"
+    path.write_text(text, encoding="utf-8")
+    return load_deployment(path)
+
+
+class Run:
+    """Controller and crane in lock-step, with what was reported and sent."""
+
+    def __init__(self, deployment: Deployment, script: Script, crane: CraneParameters) -> None:
+        self.controller = Controller(deployment)
+        self.frames: list[Frame] = []
+        self.events: list[str] = []
+        node = PlantNode(deployment, crane)
+        hands = [JoystickNode(deployment, script)]
+        lock_step = LockStep(deployment, self.controller, node, hands, self._seen)
+        while lock_step.time_ms < 1000.0 * script.duration_s:
+            lock_step.step()
+            self.events += [event.text for event in self.controller.events]
+            self.controller.events.clear()
+
+    def _seen(self, frame: Frame, time_s: float) -> None:
+        self.frames.append(frame)
+
+    def trust(self, axis: str) -> list[str]:
+        """What was reported of a sensor."""
+        start = f"axis={axis} sway_sensor="
+        return [event.removeprefix(start) for event in self.events if event.startswith(start)]
+
+
+def crane(**sensor: float) -> CraneParameters:
+    return CraneParameters(sway_sensor=SwaySensorParameters(**sensor))
+
+
+def test_it_is_reported_when_it_is_trusted() -> None:
+    run = Run(load_deployment(FILE), PULSE, crane())
+    assert run.trust("near_far") == ["UNPROVED", "TRUSTED"]
+    assert run.trust("slew") == ["UNPROVED"]
+    assert run.trust("lift") == []
+
+
+def test_the_status_message_says_it() -> None:
+    deployment = load_deployment(FILE)
+    run = Run(deployment, PULSE, crane())
+    status = deployment.axes["near_far"].status
+    assert status is not None
+    key = status.sender.key
+    values = [status.decode(frame.data) for frame in run.frames if frame[:3] == key]
+    trusts = [value["SwaySensor"] for value in values if value]
+    assert trusts[-1] is Trust.TRUSTED
+    assert Trust.UNPROVED in trusts
+
+
+@pytest.mark.parametrize(
+    ("fault", "reported"),
+    [
+        ({"lost_s": 2.0}, ["UNPROVED", "TRUSTED", "LOST"]),
+        ({"jump_s": 2.0}, ["UNPROVED", "TRUSTED", "JUMP"]),
+        ({"gain": -1.0}, ["UNPROVED", "WRONG_SIGN"]),
+    ],
+)
+def test_a_fault_is_named_and_never_trips(fault: dict[str, float], reported: list[str]) -> None:
+    stroke = Script("stroke", (Stroke("near_far", 0.5, 2.5, 1.0, 0.1),), 5.0)
+    run = Run(load_deployment(FILE), stroke, crane(**fault))
+    assert run.trust("near_far") == reported
+    assert not any("TRIPPED" in event for event in run.events)
+
+
+def commands(recording: Recording) -> list[float]:
+    return list(recording.axes["near_far"].sent)
+
+
+def test_watched_only_it_changes_no_command(tmp_path: Path) -> None:
+    watched = changed(tmp_path, ("use: damp", "use: watch"))
+    without = changed(tmp_path, (r"    sway_sensor:.*\n", ""))
+    long = CraneParameters(grapple=crane().grapple.__class__(l2_m=1.5))
+    assert commands(drive(watched, PULSE, parameters=long)) == commands(
+        drive(without, PULSE, parameters=long)
+    )
+    assert commands(drive(load_deployment(FILE), PULSE, parameters=long)) != commands(
+        drive(without, PULSE, parameters=long)
+    )
+
+
+def test_without_frames_it_is_the_machine_without_a_sensor(tmp_path: Path) -> None:
+    without = changed(tmp_path, (r"    sway_sensor:.*\n", ""))
+    silent = crane(lost_s=0.0)
+    assert commands(drive(load_deployment(FILE), PULSE, parameters=silent)) == commands(
+        drive(without, PULSE, parameters=silent)
+    )
+
+
+def test_a_rate_by_a_gyro(tmp_path: Path) -> None:
+    gyro = changed(
+        tmp_path, ("message: SwayAngle", "message: SwayRate"), ("kind: angle", "kind: rate")
+    )
+    run = Run(gyro, PULSE, crane(noise_deg=0.3))
+    assert run.trust("near_far") == ["UNPROVED", "TRUSTED"]
+
+
+def test_an_error_code_is_no_measurement(tmp_path: Path) -> None:
+    deployment = load_deployment(FILE)
+    controller = Controller(deployment)
+    message = deployment.messages.find("SwayAngle")
+    assert not isinstance(message, str)
+    beyond = message[1].encode({"Across": 0, "Along": 20000}, scaling=False, strict=False)
+    controller.receive(Frame("crane", 1040, False, beyond), 0)
+    assert list(controller.tick(0))
+    assert controller.counters.last_fault is FrameFault.INVALID_SIGNAL
+    assert controller.axes["near_far"].trust is Trust.NO_DATA
+    assert controller.axes["slew"].trust is Trust.UNPROVED
+
+
+def test_after_a_standstill_what_has_waited_is_no_measurement() -> None:
+    deployment = load_deployment(FILE)
+    controller = Controller(deployment)
+    message = deployment.messages.find("SwayAngle")
+    assert not isinstance(message, str)
+    data = message[1].encode({"Across": 0, "Along": 0}, scaling=False)
+    controller.stalled()
+    controller.receive(Frame("crane", 1040, False, data), 0)
+    assert list(controller.tick(0))
+    assert controller.axes["near_far"].trust is Trust.NO_DATA
+
+
+def test_who_only_listens_judges_no_sensor() -> None:
+    listening = load_deployment(FILE).listening()
+    assert all(axis.sway_sensor is None for axis in listening.axes.values())
+
+
+def test_a_frame_that_does_not_count_is_no_measurement() -> None:
+    sensor = load_deployment(FILE).axes["near_far"].sway_sensor
+    assert sensor is not None
+    message = SwaySensorInput(sensor.message)
+    signal = SwaySignal(message, sensor)
+    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=False)
+    assert signal.take() is None
+    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)
+    assert signal.take() == pytest.approx(math.radians(1.0))
+    assert signal.take() is None
