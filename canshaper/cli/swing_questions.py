@@ -53,17 +53,20 @@ def slewing_of(axis: str) -> "FirstSlewing | None":
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
-    """Shortest and longest time of ten swings with which the filter can run at a valve's period."""
-    from canshaper.config.first import Stopwatch, ten_swings_s
+    """Shortest and longest time of ten swings with which the filter can run at a valve's period.
+
+    And with the shortest period that may then be set on the running machine.
+    """
+    from canshaper.config.first import PERIOD_RANGE, Stopwatch, ten_swings_s
     from canshaper.config.schema import Limits
     from canshaper.machine.filters import filter_fault
 
     low, high = ten_swings_s()
     rate = Limits().slowest_per_s
     for tenth in range(round(10.0 * low), round(10.0 * high)):
-        watch = Stopwatch(tenth / 10.0, 1.0, 1.0, 1.0)
-        if filter_fault(watch.filter, watch.sway, period_s, rate) is None:
-            return watch.ten_swings_s, high
+        every = [Stopwatch(part * tenth / 10.0, 1.0, 1.0, 1.0) for part in (1.0, PERIOD_RANGE[0])]
+        if all(filter_fault(w.filter, w.sway, period_s, rate) is None for w in every):
+            return tenth / 10.0, high
     return low, high  # with none at all: the check of the whole file tells why
 
 

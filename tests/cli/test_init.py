@@ -231,11 +231,14 @@ def changed_dbc(tmp_path: Path, cycle_ms: int) -> Path:
 
 def test_a_slow_valve_takes_slow_swings_only(tmp_path: Path) -> None:
     file, dbc = tmp_path / "machine.yaml", changed_dbc(tmp_path, 200)
-    given = answers({"slew ten": "13.8\n13.9", "slew timeout": "600"})
+    given = answers({"slew ten": "19.7\n19.8", "slew timeout": "600"})
     result = CliRunner().invoke(app, ["init", str(file), "--dbc", str(dbc)], input=given)
-    assert "expected a number, 13.9 to 85.7, got '13.8'" in result.output
+    assert "expected a number, 19.8 to 85.7, got '19.7'" in result.output
     assert result.exit_code == 0, result.output
-    assert axis(file, "slew").sway.period_s == 1.39
+    assert axis(file, "slew").sway.period_s == 1.98
+    # Adjusted as far as is written, a robust shaper could not run at this tick.
+    assert "axis slew: no robust shaper yet:" in result.output
+    assert (axis(file, "slew").filter.kind, axis(file, "near_far").filter.kind) == ("gff", "robust")
 
 
 def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path) -> None:
