@@ -128,7 +128,7 @@ class CommandBits:
         length = message.length
         signal = _signal(message, valve.signal)
         self._size, self._zero, self._sign, self.full = _steps(signal, length)
-        self._codes: Mapping[tuple[float, ...], int] = {}
+        self._codes = _SIGNS
         self._direction: tuple[Field, ...] = ()
         if direction := valve.direction:
             self._direction = (Field(_signal(message, direction.signal), length),)
@@ -137,7 +137,6 @@ class CommandBits:
         elif joystick and (flags := joystick.flags):
             names = (flags.neutral, flags.positive, flags.negative)
             self._direction = tuple(Field(_signal(message, name), length) for name in names)
-            self._codes = _SIGNS
         self._back: Field | None = None
         if joystick and joystick.negative:
             self._back = _steps(_signal(message, joystick.negative), length)[0]

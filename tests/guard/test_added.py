@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.machine.binding import load_deployment
 from tests.faults import shipped
-from tests.guard.bench import Bench
+from tests.guard.bench import Bench, limited
 
 
 def robust() -> Bench:
@@ -49,6 +49,16 @@ def test_what_was_added_gives_the_own_part_no_longer_tail() -> None:
     refused = [bool(bench.sends(119, slew=1.0)) for _ in range(200)]
     # tail_s, timeout_ms, the longest standstill and three periods
     assert refused.index(True) == (2200 + 100 + 100 + 60) // 20
+
+
+@pytest.mark.parametrize("axis", ["slew", "near_far"])
+def test_each_moves_the_other_as_fast_as_the_file_says(axis: str) -> None:
+    other = {"slew": "near_far", "near_far": "slew"}[axis]
+    deployment = load_deployment(shipped.CONFIG / "forwarder-robust.yaml")
+    free = {"deadband_pct": 0.0, "rise_per_s": 100.0}
+    one = Bench(limited(deployment, axis, **free), axis)
+    why = one.sends(50, **{other: 1.0})
+    assert why == f"axis={axis} limit=asked speed=0.400 allowed=0.254"  # 25 %, half a step
 
 
 def test_a_motion_of_slew_alone_moves_nothing_else(tmp_path: Path) -> None:

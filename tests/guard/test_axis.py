@@ -4,10 +4,12 @@ Full command is 125 steps without a dead band here, a step 0.008 of full speed. 
 half a step above its limit, and the one after it one step more.
 """
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
+from canshaper.config.control import Control
 from canshaper.guard.axis import GuardedAxis
 from canshaper.machine.binding import load_deployment
 from tests.faults import shipped, variants
@@ -51,6 +53,7 @@ def test_beyond_the_maximum(sign: int) -> None:
 @signs
 def test_beyond_the_rates(sign: int) -> None:
     one = bench(rise_per_s=5.0)
+    assert not one.sends(0, near_far=float(sign))
     why = one.sends(sign * 50, near_far=float(sign))
     assert why == f"axis=near_far limit=rate speed={sign * 0.4:.3f} allowed=0.112"
 
@@ -60,6 +63,7 @@ def test_beyond_the_rates(sign: int) -> None:
 def test_faster_than_the_last_by_the_rise(sign: int, steps: int, passes: bool) -> None:
     one = bench(rise_per_s=4.0, fall_per_s=2.0)  # 0.08 and 0.04 in a tick
     one.ramp(sign * 25, near_far=float(sign))
+    assert not one.sends(sign * 25, missed=5, near_far=float(sign))
     why = one.sends(sign * steps, near_far=float(sign))
     # 0.2, a step, the rise, and half a step
     assert (why == "") is passes, why
@@ -89,7 +93,19 @@ def test_a_command_of_another_length_is_none(sign: int) -> None:
     one.ramp(sign * 25, near_far=sign * 0.2)
     one.takes(one.joysticks(near_far=sign * 0.2))
     speed = sign * float("inf")
-    assert one.sent(0, cut=1) == f"axis=near_far limit=command speed={speed} allowed=0.200"
+    assert one.sent(sign * 25, cut=1) == f"axis=near_far limit=command speed={speed} allowed=0.200"
+
+
+@signs
+@pytest.mark.parametrize("size", [60, 125])
+def test_both_were_asked_of_late_and_it_still_goes_by_way_of_zero(sign: int, size: int) -> None:
+    one = bench(fall_per_s=2.0)
+    for way in (sign, -sign):
+        one.ramp(way * size, near_far=float(way))
+        for _ in range(40):
+            assert not one.sends(0, near_far=float(way))
+    one.ramp(-sign * size, near_far=-float(sign))
+    assert "limit=rate" in one.sends(sign * (size - 5), near_far=-float(sign))
 
 
 @signs
@@ -213,6 +229,49 @@ def test_by_a_curve_rounding_is_as_coarse_as_its_steepest_part(sign: int) -> Non
     why = one.sends(sign * 100, near_far=float(sign))
     # 1.6 / 125 of full speed in a step: one and a half of them, and the rise
     assert why == f"axis=near_far limit=rate speed={sign * 0.68:.3f} allowed=0.119"
+
+
+@signs
+def test_a_slow_valve_falls_by_whole_periods(sign: int) -> None:
+    slow = limited(variants.machine("slow-valves")[1], "near_far", tail_s=0.0, stop_s=5.0)
+    one = Bench(slow, "near_far")
+    for size in (0, 30, 50, *[60] * 10):
+        one.waits(2)
+        assert not one.sends(sign * size, near_far=float(sign))
+    for _ in range(5):  # timeout_ms and the standstill are 60 ms each, three periods 180
+        one.waits(2)
+        assert not one.sends(sign * 60)
+    one.waits(1)
+    # Of its three ticks one was missed: no whole period has gone by in which it could fall.
+    one.number += 1
+    one.takes(one.joysticks())
+    assert not one.sent(sign * 60, missed=1)
+    one.waits(2)
+    assert "limit=rate" in one.sends(sign * 60)
+
+
+def test_at_full_command_a_valve_may_give_less_than_was_asked() -> None:
+    curve = {"curve_command_pct": [-100, 0, 100], "curve_speed_pct": [-80, 0, 90]}
+    one = bench(**curve, tail_s=0.0, stop_s=5.0, fall_per_s=2.0)
+    one.ramp(-125, near_far=-1.0)
+    for _ in range(LATE_NS // TICK_NS):
+        assert not one.sends(-125)
+    assert not one.sends(-125)  # 0.8, and it may still be where 0.96 was meant
+    assert "limit=rate speed=-0.800" in one.sends(-125)
+
+
+@signs
+@pytest.mark.parametrize(
+    ("key", "ends", "allowed"), [("rise_per_s", [2.0, 5.0], 0.112), ("max_pct", [50.0, 80.0], 0.8)]
+)
+def test_by_the_largest_that_a_limit_may_be_set_to(
+    sign: int, key: str, ends: list[float], allowed: float
+) -> None:
+    one = bench(**{key: ends[0]})
+    control = Control(adjustable={f"axes.near_far.limits.{key}": ends})
+    config = one.deployment.config.model_copy(update={"control": control})
+    one = Bench(replace(one.deployment, config=config), "near_far")
+    assert one.sends(sign * 125, near_far=float(sign)).endswith(f"allowed={allowed:.3f}")
 
 
 @signs

@@ -1,0 +1,119 @@
+"""Where a signal lies, and what it says: both byte orders, signs, floats, offsets."""
+
+import random
+import struct
+from typing import Any
+
+import cantools
+import pytest
+
+from canshaper.config.schema import Command, Valve
+from canshaper.guard.bits import CommandBits, Field, JoystickBits, span_of
+
+HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
+
+
+def message(*signals: str, floats: str = "") -> Any:
+    """A message of 8 bytes with these signals; ``floats`` names the one that is a float."""
+    lines = "".join(f' SG_ {signal} "" SHAPER\n' for signal in signals)
+    kind = f"SIG_VALTYPE_ 2 {floats} : 1;\n" if floats else ""
+    loaded: Any = cantools.database.load_string(HEAD + lines + kind, "dbc")
+    return loaded.get_message_by_name("Message")
+
+
+@pytest.mark.parametrize(
+    ("bits", "span"),
+    [(0x01, (0, 1)), (0x80, (0, 1)), (0x100, (1, 2)), (0xC0_00, (1, 2)), (0x01_80_00, (1, 3))],
+)
+def test_the_bytes_of_some_bits(bits: int, span: tuple[int, int]) -> None:
+    assert span_of(bits) == slice(*span)
+
+
+@pytest.mark.parametrize("sign", ["+", "-"])
+@pytest.mark.parametrize(
+    "place",
+    # Intel from its lowest bit, Motorola from its highest.
+    ["0|8@1", "5|12@1", "40|16@1", "63|1@1", "7|8@0", "3|12@0", "20|9@0", "34|3@0", "55|16@0"],
+)
+def test_a_field_is_read_as_cantools_reads_it(place: str, sign: str) -> None:
+    one = message(f"Signal : {place}{sign} (1,0) [0|0]")
+    field, rng = Field(one.signals[0], 8), random.Random(place)
+    for _ in range(50):
+        data = rng.randbytes(8)
+        assert field.raw(data) == one.decode(data, decode_choices=False)["Signal"]
+    full = -1 if sign == "-" else (1 << one.signals[0].length) - 1
+    assert field.bits == int.from_bytes(one.encode({"Signal": full}), "little")
+
+
+@pytest.mark.parametrize("order", ["0|32@1-", "7|32@0-"])
+def test_a_float_is_read_in_both_byte_orders(order: str) -> None:
+    one = message(f"Signal : {order} (1,0) [0|0]", floats="Signal")
+    assert Field(one.signals[0], 8).raw(one.encode({"Signal": -0.375})) == -0.375
+
+
+def bits_of(signals: list[str], joystick: Command | None = None, **valve: Any) -> CommandBits:
+    config = Valve(bus="crane", message="Message", signal="Speed", timeout_ms=100, **valve)
+    return CommandBits(message(*signals), config, joystick)
+
+
+@pytest.mark.parametrize(
+    ("scale", "offset", "raw", "steps"),
+    [
+        ("0.8", "-100", 125, 0),
+        ("0.8", "-100", 250, 125),
+        ("0.8", "-100", 0, -125),
+        ("-0.8", "100", 125, 0),  # the larger the raw value, the faster backwards
+        ("-0.8", "100", 250, -125),
+        ("-0.8", "100", 0, 125),
+    ],
+)
+def test_a_command_with_an_offset(scale: str, offset: str, raw: int, steps: int) -> None:
+    bits = bits_of([f"Speed : 0|8@1+ ({scale},{offset}) [-100|100]"])
+    assert bits.full == 125
+    assert bits.steps(bytes([raw, *bytes(7)])) == steps
+
+
+@pytest.mark.parametrize(
+    ("forth", "back", "steps"),
+    [(5, 5, 0), (105, 5, 100), (5, 105, -100), (6, 6, None), (4, 5, None), (5, 4, None)],
+)
+def test_a_rocker_with_an_offset(forth: int, back: int, steps: int | None) -> None:
+    signals = ["Speed : 0|8@1+ (1,-5) [0|100]", "Back : 24|8@1+ (1,-5) [0|100]"]
+    bits = bits_of(signals, Command(joystick="left", signal="Speed", negative="Back"))
+    assert bits.span == slice(0, 4)
+    assert bits.steps(bytes([forth, 0, 0, back, *bytes(4)])) == steps
+
+
+@pytest.mark.parametrize(("also", "good"), [(75, True), (74, False), (76, False), (25, False)])
+def test_the_same_in_another_resolution_with_an_offset(also: int, good: bool) -> None:
+    signals = ["Speed : 0|8@1+ (1,0) [0|100]", "Also : 8|8@1+ (2,-100) [-100|100]"]
+    bits = bits_of(signals, also=["Also"])
+    assert bits.steps(bytes([50, also, *bytes(6)])) == (50 if good else None)
+
+
+@pytest.mark.parametrize(("raw", "ask"), [(199, 0.0), (200, 0.2), (-199, 0.0), (-200, -0.2)])
+def test_within_its_neutral_band_a_joystick_asks_nothing(raw: int, ask: float) -> None:
+    one = message("Joystick : 0|16@1- (0.1,0) [-100|100]")
+    bits = JoystickBits(one, Command(joystick="left", signal="Joystick", neutral_pct=20))
+    assert bits.ask(struct.pack("<hHI", raw, 0, 0)) == pytest.approx(ask)
+
+
+def test_a_rocker_asks_by_both_its_signals() -> None:
+    one = message("Forth : 8|8@1+ (1,0) [0|100]", "Back : 24|8@1+ (1,0) [0|100]")
+    bits = JoystickBits(one, Command(joystick="left", signal="Forth", negative="Back"))
+    assert bits.span == slice(1, 4)
+    assert len(bits.fields) == 2
+    assert bits.ask(bytes([0, 0, 0, 50, *bytes(4)])) == pytest.approx(-0.5)
+
+
+@pytest.mark.parametrize(
+    ("flags", "ask"), [((1, 0, 0), 0.0), ((0, 1, 0), 0.5), ((0, 0, 1), -0.5), ((0, 1, 1), 0.0)]
+)
+def test_a_joystick_of_flags_asks_where_one_is_set(flags: tuple[int, ...], ask: float) -> None:
+    names = ("Neutral", "Positive", "Negative")
+    places = [f"{name} : {8 + 2 * i}|2@1+ (1,0) [0|1]" for i, name in enumerate(names)]
+    one = message("Joystick : 0|8@1+ (1,0) [0|100]", *places)
+    told = {"neutral": "Neutral", "positive": "Positive", "negative": "Negative"}
+    bits = JoystickBits(one, Command(joystick="left", signal="Joystick", flags=told))  # type: ignore[arg-type]
+    switched = sum(flag << 2 * i for i, flag in enumerate(flags))
+    assert bits.ask(bytes([50, switched, *bytes(6)])) == pytest.approx(ask)
