@@ -100,10 +100,9 @@ def test_a_command_of_another_length_is_none(sign: int) -> None:
 @pytest.mark.parametrize("size", [60, 125])
 def test_both_were_asked_of_late_and_it_still_goes_by_way_of_zero(sign: int, size: int) -> None:
     one = bench(fall_per_s=2.0)
-    for way in (sign, -sign):
-        one.ramp(way * size, near_far=float(way))
-        for _ in range(40):
-            assert not one.sends(0, near_far=float(way))
+    one.ramp(sign * size, near_far=float(sign))
+    for _ in range(30):
+        assert not one.sends(0, near_far=float(sign))
     one.ramp(-sign * size, near_far=-float(sign))
     assert "limit=rate" in one.sends(sign * (size - 5), near_far=-float(sign))
 
@@ -224,8 +223,8 @@ def test_a_valve_of_three_ticks_rises_by_three_ticks(sign: int, steps: int, pass
 
 @signs
 def test_by_a_curve_rounding_is_as_coarse_as_its_steepest_part(sign: int) -> None:
-    curve = {"curve_command_pct": [-100, -50, 0, 50, 100]}
-    one = bench(**curve, curve_speed_pct=[-100, -20, 0, 20, 100], rise_per_s=5.0)
+    curve = {"curve_command_pct": [-100, -50, -1, 1, 50, 100]}
+    one = bench(**curve, curve_speed_pct=[-100, -20, 0, 0, 20, 100], rise_per_s=5.0)
     why = one.sends(sign * 100, near_far=float(sign))
     # 1.6 / 125 of full speed in a step: one and a half of them, and the rise
     assert why == f"axis=near_far limit=rate speed={sign * 0.68:.3f} allowed=0.119"
@@ -251,7 +250,7 @@ def test_a_slow_valve_falls_by_whole_periods(sign: int) -> None:
 
 
 def test_at_full_command_a_valve_may_give_less_than_was_asked() -> None:
-    curve = {"curve_command_pct": [-100, 0, 100], "curve_speed_pct": [-80, 0, 90]}
+    curve = {"curve_command_pct": [-100, -1, 1, 100], "curve_speed_pct": [-80, 0, 0, 90]}
     one = bench(**curve, tail_s=0.0, stop_s=5.0, fall_per_s=2.0)
     one.ramp(-125, near_far=-1.0)
     for _ in range(LATE_NS // TICK_NS):

@@ -30,3 +30,13 @@ def test_flags_tell_the_direction_there_too(tmp_path: Path) -> None:
     assert not one.sends(0, slew=-0.2)
     assert not one.sends(-200, slew=-0.2)
     assert "limit=asked speed=-0.300 allowed=0.200" in one.sends(-300, slew=-0.2)
+
+
+def test_the_second_frame_of_a_period_is_no_faster_for_the_rates() -> None:
+    deployment = load_deployment(shipped.CONFIG / "gateway-forwarder.yaml")
+    one = Bench(limited(deployment, "slew", deadband_pct=0.0, rise_per_s=5.0), "slew")
+    one.ramp(200, slew=1.0)
+    assert not one.sends(200, slew=1.0)
+    one.number -= 1
+    one.guard.at = one.guard.at[0] - 1, one.guard.at[1] - 1  # the same tick once more
+    assert one.sends(280, slew=1.0).endswith("limit=rate speed=0.280 allowed=0.202")
