@@ -60,8 +60,9 @@ class OutputGuard:
     def __init__(self, deployment: Deployment) -> None:
         config, bound = deployment.config, deployment.joysticks
         joysticks = {n: GuardedJoystick(one, one.config.enable) for n, one in bound.items()}
-        inputs: list[tuple[BoundInput, GuardedInput]] = []
-        inputs += [(one, joysticks[name]) for name, one in bound.items()]
+        inputs: list[tuple[BoundInput, GuardedInput]] = [
+            (one, joysticks[name]) for name, one in bound.items()
+        ]
         stop = None
         if button := deployment.emergency_stop:
             stop = GuardedStop(button, button.config.signal)
