@@ -162,6 +162,13 @@ class TestEmergencyStop:
         one.guard.inputs[bound.key].note(pressed, one.now_ns)
         assert "limit=emergency-stop speed=0.284 allowed=0.000" in one.sent(40)
 
+    def test_before_it_was_heard_nothing_moves(self) -> None:
+        one = Bench(variants.machine("protected")[1], "near_far")
+        bound = one.deployment.emergency_stop
+        assert bound is not None
+        one.takes([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
+        assert "limit=emergency-stop" in one.sent(10)
+
     def test_at_the_very_end_of_its_silence_it_is_not_what_stops(self) -> None:
         one = self.moving()
         bound = one.deployment.emergency_stop
