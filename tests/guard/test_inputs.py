@@ -1,5 +1,7 @@
 """What the guard believes of joysticks and emergency stop, and for how long."""
 
+from dataclasses import replace
+
 import pytest
 
 from canshaper.codec.frame import Frame
@@ -23,6 +25,15 @@ def test_a_joystick_that_is_silent_holds_for_its_timeout_and_stop() -> None:
     ends = (100 + 2000 + 100 + 60) // 20
     assert not any(held[:ends])
     assert "limit=silence" in held[ends]
+
+
+def test_a_joystick_that_drives_nothing_is_heard_too() -> None:
+    deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+    axes = {name: axis for name, axis in deployment.axes.items() if name != "lift"}
+    one = Bench(replace(deployment, axes=axes), "near_far")
+    one.takes(one.joysticks(near_far=0.5))
+    one.takes(one.joysticks(enable=False))
+    assert [joystick.released for joystick in one.guard._joysticks] == [True, True]
 
 
 @pytest.mark.parametrize("spoil", [slice(0, 7), slice(0, 6)])
