@@ -94,7 +94,7 @@ def least_velocity(limits: OutputLimits, grid_steps: int) -> float:
     """
     curve, deadband = limits.curve, limits.deadband
     least = max(limits.minimum, 0.5 / grid_steps)
-    for raw in range(1, grid_steps + 1):
+    for raw in range(1, grid_steps):
         command = raw / grid_steps
         velocity = curve.velocity(command) if curve else without_deadband(command, deadband)
         if velocity >= least:

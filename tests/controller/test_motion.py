@@ -72,6 +72,15 @@ def test_near_far_moves_in_while_slewing_and_comes_back(changed_rig: Make) -> No
     assert transitions.count(("near_far", Reason.AT_REST)) == 1
 
 
+def test_a_valve_of_two_ticks_is_moved_as_far(changed_rig: Make) -> None:
+    cycle = 'BA_ "GenMsgCycleTime" BO_ 513 '
+    rig = moving_as_one(changed_rig, dbc={f"{cycle}20;": f"{cycle}40;"})
+    rig.run(3)
+    moving = near_far(rig, 200, Slew=1000)
+    assert moving[0::2] == moving[1::2] or moving[1:-1:2] == moving[2::2]
+    assert sum(moving) * TICK_S == pytest.approx(-3.0 * 0.5**2 * 1.2 / 9.81, abs=0.01)
+
+
 def test_slew_is_given_what_the_filter_does_not_lead_by_itself(changed_rig: Make) -> None:
     """The tip stands ahead of the grapple by psi, tan psi = L / s5; the filter makes the lead L."""
     rig = moving_as_one(changed_rig)

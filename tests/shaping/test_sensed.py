@@ -149,6 +149,15 @@ def test_a_sign_that_turns_while_all_else_is_right() -> None:
     assert not rig.fed_back()
 
 
+def test_a_grapple_that_is_pushed_all_the_time_is_no_pendulum() -> None:
+    rig = Rig().trusted()
+    for tick in range(30):
+        rig.run(TICK_S, rig.angle + math.radians(tick))
+    assert rig.sensed.state is Trust.CONTACT
+    rig.run(FADE_S)
+    assert not rig.fed_back()
+
+
 @pytest.mark.parametrize(("offset_deg", "state"), [(2.0, Trust.TRUSTED), (5.0, Trust.OFFSET)])
 def test_an_offset_within_its_range_is_found(offset_deg: float, state: Trust) -> None:
     rig = Rig(offset_rad=math.radians(offset_deg))

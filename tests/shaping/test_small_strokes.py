@@ -208,6 +208,10 @@ def test_what_another_axis_wants_in_vain_is_not_due() -> None:
     assert small.output(0.0, 0.0, 0.0, 0.0, 0.1) == least_velocity(LIMITS, 125)
 
 
+def test_a_frame_of_one_step_has_full_speed_only() -> None:
+    assert least_velocity(LIMITS, 1) == 1.0
+
+
 @pytest.mark.parametrize(
     "joystick",
     [CommandInput(enabled=False), CommandInput(trip=Reason.EMERGENCY_STOP)],
