@@ -13,6 +13,7 @@ CONFIG = ROOT / "config"
 NAMES = (
     "forwarder",
     "forwarder-robust",
+    "forwarder-sensor",
     "forwarder-joints",
     "j1939-forwarder",
     "j1939-profiles",
