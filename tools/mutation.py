@@ -37,7 +37,9 @@ CORE_TESTS = [
     "test_axis*.py",
     "test_limits.py",
     "test_motion.py",
+    "test_sensed.py",
     "test_sets.py",
+    "test_small_strokes.py",
     "test_state_machine.py",
     "test_valve_curve.py",
 ]
