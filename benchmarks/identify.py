@@ -1,4 +1,4 @@
-"""CPU time of ``canshaper identify`` on long logs, beside python-can only reading them.
+"""CPU time of ``canshaper identify`` on long logs, next to python-can only reading them.
 
 The log is a drive of both axes with random strokes, hardly ever left alone: the solver has hundreds
 of stretches, and some free swings to find between them.
@@ -22,7 +22,7 @@ READ = "import can, sys\nfor _ in can.LogReader(sys.argv[1]): pass"
 
 def strokes(seconds: float, seed: int) -> list[Push]:
     """Strokes of slew and near-far, one in ten with a longer pause behind it."""
-    chance, found = random.Random(seed), []
+    chance, pushes = random.Random(seed), []
     for axis in ("slew", "near_far"):
         at = 2.0
         while at < seconds - 10.0:
@@ -30,9 +30,9 @@ def strokes(seconds: float, seed: int) -> list[Push]:
                 chance.uniform(0.3, 3.0),
                 chance.choice((-1, 1)) * chance.uniform(0.2, 1.0),
             )
-            found.append(Push(axis, at, long, level))
+            pushes.append(Push(axis, at, long, level))
             at += long + chance.uniform(0.3, 4.0 if chance.random() < 0.9 else 25.0)
-    return found
+    return pushes
 
 
 def cpu_s(*command: object) -> float:

@@ -12,9 +12,10 @@ from canshaper.commissioning.identification.decay_problem import DecayProblem, S
 from canshaper.commissioning.identification.series import Array
 
 CONFIDENCE: Final = 0.95
-# What no noise tells: a tool on two joints is not quite the pendulum of the model, and a swing in
-# the other direction takes from it and gives back. So the intervals hold the truth in 95 % of
-# simulated cranes that swing in both directions: tests/commissioning/identification/coverage.py.
+# What the noise does not show: a tool on two joints is not quite the pendulum of the model, and a
+# swing in the other direction takes from it and gives back. So the intervals hold the truth in 95 %
+# of simulated cranes that swing in both directions: python -m
+# tests.commissioning.identification.coverage.
 MODEL_PERIOD: Final = 0.002
 MODEL_RATIO: Final = 0.02
 MODEL_RATIO_ABS: Final = 0.001

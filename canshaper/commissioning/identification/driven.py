@@ -1,21 +1,16 @@
 """The driven swing: full speed of the tip, and the swing itself where it never was free.
 
-The tip follows its command with a delay and a lag; its acceleration drives the pendulum,
-
-    theta'' + 2 z w0 theta' + w0^2 theta = (w0^2 / g) V v',     v: command, V: full speed of the tip
-
-as in `canshaper.shaping.sway`. Each stretch of driving has a free swing, an offset and a drift of
-its own, which are eliminated; V is common to all, and its sign, which is that of the sensor, goes.
+The model is that of `driven_model`. The free swing, the offset and the drift of each stretch are
+eliminated; the full speed is common to all, and its sign, which is that of the sensor, goes.
 """
 
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Final
+from typing import Any, Final, NamedTuple
 
 import numpy as np
 from scipy.optimize import least_squares
-from scipy.signal import lfilter
 from scipy.stats import t as student
 
 from canshaper.commissioning.identification.decay import (
@@ -27,18 +22,12 @@ from canshaper.commissioning.identification.decay import (
 )
 from canshaper.commissioning.identification.decay_problem import density
 from canshaper.commissioning.identification.driven_data import Driven, stretches
-from canshaper.commissioning.identification.series import (
-    BIN_S,
-    Array,
-    Kind,
-    Series,
-)
-from canshaper.shaping.sway import GRAVITY_M_S2
+from canshaper.commissioning.identification.driven_model import bases_of, free_columns, responses
+from canshaper.commissioning.identification.series import Array, Kind, Series
 
 # Longest delay and lag of a valve that are looked for, s.
 LONGEST_DELAY_S: Final = 0.5
 LONGEST_LAG_S: Final = 0.6
-SHORTEST_LAG_S: Final = 0.005  # of the model: without one it is another
 # Stretches of a long log, spread over it, that are tried first from every start; all of them then
 # from the best one.
 FIRST_STRETCHES: Final = 16
@@ -107,42 +96,41 @@ def fit_driven(
     Returns:
         None where no axis was driven, or no command is known.
     """
-    found = [f for period in periods if (f := _first_fit(series, period, free))]
-    if not found:
+    fits = [fit for period in periods if (fit := _first_fit(series, period, free))]
+    if not fits:
         return None
-    problem, x, low, high, _ = max(found, key=lambda f: f[-1])
+    problem, x, _ = max(fits, key=lambda fit: fit.explained)
     if len(problem.data) > FIRST_STRETCHES:
-        x = _solved(problem, x, low, high).x
+        x = problem.solved(x).x
     return problem.result(x)
+
+
+class _FirstFit(NamedTuple):
+    """The problem of a period, its solution on a part of the stretches, and what that explains."""
+
+    problem: "_Problem"
+    x: Array
+    explained: float
 
 
 def _first_fit(
     series: Sequence[Series], period_s: float, free: DecayFit | None
-) -> tuple["_Problem", Array, list[float], list[float], float] | None:
-    """The problem of a period, its solution on a part of the stretches, bounds, part explained."""
+) -> _FirstFit | None:
     data = [part for one in series for part in stretches(one, period_s)]
     if not data:
         return None
+    omega, known = 2.0 * math.pi / period_s, None
+    # A delay and a lag of the valve do nearly the same; from two starts the better one.
+    starts = [[0.1, 0.1], [0.3, 0.02]]
     if free:
         known = _pole(free.period_s.value, max(free.damping_ratio.value, 0.0))
-        start, low, high = [0.1, 0.1], [0.0, 0.0], [LONGEST_DELAY_S, LONGEST_LAG_S]
     else:
-        known = None
-        omega = 2.0 * math.pi / period_s
-        start = [0.1, 0.1, omega, 0.05 * omega]
-        low = [0.0, 0.0, 0.75 * omega, 0.0]
-        high = [LONGEST_DELAY_S, LONGEST_LAG_S, 1.35 * omega, 0.6 * omega]
-    problem = _Problem(data, known)
+        starts = [[*start, omega, 0.05 * omega] for start in starts]
+    problem = _Problem(data, known, omega)
     every = -(-len(data) // FIRST_STRETCHES)
-    first = _Problem(data[::every], known) if every > 1 else problem
-    # A delay and a lag of the valve do nearly the same; from two starts the better one.
-    starts = [np.array(start), np.array([0.3, 0.02, *start[2:]])]
-    found = min((_solved(first, s, low, high) for s in starts), key=lambda f: float(f.cost))
-    return problem, found.x, low, high, first.explained(found.x)
-
-
-def _solved(problem: "_Problem", start: Array, low: list[float], high: list[float]) -> Any:
-    return least_squares(problem.residual, start, bounds=(low, high), x_scale=high, max_nfev=60)
+    first = _Problem(data[::every], known, omega) if every > 1 else problem
+    best = min((first.solved(np.array(s)) for s in starts), key=lambda fit: float(fit.cost))
+    return _FirstFit(problem, best.x, first.explained(best.x))
 
 
 def _pole(period_s: float, ratio: float) -> tuple[float, float]:
@@ -152,25 +140,37 @@ def _pole(period_s: float, ratio: float) -> tuple[float, float]:
 
 
 class _Problem:
-    """Least squares over delay and lag of the valve and, unless known, frequency and decay."""
+    """Least squares over delay and lag of the valve and, unless known, frequency and decay.
 
-    def __init__(self, data: Sequence[Driven], known: tuple[float, float] | None) -> None:
+    Args:
+        data: the stretches.
+        known: frequency and decay.
+        omega: frequency, about.
+    """
+
+    def __init__(
+        self, data: Sequence[Driven], known: tuple[float, float] | None, omega: float
+    ) -> None:
         self.data = data
         self.known = known
-        self._known_bases = _bases(data, *known) if known else None
+        self._low, self._high = [0.0, 0.0], [LONGEST_DELAY_S, LONGEST_LAG_S]
+        if known is None:
+            self._low += [0.75 * omega, 0.0]
+            self._high += [1.35 * omega, 0.6 * omega]
+        self._known_bases = bases_of(data, *known) if known else None
 
     def parts(self, x: Array) -> list[tuple[Array, Array, Array]]:
         """Of each stretch: swing by commands at unit speed, free columns, commanded speed."""
         omega, sigma = self.known or (float(x[2]), float(x[3]))
-        driven = _responses(self.data, omega, sigma, float(x[0]), float(x[1]))
-        columns = [_free_columns(one, omega, sigma) for one in self.data]
+        driven = responses(self.data, omega, sigma, float(x[0]), float(x[1]))
+        columns = [free_columns(one, omega, sigma) for one in self.data]
         return [(swing, free, speed) for (swing, speed), free in zip(driven, columns, strict=True)]
 
     def projected(self, x: Array) -> list[tuple[Array, Array]]:
         """Of each stretch: unit swing and data, both without what free swings explain."""
         omega, sigma = self.known or (float(x[2]), float(x[3]))
-        driven = _responses(self.data, omega, sigma, float(x[0]), float(x[1]))
-        bases = self._known_bases or _bases(self.data, omega, sigma)
+        driven = responses(self.data, omega, sigma, float(x[0]), float(x[1]))
+        bases = self._known_bases or bases_of(self.data, omega, sigma)
         return [
             (swing - q @ (q.T @ swing), rest)
             for (swing, _), (q, rest) in zip(driven, bases, strict=True)
@@ -188,10 +188,18 @@ class _Problem:
         gain = self.speed(projected)
         return np.concatenate([y - gain * h for h, y in projected])
 
+    def solved(self, start: Array) -> Any:
+        """What SciPy finds from a start."""
+        bounds, scale = (self._low, self._high), self._high
+        return least_squares(self.residual, start, bounds=bounds, x_scale=scale, max_nfev=60)
+
     def explained(self, x: Array) -> float:
         """Part of what the commands could have made that they explain."""
         projected = self.projected(x)
-        gain = self.speed(projected)
+        return self._explained(projected, self.speed(projected))
+
+    @staticmethod
+    def _explained(projected: Sequence[tuple[Array, Array]], gain: float) -> float:
         total = sum(float(y @ y) for _, y in projected)
         left = sum(float(np.sum((y - gain * h) ** 2)) for h, y in projected)
         return 1.0 - left / max(total, 1e-30)
@@ -224,7 +232,7 @@ class _Problem:
             Value(abs(gain), math.hypot(factor * deviation, MODEL_PART * gain)) if angles else None,
             period,
             ratio,
-            self.explained(x),
+            self._explained(projected, gain),
             float(x[0] + x[1]),
             stretches,
         )
@@ -262,60 +270,3 @@ class _Problem:
         inverse = np.linalg.pinv(slope.T @ slope)
         covariance = inverse @ meat @ inverse
         return deviations(x[2:4], covariance[2:4, 2:4])
-
-
-def _free_columns(one: Driven, omega: float, sigma: float) -> Array:
-    """What a stretch may show without a command: a free swing, an offset, a drift."""
-    t = one.time_s
-    decay = np.exp(-sigma * t)
-    return np.stack(
-        [decay * np.cos(omega * t), decay * np.sin(omega * t), np.ones_like(t), t], axis=1
-    )
-
-
-def _bases(data: Sequence[Driven], omega: float, sigma: float) -> list[tuple[Array, Array]]:
-    """Of each stretch: an orthonormal basis of the free columns, and the data without them."""
-    found = []
-    for one in data:
-        q, _ = np.linalg.qr(_free_columns(one, omega, sigma))
-        found.append((q, one.value - q @ (q.T @ one.value)))
-    return found
-
-
-def _responses(
-    data: Sequence[Driven], omega: float, sigma: float, delay: float, lag: float
-) -> list[tuple[Array, Array]]:
-    """Of each stretch: swing by its commands at a full speed of 1 m/s, and the commanded speed."""
-    filters = {
-        kind: _swing_filter(omega, sigma, max(lag, SHORTEST_LAG_S), kind)
-        for kind in {one.kind for one in data}
-    }
-    return [_response(one, filters[one.kind], delay) for one in data]
-
-
-def _response(one: Driven, swing_filter: tuple[Array, Array], delay: float) -> tuple[Array, Array]:
-    grid = np.arange(0.0, float(one.time_s[-1]) + 1.0 + 2.0 * BIN_S, BIN_S)
-    at = np.searchsorted(one.command.time_s, one.start_s - 1.0 + grid - delay, side="right") - 1
-    speed = np.where(at >= 0, one.command.speed[np.maximum(at, 0)], 0.0)
-    # From rest at the first command's level; a swing before it is a free one.
-    swing = lfilter(*swing_filter, speed - speed[0])
-    time = one.time_s + 1.0
-    return np.interp(time, grid, swing), np.interp(time, grid, speed)
-
-
-def _swing_filter(omega: float, sigma: float, lag: float, kind: Kind) -> tuple[Array, Array]:
-    """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
-
-    By partial fractions of the step response, as a matrix exponential for every try of the solver
-    takes most of its time. The three poles differ: one is real, two are not.
-    """
-    square = omega**2 + sigma**2
-    poles = np.array([-1.0 / lag, complex(-sigma, omega), complex(-sigma, -omega)])
-    apart = np.array([np.prod(pole - np.delete(poles, i)) for i, pole in enumerate(poles)])
-    residues = square / (GRAVITY_M_S2 * lag * apart)
-    if kind is Kind.RATE:
-        residues = residues * poles
-    decays = np.exp(poles * BIN_S)
-    parts = [residue * np.poly(np.delete(decays, i)) for i, residue in enumerate(residues)]
-    b = np.convolve([1.0, -1.0], np.sum(parts, axis=0)).real
-    return b, np.asarray(np.poly(decays).real, dtype=np.float64)

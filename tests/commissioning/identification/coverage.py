@@ -27,11 +27,11 @@ PAUSES_S = {ONE: (0.3, 6.0), BOTH: (0.3, 6.0), CALM: (15.0, 30.0)}
 
 
 class Case(NamedTuple):
-    """What is found of an axis, and the truth."""
+    """What is identified of an axis, and the truth."""
 
     driving: str
     mode: SwayMode
-    found: Finding
+    finding: Finding
 
 
 def drawn(seed: int) -> list[Case]:
@@ -61,8 +61,8 @@ def cases(tool: Grapple, driving: str, level: float, noise_deg: float, seed: int
             at += long + chance.uniform(*PAUSES_S[driving])
     deployment = load_deployment(FILE)
     with tempfile.TemporaryDirectory() as folder:
-        told = driven(SECONDS, pushes, grapple=tool)
-        log = candump(Path(folder) / "drive.log", told, seed=seed, noise_deg=noise_deg)
+        states = driven(SECONDS, pushes, grapple=tool)
+        log = candump(Path(folder) / "drive.log", states, seed=seed, noise_deg=noise_deg)
         read = read_can(log, "", SIGNALS, deployment.messages, deployment=deployment)
     modes = {"slew": tool.mode5, "near_far": tool.mode6}
     return [Case(driving, modes[axis], identify(axis, "", [read[axis]])) for axis in axes]
@@ -70,7 +70,7 @@ def cases(tool: Grapple, driving: str, level: float, noise_deg: float, seed: int
 
 def held(case: Case) -> tuple[bool, bool]:
     """Whether the intervals of period and damping ratio hold the truth."""
-    period, ratio = case.found.period_s, case.found.damping_ratio
+    period, ratio = case.finding.period_s, case.finding.damping_ratio
     assert period and ratio
     return (
         abs(period.value - period_of(case.mode)) <= period.half,
@@ -88,14 +88,16 @@ def main() -> None:
     every = [case for i in range(asked.cranes) for case in drawn(asked.seed + i)]
     groups: dict[str, list[Case]] = defaultdict(list)
     for case in every:
-        if case.found.usable:
-            alone = "free swings" if case.found.free else "driven alone"
+        if case.finding.usable:
+            alone = "free swings" if case.finding.free else "driven alone"
             for name in ("all", f"{case.driving}, {alone}"):
                 groups[name].append(case)
     print(f"{len(every)} axes, {len(groups['all'])} of them usable; the intervals hold")
     for name, some in sorted(groups.items()):
         periods, ratios = zip(*map(held, some), strict=True)
-        halves = sorted(case.found.damping_ratio.half for case in some if case.found.damping_ratio)
+        halves = sorted(
+            case.finding.damping_ratio.half for case in some if case.finding.damping_ratio
+        )
         print(
             f"  {name} ({len(some)}): period {100 * sum(periods) / len(some):.0f} %, damping ratio"
             f" {100 * sum(ratios) / len(some):.0f} %, which is within {halves[len(some) // 2]:.4f}"
