@@ -47,14 +47,14 @@ class MachineInputs:
                 self.bound.append((motion.radius, self.radii[name]))
 
         self.sway_sensors: dict[str, SwaySensorInput] = {}
-        messages: dict[int, SwaySensorInput] = {}
+        messages: dict[MessageKey, SwaySensorInput] = {}
         for name, axis in deployment.axes.items():
             if sensor := axis.sway_sensor:
-                message = messages.get(id(sensor.message)) or SwaySensorInput(sensor.message)
-                if id(sensor.message) not in messages:
-                    messages[id(sensor.message)] = message
-                    self.bound.append((sensor.message, message))
-                self.sway_sensors[name] = message
+                key = sensor.message.key
+                if key not in messages:
+                    messages[key] = SwaySensorInput(sensor.message)
+                    self.bound.append((sensor.message, messages[key]))
+                self.sway_sensors[name] = messages[key]
 
     def _profile(self, deployment: Deployment) -> ProfileChoice | None:
         config = deployment.config

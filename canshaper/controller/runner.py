@@ -19,7 +19,7 @@ from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
 from canshaper.shaping.sway import SwayModel
-from canshaper.shaping.trust import SensorLimits, Trust
+from canshaper.shaping.trust import Trust
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
 # valve message.
@@ -134,14 +134,9 @@ class AxisRunner:
         bound, sway = self.bound.sway_sensor, self.axis.sway
         assert bound is not None
         assert sway is not None  # checked with the deployment
-        noise, offset = bound.config.noise, bound.config.offset_max_deg
         self._sway_signal = SwaySignal(message, bound)
-        self.axis.sensed = SensedSway(
-            sway,
-            bound.timing(self.period_s),
-            SensorLimits(math.radians(noise), math.radians(offset)),
-            damps=bound.config.use == "damp",
-        )
+        damps, timing = bound.config.use == "damp", bound.timing(self.period_s)
+        self.axis.sensed = SensedSway(sway, timing, bound.limits, damps=damps)
 
     def isolate(self, joystick: CommandSource, axis: Axis | None = None) -> None:
         """For a measurement: another joystick, perhaps another ``Axis``, nothing of other axes.
@@ -224,15 +219,9 @@ class AxisRunner:
         if fault is not None and (command.enabled or axis.neutral):
             command = CommandInput(fault=fault, reset=command.reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
-        if (
-            overrun
-            and axis.state is not State.BYPASS_ON
-            and command.enabled
-            and command.fault is None
-        ):
-            command = CommandInput(
-                fault=Reason.LOOP_OVERRUN, reset=command.reset, trip=command.trip
-            )
+        late = Reason.LOOP_OVERRUN if overrun and axis.state is not State.BYPASS_ON else None
+        if late and command.enabled and command.fault is None:
+            command = CommandInput(fault=late, reset=command.reset, trip=command.trip)
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:

@@ -3,9 +3,8 @@
 from typing import Any
 
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.signals import special_codes
 from canshaper.inputs.input import GOOD, Input
-from canshaper.inputs.value import measurable
+from canshaper.inputs.value import MeasuredSignal, measurable
 from canshaper.machine.sway_sensor import BoundSwaySensor, SensorMessage
 from canshaper.shaping.states import Reason
 
@@ -20,10 +19,7 @@ class SwaySensorInput(Input):
 
     def __init__(self, bound: SensorMessage) -> None:
         super().__init__(bound)
-        self._signals = [
-            (one.name, one.scale, one.offset, special_codes(one), *measurable(one))
-            for one in bound.signals
-        ]
+        self._signals = [MeasuredSignal(signal, *measurable(signal)) for signal in bound.signals]
         self.number = 0
         self.values: dict[str, float | None] = {}
 
@@ -34,18 +30,12 @@ class SwaySensorInput(Input):
         arrived_ns: int,
         accepted: bool,
     ) -> FrameFault:
-        """An error code is no measurement, nor is what lies outside the range, or is no number."""
-        fault = GOOD
-        self.number += accepted
-        for name, scale, offset, special, low, high in self._signals:
-            code = raw[name]
-            value = code * scale + offset
-            valid = code not in special and low <= value <= high
-            if not valid:
-                fault = FrameFault.INVALID_SIGNAL
-            if accepted:
-                self.values[name] = value if valid else None
-        return fault
+        """What is no value is a fault, and no measurement."""
+        values = {signal.name: signal.value(raw) for signal in self._signals}
+        if accepted:
+            self.number += 1
+            self.values = values
+        return FrameFault.INVALID_SIGNAL if None in values.values() else GOOD
 
     def invalidate(self) -> None:
         """Nothing received so far counts any more."""

@@ -1,6 +1,7 @@
 """One number out of a message, while it is fresh: a radius, a weight, a choice, a flow."""
 
 import sys
+from collections.abc import Mapping
 from typing import Any
 
 from cantools.database.can import Signal
@@ -12,6 +13,32 @@ from canshaper.machine.inputs import BoundInput
 from canshaper.shaping.states import Reason
 
 LARGEST = sys.float_info.max
+
+
+class MeasuredSignal:
+    """A signal with a range: an error code is no value, nor what lies outside, or is no number.
+
+    Args:
+        signal: the signal of the DBC.
+        low: smallest value that is one.
+        high: largest.
+
+    Attributes:
+        name: of the signal.
+    """
+
+    __slots__ = ("_high", "_low", "_offset", "_scale", "_special", "name")
+
+    def __init__(self, signal: Signal, low: float, high: float) -> None:
+        self.name, self._scale, self._offset = signal.name, signal.scale, signal.offset
+        self._special = special_codes(signal)
+        self._low, self._high = low, high
+
+    def value(self, raw: Mapping[str, Any]) -> float | None:
+        """Its value by the raw values of a message, in the DBC's unit; None where it is none."""
+        code = raw[self.name]
+        value: float = code * self._scale + self._offset
+        return value if code not in self._special and self._low <= value <= self._high else None
 
 
 class ValueInput(Input):
@@ -34,9 +61,7 @@ class ValueInput(Input):
         super().__init__(bound)
         signal = find_signal(bound.message, name)
         assert signal is not None  # checked with the deployment
-        self._name, self._scale, self._offset = name, signal.scale, signal.offset
-        self._special = special_codes(signal)
-        self._low, self._high = low, high
+        self._signal = MeasuredSignal(signal, low, high)
         self.value = 0.0
         self.measured_ns: int | None = None
 
@@ -47,10 +72,9 @@ class ValueInput(Input):
         arrived_ns: int,
         accepted: bool,
     ) -> FrameFault:
-        """An error code is no value, nor is what lies outside the range, or is no number."""
-        code = raw[self._name]
-        value = code * self._scale + self._offset
-        if code in self._special or not self._low <= value <= self._high:
+        """What is no value is a fault."""
+        value = self._signal.value(raw)
+        if value is None:
             return FrameFault.INVALID_SIGNAL
         if accepted:
             self.value, self.measured_ns = value, arrived_ns

@@ -14,6 +14,7 @@ from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
 from canshaper.shaping.observer import Measured, SensorTiming
 from canshaper.shaping.registry import KINDS
+from canshaper.shaping.trust import SensorLimits
 
 _ANGLES = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3}
 UNITS = {
@@ -57,6 +58,12 @@ class BoundSwaySensor:
     signal: Signal
     factor: float
     cycle_s: float
+
+    @property
+    def limits(self) -> SensorLimits:
+        """What it may show."""
+        noise, offset = self.config.noise, self.config.offset_max_deg
+        return SensorLimits(math.radians(noise), math.radians(offset))
 
     def timing(self, period_s: float) -> SensorTiming:
         """For an axis whose command is sent every so many seconds."""
