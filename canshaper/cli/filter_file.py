@@ -25,21 +25,29 @@ def write_filter(
         Lines that have changed, and why the tail has not.
 
     Raises:
-        ConfigError: the file cannot be changed.
+        ConfigError: the file cannot be changed, or is no good deployment with the filter: a range
+            in which the sway may be adjusted can be too wide for it. The file is as it was.
     """
     from canshaper.config.edit import set_values
+    from canshaper.errors import ConfigError
+    from canshaper.machine.binding import load_deployment
     from canshaper.machine.stopping import stop_fault
 
     path, config = deployment.path, deployment.axes[axis].config
-    before = path.read_text(encoding="utf-8")
+    before = path.read_bytes()
     set_values(path, ("axes", axis, "filter"), filter_values)
+    try:
+        load_deployment(path)
+    except ConfigError:
+        path.write_bytes(before)
+        raise
     kept = None
     if tail_s is not None and tail_s > config.limits.tail_s:
         limits = config.limits.model_copy(update={"tail_s": tail_s})
         kept = stop_fault(deployment, axis, config.model_copy(update={"limits": limits}))
         if not kept:
             _write_tail(path, axis, tail_s, section="limits" in config.model_fields_set)
-    lines = list(_changed(before, path.read_text(encoding="utf-8")))
+    lines = list(_changed(before.decode(), path.read_text(encoding="utf-8")))
     if kept:
         text = f"expected {tail_s:g} s, got {config.limits.tail_s:g} s, which stays"
         lines.append(f"WARNING: axes.{axis}.limits.tail_s: {text}: stop_distance_m: {kept}")

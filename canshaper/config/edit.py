@@ -264,9 +264,10 @@ def _replace(path: Path, before: str, text: str, expected: Any) -> None:
             file.write(text.encode("utf-8"))
             file.flush()
             os.fsync(file.fileno())
-            os.fchmod(file.fileno(), stat.S_IMODE(status.st_mode))
-            if (status.st_uid, status.st_gid) != (os.geteuid(), os.getegid()):
-                os.fchown(file.fileno(), status.st_uid, status.st_gid)
+            owner = (status.st_uid, status.st_gid)
+            if hasattr(os, "fchown") and owner != (os.geteuid(), os.getegid()):
+                os.fchown(file.fileno(), *owner)
+        temporary.chmod(stat.S_IMODE(status.st_mode))
         _check(path, temporary, expected)
         if _read(path) != before:
             text = "changed by someone else meanwhile; nothing was written"

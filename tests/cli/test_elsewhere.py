@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from canshaper.cli.app import LINUX_ONLY
+from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[2]
 # Names of Windows' Python are fewer than those of macOS; numpy and matplotlib look at some of
@@ -27,8 +28,8 @@ without(socket, "AF_CAN", "AF_NETLINK", "AF_UNIX", "CAN", "CMSG", "MSG_DONTWAIT"
 without(socket, "SOCK_CLOEXEC", "SOCK_NONBLOCK", "SOL_CAN", "SO_PEERCRED", "SO_REUSEPORT")
 without(signal, "SIGALRM", "SIGCHLD", "SIGCONT", "SIGHUP", "SIGKILL", "SIGPIPE", "SIGQUIT")
 without(signal, "SIGSTOP", "SIGTSTP", "SIGUSR", "SIGWINCH", "pthread_", "sigtimedwait", "sigwait")
-without(os, "eventfd", "getloadavg", "geteuid", "getgid", "getuid", "memfd", "mkfifo", "pidfd")
-without(os, "sched_")
+without(os, "eventfd", "fchmod", "fchown", "getloadavg", "geteuid", "getgid", "getuid", "memfd")
+without(os, "mkfifo", "pidfd", "sched_")
 without(time, "CLOCK_", "clock_")
 for module in ("fcntl", "grp", "pty", "pwd", "resource", "syslog", "termios", "tty"):
     sys.modules[module] = None
@@ -58,6 +59,15 @@ def test_desk_work_runs_on_any_system(line: str, answer: str, tmp_path: Path) ->
     done = called(*line.split(), *out)
     assert done.returncode == 0, done.stderr
     assert answer in done.stdout
+
+
+def test_what_is_found_is_written_on_any_system(tmp_path: Path) -> None:
+    file = tmp_path / "machine.yaml"
+    text = (ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8")
+    file.write_text(text.replace("../dbc", str(ROOT / "dbc")), encoding="utf-8")
+    done = called("robust", file, "--axis", "near_far", "--write")
+    assert done.returncode == 0, done.stderr
+    assert load_deployment(file).axes["near_far"].config.filter.kind == "robust"
 
 
 @pytest.mark.parametrize("verb", sorted(LINUX_ONLY))

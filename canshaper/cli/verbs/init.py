@@ -66,19 +66,15 @@ def init(
 def _designed(file: Path, axis: str) -> bool:
     """Whether a robust shaper was designed for an axis and written; otherwise says why not."""
     from canshaper.cli.verbs.robust import design
-    from canshaper.machine.binding import load_deployment
 
-    before = file.read_bytes()
     try:
         design(str(file), axis, write=True)
-        load_deployment(file)  # a slow valve may not let it be adjusted as far
     except ModuleNotFoundError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in EXTRAS:
             raise
         echo(f"axis {axis}: no robust shaper yet, {missing} is missing: {install_line(missing)}")
     except CanshaperError as error:
-        file.write_bytes(before)
         echo(f"axis {axis}: no robust shaper yet: {error}")
     else:
         return True

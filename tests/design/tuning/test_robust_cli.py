@@ -72,6 +72,16 @@ def test_write_lengthens_a_tail_that_is_too_short(file: Path) -> None:
     assert "designed_for" not in CliRunner().invoke(app, ["check", str(file)]).output
 
 
+def test_a_filter_that_the_adjustable_range_refuses_is_not_written(file: Path) -> None:
+    adjustable = "adjustable: { axes.slew.sway.period_s: [1.5, 3.0] }"
+    before = f"{file.read_text()}\ncontrol: {{ socket: /tmp/machine.sock, {adjustable} }}\n"
+    file.write_text(before)
+    words = (str(file), "--axis", "slew", "--second", "0.6,0.1,20", "--write")
+    status, output = run(*words)
+    assert (status, "control.adjustable.axes.slew.sway.period_s: at 1.5" in output) == (2, True)
+    assert file.read_text() == before
+
+
 def test_a_tail_too_short_is_told(file: Path) -> None:
     assert "tail_s is 2 s" in run(str(file), "--axis", "near_far", "--duration", "2.4")[1]
     assert "tail_s" not in run(str(file), "--axis", "near_far", "--duration", "1.6")[1]
