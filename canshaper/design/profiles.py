@@ -79,8 +79,7 @@ def figures(deployment: Deployment) -> Iterator[Figures]:
 
 def _press(deployment: Deployment, axis: str, name: str, length_pct: int) -> AxisMetrics:
     crane = CraneParameters()
-    length_m = crane.grapple.l2_m * (1.0 + length_pct / 100.0)
-    crane = replace(crane, grapple=replace(crane.grapple, l2_m=length_m))
+    crane = replace(crane, grapple=crane.grapple.longer(length_pct))
 
     def choose(controller: Controller) -> None:
         for runner in controller.axes.values():

@@ -15,12 +15,13 @@ def rms(t_s: list[float], values: list[float]) -> float | None:
     """Root of the mean square over the time; None without an interval."""
     if len(t_s) < 2:
         return None
-    area = _integral(t_s, [value * value for value in values], range(len(t_s)))
+    area = integral(t_s, [value * value for value in values])
     return math.sqrt(area / (t_s[-1] - t_s[0]))
 
 
-def _integral(t_s: list[float], values: list[float], window: range) -> float:
-    """Integrate over the samples of the window by trapezoids."""
+def integral(t_s: list[float], values: list[float], window: range | None = None) -> float:
+    """Integrate over the samples of the window, or over all, by trapezoids."""
+    window = range(len(t_s)) if window is None else window
     return math.fsum(0.5 * (values[k] + values[k + 1]) * (t_s[k + 1] - t_s[k]) for k in window[:-1])
 
 
@@ -59,7 +60,7 @@ def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:
 
 def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
     """Travel after the release, in seconds of full speed."""
-    return stroke.direction * _integral(t_s, trace.speed, stroke.rest)
+    return stroke.direction * integral(t_s, trace.speed, stroke.rest)
 
 
 def dip(trace: AxisTrace, stroke: Stroke) -> float:

@@ -14,8 +14,8 @@ swings inwards, towards the pillar.
 """
 
 import math
-from dataclasses import dataclass
-from typing import NamedTuple
+from dataclasses import dataclass, replace
+from typing import NamedTuple, Self
 
 from canshaper_sim.ranges import check_ranges
 
@@ -83,6 +83,10 @@ class Grapple:
 
     def __post_init__(self) -> None:
         check_ranges("grapple", self, _ALLOWED)
+
+    def longer(self, percent: float) -> Self:
+        """The same with so much more, or less, from the joint of theta6 to the centre of mass."""
+        return replace(self, l2_m=self.l2_m * (1.0 + percent / 100.0))
 
     @property
     def mode5(self) -> SwayMode:

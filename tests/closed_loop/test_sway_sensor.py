@@ -233,13 +233,10 @@ def watching(tmp_path: Path) -> Deployment:
 def tilt_deg(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> float:
     """Largest tilt of the grapple in the last three seconds."""
     crane = CraneParameters()
-    length_m = crane.grapple.l2_m * (1.0 + length_pct / 100.0)
-    crane = replace(crane, grapple=replace(crane.grapple, l2_m=length_m))
+    crane = replace(crane, grapple=crane.grapple.longer(length_pct))
     recording = lock_step(deployment, Script("both", strokes, 13.0), parameters=crane)
-    slew, near_far = recording.axes["slew"].sway_deg, recording.axes["near_far"].sway_deg
-    assert slew is not None
-    assert near_far is not None
-    return max(map(math.hypot, slew[-150:], near_far[-150:]))
+    assert recording.crane is not None
+    return max(recording.crane.sway_deg[-150:])
 
 
 def test_a_slew_is_damped_in_its_plane(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 import math
 import multiprocessing
 import signal
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -15,12 +15,12 @@ from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import axis_metrics
+from canshaper.report.stroke_metrics import integral
+from canshaper.report.strokes import RESIDUAL_DWELL_S
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.grapple import Grapple, Sway
 from canshaper_sim.recording import Recording
 
-# Residual: largest swing later than this after the last stroke, as in the report of a drive.
-DWELL_S = 2.5
 # Below this part of full speed the tip stands, and what comes after is another movement.
 STANDS = 0.01
 
@@ -63,17 +63,17 @@ def measure(
     deployment: Deployment, candidate: Candidate, task: Manoeuvre, length_pct: int
 ) -> Outcome:
     """Drive once and measure."""
-    crane = task.crane
-    grapple = replace(crane.grapple, l2_m=crane.grapple.l2_m * (1.0 + length_pct / 100.0))
+    grapple = task.crane.grapple.longer(length_pct)
     recording = drive(
         with_candidate(deployment, candidate),
         task.script,
-        parameters=replace(crane, grapple=grapple),
+        parameters=replace(task.crane, grapple=grapple),
         sway=Sway(theta6_rad=math.radians(task.initial_deg)),
         load=None if task.load_s is None else (task.load_s, _loaded(grapple)),
     )
-    tilt_deg = _tilt_deg(recording)
-    quiet_s = max(s.end_s for s in task.script.strokes) + DWELL_S
+    assert recording.crane is not None  # of a tip with both planes
+    tilt_deg = recording.crane.sway_deg
+    quiet_s = max(s.end_s for s in task.script.strokes) + RESIDUAL_DWELL_S
     outcome = Outcome(
         candidate.name,
         task.name,
@@ -82,11 +82,11 @@ def measure(
         length_pct,
         residual_deg=max(a for t, a in zip(recording.t_s, tilt_deg, strict=True) if t >= quiet_s),
         peak_deg=max(tilt_deg),
-        path=sum(_integral(recording.t_s, map(abs, recording.axes[a].speed)) for a in AXES),
+        path=sum(integral(recording.t_s, [*map(abs, recording.axes[a].speed)]) for a in AXES),
     )
     if task.work == "tap" and task.axis:
         speed = recording.axes[task.axis].speed
-        travel = _integral(recording.t_s, speed)
+        travel = integral(recording.t_s, speed)
         return replace(outcome, travel=travel, movements=_movements(speed))
     if task.work == "pulse" and task.axis:
         return _with_metrics(outcome, recording, task.axis, deployment)
@@ -95,18 +95,6 @@ def measure(
 
 def _loaded(grapple: Grapple) -> Grapple:
     return replace(grapple, m2_kg=LOAD_MASS * grapple.m2_kg, l2_m=grapple.l2_m + LOAD_M)
-
-
-def _tilt_deg(recording: Recording) -> list[float]:
-    across, along = (recording.axes[axis].sway_deg for axis in AXES)
-    assert across is not None
-    assert along is not None
-    return [math.hypot(a, b) for a, b in zip(across, along, strict=True)]
-
-
-def _integral(t_s: list[float], speed: Iterable[float]) -> float:
-    steps = zip(pairwise(t_s), pairwise(speed), strict=True)
-    return math.fsum(0.5 * (v + w) * (t - s) for (s, t), (v, w) in steps)
 
 
 def _movements(speed: list[float]) -> int:
@@ -137,7 +125,7 @@ def _with_metrics(
 
 def measure_all(
     file: Path,
-    found: list[Candidate],
+    candidates: list[Candidate],
     tasks: list[Manoeuvre],
     *,
     on_progress: Callable[[float], None],
@@ -149,12 +137,12 @@ def measure_all(
 
     Args:
         file: deployment file, loaded again in every process.
-        found: the candidates.
+        candidates: what is compared.
         tasks: the manoeuvres.
         on_progress: called with the part done, 0 to 1.
         processes: number of processes; by default one a processor.
     """
-    jobs = [(c, t, p) for c in found for t in tasks for p in t.lengths_pct]
+    jobs = [(c, t, p) for c in candidates for t in tasks for p in t.lengths_pct]
     outcomes = []
     with ProcessPoolExecutor(processes, initializer=_load, initargs=(file,)) as pool:
         futures = [pool.submit(_measure, *job) for job in jobs]
