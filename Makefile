@@ -8,25 +8,31 @@
 # make paper   the paper's figures and numbers beside ours, in out/paper
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
+# make docs   the pages as a site that opens without a network: out/site/index.html
+# make release   wheel, source distribution, Debian packages, container image, checksums: dist/
 # make generate   value tables of the DBC files and the tables of docs/states.md, from the program
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test quick versions test-others test-long test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime deb lock clean
+.PHONY: demo test quick versions test-others test-long test-studies test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime docs deb release image lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
 	@touch $@
 
 .venv/test-ready: pyproject.toml tools/venv.sh
-	tools/venv.sh tools,studio,dev,lint
+	tools/venv.sh tools,studio,cluster,dev,docs,lint
 	@touch $@
 
 .venv/fuzz-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools,dev,fuzz
 	@touch $@
 
+.venv/docs-ready: pyproject.toml tools/venv.sh
+	tools/venv.sh docs
+	@touch $@
+
 demo: .venv/demo-ready
-	.venv/bin/canshaper demo
+	.venv/bin/canshaper demo $(ARGS)
 
 # The parts of `make test`, the longest first: so many side by side, each printed when it ends.
 JOBS ?= 2
@@ -49,7 +55,11 @@ test-long: .venv/test-ready
 	$(NICE) .venv/bin/python -m pytest -q -m long $(GATE)
 
 test-others: .venv/test-ready
-	$(NICE) .venv/bin/python -m pytest -q $(GATE:%=--ignore=%)
+	$(NICE) .venv/bin/python -m pytest -q -m "not study" $(GATE:%=--ignore=%)
+
+# Every seed of noise, instant of a fault and combination of a sway sensor; prints the worst.
+test-studies: .venv/test-ready
+	$(NICE) .venv/bin/python -m pytest -q -s -m study tests/closed_loop tests/commissioning/sensor
 
 test-socketcan: .venv/test-ready
 	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_socketcan.py tests/hil/test_daemon.py \
@@ -82,7 +92,7 @@ test-service: .venv/test-ready
 
 # The live page in a real browser: Debian's Chromium.
 test-studio: .venv/test-ready
-	CANSHAPER_BROWSER=1 .venv/bin/python -m pytest tests/studio/test_browser.py
+	CANSHAPER_BROWSER=1 .venv/bin/python -m pytest tests/studio/test_browser*.py
 
 lint: .venv/test-ready
 	.venv/bin/ruff check
@@ -119,7 +129,9 @@ bench: .venv/test-ready
 	.venv/bin/python benchmarks/startup.py
 	.venv/bin/python benchmarks/large_dbc.py
 	.venv/bin/python benchmarks/lockstep.py
+	.venv/bin/python benchmarks/campaign.py
 	.venv/bin/python benchmarks/replay.py
+	.venv/bin/python benchmarks/logs.py
 	.venv/bin/python benchmarks/identify.py
 	.venv/bin/python benchmarks/tune.py
 	.venv/bin/python benchmarks/frames.py
@@ -136,9 +148,22 @@ bench-realtime: .venv/test-ready
 	.venv/bin/python benchmarks/gateway.py
 	.venv/bin/python benchmarks/memory.py --minutes 60 --every 30
 
+# And the manual pages, out/man.
+docs: .venv/docs-ready
+	.venv/bin/python tools/site/build.py
+	.venv/bin/python tools/man.py out/man
+
 # dist/canshaper_VERSION_ARCH.deb: docs/service.md
-deb:
+deb: docs
 	tools/deb.sh
+
+# What is released, into dist/, with checksums: RELEASE="trixie/arm64" builds fewer Debian packages.
+release: docs
+	tools/release.sh $(RELEASE)
+
+# dist/canshaper-VERSION.oci.tar
+image: docs
+	tools/image.sh
 
 # Newer versions for the package: tools/deb/*requirements.txt
 lock:

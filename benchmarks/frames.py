@@ -1,4 +1,4 @@
-"""Joystick frame in to valve frame out, beside other gateways, in virtual time.
+"""Joystick frame in to valve frame out, next to other gateways, in virtual time.
 
 The daemon has a tick: a joystick frame waits for the next one. "from outside" has that wait, with
 joystick frames at every phase of the tick. "processing" has not: from the last moment at which a
@@ -12,7 +12,10 @@ tick. Gateways have FIFO priority 40, the client 30, everything else none.
 
     python benchmarks/frames.py                            vcan0
     python benchmarks/frames.py --bus can --kernel rt      two controllers on a bus, PREEMPT_RT
-    python benchmarks/frames.py --load flood busy disk     again with that load beside it
+    python benchmarks/frames.py --load flood busy disk     again with that load next to it
+
+"ticks that follow" is the daemon with ``tick: { follow: left }``: from outside, with both joysticks
+at their cycle; and how far its valve frames are apart.
 """
 
 import argparse
@@ -23,6 +26,7 @@ import tempfile
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 
 from rig import (
@@ -50,6 +54,7 @@ from wire import HIGH_PCT, LOW_PCT, Exchange, Wire, wait_for_frames
 WARM_UP = 100
 ECHO_PERIOD_NS = 5_000_000
 JOYSTICK_NS = 20_000_000
+RIGHT_NS = 5_000_000  # the right joystick comes before the left
 AHEAD_NS = 100_000  # what the client needs from one exchange to the next
 PYTHON_ECHO, NOTIFIER, CANGW = "Python echo", "Notifier + cantools", "cangw, in the kernel"
 CANGW_SETS = "SET:I:200.0.0000000000000000"
@@ -173,7 +178,42 @@ class Ticking:
         return seen
 
 
-def each_gateway(directory: Path, wire: Wire, count: int) -> Iterator[Answering | Ticking]:
+class Following:
+    """The daemon whose ticks follow the joystick, which keeps its cycle."""
+
+    def __init__(self, title: str, wire: Wire, pid: int, count: int) -> None:
+        self.title, self.wire, self.pid, self.count = title, wire, pid, count
+        self._at = time.monotonic_ns()
+
+    def find_phase(self) -> None:
+        """Wait until it has found the joystick's."""
+        for _ in range(200):
+            self._move(0.0)
+
+    def measure(self, at_work: Callable[[], bool]) -> list[Result]:
+        """Frames at the joystick's cycle, once the load is at work."""
+        while not at_work():
+            self._move(HIGH_PCT)
+        for _ in range(200):
+            self._move(HIGH_PCT)
+        seen = []
+        for _ in range(self.count):
+            self._at += JOYSTICK_NS
+            seen.append(self.wire.exchange(self._at, HIGH_PCT, RIGHT_NS, jump=False))
+        apart = [(two.out_ns - one.out_ns) / 1e3 for one, two in pairwise(seen)]
+        return [
+            Result(f"{self.title}: from outside", [e.gateway_us for e in seen]),
+            Result(f"{self.title}: valve frames apart", apart),
+        ]
+
+    def _move(self, pct: float) -> None:
+        self._at += JOYSTICK_NS
+        self.wire.send(self._at, pct, RIGHT_NS)
+
+
+def each_gateway(
+    directory: Path, wire: Wire, count: int
+) -> Iterator[Answering | Ticking | Following]:
     """Every gateway, each running while it is yielded."""
     near, log = wire.near, directory / "log"
     echo = compiled(PEERS / "echo.c", directory)
@@ -200,6 +240,12 @@ def each_gateway(directory: Path, wire: Wire, count: int) -> Iterator[Answering 
         with running(daemon(file), log) as process:
             wait_for_frames(wire, process, log)
             yield Ticking(title, wire, process.pid, count, tick_ms)
+    file = shipped(directory, near)
+    text = file.read_text(encoding="utf-8")
+    file.write_text(f"tick: {{ follow: left }}\n{text}", encoding="utf-8")
+    with running(daemon(file), log) as process:
+        wait_for_frames(wire, process, log)
+        yield Following("ticks that follow, 3 axes, 20 ms", wire, process.pid, count)
 
 
 def print_results(results: list[Result]) -> None:

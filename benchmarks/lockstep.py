@@ -1,42 +1,64 @@
-"""How much faster than real time the closed loop runs in lock-step, and what takes the time.
+"""How many drives a second the closed loop makes in lock-step, and what takes the time.
 
-One drive of the demo script with the shipped deployment: operator, the daemon's controller and the
-plant exchange every frame. Beside it the plant alone, with the same commands.
+The demo script with a shipped deployment, in turn: recorded from its frames, as `demo` and
+`compare` drive it; measured on the fly, as a campaign does; and the plant alone with the same
+commands. The ratio to the plant alone hardly depends on the machine.
 
-    python benchmarks/lockstep.py [--runs 5]
+    python benchmarks/lockstep.py [--runs 5] [--deployment forwarder-robust.yaml]
 """
 
 import argparse
 import statistics
 import time
+from collections.abc import Callable
 
-from canshaper.design.lockstep import drive
+from canshaper.design.lockstep import Simulation, drive
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
 from canshaper_sim.crane import Crane
 from canshaper_sim.operator import SCRIPTS
 
 
+def cpu_s(work: Callable[[], object]) -> float:
+    """Processor time of one run."""
+    start = time.process_time()
+    work()
+    return time.process_time() - start
+
+
 def main() -> None:
     """Measure and print."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--runs", type=int, default=5)
-    runs = parser.parse_args().runs
-    deployment = load_deployment(deployment_path("forwarder.yaml"))
+    parser.add_argument("--deployment", default="forwarder-robust.yaml")
+    options = parser.parse_args()
+    deployment = load_deployment(deployment_path(options.deployment))
     script = SCRIPTS["demo"]
-    loop, plant = [], []
-    for _ in range(runs):
-        start = time.perf_counter()
-        recording = drive(deployment, script)
-        loop.append(script.duration_s / (time.perf_counter() - start))
+    recording = drive(deployment, script)
+    sent = {name: trace.sent for name, trace in recording.axes.items()}
+    tick_s = deployment.config.tick_ms / 1000.0
+
+    def alone() -> None:
         crane = Crane()
-        sent = {name: trace.sent for name, trace in recording.axes.items()}
-        start = time.perf_counter()
         for i in range(len(recording.t_s)):
-            crane.step(0.02, {name: values[i] for name, values in sent.items()})
-        plant.append(script.duration_s / (time.perf_counter() - start))
-    for title, row in (("closed loop", loop), ("plant alone", plant)):
-        print(f"{title:12} median {statistics.median(row):6.0f} x real time, least {min(row):6.0f}")
+            crane.step(tick_s, {name: values[i] for name, values in sent.items()})
+
+    def lean() -> None:
+        for _ in Simulation(deployment, script).ticks():
+            pass
+
+    works = {"recorded": lambda: drive(deployment, script), "lean": lean, "plant alone": alone}
+    times: dict[str, list[float]] = {name: [] for name in works}
+    for _ in range(options.runs):
+        for name, work in works.items():
+            times[name].append(cpu_s(work))
+    plant_s = statistics.median(times["plant alone"])
+    for name, row in times.items():
+        median_s = statistics.median(row)
+        print(
+            f"{name:12} {1 / median_s:6.1f} drives a second of CPU,"
+            f" {script.duration_s / median_s:6.0f} x real time, {median_s / plant_s:5.2f} x plant"
+        )
 
 
 if __name__ == "__main__":

@@ -80,8 +80,8 @@ def main() -> None:
     """Run ``canshaper run`` with the rest of the command line."""
     notes = {"ticks": Ticks, "blocks": Blocks}[sys.argv[1]](sys.argv[2])
     loop = daemon_module.run_at_deadlines
-    daemon_module.run_at_deadlines = lambda period_ns, body, wait: loop(
-        period_ns, notes.around(body), wait
+    daemon_module.run_at_deadlines = lambda period_ns, body, *rest: loop(
+        period_ns, notes.around(body), *rest
     )
     sys.argv = ["canshaper", "run", *sys.argv[3:]]
     try:

@@ -21,7 +21,8 @@ from typing import Any
 
 from rig import Row, print_table, slew_only
 
-from canshaper.bus.raw import CAN_FRAME, RawPort
+from canshaper.bus.packet import CAN_FRAME
+from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded

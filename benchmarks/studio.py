@@ -32,6 +32,7 @@ import uvicorn
 from playwright.sync_api import Browser
 
 from canshaper.studio.access import Access
+from canshaper.studio.commission import Commission
 from canshaper.studio.crane import copied, groups
 from canshaper.studio.events import Events
 from canshaper.studio.server import build_app, listening, server
@@ -191,7 +192,9 @@ def serving(stage: Stage) -> Iterator[str]:
     """The page of a stage in a thread; its address."""
     one = listening("127.0.0.1", 0)
     port = one.getsockname()[1]
-    web: uvicorn.Server = server(build_app(stage, Access(port), CraneParameters()))
+    web: uvicorn.Server = server(
+        build_app(stage, Access(port), CraneParameters(), Commission(None, [], machine=False))
+    )
     thread = threading.Thread(target=lambda: web.run(sockets=[one]))
     thread.start()
     try:

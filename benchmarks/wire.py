@@ -1,6 +1,6 @@
 """Joystick frames at chosen moments, and the valve frames that answer them.
 
-The joystick jumps between two deflections with every frame, so that a valve frame tells which
+The joystick jumps between two deflections with every frame, so that a valve frame shows which
 joystick frame it answers: the valve jumps the same way.
 """
 
@@ -24,7 +24,7 @@ HIGH_PCT, LOW_PCT = 52.0, 48.0
 # own motion.
 LEAST_STEPS = 2
 MOST_UNMOVED = 50  # an axis that has stopped answers no more
-# The kernel stamps frames by the wall clock, which nobody sets in a machine of its own.
+# The kernel stamps frames by the wall clock, which no one sets in a machine of its own.
 WALL_NS = time.time_ns() - time.monotonic_ns()
 
 

@@ -36,6 +36,7 @@ if TYPE_CHECKING:
         RefusalEvent,
         StateEvent,
         SwaySensorEvent,
+        SwingLengthEvent,
     )
     from canshaper.machine.deployment import Deployment
     from canshaper.protocols.interface import Event
@@ -69,6 +70,7 @@ __all__ = [
     "SwayMode",
     "SwayModel",
     "SwaySensorEvent",
+    "SwingLengthEvent",
     "Xor",
     "build_shaper",
     "errors",
@@ -85,6 +87,7 @@ _HOMES = {
         "RefusalEvent",
         "StateEvent",
         "SwaySensorEvent",
+        "SwingLengthEvent",
     ),
     "machine.deployment": ("Deployment",),
     "protocols.interface": ("Event",),

@@ -7,7 +7,7 @@ the kernel may send instead of us.
 
 import binascii
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cache, reduce
 from hashlib import sha256
@@ -16,7 +16,7 @@ from operator import xor
 from pathlib import Path
 from typing import Literal
 
-from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, Crc16Arc
+from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, Crc16Arc, Crc16Base, CrcBase
 
 GROUP = "canshaper.checksums"
 """Entry points of packages: the name of a kind, and the ``ChecksumKind`` that it is."""
@@ -39,6 +39,11 @@ class Checksum:
     shift: int = 0
     order: Literal["little", "big"] = "little"
     can_id: int = field(default=0, compare=False)
+
+    def __reduce__(self) -> tuple[Callable[..., "Checksum"], tuple[object, ...]]:
+        """Pickled with what its row is made of: a reload reads it in a process of its own."""
+        bound = (self.kind, self.byte, self.shift, self.order, self.can_id)
+        return _handed_over, (_NUMBERS.get(self.kind), bound)
 
     def others(self, data: bytes) -> bytes:
         """The bytes of a frame in which no bit of it lies."""
@@ -97,7 +102,9 @@ class Xor(KernelSum):
 
 
 class Crc8(KernelSum):
-    """The CRC of a class of crccheck that reflects nothing; the library works bit by bit.
+    """The CRC of a class of crccheck that reflects bytes and result, or neither.
+
+    The library works bit by bit.
 
     Attributes:
         start: the register before the first byte.
@@ -170,6 +177,91 @@ class ChecksumKind:
         return algorithm if isinstance(algorithm, Xor | Crc8) else None
 
 
+class ReflectedCrc:
+    """The CRC of a class of crccheck that reflects bytes and result, of 16 bits or more.
+
+    By a table, a byte at a time; the library works bit by bit.
+    """
+
+    def __init__(self, library: type[CrcBase]) -> None:
+        self._end: int = library.calc(b"", initvalue=0)
+        self._start: int = library.calc(b"") ^ self._end
+        self._table = _table(library, self._end)
+
+    def of(self, data: bytes) -> int:
+        """CRC of ``data``."""
+        value, table = self._start, self._table
+        for byte in data:
+            value = value >> 8 ^ table[(value ^ byte) & 0xFF]
+        return value ^ self._end
+
+
+def _table(library: type[CrcBase], end: int) -> tuple[int, ...]:
+    """The register after one byte, by what the lowest byte of both is together."""
+    return tuple(library.calc(bytes((i,)), initvalue=0) ^ end for i in range(256))
+
+
+CRC_WIDTHS: Mapping[int, type[CrcBase]] = {8: Crc8Base, 16: Crc16Base}
+"""Bits that a CRC by its polynomial may have."""
+
+
+def crc_kind(bits: int, polynomial: int, start: int, end: int, *, reflected: bool) -> str:
+    """The name of a CRC by its numbers, which is in ``CHECKSUMS`` from now on.
+
+    Args:
+        bits: one of ``CRC_WIDTHS``.
+        polynomial: without its highest bit.
+        start: register before the first byte.
+        end: what the register is changed by after the last.
+        reflected: the lowest bit of each byte comes first, and of the register.
+    """
+    name = f"crc{bits} {polynomial:#x} start {start:#x} end {end:#x}{' reflected' * reflected}"
+    if name not in CHECKSUMS:
+        numbers = {
+            "_poly": polynomial,
+            "_initvalue": start,
+            "_xor_output": end,
+            "_reflect_input": reflected,
+            "_reflect_output": reflected,
+        }
+        library = type("Crc", (CRC_WIDTHS[bits],), numbers)
+        narrow = issubclass(library, Crc8Base)
+        algorithm = Crc8(library) if narrow else _by_table(library, reflected=reflected)
+        CHECKSUMS[name] = ChecksumKind(name, bits, algorithm)
+        _NUMBERS[name] = bits, polynomial, start, end, reflected
+    return name
+
+
+def _handed_over(
+    numbers: tuple[int, int, int, int, bool] | None,
+    bound: tuple[str, int, int, Literal["little", "big"], int],
+) -> Checksum:
+    """A checksum of another process; its kind may be in the table of that one only."""
+    if numbers is not None:
+        crc_kind(*numbers[:4], reflected=numbers[4])
+    elif bound[0] not in CHECKSUMS:
+        known_checksum(bound[0])
+    return Checksum(*bound)
+
+
+def _by_table(library: type[CrcBase], *, reflected: bool) -> Algorithm:
+    """A CRC of 16 bits, a byte at a time; the library works bit by bit."""
+    if reflected:
+        crc = ReflectedCrc(library)
+        return lambda _can_id, place, data: crc.of(place.others(data))
+    end: int = library.calc(b"", initvalue=0)
+    start: int = library.calc(b"") ^ end
+    table = _table(library, end)
+
+    def left(_can_id: int, place: Checksum, data: bytes) -> int:
+        value = start
+        for byte in place.others(data):
+            value = (value & 0xFF) << 8 ^ table[value >> 8 ^ byte]
+        return value ^ end
+
+    return left
+
+
 def _nibbles(_can_id: int, _place: Checksum, data: bytes) -> int:
     return sum(data) + sum(byte >> 4 for byte in data)  # modulo 16 a byte is its lower half
 
@@ -180,16 +272,6 @@ def _sum_id(can_id: int, _place: Checksum, data: bytes) -> int:
 
 def _ccitt_false(_can_id: int, place: Checksum, data: bytes) -> int:
     return binascii.crc_hqx(place.others(data), 0xFFFF)
-
-
-_ARC = tuple(Crc16Arc.calc(bytes((i,))) for i in range(256))
-
-
-def _arc(_can_id: int, place: Checksum, data: bytes) -> int:
-    value = 0
-    for byte in place.others(data):
-        value = value >> 8 ^ _ARC[(value ^ byte) & 0xFF]
-    return value
 
 
 CHECKSUMS: dict[str, ChecksumKind] = {
@@ -205,12 +287,16 @@ CHECKSUMS: dict[str, ChecksumKind] = {
     ),
     "sum4": ChecksumKind("sum of the half bytes", 4, _nibbles),
     "crc16_ccitt_false": ChecksumKind("CRC 0x1021, start 0xFFFF (IBM 3740)", 16, _ccitt_false),
-    "crc16_arc": ChecksumKind("CRC 0x8005, reflected, start 0", 16, _arc),
+    "crc16_arc": ChecksumKind(
+        "CRC 0x8005, reflected, start 0", 16, _by_table(Crc16Arc, reflected=True)
+    ),
 }
 """Every kind by its name, over all bytes of a frame but its own. Those of packages join it when a
 deployment names them."""
 
 _OURS = frozenset(CHECKSUMS)
+_NUMBERS: dict[str, tuple[int, int, int, int, bool]] = {}
+"""What ``crc_kind`` made a row from, by its name."""
 _SHA256: dict[str, str] = {}
 """Of the modules that added a kind, by kind."""
 
@@ -238,7 +324,7 @@ def known_checksum(kind: object) -> str:
 
 def checksum_names() -> list[str]:
     """Names of all kinds, ours first; no package is loaded for it."""
-    return list(dict.fromkeys([*CHECKSUMS, *_packages()]))
+    return list(dict.fromkeys([*(n for n in CHECKSUMS if n in _OURS), *_packages()]))
 
 
 def package_line(kind: str) -> str | None:

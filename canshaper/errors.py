@@ -10,6 +10,7 @@
      |    +-- WrongDeviceError      so is an interface
      |    +-- GatewayError          the kernel's gateway refuses
      +-- ControlError           a running daemon cannot be reached, or refuses
+     +-- NodeError              so with a node of CANopen that is to be set
      +-- WrongLengthError       a frame is shorter or longer than its message
      +-- PageMessageError       what a page sent is no message
      +-- LogError               a log cannot be used
@@ -19,6 +20,8 @@
      +-- DesignError            a design or simulation that cannot be, or finds nothing that fits
      |    +-- InfeasibleError       no poles keep all requirements
      |    +-- DriveError            a simulated drive could not be made
+     +-- CampaignError          a campaign cannot begin or go on; what is done is kept
+     |    +-- WorkerError           a process that drives is not the program that asks it to
      +-- MeasurementError       a measurement failed, or says nothing
           +-- IdentificationError   of the swing
           +-- CalibrationError      of a valve
@@ -109,6 +112,10 @@ class ControlError(CanshaperError):
     """A running daemon cannot be reached, or refuses."""
 
 
+class NodeError(CanshaperError):
+    """A node of CANopen does not answer, or does not take a parameter."""
+
+
 class WrongLengthError(CanshaperError):
     """A frame is shorter or longer than its message in the DBC file."""
 
@@ -143,6 +150,25 @@ class InfeasibleError(DesignError):
 
 class DriveError(DesignError):
     """A simulated drive could not be made."""
+
+
+class CampaignError(CanshaperError):
+    """A campaign cannot begin or go on; what is done is kept."""
+
+
+class WorkerError(CampaignError):
+    """A process that is to drive is not the program that asks it to.
+
+    Attributes:
+        worker: its address.
+    """
+
+    def __init__(self, worker: str, text: str) -> None:
+        super().__init__(worker, text)
+        self.worker = worker
+
+    def __str__(self) -> str:
+        return f"worker {self.args[0]}: {self.args[1]}"
 
 
 class MeasurementError(CanshaperError):

@@ -17,3 +17,10 @@ def deployment_path(name: str | Path) -> Path:
         return path
     shipped = data_directory() / "config" / path.name
     return shipped if shipped.exists() and path.parent in (Path(), Path("config")) else path
+
+
+def site_directory() -> Path | None:
+    """Directory of the built site of the pages; None where it is neither installed nor built."""
+    data = data_directory()
+    places = (data / "site", data / "out" / "site")
+    return next((one for one in places if (one / "index.html").exists()), None)

@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[1]
 FILE = ROOT / "docs" / "architecture.svg"
 # Stops of a joystick frame: bus, I/O cycle, routing, what is known of the message, axis, valve.
 PATH = ("bus", "daemon", "controller", "inputs", "shaping", "codec")
-DESK = ("cli", "studio", "commissioning", "recording", "design", "report")
+DESK = ("cli", "studio", "campaign", "commissioning", "recording", "design", "report")
 WIDTH, ROW, LEFT = 960, 46, 24
 STYLE = """
   text { font: 13px sans-serif; fill: #1c2733 } .name { font-weight: bold }

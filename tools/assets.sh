@@ -1,6 +1,7 @@
 #!/bin/sh
-# Fetch and pack the libraries of the live page into canshaper/studio/static/vendor; needs npm.
-# The result is kept in the repository: neither the page nor its tests need this script.
+# Fetch and pack the libraries of the live page into canshaper/studio/static/vendor, and that of the
+# site of the pages into tools/site/vendor; needs npm. The result is kept in the repository: neither
+# page nor site nor their tests need this script.
 #
 # Versions stand in tools/assets/package.json, the hashes of their packages in package-lock.json,
 # those of the result in vendor/SHA256SUMS. After a change of a version:
@@ -8,6 +9,7 @@
 set -eu
 cd "$(dirname "$0")/.."
 vendor=$PWD/canshaper/studio/static/vendor
+site=$PWD/tools/site/vendor
 
 work=$(mktemp -d)
 trap 'rm -rf "$work"' EXIT
@@ -26,12 +28,21 @@ export {
 export { OrbitControls } from "three/examples/jsm/controls/OrbitControls.js";
 END
 echo 'export { default } from "uplot";' >uplot.js
+banner() { # NAME
+  version=$(node -p "require('./node_modules/$1/package.json').version")
+  echo "/* $1 $version, MIT licence: $1.LICENSE */"
+}
 for name in three uplot; do
-  version=$(node -p "require('./node_modules/$name/package.json').version")
   ./node_modules/.bin/esbuild "$name.js" --bundle --minify --format=esm --legal-comments=none \
-    --banner:js="/* $name $version, MIT licence: $name.LICENSE */" --outfile="$vendor/$name.js"
+    --banner:js="$(banner $name)" --outfile="$vendor/$name.js"
   cp "node_modules/$name/LICENSE" "$vendor/$name.LICENSE"
 done
 cp node_modules/uplot/dist/uPlot.min.css "$vendor/uplot.css"
 cd "$vendor"
 sha256sum three.LICENSE three.js uplot.LICENSE uplot.css uplot.js >SHA256SUMS
+cd "$work"
+mkdir -p "$site"
+{ banner iframe-worker && cat node_modules/iframe-worker/shim/index.js; } >"$site/iframe-worker.js"
+cp node_modules/iframe-worker/LICENSE "$site/iframe-worker.LICENSE"
+cd "$site"
+sha256sum iframe-worker.LICENSE iframe-worker.js >SHA256SUMS

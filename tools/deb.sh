@@ -4,6 +4,7 @@
 #
 # Everything the daemon needs but Python itself lies in /usr/lib/canshaper, so the package neither
 # uses nor disturbs Python packages of the system. It fits the Python of the machine it was built on.
+# With the site and the manual pages in it where these were built: make deb does that.
 # Plain dpkg-deb with the files of tools/deb: no root, no debhelper. DEBFULLNAME and DEBEMAIL name
 # the maintainer; SOURCE_DATE_EPOCH the time, else that of the last commit.
 set -eu
@@ -46,7 +47,7 @@ SOURCE_DATE_EPOCH=${SOURCE_DATE_EPOCH:-$(git log -1 --format=%ct 2>/dev/null || 
 export SOURCE_DATE_EPOCH PYTHONHASHSEED=0
 
 rm -rf "$work"
-mkdir -p "$library" "$documents" "$root/DEBIAN" "$root/usr/bin" "$root/usr/share/man/man1" \
+mkdir -p "$library" "$documents" "$root/DEBIAN" "$root/usr/bin" \
     "$root/usr/share/canshaper" "$root/lib/systemd/system" "$root/etc/canshaper/dbc" \
     "$root/usr/share/lintian/overrides" dist
 
@@ -62,6 +63,15 @@ rm -rf "$library/bin" "$library"/*.dist-info/RECORD "$library"/*.dist-info/direc
 find "$library" -name '*.py[ci]' -delete
 # One copy of the shipped deployments, where an administrator looks for it.
 mv "$library/canshaper/data/config" "$library/canshaper/data/dbc" "$root/usr/share/canshaper"
+if [ -d "$library/canshaper/data/site" ]; then
+    mv "$library/canshaper/data/site" "$root/usr/share/canshaper"
+    ln -s ../../canshaper/site "$documents/html"
+    mv "$library/share/man" "$root/usr/share"
+    gzip -9n "$root/usr/share/man/man1"/*
+    rmdir "$library/share"
+else
+    echo "without site and manual pages: make deb builds them" >&2
+fi
 rmdir "$library/canshaper/data"
 ln -s ../../../share/canshaper "$library/canshaper/data"
 mv "$root/usr/share/canshaper/config/systemd"/*.service "$root/lib/systemd/system"
@@ -79,11 +89,9 @@ done
 
 sed "s|@LIBRARY@|/usr/lib/canshaper|" tools/deb/canshaper >"$root/usr/bin/canshaper"
 chmod 755 "$root/usr/bin/canshaper"
-cp docs/service.md docs/deployment.md docs/states.md docs/safety.md docs/machine-manual.md \
-    SECURITY.md "$documents"
+cp docs/*.md SECURITY.md "$documents"
 "$work/venv/bin/python" tools/deb/sbom.py "$library" "$version" \
     >"$documents/sbom.cdx.json"
-gzip -9n <tools/deb/canshaper.1 >"$root/usr/share/man/man1/canshaper.1.gz"
 cp tools/deb/lintian-overrides "$root/usr/share/lintian/overrides/canshaper"
 { cat tools/deb/copyright && "$python" tools/deb/bundled.py "$library"; } >"$documents/copyright"
 maintainer="${DEBFULLNAME:-canshaper} <${DEBEMAIL:-canshaper@example.org}>"
@@ -97,8 +105,14 @@ END
 
 # Same content, same package: bytecode that does not depend on times, and fixed times.
 "$python" -m compileall -q -s "$root" --invalidation-mode unchecked-hash "$library"
-# The administrator's copies must be good as they lie there.
 sed "s|@LIBRARY@|$PWD/$library|" tools/deb/canshaper >"$work/canshaper"
+for shell in bash zsh fish; do
+    _CANSHAPER_COMPLETE=source_$shell "$python" -ISB "$work/canshaper" >"$work/completion.$shell"
+done
+install -D -m 644 "$work/completion.bash" "$root/usr/share/bash-completion/completions/canshaper"
+install -D -m 644 "$work/completion.zsh" "$root/usr/share/zsh/vendor-completions/_canshaper"
+install -D -m 644 "$work/completion.fish" "$root/usr/share/fish/vendor_completions.d/canshaper.fish"
+# The administrator's copies must be good as they lie there.
 for file in "$root"/etc/canshaper/*.yaml; do
     "$python" -ISB "$work/canshaper" check "$file" >/dev/null
 done

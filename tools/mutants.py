@@ -1,4 +1,4 @@
-"""mutmut with more operators, and what its result says; for tools/mutation.py.
+"""Mutants by mutmut and more operators, and what their tests say; for tools/mutation.py.
 
     mutants.py run PROCESSES [PATTERN ...]         all; run-typed: without what mypy refuses
     mutants.py judge SURVIVORS [PATTERN ...]
@@ -11,25 +11,26 @@ import re
 import signal
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from difflib import unified_diff
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import libcst as cst
 from mutant_names import explained, numbered
+from mutant_run import FAILED, UNREACHED, Forks
 from mutmut import __main__ as mutmut
+from mutmut.configuration import config
 from mutmut.mutation.data import SourceFileMutationData
 from mutmut.mutation.diff_apply import read_functions_from_index
 from mutmut.mutation.mutators import mutation_operators
+from mutmut.mutation.trampoline import set_mutant_under_test
 from mutmut.runners.harness import PytestRunner
-from mutmut.state import state
 from mutmut.utils.file_utils import change_cwd, walk_mutatable_files
-from mutmut.workers import isolation
+from mutmut.workers.isolation import ForkRunner
 
-# Exit codes of mutmut's workers: a test failed, or its time was up (a loop that never ends).
-KILLED, TIMED_OUT, SURVIVED, TYPES = (1, 3), (-27, -24, 24, 36, 152, 255), 0, 37
-UNREACHED = 33  # none of the chosen tests calls the function
+# Exit codes: no test failed; the time was up (a loop that never ends); left to the type checker.
+SURVIVED, TIMED_OUT, TYPES = 0, (-signal.SIGPROF, -signal.SIGXCPU), 37
 
 
 class Mutant(NamedTuple):
@@ -40,6 +41,11 @@ class Mutant(NamedTuple):
     name: str  # function: operator #number
     before: str
     after: str
+
+    def save(self, exit_code: int) -> None:
+        """Keep the exit code of its tests."""
+        self.data.exit_code_by_key[self.key] = exit_code
+        self.data.save()
 
     def difference(self) -> str:
         """Lines that changed."""
@@ -80,49 +86,40 @@ MORE = (
 # -- the run, in the working directory -------------------------------------------------------------
 
 
-def patient(pid: int, timeout_s: float) -> None:
-    """Leave the limit to processor time: on a busy machine the clock would kill what survives."""
-    register_timeout(pid, 30.0 * timeout_s)
-
-
-register_timeout = isolation.register_timeout
-
-
-class Limit:
-    """Ends a worker in one of whose tests a loop never ends, by processor time."""
-
-    def pytest_runtest_logstart(self, nodeid: str, location: Any) -> None:
-        """Four times what the test takes without a mutant, and two seconds more."""
-        signal.setitimer(signal.ITIMER_PROF, 2.0 + 4.0 * state().duration_by_test[nodeid])
-
-
-def run_tests(runner: PytestRunner, *, mutant_name: str | None, tests: Iterable[str]) -> int:
-    """Run tests as mutmut does, each of those of a mutant with a limit."""
-    plugins = [Limit()] if mutant_name else []
-    with change_cwd("mutants"):
-        return int(runner.execute_pytest(runner._pytest_args_regular_run(tests), plugins=plugins))
-
-
-def run(processes: int, patterns: list[str], *, none: bool) -> None:
-    """Run mutmut.
+def run(processes: int, patterns: list[str], *, typed: bool) -> int:
+    """Make the mutants and run the tests of each.
 
     Args:
         processes: how many at a time.
         patterns: names of mutants; none for all.
-        none: whether what puts None into the code is run too, which the type checker refuses.
+        typed: whether what puts None into the code is left to the type checker, which refuses it.
+
+    Returns:
+        Exit code of pytest.
     """
     mutation_operators.extend(MORE)  # type: ignore[attr-defined]
-    isolation.register_timeout = patient
-    PytestRunner.run_tests = run_tests  # type: ignore[method-assign]
-    if not none:
-        Path("mutants").mkdir()
-        mutmut.copy_src_dir()
-        mutmut.create_mutants(processes)
-        for mutant in mutants():
-            if re.search(r"-> None #\d+$", mutant.name):
-                mutant.data.exit_code_by_key[mutant.key] = TYPES
-                mutant.data.save()
-    mutmut._run(patterns, processes)
+    Path("mutants").mkdir()
+    set_mutant_under_test("mutant_generation")
+    mutmut.copy_src_dir()
+    mutmut.copy_also_copy_files()
+    mutmut.setup_source_paths()
+    mutmut.create_mutants(processes)
+    chosen = []
+    for mutant in mutants():
+        if typed and re.search(r"-> None #\d+$", mutant.name):
+            mutant.save(TYPES)
+        elif any(fnmatch.fnmatch(mutant.key, pattern) for pattern in patterns or ["*"]):
+            chosen.append(mutant)
+    runner = PytestRunner()
+    mutmut.collect_or_load_stats(ForkRunner(processes, runner))  # which test reaches what
+    set_mutant_under_test("")
+    forks = Forks([mutant.key for mutant in chosen], processes)
+    with change_cwd("mutants"):
+        every_test = config().pytest_add_cli_args_test_selection
+        code = runner.execute_pytest(["-q", *every_test], plugins=[forks])
+    for mutant in chosen:
+        mutant.save(forks.exit_codes[mutant.key])
+    return code
 
 
 def mutants() -> Iterator[Mutant]:
@@ -163,8 +160,8 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
             continue
         code = mutant.data.exit_code_by_key[mutant.key]
         seen.add(mutant.name)
-        if code in (*KILLED, *TIMED_OUT):
-            counts["killed" if code in KILLED else "killed by the time limit"] += 1
+        if code in (FAILED, *TIMED_OUT):
+            counts["killed" if code == FAILED else "killed by the time limit"] += 1
             if mutant.name in known:
                 failures += 1
                 print(f"\n# killed, though explained\n{mutant.name}\n{mutant.difference()}")
@@ -191,6 +188,6 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
 if __name__ == "__main__":
     match sys.argv[1:]:
         case ["run" | "run-typed" as how, processes, *patterns]:
-            run(int(processes), patterns, none=how == "run")
+            sys.exit(run(int(processes), patterns, typed=how == "run-typed"))
         case ["judge", survivors, *patterns]:
             sys.exit(judge(explained(Path(survivors)), patterns))

@@ -37,6 +37,7 @@ CORE_TESTS = [
     "test_axis*.py",
     "test_limits.py",
     "test_motion.py",
+    "test_other_plane.py",
     "test_sensed.py",
     "test_sets.py",
     "test_small_strokes.py",
@@ -70,7 +71,7 @@ only_mutate = {only}
 also_copy = {COPIED[1:]}
 pytest_add_cli_args_test_selection = {tests}
 pytest_add_cli_args = [
-    "-m", "not long and not processes", "--hypothesis-profile=few", "-p", "no:cacheprovider",
+    "-m", "not long and not processes", "--hypothesis-profile=mutants", "-p", "no:cacheprovider",
     "-p", "no:unraisableexception",  # collects garbage at the end of every run
 ]
 timeout_multiplier = 2.0

@@ -104,5 +104,9 @@ class Recorder:
                 put(kind, 0, 0, False, number, time_ns, b"")
             else:
                 bus, can_id, extended, data = frame
-                put(kind, buses[bus], len(data), extended, can_id, time_ns, data)
+                length = len(data)
+                while len(data) > CHUNK:
+                    put(Kind.BEFORE, buses[bus], CHUNK, extended, can_id, time_ns, data[:CHUNK])
+                    data = data[CHUNK:]
+                put(kind, buses[bus], length, extended, can_id, time_ns, data)
         self._calls.clear()

@@ -34,6 +34,8 @@ class Kind(IntEnum):
     """A bus has a fault: ``number`` is that of the fault."""
     SET = 10
     """Numbers were changed by hand: a part of their JSON; ``number`` bytes are left with it."""
+    BEFORE = 11
+    """8 bytes of the frame of the next record, in front of its data: CAN FD has up to 64."""
 
 
 class Record(NamedTuple):
@@ -54,5 +56,13 @@ class Record(NamedTuple):
 
 
 def records(data: bytes | memoryview) -> Iterator[Record]:
-    """Every record of a segment, in the order in which things happened."""
-    return map(Record._make, RECORD.iter_unpack(data))
+    """Every record of a segment, in the order in which things happened, each with all its data."""
+    before = b""
+    for record in map(Record._make, RECORD.iter_unpack(data)):
+        if record.kind == Kind.BEFORE:
+            before += record.data
+        elif before:
+            yield record._replace(data=before + record.data)
+            before = b""
+        else:
+            yield record

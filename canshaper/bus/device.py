@@ -21,7 +21,8 @@ from canshaper.errors import WrongDeviceError
 ROOT = Path("/")
 # linux/rtnetlink.h, linux/if_link.h, linux/can/netlink.h; Python has no names for these.
 GET_LINK = 18
-LINK_INFO, INFO_KIND, INFO_DATA, CAN_BIT_TIMING = 18, 1, 2, 1
+FD_MTU = 72  # linux/can.h, CANFD_MTU
+LINK_INFO, INFO_KIND, INFO_DATA, CAN_BIT_TIMING, CAN_DATA_BIT_TIMING = 18, 1, 2, 1, 9
 _LINK = struct.Struct("=BxHiII")  # ifinfomsg
 _BITRATE = struct.Struct("=I")  # the first member of can_bittiming
 # What two places in the tree of devices are called, and which of their parents they stand for; as
@@ -30,8 +31,8 @@ _USB_PORT = re.compile(r"\d+-(.+)")
 _CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
 
 
-KindAndBitrate = tuple[str | None, int | None]
-Ask = Callable[[int], KindAndBitrate]
+KindAndBitrates = tuple[str | None, int | None, int | None]
+Ask = Callable[[int], KindAndBitrates]
 
 
 @dataclass(frozen=True)
@@ -46,6 +47,7 @@ class Device:
         driver: of the kernel; the kind of an interface without hardware, such as vcan.
         bitrate: bit/s.
         channels: interfaces of the same adapter.
+        data_bitrate: bit/s of the data of CAN FD.
     """
 
     name: str
@@ -55,10 +57,11 @@ class Device:
     driver: str | None
     bitrate: int | None
     channels: int = 1
+    data_bitrate: int | None = None
 
 
-def kind_and_bitrate(index: int) -> KindAndBitrate:
-    """Ask the kernel for kind and bit rate of an interface.
+def kind_and_bitrates(index: int) -> KindAndBitrates:
+    """Ask the kernel for kind, bit rate and that of the data of an interface.
 
     Raises:
         OSError: there is no such interface, or netlink is not permitted.
@@ -66,19 +69,19 @@ def kind_and_bitrate(index: int) -> KindAndBitrate:
     (body,) = ask(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
     info = dict(attributes(dict(attributes(body[_LINK.size :])).get(LINK_INFO, b"")))
     kind = info.get(INFO_KIND, b"").rstrip(b"\0").decode() or None
-    timing = (
-        dict(attributes(info.get(INFO_DATA, b""))).get(CAN_BIT_TIMING) if kind == "can" else b""
-    )
-    return kind, (_BITRATE.unpack_from(timing)[0] if timing else None)
+    data = dict(attributes(info.get(INFO_DATA, b""))) if kind == "can" else {}
+    timings = (data.get(CAN_BIT_TIMING), data.get(CAN_DATA_BIT_TIMING))
+    rates = [_BITRATE.unpack_from(timing)[0] if timing else None for timing in timings]
+    return kind, rates[0], rates[1]
 
 
-def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate) -> Device:
+def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates) -> Device:
     """The device behind an interface.
 
     Args:
         name: of the interface.
         root: of the file system.
-        ask_kernel: for kind and bit rate of the interface with an index.
+        ask_kernel: for kind and bit rates of the interface with an index.
 
     Raises:
         OSError: ENODEV where there is no such interface, or the name changed hands meanwhile;
@@ -88,7 +91,7 @@ def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate
     index = _number(directory / "ifindex")
     if index is None:
         raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
-    kind, bitrate = ask_kernel(index)
+    kind, bitrate, data_bitrate = ask_kernel(index)
     hardware = directory / "device"
     real = hardware.is_dir()
     places = list(_upwards(hardware.resolve(), root)) if real else []
@@ -100,6 +103,7 @@ def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate
         (_linked(hardware / "driver") if real else None) or kind,
         bitrate,
         max(len(list((hardware / "net").glob("*"))), 1),
+        data_bitrate,
     )
     if _number(directory / "ifindex") != index:  # what was read may be of two devices
         raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
@@ -131,6 +135,18 @@ def check_device(sockets: Sequence[socket.socket], bus: Bus) -> None:
         raise WrongDeviceError(fault)
 
 
+def check_mtu(bus: Bus, root: Path = ROOT) -> None:
+    """Whether the interface of a bus of CAN FD is set up for it.
+
+    Raises:
+        OSError: it is not.
+    """
+    mtu = _number(root / "sys/class/net" / bus.channel / "mtu") if bus.fd else None
+    if mtu is not None and mtu < FD_MTU:
+        text = f"expected an interface with CAN FD, which has the MTU {FD_MTU}, got {mtu}"
+        raise OSError(errno.EINVAL, text)
+
+
 def device_fault(bus: Bus, device: Device) -> str | None:
     """Why a device is not the one of a bus; None where it is, or the bus asks for none."""
     wanted = expected(bus, device)
@@ -145,13 +161,14 @@ def device_fault(bus: Bus, device: Device) -> str | None:
 def expected(bus: Bus, device: Device) -> dict[str, str | int]:
     """What a device has to have, by its fields.
 
-    The bit rate of the bus counts too, for an interface that has one.
+    The bit rates of the bus count too, for an interface that has them.
     """
     if bus.match is None:
         return {}
     wanted: dict[str, str | int] = bus.match.model_dump(exclude_none=True)
-    if bus.bitrate is not None and device.bitrate is not None:
-        wanted.setdefault("bitrate", bus.bitrate)
+    for key in ("bitrate", "data_bitrate"):
+        if (rate := getattr(bus, key)) is not None and getattr(device, key) is not None:
+            wanted.setdefault(key, rate)
     return wanted
 
 
@@ -165,7 +182,7 @@ def match_fault(bus: Bus) -> str | None:
     return f"{fault}{whereabouts(bus)}" if fault else None
 
 
-def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate) -> str:
+def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates) -> str:
     """Which interface is the device of a bus now, behind a message; empty where none is named.
 
     It is only reported, never used by itself: which bus is driven stands in the file.
@@ -193,6 +210,7 @@ _WORDS = {
     "port": "port",
     "driver": "driver",
     "bitrate": "bit rate",
+    "data_bitrate": "data bit rate",
 }
 
 

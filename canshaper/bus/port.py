@@ -1,33 +1,24 @@
 """CAN buses of a deployment: SocketCAN by raw sockets, everything else through python-can.
 
-Every error of a bus is counted and told, none leaves this module; reading and sending go on with
-the next tick, so an interface that comes back is used again.
+Every error of a bus is counted and reported, none leaves this module; reading and sending go on
+with the next tick, so an interface that comes back is used again.
 """
 
 import errno
-from collections import deque
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+import socket
+import sys
+from collections.abc import Callable, Iterable, Iterator
 from functools import partial
-from typing import Any, Protocol
+from typing import Protocol
 
-import can
-
-from canshaper.bus.arrival import Arrivals
 from canshaper.bus.device import whereabouts
-from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
-from canshaper.bus.raw import MOST_FRAMES, RawPort
+from canshaper.bus.python_can import PythonCanPort
+from canshaper.bus.raw import RawPort
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError, WrongBusError, WrongDeviceError
 from canshaper.machine.routing import BusRoutes
-
-# Frames sent and not yet seen again: a few ticks of a machine with many axes.
-MOST_ECHOES = 256
-# Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
-# behind it must not grow old; a bus that is gone fails at every call.
-MOST_FAILURES = 20
 
 
 class Port(Protocol):
@@ -50,7 +41,7 @@ class Port(Protocol):
         """Every frame that waits, in order; ends when there is none or the bus fails."""
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valves have been told: other senders with our ids, and so on."""
+        """What can wait until the valve frames are out: other senders with our ids, and so on."""
 
     def send(self, frame: Frame) -> bool:
         """Send now or not at all; False when the frame did not go out."""
@@ -66,7 +57,12 @@ class Port(Protocol):
 
 
 def open_port(
-    name: str, config: Bus, on_fault: Callable[[FrameFault], None], ids: BusRoutes | None = None
+    name: str,
+    config: Bus,
+    on_fault: Callable[[FrameFault], None],
+    ids: BusRoutes | None = None,
+    *,
+    fd: Iterable[tuple[int, bool]] = (),
 ) -> Port:
     """Open a bus.
 
@@ -75,13 +71,15 @@ def open_port(
         config: its section.
         on_fault: called with every fault of the bus.
         ids: the messages that matter; None takes all frames.
+        fd: without ``ids``, what is sent in frames of CAN FD.
 
     Raises:
         BusError: the bus cannot be opened, or is another device; the message says which and why.
     """
     try:
+        fd = ids.fd if ids else fd
         if config.interface != "socketcan":
-            return PythonCanPort(name, config, on_fault)
+            return PythonCanPort(name, config, on_fault, fd)
         return RawPort(
             name,
             partial(open_sockets, config),
@@ -89,16 +87,25 @@ def open_port(
             on_fault,
             confirms=ids is not None,
             matched=config.match is not None,
+            fd=fd if config.fd else None,
+            brs=config.data_bitrate is not None,
         )
     except WrongDeviceError as error:
         raise WrongBusError(name, f"{error}{whereabouts(config)}") from error
     except Exception as error:  # each interface raises its own kinds
-        text = (error.strerror if isinstance(error, OSError) else None) or str(error)
-        if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
-            text = "this kernel has no CAN, or its module can_raw is not loaded"
-        where = f"{config.interface} channel {config.channel}"
-        text = f"{text or type(error).__name__}{whereabouts(config)}"
-        raise BusError(f"bus {name}: cannot open {where}: {text}") from error
+        raise not_opened(name, config, error) from error
+
+
+def not_opened(name: str, config: Bus, error: Exception) -> BusError:
+    """A bus that cannot be opened, in the words of every verb; ``error`` is why."""
+    text = (error.strerror if isinstance(error, OSError) else None) or str(error)
+    if isinstance(error, OSError) and error.errno == errno.EAFNOSUPPORT:
+        text = "this kernel has no CAN, or its module can_raw is not loaded"
+    if config.interface == "socketcan" and not hasattr(socket, "AF_CAN"):
+        text = f"it needs Linux, got {sys.platform}; python-can has other interfaces"
+    where = f"{config.interface} channel {config.channel}"
+    text = f"{text or type(error).__name__}{whereabouts(config)}"
+    return BusError(f"bus {name}: cannot open {where}: {text}")
 
 
 class ListeningPort:
@@ -146,108 +153,3 @@ class ListeningPort:
     def close(self) -> None:
         """Close the bus."""
         self._port.close()
-
-
-class PythonCanPort:
-    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
-
-    def __init__(self, name: str, config: Bus, on_fault: Callable[[FrameFault], None]) -> None:
-        self.name = name
-        self.state = BusState.UP
-        self.arrived_ns = 0
-        self._arrivals = Arrivals()  # before a frame can arrive
-        self._on_fault = on_fault
-        self._bus = open_python_can(config)
-        # Multicast brings back what this process sent; the others do not.
-        multicast = config.interface == "udp_multicast"
-        self._echoes: deque[Frame] | None = deque(maxlen=MOST_ECHOES) if multicast else None
-
-    def frames(self) -> Iterator[Frame]:
-        """Every frame that waits, in order; ends when there is none or the bus fails."""
-        receive, failures = self._bus.recv, 0
-        # python-can's own times are those of whatever clock an interface has.
-        self.arrived_ns = self._arrivals.begin()
-        for _ in range(MOST_FRAMES):
-            try:
-                message = receive(0)
-            except Exception:  # each interface raises its own kinds
-                self.state = BusState.FAILED
-                self._on_fault(FrameFault.BUS_ERROR)
-                failures += 1
-                if failures == MOST_FAILURES:
-                    return
-                continue
-            if message is None:
-                self._arrivals.emptied()
-                return
-            self.state = BusState.UP
-            if message.is_error_frame:  # first: its id is an error class, and could match
-                self._on_fault(FrameFault.ERROR_FRAME)
-            elif message.is_remote_frame or message.is_fd:
-                self._on_fault(FrameFault.WRONG_LENGTH)
-            else:
-                frame = Frame(
-                    self.name, message.arbitration_id, message.is_extended_id, bytes(message.data)
-                )
-                if self._echoes and frame in self._echoes:
-                    self._echoes.remove(frame)
-                else:
-                    yield frame
-
-    def background(self) -> Iterator[Frame]:
-        """Nothing: ``frames`` hands out everything."""
-        return iter(())
-
-    def send(self, frame: Frame) -> bool:
-        """Send now or not at all; False when the frame did not go out."""
-        message = can.Message(
-            arbitration_id=frame.can_id, is_extended_id=frame.extended, data=frame.data
-        )
-        try:
-            self._bus.send(message)
-        except Exception:  # as above
-            self.state = BusState.FAILED
-            return False
-        if self._echoes is not None:
-            self._echoes.append(frame)
-        return True
-
-    def watch(self, name: str, ids: BusRoutes) -> None:
-        """Serve another deployment: its name of the bus."""
-        self.name = name
-
-    def fileno(self) -> int:
-        """File descriptor to wait on; -1 where the interface has none."""
-        try:
-            return int(self._bus.fileno())
-        except Exception:  # most have none and say so in their own way
-            return -1
-
-    def close(self) -> None:
-        """Close the bus; errors of a bus that is gone do not matter any more."""
-        with suppress(Exception):
-            self._bus.shutdown()
-
-
-def open_python_can(config: Bus) -> can.BusABC:
-    """Open a bus of python-can; ``udp_multicast`` stays on this machine but with ``network``.
-
-    Raises:
-        Exception: each interface raises its own kinds.
-    """
-    if config.interface == "udp_multicast" and not config.network:
-        return LocalMulticastBus(config.channel)
-    options: dict[str, Any] = {} if config.bitrate is None else {"bitrate": config.bitrate}
-    # ignore_config: files and variables of the environment must not change the bus
-    bus = can.Bus(
-        interface=config.interface,
-        channel=config.channel,
-        ignore_config=True,
-        receive_own_messages=False,
-        **options,
-    )
-    if config.interface == "udp_multicast":
-        receive_one_group(bus.fileno())
-        while bus.recv(0) is not None:  # of other groups, until now
-            pass
-    return bus

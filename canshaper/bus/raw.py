@@ -1,4 +1,4 @@
-"""A bus on raw sockets that carry the kernel's ``struct can_frame``, made for a control loop.
+"""A bus on raw sockets that carry the kernel's frames, made for a control loop.
 
 What a valve needs: a frame goes out now or not at all; frames that do not get onto the bus are seen
 and no more are queued behind them; an interface that comes back is used again by itself.
@@ -7,21 +7,18 @@ and no more are queued behind them; an interface that comes back is used again b
 import errno
 import select
 import socket
-import struct
 import time
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
+from canshaper.bus.packet import BRS, CAN_FRAME, FD_FRAME, FD_SIZE, FDF, SIZE, WORD
 from canshaper.bus.socketcan import dropped_frames, set_filters
 from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
 from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
-
-CAN_FRAME = struct.Struct("=IB3x8s")  # linux/can.h, struct can_frame
-SIZE = CAN_FRAME.size
 
 # Frames taken in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
 # empties any backlog and still cannot hold up the tick for ever.
@@ -66,6 +63,8 @@ class RawPort:
         confirms: whether our own frames come back when they were sent, with MSG_CONFIRM.
         matched: whether ``open_sockets`` looks at the device: then an interface that was down is
             opened again too, because name and bit rate may be others when it is back.
+        fd: what is sent in frames of CAN FD; None on a bus of classical CAN.
+        brs: whether their data are sent at a bit rate of their own.
 
     Attributes:
         state: of the bus, as far as seen.
@@ -86,6 +85,8 @@ class RawPort:
         *,
         confirms: bool,
         matched: bool = False,
+        fd: Iterable[tuple[int, bool]] | None = None,
+        brs: bool = False,
     ) -> None:
         self.name = name
         self.state = UP
@@ -98,6 +99,9 @@ class RawPort:
         self._since_ns: dict[int, int] = {}
         self._dropped = 0
         self._ids = ids
+        self._size = SIZE if fd is None else FD_SIZE
+        self._fd = _words(fd or ())
+        self._fd_flags = FDF | BRS if brs else FDF
         self._valves = _words(ids.valves if ids else ())
         self._claims = _words(ids.claims if ids else ())
         self._claimed: deque[Any] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
@@ -110,13 +114,14 @@ class RawPort:
         if not self._sockets and not self._reopened():
             return
         waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
+        size = self._size
         arrivals.begin()
         for _ in _EACH_FRAME:
             if not waiting(0):  # cheaper than the exception of a socket with nothing to read
                 arrivals.emptied()
                 return
             try:
-                data, ancillary, _flags, _sender = receive(SIZE, ANCILLARY_BYTES)
+                data, ancillary, _flags, _sender = receive(size, ANCILLARY_BYTES)
             except OSError as error:
                 self._failed(error)
                 return
@@ -149,20 +154,19 @@ class RawPort:
             if not waiting(0):
                 return
             try:
-                data, _ancillary, flags, _sender = receive(SIZE)
+                data, _ancillary, flags, _sender = receive(self._size)
             except OSError as error:
                 self._failed(error)
                 return
-            if flags & socket.MSG_CONFIRM and len(data) == SIZE:
-                self._confirmed(CAN_FRAME.unpack(data)[0])
+            if flags & socket.MSG_CONFIRM and len(data) in (SIZE, FD_SIZE):
+                self._confirmed(WORD.unpack_from(data)[0])
             elif (frame := self._frame(data)) is not None:
                 yield frame
 
     def _frame(self, data: bytes) -> Frame | None:
         """The frame, where it is one that can be taken."""
         if len(data) != SIZE:
-            self._on_fault(FrameFault.WRONG_LENGTH)
-            return None
+            return self._fd_frame(data)
         word, length, payload = CAN_FRAME.unpack(data)
         if word <= SFF_MASK and length <= 8:  # the most frequent kind first
             return new_frame(Frame, (self.name, word, False, payload[:length]))
@@ -173,6 +177,16 @@ class RawPort:
             self._on_fault(FrameFault.WRONG_LENGTH)
             return None
         return Frame(self.name, word & EFF_MASK, True, payload[:length])
+
+    def _fd_frame(self, data: bytes) -> Frame | None:
+        """The same of one of CAN FD; a socket has them where it was asked to."""
+        if len(data) == FD_SIZE == self._size:
+            word, length, _flags, payload = FD_FRAME.unpack(data)
+            if length <= len(payload) and not word & (ERR_FLAG | RTR_FLAG):
+                extended = word & EFF_FLAG != 0
+                return Frame(self.name, word & EFF_MASK, extended, payload[:length])
+        self._on_fault(FrameFault.WRONG_LENGTH)
+        return None
 
     def _error_frame(self, word: int, payload: bytes) -> None:
         fault = FrameFault.ERROR_FRAME
@@ -202,7 +216,10 @@ class RawPort:
         under_way = self._unconfirmed.get(word, 0)
         if under_way and self._stuck(word, under_way):
             return False
-        packed = CAN_FRAME.pack(word, len(data), data)
+        if word in self._fd:
+            packed = FD_FRAME.pack(word, len(data), self._fd_flags, data)
+        else:
+            packed = CAN_FRAME.pack(word, len(data), data)
         try:
             self._send(packed)
         except OSError as error:
@@ -327,6 +344,7 @@ class RawPort:
         """Serve another deployment: its name of the bus, its messages."""
         self.name, self._ids = name, ids
         self._valves, self._claims = _words(ids.valves), _words(ids.claims)
+        self._fd = _words(ids.fd)
         self._forget()
         if self._sockets:
             try:

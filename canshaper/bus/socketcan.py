@@ -7,7 +7,7 @@ import socket
 import struct
 from collections.abc import Iterable
 
-from canshaper.bus.device import check_device
+from canshaper.bus.device import check_device, check_mtu
 from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
 from canshaper.codec.identifier import SERVICES, group_mask
 from canshaper.config.bus import Bus
@@ -37,7 +37,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     one for everything.
 
     Raises:
-        OSError: the kernel has no CAN, or there is no such interface.
+        OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD.
         WrongDeviceError: the interface is another device; nothing was sent or taken.
     """
     opened: list[socket.socket] = []
@@ -45,6 +45,8 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
         for _ in range(1 if ids is None else 3):
             opened.append(socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW))
             opened[-1].setblocking(False)
+            if bus.fd:
+                opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
         opened[0].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
         opened[0 if ids is None else 1].setsockopt(
             socket.SOL_CAN_RAW, CAN_RAW_ERR_FILTER, ERROR_CLASSES
@@ -57,6 +59,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
             set_filters(opened, ids)
         for one in opened:
             one.bind((bus.channel,))
+        check_mtu(bus)
         check_device(opened, bus)
     except (OSError, WrongDeviceError):
         for one in opened:

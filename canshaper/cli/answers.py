@@ -1,19 +1,129 @@
 """Answers to questions: each is checked when it is given, and asked again until it is one."""
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
 from typing import TypeVar
 
 import typer
 
 from canshaper.cli.common import echo
+from canshaper.errors import ConfigError, Problem
 
 _T = TypeVar("_T")
 NONE = "-"
 MOST_OFFERED = 6
+MOST_LISTED = 20
+
+
+class Given:
+    """Answers out of a file, for questions that no one is asked.
+
+    A line is ``QUESTION = ANSWER``, the question by its first words, that of an axis after its
+    name; ``#`` begins a comment. A question without a line takes what Enter would.
+
+    Args:
+        path: the file; None for no line at all.
+
+    Raises:
+        OSError: it cannot be read.
+        ConfigError: it is no text, or a line is none.
+    """
+
+    def __init__(self, path: Path | None) -> None:
+        self._path = path
+        self._left: dict[int, tuple[str, str]] = {}
+        self._axis = ""
+        if path:
+            self._read(path)
+
+    def _read(self, path: Path) -> None:
+        problems = []
+        try:
+            lines = path.read_text(encoding="utf-8-sig").splitlines()  # an editor may put a mark
+        except UnicodeDecodeError as error:
+            before = error.object[: error.start].count(b"\n")
+            text = f"expected UTF-8, got the byte 0x{error.object[error.start]:02X}"
+            raise ConfigError([Problem(str(path), before + 1, "", text)]) from None
+        for number, line in enumerate(lines, 1):
+            question, equals, answer = line.partition("#")[0].partition("=")
+            if equals and question.strip():
+                self._left[number] = question.strip(), answer.strip()
+            elif line.partition("#")[0].strip():
+                problems.append(
+                    Problem(str(path), number, "", f"expected QUESTION = ANSWER, got {line!r}")
+                )
+        if problems:
+            raise ConfigError(problems)
+
+    def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
+        """The answer to a question.
+
+        Raises:
+            ConfigError: it is none.
+        """
+        question = text.strip()
+        if text.startswith("    "):  # one more on the same axis
+            question = f"{self._axis}: {question}"
+        elif text.startswith("  "):
+            self._axis = question.partition(":")[0]
+        matches = (n for n, (words, _) in self._left.items() if question.startswith(words))
+        number = next(matches, None)
+        words, answer = self._left.pop(number) if number else (question, default)
+        try:
+            return parse(answer)
+        except ValueError as error:
+            raise ConfigError([Problem(str(self._path), number, words, str(error))]) from None
+
+    def check_all_used(self) -> None:
+        """Refuse answers to what was not asked.
+
+        Raises:
+            ConfigError: there are some.
+        """
+        problems = [
+            Problem(
+                str(self._path),
+                number,
+                words,
+                "expected a question of this command, once, got another",
+            )
+            for number, (words, _) in self._left.items()
+        ]
+        if problems:
+            raise ConfigError(problems)
+
+
+_given: Given | None = None
+
+
+@contextmanager
+def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
+    """Take the answers to all questions in the block from a file, where there is one.
+
+    With ``yes`` what has no line in it is answered as by Enter, without a file everything.
+    """
+    global _given  # noqa: PLW0603  # of the one command that runs
+    _given = Given(path) if path or yes else None
+    try:
+        yield
+        if _given:
+            _given.check_all_used()
+    finally:
+        _given = None
+
+
+def confirmed(text: str, *, default: bool) -> bool:
+    """Ask for yes or no."""
+    if _given:
+        return _given.answer(text, one(("yes", "no")), "yes" if default else "no") == "yes"
+    return typer.confirm(text, default=default)
 
 
 def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
     """Ask until the answer is one."""
+    if _given:
+        return _given.answer(text, parse, default)
     while True:
         try:
             return parse(str(typer.prompt(text, default=default)).strip())
@@ -24,7 +134,7 @@ def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
 def name(taken: Collection[str]) -> Callable[[str], str]:
     """Takes a word that can be a name in a deployment file and is none of those taken, or NONE."""
 
-    from canshaper.config.first import plain
+    from canshaper.config.flow import plain
 
     def parse(text: str) -> str:
         if text != NONE and not (text.isidentifier() and plain(text) == text):
@@ -44,12 +154,21 @@ def channel(text: str) -> str:
     return text
 
 
+def _listed(allowed: Sequence[str], text: str) -> str:
+    """Those that are allowed, not more than a person reads, and the one that looks like a text."""
+    from canshaper.config.similar import did_you_mean
+
+    names = ", ".join(allowed[:MOST_LISTED])
+    more = f" and {len(allowed) - MOST_LISTED} more" if len(allowed) > MOST_LISTED else ""
+    return f"{names}{more}, got {text!r}{did_you_mean(text, allowed)}"
+
+
 def one(allowed: Sequence[str]) -> Callable[[str], str]:
     """Takes one of these."""
 
     def parse(text: str) -> str:
         if text not in allowed:
-            raise ValueError(f"expected one of {', '.join(allowed)}, got {text!r}")
+            raise ValueError(f"expected one of {_listed(allowed, text)}")
         return text
 
     return parse
@@ -61,7 +180,7 @@ def several(allowed: Sequence[str]) -> Callable[[str], list[str]]:
     def parse(text: str) -> list[str]:
         names = text.replace(",", " ").split()
         if not names or not {*names} <= {*allowed}:
-            raise ValueError(f"expected some of {', '.join(allowed)}, got {text!r}")
+            raise ValueError(f"expected some of {_listed(allowed, text)}")
         return names
 
     return parse

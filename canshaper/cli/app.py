@@ -4,18 +4,22 @@ import sys
 from collections.abc import Callable
 from functools import wraps
 from importlib import import_module
+from inspect import cleandoc
 from pkgutil import iter_modules
+from textwrap import wrap
 from typing import Any, cast
 
 import typer
 from typer.core import TyperGroup
 
 from canshaper.cli import verbs
-from canshaper.cli.common import EXIT_WRONG, EXTRAS, echo, fail, install_line
+from canshaper.cli.common import EXIT_INTERRUPTED, EXIT_WRONG, EXTRAS, echo, fail, install_line
 from canshaper.errors import CanshaperError, UsageError
 
+EXAMPLE_WIDTH = 70  # of an example, which is indented, in 80 columns
+SENTENCE = 200  # longer than any
 # They need a scheduler, sockets and signals that only Linux has.
-LINUX_ONLY = {"doctor", "gateway", "run", "set", "studio"}
+LINUX_ONLY = {"commission", "doctor", "gateway", "run", "set"}
 
 
 class Verbs(TyperGroup):
@@ -44,9 +48,16 @@ class Verbs(TyperGroup):
             context_settings={"help_option_names": ["-h", "--help"]},
         )
         verb = getattr(import_module(f"{verbs.__name__}.{word}"), word)
-        one.command(name)(_linux_only(verb) if name in LINUX_ONLY else verb)
+        checked = _linux_only(verb) if name in LINUX_ONLY else verb
+        one.command(name, help=pasteable(verb.__doc__ or ""))(checked)
         self.commands[name] = typer.main.get_command(one)
         return self.commands[name]
+
+    def format_commands(self, ctx: Any, formatter: Any) -> None:
+        """List them, each with its whole first sentence; click would cut it off."""
+        every = [(name, self.get_command(ctx, name)) for name in self.commands]
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, verb.get_short_help_str(SENTENCE)) for name, verb in every])
 
     def invoke(self, ctx: Any) -> Any:
         """Run the verb that is named."""
@@ -54,6 +65,27 @@ class Verbs(TyperGroup):
             return super().invoke(ctx)
         except CanshaperError as error:
             raise fail(error) from None
+        except OSError as error:
+            if error.filename is None:
+                raise
+            raise fail(UsageError(f"{error.filename}: {error.strerror or error}")) from None
+        except KeyboardInterrupt:
+            echo("interrupted", err=True)
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+
+
+def pasteable(text: str) -> str:
+    """Help whose examples are not broken anywhere: what needs another line says so to the shell."""
+    paragraphs = []
+    for paragraph in cleandoc(text).split("\n\n"):
+        words = " ".join(paragraph.split())
+        if words.startswith(("canshaper ", "sudo canshaper ")):
+            # Behind a line with \b click leaves a paragraph as it is.
+            first, *others = wrap(words, EXAMPLE_WIDTH, break_on_hyphens=False)
+            paragraphs.append("\b\n  " + " \\\n      ".join((first, *others)))
+        else:
+            paragraphs.append(paragraph)
+    return "\n\n".join(paragraphs)
 
 
 def _linux_only(verb: Callable[..., None]) -> Callable[..., None]:

@@ -1,10 +1,14 @@
 """What several verbs share: deployments by name, bus options, pictures, errors for people."""
 
-from collections.abc import Callable, Iterator
+import shlex
+import signal
+import sys
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from types import FrameType
+from typing import TYPE_CHECKING, Literal
 
 import typer
 
@@ -14,26 +18,32 @@ from canshaper.errors import (
     CalibrationError,
     ConfigError,
     ControlError,
+    NodeError,
     Problem,
     UsageError,
 )
 from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
+    from canshaper.campaign.engine import Engine
     from canshaper.machine.deployment import Deployment
 
 MOST_WARNINGS = 10  # of DBC files; the others are counted
 EXIT_WRONG = 2  # of a file, an option, or what is not installed
+EXIT_INTERRUPTED = 130  # by SIGINT, as a shell has it
 # What ends a command with another code.
 EXITS: dict[type[Exception], int] = {
     ControlError: 1,
     CalibrationError: 1,
+    NodeError: 1,
     BusError: 3,  # the file is good; the service manager tries again until the interface is there
 }
 # The extra that installs a package.
 EXTRAS = {
-    **dict.fromkeys(("casadi", "matplotlib", "numpy", "scipy"), "tools"),
+    **dict.fromkeys(("canopen", "casadi", "matplotlib", "numpy", "scipy"), "tools"),
     **dict.fromkeys(("starlette", "uvicorn", "websockets"), "studio"),
+    "pyarrow": "campaign",
+    **dict.fromkeys(("dask_jobqueue", "distributed"), "cluster"),
 }
 
 FILE = typer.Argument(..., help="Deployment file (YAML), or the name of a shipped one.")
@@ -48,12 +58,56 @@ CRANE = typer.Option(
     "--crane",
     help="Which one, where the deployment has several: the first part of axis names.",
 )
+SENSED = "forwarder-sensor.yaml"
+SENSOR: bool = typer.Option(
+    False, "--sensor", help=f"The shipped deployment with a sway sensor: {SENSED}."
+)
 SET = typer.Option(
     None, "--set", metavar="NAME=VALUE", help="Change a parameter, such as grapple.l2_m=1.5."
+)
+PROCESSES = typer.Option(None, "--processes", min=1, help="Processes; by default one a processor.")
+SCHEDULER = typer.Option(
+    None, "--scheduler", metavar="ADDRESS", help="Dask cluster, such as tcp://10.0.0.1:8786."
 )
 NETWORK = typer.Option(
     False, "--network", help="Share a bus of udp_multicast over the network; else it stays local."
 )
+
+REPORT = typer.Option(
+    None, "--report", metavar="FILE.html", help="Write it all into one file, to print and sign."
+)
+PICTURE = typer.Option(
+    None, "--picture", metavar="FILE", help="Write the picture here: .png, .svg or .pdf."
+)
+
+
+class Stop:
+    """Asked for by SIGTERM or SIGINT; a second time it ends at once."""
+
+    def __init__(self) -> None:
+        self.asked = False
+        for number in (signal.SIGTERM, signal.SIGINT):
+            signal.signal(number, self._on_signal)
+
+    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
+        self.asked = True
+        signal.signal(number, signal.SIG_DFL)
+
+
+def engine(
+    processes: int | None, scheduler: str | None, cluster: Literal["slurm"] | None = None
+) -> "Engine":
+    """Who does much work: processes of this machine, workers of a scheduler, or jobs of Slurm."""
+    from canshaper.campaign.engine import Cluster, Processes, Slurm
+
+    def on_refusal(text: str) -> None:
+        echo(f"refused: {text}", err=True)
+
+    if cluster is not None:
+        if scheduler is not None or processes is None:
+            raise UsageError("--cluster: expected --processes, its jobs, and no --scheduler")
+        return Slurm(processes, on_refusal)
+    return Processes(processes) if scheduler is None else Cluster(scheduler, on_refusal)
 
 
 def echo(text: str, *, err: bool = False) -> None:
@@ -78,36 +132,35 @@ def os_errors(path: Path) -> Iterator[None]:
 
 
 def install_line(package: str) -> str:
-    """How to get what an extra installs."""
-    return f"pip install 'canshaper[{EXTRAS[package]}]'"
+    """How to get what an extra installs, from anywhere."""
+    packages = [name for name, extra in EXTRAS.items() if extra == EXTRAS[package]]
+    return f"{shlex.quote(sys.executable)} -m pip install {' '.join(packages)}"
 
 
-def picture(path: Path, draw: Callable[[Path], None]) -> Path | None:
-    """Let a picture be drawn, in a folder that is made; None where matplotlib is missing."""
-    try:
-        import matplotlib  # noqa: F401
-    except ImportError:
-        return None
-    path.parent.mkdir(parents=True, exist_ok=True)
-    draw(path)
-    return path
-
-
-def picture_line(path: Path | None) -> str:
-    """Where it is, or why there is none."""
-    none = f"none, matplotlib is missing: {install_line('matplotlib')}"
-    return f"Picture: {path or none}"
-
-
-def refuse_shipped(file: str) -> None:
+def refuse_shipped(file: str, option: str = "--write") -> None:
     """Refuse to write into a deployment that is only found among the shipped ones.
+
+    Args:
+        file: as the command line names it.
+        option: that asks for writing.
 
     Raises:
         ConfigError: it is one of them.
     """
     if deployment_path(file) != Path(file):
         text = "shipped with the package; copy it, then write to the copy"
-        raise ConfigError([Problem(file, None, "--write", text)])
+        raise ConfigError([Problem(file, None, option, text)])
+
+
+def sensed(file: str, default: str, sensor: bool) -> str:
+    """The deployment to show: with ``--sensor`` the shipped one with a sway sensor.
+
+    Raises:
+        UsageError: both are asked for.
+    """
+    if sensor and file != default:
+        raise UsageError(f"--sensor: expected without FILE, got {file}: it is {SENSED}")
+    return SENSED if sensor else file
 
 
 def loader(
@@ -155,6 +208,32 @@ def loader(
     return load
 
 
+def names_of(paths: Sequence[Path]) -> list[str]:
+    """A name for each deployment, different ones for different files."""
+    stems = [path.stem for path in paths]
+    return [
+        stem if stems.count(stem) == 1 else f"{stem}-{stems[: i + 1].count(stem)}"
+        for i, stem in enumerate(stems)
+    ]
+
+
+def channels_of(given: Sequence[str]) -> dict[str, str]:
+    """Channels of a log by bus from BUS=CHANNEL."""
+    channels = {}
+    for item in given:
+        bus, mark, channel = item.partition("=")
+        if not mark:
+            raise typer.BadParameter(f"expected BUS=CHANNEL, got {item!r}", param_hint="--channel")
+        channels[bus] = channel
+    return channels
+
+
+def buses_line(deployment: "Deployment") -> str:
+    """The buses of a deployment: name, interface and channel of each."""
+    buses = deployment.config.buses.items()
+    return ", ".join(f"{name} ({bus.interface} {bus.channel})" for name, bus in buses)
+
+
 def control_socket(deployment: "Deployment") -> Path:
     """Path of the control socket of its daemon.
 
@@ -172,9 +251,9 @@ def control_socket(deployment: "Deployment") -> Path:
 
 
 def print_warnings(count: int, warnings: list[Problem], are: str) -> None:
-    """Show the first faults of DBC files in messages that ``are`` in this way, and how many."""
+    """Show the first faults of DBC files in what ``are`` says of them, and how many."""
     if count:
-        echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages that are {are}:")
+        echo(f"  {count} WARNING{'S' if count > 1 else ''} in messages and tables that are {are}:")
     for warning in warnings[:MOST_WARNINGS]:
         echo(f"    {warning}")
     if (more := count - MOST_WARNINGS) > 0:

@@ -3,19 +3,24 @@
 import re
 from typing import TYPE_CHECKING
 
-import typer
-
-from canshaper.cli.answers import MOST_OFFERED, NONE, asked, number, one
+from canshaper.cli.answers import MOST_OFFERED, NONE, asked, confirmed, number, one
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
 
-    from canshaper.config.first import FirstAxis, FirstMotion, FirstSlewing, Stopwatch
+    from canshaper.config.first import (
+        FirstAxis,
+        FirstMotion,
+        FirstSensor,
+        FirstSlewing,
+        Stopwatch,
+    )
 
 # By their names: axes that make nothing swing, that turn the crane, that move its tip in and out.
 CALM = re.compile(r"lift|rotat|turn|grip|open|close", re.IGNORECASE)
 SLEW = re.compile(r"slew|swing|swivel", re.IGNORECASE)
 NEAR_FAR = re.compile(r"near|far|radial|reach|crowd", re.IGNORECASE)
+SENSOR_CYCLES = 4  # of a sensor's message in its timeout
 # Of a tip; what it travels when it stops is then a distance that the file may have.
 _FASTEST_M_S = 40.0
 
@@ -27,7 +32,7 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     from canshaper.config.sway import Sway
 
     question = f"  {axis}: does it make the grapple swing"
-    if not typer.confirm(question, default=not CALM.search(axis)):
+    if not confirmed(question, default=not CALM.search(axis)):
         return None
     seconds = asked("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
     first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
@@ -37,13 +42,50 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     return Stopwatch(seconds, first, last, speed)
 
 
+def sensor_of(
+    axis: str, swing_s: float, others: "list[Message]", taken: "list[FirstAxis]"
+) -> "FirstSensor | None":
+    """What measures the swing of an axis; ``others`` are messages left, ``taken`` have theirs."""
+    from canshaper.config.first import FirstSensor
+    from canshaper.config.load import limits
+    from canshaper.config.sway_sensor import SwaySensor
+    from canshaper.machine import suggest
+    from canshaper.machine.sway_sensor import LEAST_FUSION
+
+    used = {(one.sensor.message, one.sensor.signal) for one in taken if one.sensor}
+    possible = {
+        f"{message.name}.{signal.name}": (message, signal)
+        for message, signal in suggest.sway_sensors(others, swing_s)
+        if (message.name, signal.name) not in used
+    }
+    if not possible:
+        return None
+    text = f"  {axis}: sway sensor on the tool, such as {', '.join([*possible][:MOST_OFFERED])}"
+    answer = asked(f"{text}, - for none", one([*possible, NONE]), NONE)
+    if answer == NONE:
+        return None
+    message, signal = possible[answer]
+    least, most = limits(SwaySensor, "timeout_ms")
+    timeout_ms = int(min(max(SENSOR_CYCLES * (message.cycle_time or 0), least), most))
+    if (signal.unit or "").endswith("/s"):
+        return FirstSensor(message.name, signal.name, "rate", timeout_ms)
+    text = "    angle in the joint, or inclination against the vertical"
+    kind = asked(text, one(["angle", "inclination"]), "angle")
+    fusion_s = None
+    if kind == "inclination":
+        shortest, longest = LEAST_FUSION * swing_s, limits(SwaySensor, "fusion_s")[1]
+        text = "    time constant with which accelerations correct its gyro, s (its data sheet)"
+        fusion_s = asked(text, number(shortest, longest), f"{max(5.0, shortest):.2g}")
+    return FirstSensor(message.name, signal.name, kind, timeout_ms, fusion_s)
+
+
 def slewing_of(axis: str) -> "FirstSlewing | None":
     """How an axis turns the crane; None where it does not."""
     from canshaper.config.first import FirstSlewing
     from canshaper.config.load import limits
     from canshaper.config.schema import Slewing
 
-    if not typer.confirm(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
+    if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
     speed = asked("    speed at full deflection, rad/s (a turn is 6.28)", allowed, "0.5")
@@ -67,7 +109,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
         every = [Stopwatch(part * tenth / 10.0, 1.0, 1.0, 1.0) for part in (1.0, PERIOD_RANGE[0])]
         if all(filter_fault(w.filter, w.sway, period_s, rate) is None for w in every):
             return tenth / 10.0, high
-    return low, high  # with none at all: the check of the whole file tells why
+    return low, high  # with none at all: the check of the whole file says why
 
 
 def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion | None":

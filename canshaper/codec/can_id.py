@@ -5,5 +5,5 @@ Python's ``socket`` has these names on Linux only; logs are read and machines si
 
 EFF_FLAG = 0x80000000  # an id of 29 bits
 RTR_FLAG = 0x40000000  # a remote frame
-ERR_FLAG = 0x20000000  # the kernel tells of an error
+ERR_FLAG = 0x20000000  # an error that the kernel reports
 SFF_MASK, EFF_MASK = 0x7FF, 0x1FFFFFFF

@@ -1,23 +1,28 @@
-"""Profiles 1 and 2 of AUTOSAR E2E, for the eight bytes of classical CAN.
+"""Profiles of AUTOSAR E2E: 1, 2, 5, 6, 11 and 22 of any frame, 4 and 7 of CAN FD.
 
-Source: AUTOSAR PRS_E2EProtocol (FO R20-11), profiles 1 and 2, whose protocol examples are in the
-tests. Start and end values of the CRCs, order of the bytes of the data ID and counter positions are
-those of the MIT-licensed Python package autosar-e2e and of torsko/autosar-e2e, which agree.
+Source: AUTOSAR PRS_E2EProtocol (FO R20-11), whose protocol examples are in the tests. Start and end
+values of the CRCs, order of the bytes of the data ID and counter positions are those of the
+MIT-licensed Python package autosar-e2e and of torsko/autosar-e2e, which agree.
 
-Both lay a header over the first bytes of a message: the CRC fills byte 0, the counter the lower
-half of byte 1. Other positions are not taken.
+All lay a header over the first bytes of a message. In profiles 1 and 2 the CRC fills byte 0, the
+counter the lower half of byte 1; 11 and 22 are the same with fewer variants. Other positions are
+not taken. Profiles 4 and 7 have headers of 12 and 20 bytes, which only frames of CAN FD hold.
 """
 
+import binascii
 from collections.abc import Sequence
+from typing import Literal
 
-from canshaper.checksums import AUTOSAR, SAE_J1850
+from crccheck.crc import Crc32Autosar, Crc64Xz
+
+from canshaper.checksums import AUTOSAR, SAE_J1850, ReflectedCrc
 
 COUNTER = 0x0F
-"""Bits of byte 1 that hold the counter."""
+"""Bits of byte 1 that hold the counter in profiles 1 and 2."""
 
 
 class E2e:
-    """What both profiles share.
+    """What the profiles share.
 
     Attributes:
         counts: values of the counter.
@@ -26,6 +31,10 @@ class E2e:
 
     counts: int
     bits = 12
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        return data[1] & COUNTER
 
     def __eq__(self, other: object) -> bool:
         """Whether that is the same profile with the same data ID."""
@@ -36,7 +45,7 @@ class E2e:
 
     def verify(self, data: bytes) -> bool:
         """Whether a frame of two bytes or more has the header that it should."""
-        count = data[1] & COUNTER
+        count = self.count(data)
         return count < self.counts and data[0] == self.crc(data, count)
 
     def protect(self, data: bytes, count: int) -> bytes:
@@ -57,7 +66,7 @@ class Profile1(E2e):
     """CRC-8 SAE J1850 over the data ID and then the bytes from 1; counter 0 to 14, 15 is invalid.
 
     Args:
-        data_id: 16 bits that tell this message from all others.
+        data_id: 16 bits that distinguish this message from all others.
         mode: bytes of it that enter the CRC. ``both``: the low one, then the high one. ``low``: the
             low one. ``alternating``: the low one with even counters, the high one with odd ones.
             ``nibble``: the low one, then a zero; four bits of the high one are sent in the upper
@@ -119,3 +128,104 @@ class Profile2(E2e):
     def crc(self, data: bytes, count: int) -> int:
         """CRC of a frame."""
         return AUTOSAR.of(data[1:] + self.ids[count])
+
+
+class Profile5(E2e):
+    """CRC-16 over the bytes from 2 and the data ID, low byte first; counter 0 to 255 in byte 2.
+
+    Args:
+        data_id: 16 bits that distinguish this message from all others.
+    """
+
+    counts = 256
+    bits = 24
+    _order: Literal["little", "big"] = "little"
+
+    def __init__(self, data_id: int) -> None:
+        self._id = data_id.to_bytes(2, self._order)
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        return data[2]
+
+    def verify(self, data: bytes) -> bool:
+        """Whether a frame has the header that it should."""
+        return data[:2] == self.crc(data, 0).to_bytes(2, self._order)
+
+    def protect(self, data: bytes, count: int) -> bytes:
+        """The same frame with its header."""
+        data = data[:2] + bytes((count,)) + data[3:]
+        return self.crc(data, count).to_bytes(2, self._order) + data[2:]
+
+    def crc(self, data: bytes, count: int) -> int:
+        """CRC of a frame, whose counter is among its bytes."""
+        return binascii.crc_hqx(data[2:] + self._id, 0xFFFF)
+
+
+class Profile6(Profile5):
+    """The same with the high byte first; bytes 2 and 3 are the length, byte 4 is the counter."""
+
+    bits = 40
+    _order = "big"
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        return data[4]
+
+    def verify(self, data: bytes) -> bool:
+        """Whether header and length are what they should be."""
+        return data[2:4] == len(data).to_bytes(2, "big") and super().verify(data)
+
+    def protect(self, data: bytes, count: int) -> bytes:
+        """The same frame with its header."""
+        data = data[:2] + len(data).to_bytes(2, "big") + bytes((count,)) + data[5:]
+        return self.crc(data, count).to_bytes(2, "big") + data[2:]
+
+
+CRC32_P4 = ReflectedCrc(Crc32Autosar)
+"""Polynomial 0xF4ACFB13, start and end all ones."""
+CRC64 = ReflectedCrc(Crc64Xz)
+"""Polynomial 0x42F0E1EBA9EA3693, start and end all ones."""
+
+
+class Profile4(E2e):
+    """CRC-32 over all other bytes; before it length, counter and data ID, high bytes first.
+
+    Args:
+        data_id: 32 bits that distinguish this message from all others.
+    """
+
+    counts = 1 << 16
+    bits = 96
+
+    def __init__(self, data_id: int) -> None:
+        self._id = data_id.to_bytes(4, "big")
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        return int.from_bytes(data[2:4], "big")
+
+    def verify(self, data: bytes) -> bool:
+        """Whether a frame has the header that it should."""
+        return self.protect(data, self.count(data)) == data
+
+    def protect(self, data: bytes, count: int) -> bytes:
+        """The same frame with its header."""
+        head = len(data).to_bytes(2, "big") + count.to_bytes(2, "big") + self._id
+        return head + CRC32_P4.of(head + data[12:]).to_bytes(4, "big") + data[12:]
+
+
+class Profile7(Profile4):
+    """The same with a CRC-64, which comes first, and length and counter of 32 bits."""
+
+    counts = 1 << 32
+    bits = 160
+
+    def count(self, data: bytes) -> int:
+        """The counter of a frame."""
+        return int.from_bytes(data[12:16], "big")
+
+    def protect(self, data: bytes, count: int) -> bytes:
+        """The same frame with its header."""
+        rest = len(data).to_bytes(4, "big") + count.to_bytes(4, "big") + self._id + data[20:]
+        return CRC64.of(rest).to_bytes(8, "big") + rest

@@ -1,9 +1,9 @@
-"""Checks of protected messages as the kernel's gateway reckons them, where it can."""
+"""Checks of protected messages as the kernel's gateway computes them, where it can."""
 
 import struct
 
 from canshaper.checksums import AUTOSAR, CHECKSUMS, SAE_J1850, Checksum, Crc8, Xor
-from canshaper.codec.e2e import Profile1, Profile2
+from canshaper.codec.e2e import Profile1, Profile2, Profile4, Profile5
 from canshaper.codec.protection import Protection
 
 # linux/can/gw.h: attributes of a rule that compute a checksum.
@@ -15,21 +15,23 @@ PLAIN, BY_COUNTER = 0, 2
 
 
 def neutral_fault(protection: Protection, length: int) -> str | None:
-    """Why the kernel cannot protect a frame of so many bytes anew that it has changed, or None."""
+    """Why the kernel cannot protect a frame of so many bytes again that it has changed, or None."""
     check = protection.check
     if isinstance(check, Checksum):
         kernel = CHECKSUMS[check.kind].kernel
         if kernel is None:
             return f"can-gw of the kernel knows no checksum of the kind {check.kind}"
         if isinstance(kernel, Crc8) and check.byte not in (0, length - 1):
-            return f"can-gw of the kernel reckons {check.kind} in the first or last byte only"
+            return f"can-gw of the kernel computes {check.kind} in the first or last byte only"
+    if isinstance(check, Profile4 | Profile5):
+        return "can-gw of the kernel knows no CRC of more than 8 bits"
     if isinstance(check, Profile1) and check.starts[0] != check.starts[1]:
         return "can-gw of the kernel knows no data ID that alternates"
     return None
 
 
 def kernel_check(protection: Protection, length: int) -> tuple[tuple[tuple[int, bytes], ...], int]:
-    """The check as can-gw reckons it, and bits that have to be 0 before; no ``neutral_fault``."""
+    """The check as can-gw computes it, and bits that have to be 0 before; no ``neutral_fault``."""
     check = protection.check
     last = length - 1
     if check is None:

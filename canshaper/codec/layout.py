@@ -13,6 +13,10 @@ try:
 except ImportError:  # no compiled part for this machine: the same in Python, and slower
     from bitstruct import compile as compile_format
 
+CLASSICAL_BYTES = 8
+FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
+"""Bytes that a frame of CAN FD may have (ISO 11898-1)."""
+
 
 def layout_fault(message: Message) -> str | None:
     """Why the bits of a message cannot be read, or None; cantools tells with a frame only."""
@@ -85,6 +89,18 @@ class Layout:
         if self._unused:
             data = (int.from_bytes(data, "little") | self._unused).to_bytes(self.length, "little")
         return data
+
+
+def is_fd(message: Message) -> bool:
+    """Whether a message is sent in frames of CAN FD: by the DBC, or for its length."""
+    return message.is_fd or (message.length > CLASSICAL_BYTES and not is_j1939(message))
+
+
+def frame_length(message: Message) -> int:
+    """Bytes of its frames: CAN FD has few lengths beyond 8, and what is shorter is filled up."""
+    if not is_fd(message):
+        return message.length
+    return next((n for n in FD_LENGTHS if n >= message.length), message.length)
 
 
 def is_j1939(message: Message) -> bool:

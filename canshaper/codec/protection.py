@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Any, Self
 
 from canshaper.checksums import Checksum
-from canshaper.codec.e2e import COUNTER, E2e
+from canshaper.codec.e2e import E2e
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.layout import Layout
 
@@ -97,7 +97,7 @@ class SequenceChecker:
         self._range = protection.counts
         self._max_step = max_step
         self._check = protection.check
-        self._in_header = isinstance(protection.check, E2e)
+        self._header = protection.check if isinstance(protection.check, E2e) else None
         self._qualify = qualify
         self._last: int | None = None
         self._resynced = True
@@ -126,8 +126,8 @@ class SequenceChecker:
             self._requalify()
             return FrameFault.CHECKSUM
         if self._range:
-            if self._in_header:
-                count = data[1] & COUNTER
+            if self._header is not None:
+                count = self._header.count(data)
             last = self._last
             self._last = count
             if last is not None:

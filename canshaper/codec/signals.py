@@ -14,6 +14,10 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.layout import Layout, is_j1939
 from canshaper.shaping.states import Reason
 
+# Part of a raw step: what the rounding of decimals may take.
+STEP_ROUNDING = 1e-6
+LEAST_STEPS = 10
+"""Raw steps to full command that a valve can be moved with."""
 FULL_SET_POINT = 0x4000
 """Of a valve of CiA 408; +-0x7FFF would be float, in which it drops its load."""
 
@@ -41,16 +45,24 @@ def raw_limits(signal: Signal) -> tuple[int, int]:
 
 def symmetrical_range(signal: Signal) -> str | None:
     """Why the DBC range of a velocity signal cannot serve as full scale, or None when it can."""
-    low, high = signal.minimum, signal.maximum
     if fault := _no_range(signal):
         return fault
-    if not math.isclose(-(low or 0.0), high or 0.0):
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
+    # Two's complement has one step more on one side.
+    step = 0.0 if signal.is_float else abs(signal.scale) * (1.0 + STEP_ROUNDING)
+    if not math.isclose(-low, high) and (not low < 0.0 < high or abs(low + high) > step):
         return f"{signal.name}: expected a symmetrical range, got [{low:g}|{high:g}]"
     return _not_reached(signal)
 
 
+def full_scale(signal: Signal) -> float:
+    """Value at full command: the end of its range, of one off by a step the nearer end."""
+    low, high = signal.minimum or 0.0, signal.maximum or 0.0
+    return min(-low, high) if low < 0.0 else high
+
+
 def magnitude_range(signal: Signal) -> str | None:
-    """The same for a velocity whose direction is told by flags: its range begins at 0."""
+    """The same for a velocity whose direction flags carry: its range begins at 0."""
     if fault := _no_range(signal):
         return fault
     if signal.minimum != 0.0:
@@ -64,7 +76,7 @@ def _no_range(signal: Signal) -> str | None:
     if not signal.scale:
         return f"{signal.name}: expected a scale other than 0, got 0"
     if low is None or high is None or high <= low:
-        return f"{signal.name} has no range in the DBC; full speed is taken from it"
+        return f"{signal.name} has no range in the DBC; full speed is taken from it, or from full"
     return None
 
 
@@ -75,8 +87,8 @@ def _not_reached(signal: Signal) -> str | None:
     low, high = signal.minimum or 0.0, signal.maximum or 0.0
     raw_low, raw_high = raw_limits(signal)
     ends = [(v - signal.offset) / signal.scale for v in (low, high)]
-    # A millionth of a step: scale and range are decimals, 88.9 / 0.7 is a little above 127.
-    if min(ends) < raw_low - 1e-6 or max(ends) > raw_high + 1e-6:
+    # Scale and range are decimals, 88.9 / 0.7 is a little above 127.
+    if min(ends) < raw_low - STEP_ROUNDING or max(ends) > raw_high + STEP_ROUNDING:
         return (
             f"{signal.name} cannot reach its range [{low:g}|{high:g}] with {signal.length}"
             f" bits at {signal.scale:g} per bit"
@@ -86,13 +98,13 @@ def _not_reached(signal: Signal) -> str | None:
 
 def valve_steps(full: float, scale: float) -> int:
     """Raw steps from zero to full command; rounded down so that full is never passed."""
-    return int(full / scale + 1e-6)
+    return int(full / scale + STEP_ROUNDING)
 
 
 def command_fault(signal: Signal) -> str | None:
     """Why a valve cannot be commanded with a signal of symmetrical range, or None."""
-    if valve_steps(signal.maximum or 0.0, abs(signal.scale)) < 10:
-        return f"{signal.name} has fewer than 10 steps to full command"
+    if valve_steps(full_scale(signal), abs(signal.scale)) < LEAST_STEPS:
+        return f"{signal.name} has fewer than {LEAST_STEPS} steps to full command"
     zero = signal.offset / signal.scale
     if abs(zero - round(zero)) > 1e-6:
         return f"{signal.name} has no raw value for zero, which neutral needs"
@@ -103,7 +115,7 @@ def set_point_fault(signal: Signal) -> str | None:
     """Why a command signal cannot be the set point of a valve of CiA 408, or None."""
     if signal.offset:
         return f"{signal.name} has the offset {signal.offset:g}; a set point of CiA 408 has none"
-    if (steps := valve_steps(signal.maximum or 0.0, abs(signal.scale))) > FULL_SET_POINT:
+    if (steps := valve_steps(full_scale(signal), abs(signal.scale))) > FULL_SET_POINT:
         text = f"{signal.name} has {steps} steps to full command; a set point of CiA 408 has"
         return f"{text} {FULL_SET_POINT}, and float at {raw_limits(signal)[1]}"
     return None
@@ -133,7 +145,7 @@ LENGTHS = (None, "", "m")
 
 
 def radius_range(signal: Signal) -> str | None:
-    """Why a signal is no radius, or its range does not tell what is one; None where it does."""
+    """Why a signal is no radius, or its range does not say what is one; None where it does."""
     if signal.unit not in LENGTHS:
         return f"{signal.name}: expected a radius in m, got a signal in {signal.unit}"
     low, high = signal.minimum, signal.maximum
@@ -157,12 +169,16 @@ class VelocitySignal:
     offset: float
     full: float
     special: dict[Any, Reason]
+    low: float = -1.0 - ROUNDING
+    high: float = 1.0 + ROUNDING
 
     @classmethod
     def of(cls, signal: Signal) -> "VelocitySignal":
         """Bind a DBC signal with a ``symmetrical_range``, or a ``magnitude_range``."""
-        full = float(signal.maximum or 0.0)
-        return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal))
+        full = full_scale(signal)
+        low, high = (signal.minimum or 0.0) / full, (signal.maximum or 0.0) / full
+        ends = min(low, -1.0) - ROUNDING, high + ROUNDING
+        return cls(signal.name, signal.scale, signal.offset, full, special_codes(signal), *ends)
 
     def read(self, raw: dict[str, Any]) -> float | Reason:
         """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
@@ -175,7 +191,7 @@ class VelocitySignal:
             return value
         if not math.isfinite(value):
             return Reason.JOYSTICK_NOT_A_NUMBER
-        if abs(value) > 1.0 + ROUNDING:
+        if not self.low <= value <= self.high:
             return Reason.JOYSTICK_OUT_OF_RANGE
         return math.copysign(1.0, value)
 

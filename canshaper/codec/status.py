@@ -86,6 +86,10 @@ class ReportedAxis(Protocol):
     def trust(self) -> Trust:
         """What is thought of the sway sensor."""
 
+    @property
+    def swing_length_m(self) -> float:
+        """Length of the pendulum, as the sway sensor shows it; 0 where it is not known."""
+
 
 def _command_pct(one: ReportedAxis) -> float:
     return 100.0 * one.axis.command
@@ -104,6 +108,7 @@ AXIS_STATUS: list[StatusField[ReportedAxis]] = [
     StatusField("PredictedSway", attrgetter("sway_deg"), required=True),
     StatusField("ActiveSet", attrgetter("active_set"), int),
     StatusField("SwaySensor", attrgetter("trust"), _Code(Trust), largest=max(Trust)),
+    StatusField("SwingLength", attrgetter("swing_length_m")),
 ]
 LAST_FAULT: StatusField[dict[str, int]] = StatusField(
     "LastFault", itemgetter("LastFault"), _Code(FrameFault), True, max(FrameFault)

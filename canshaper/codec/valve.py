@@ -8,7 +8,7 @@ from cantools.database.can import Signal
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame, new_frame
-from canshaper.codec.signals import valve_steps
+from canshaper.codec.signals import full_scale, valve_steps
 
 
 class ValveMessage:
@@ -39,18 +39,18 @@ class ValveMessage:
 
 
 class Direction(Protocol):
-    """What tells the direction of a magnitude."""
+    """What carries the direction of a magnitude."""
 
     def put(self, raw: dict[str, Any], sign: int) -> None:
-        """Tell a sign: 0 for neutral, 1 or -1."""
+        """Write a sign: 0 for neutral, 1 or -1."""
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign that is told; None where it is none."""
+        """The sign it carries; None where it is none."""
 
 
 @dataclass(frozen=True, slots=True)
 class DirectionCodec:
-    """Signal that tells the direction of a magnitude, as the valve state of ISO 11783-7 does.
+    """Signal that carries the direction of a magnitude, as the valve state of ISO 11783-7 does.
 
     Attributes:
         signal: its name.
@@ -61,17 +61,17 @@ class DirectionCodec:
     codes: tuple[int, int, int]
 
     def put(self, raw: dict[str, Any], sign: int) -> None:
-        """Tell a sign: 0 for neutral, 1 or -1."""
+        """Write a sign: 0 for neutral, 1 or -1."""
         raw[self.signal] = self.codes[sign]  # the last one is that of -1
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign that is told; None where it is none."""
+        """The sign it carries; None where it is none."""
         return dict(zip(self.codes, (0, 1, -1), strict=True)).get(raw[self.signal])
 
 
 @dataclass(frozen=True, slots=True)
 class FlagsCodec:
-    """Three flags that tell the direction of a magnitude, as joysticks of J1939-71 do.
+    """Three flags that carry the direction of a magnitude, as joysticks of J1939-71 do.
 
     Attributes:
         signals: names of the flags of neutral, of positive and of negative, in this order.
@@ -80,14 +80,14 @@ class FlagsCodec:
     signals: tuple[str, str, str]
 
     def put(self, raw: dict[str, Any], sign: int) -> None:
-        """Tell a sign: 0 for neutral, 1 or -1."""
+        """Write a sign: 0 for neutral, 1 or -1."""
         for name, of in zip(self.signals, (0, 1, -1), strict=True):
             raw[name] = int(of == sign)
 
     def read(self, raw: Mapping[str, Any]) -> int | None:
-        """The sign that is told; None where it is none."""
-        told = [of for n, of in zip(self.signals, (0, 1, -1), strict=True) if raw[n] == 1]
-        return told[0] if len(told) == 1 else None
+        """The sign it carries; None where it is none."""
+        signs = [of for n, of in zip(self.signals, (0, 1, -1), strict=True) if raw[n] == 1]
+        return signs[0] if len(signs) == 1 else None
 
 
 class ValveCodec:
@@ -96,10 +96,10 @@ class ValveCodec:
     Args:
         message: the message it is sent in.
         signal: the command; with a direction its magnitude.
-        direction: where the direction is told, if not by the sign.
+        direction: where the direction stands, if not by the sign.
         negative: magnitude of negative commands, where they have a signal of their own, which is
             like that of the positive ones.
-        also: signals that tell the same in another resolution.
+        also: signals that carry the same in another resolution.
 
     Attributes:
         steps: steps from zero to full command.
@@ -167,7 +167,7 @@ class ValveCodec:
 
 
 def _steps(signal: Signal) -> int:
-    return valve_steps(signal.maximum or 0.0, abs(signal.scale))
+    return valve_steps(full_scale(signal), abs(signal.scale))
 
 
 def _zero(signal: Signal) -> int:

@@ -10,6 +10,7 @@ from rich.console import Console, Group, RenderableType
 from rich.table import Table
 from rich.text import Text
 
+from canshaper.config.enable import slowest_ms
 from canshaper.config.filters import Filter
 from canshaper.config.schedule import Profile
 from canshaper.config.schema import AxisConfig
@@ -72,7 +73,8 @@ def _stopping(deployment: Deployment, bound: BoundAxis) -> Stopping:
     joystick = deployment.joysticks[bound.config.command.joystick]
     limits = bound.config.limits
     tick_s = deployment.config.tick_ms / 1000.0
-    period_s, timeout_s = tick_s * bound.period_ticks, joystick.config.timeout_ms / 1000.0
+    period_s = tick_s * bound.period_ticks
+    timeout_s = slowest_ms(deployment.config, joystick.name) / 1000.0
     travels = [
         travel(
             lambda one=one: AxisRunner(one, tick_s, JoystickInput(joystick)).axis,  # type: ignore[misc]

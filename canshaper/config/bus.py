@@ -1,8 +1,8 @@
 """Schema of the buses of a deployment, and of our node on them."""
 
-from typing import Annotated, Self
+from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import AfterValidator, Field, WithJsonSchema, model_validator
 
 from canshaper.config.section import Section, number
 
@@ -12,7 +12,7 @@ LAST_SPN = 524287
 
 
 class J1939Name(Section):
-    """NAME of our node (SAE J1939-81): what tells two nodes apart, and which of them wins."""
+    """NAME of our node (SAE J1939-81): what distinguishes two nodes, and which of them wins."""
 
     identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of this PC")]
     manufacturer_code: Annotated[int, number(0, 2047, "", "code that SAE gave to the maker")]
@@ -85,6 +85,17 @@ class Match(Section):
         )
 
 
+def _scalar(value: object) -> object:
+    if not isinstance(value, bool | int | float | str):
+        raise ValueError(f"expected a text, a number, true or false, got {value!r}")
+    return value
+
+
+Scalar = Annotated[
+    Any, AfterValidator(_scalar), WithJsonSchema({"type": ["boolean", "number", "string"]})
+]
+
+
 class Bus(Section):
     """A CAN bus, in the words of python-can."""
 
@@ -92,6 +103,14 @@ class Bus(Section):
     channel: str = Field(description="channel of the interface, such as can0")
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
     """Bit rate (bit/s), with which the load is computed; SocketCAN itself is set by the system."""
+    fd: bool = Field(False, description="CAN FD: messages of up to 64 bytes")
+    data_bitrate: (
+        Annotated[int, number(10_000, 10_000_000, "bit/s", "bit rate of the data of CAN FD")] | None
+    ) = None
+    """Bit rate (bit/s) of their data; with it they are sent with bit rate switch (BRS)."""
+    options: dict[str, Scalar] = Field(
+        {}, description="what else python-can opens the interface with, such as host and port"
+    )
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )
@@ -102,3 +121,14 @@ class Bus(Section):
     """Our node, on a bus of J1939 or ISO 11783."""
     canopen: Canopen | None = None
     """Our node, on a bus of CANopen."""
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether no machine can be on it: it is in this computer, or of UDP."""
+        if self.interface == "socketcan":
+            return self.channel.startswith(("vcan", "vxcan"))
+        return self.interface in ("virtual", "udp_multicast")
+
+    def __hash__(self) -> int:
+        """Of where it is: a bus is a key where it is asked for what is open."""
+        return hash((self.interface, self.channel))

@@ -4,8 +4,9 @@ import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Literal, Optional, Self, Union
 
-from pydantic import BeforeValidator, ConfigDict, Field, create_model, model_validator
+from pydantic import BeforeValidator, Field, create_model, model_validator
 
+from canshaper.config.origin import Origin
 from canshaper.config.runs import RUN, expanded
 from canshaper.config.section import Section, number
 from canshaper.shaping.registry import KINDS
@@ -50,6 +51,7 @@ class DesignedFor(Section):
         Annotated[float, number(0, 100, "full speeds per s", "rate of the valve that it keeps to")]
         | None
     ) = None
+    origin: Origin | None = Field(None, description="where the filter, and its swing, come from")
 
     def faults(
         self, mode: SwayMode, valve_rate_per_s: float, tail_s: float
@@ -105,9 +107,6 @@ def _periods(period_s: float, length_range_pct: float) -> tuple[float, float]:
 
 class FilterSection(Section):
     """A filter: its ``kind`` and its parameters by the names the registry takes."""
-
-    # Made from the rows of the registry, each with its description: there is no source to read.
-    model_config = ConfigDict(use_attribute_docstrings=False)
 
     kind: str
 

@@ -1,10 +1,8 @@
-"""The text of a first deployment file, from what a person knows of a new machine."""
+"""What a person knows of a new machine, from which its first deployment file is written."""
 
-import json
 import math
-import re
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 
 from canshaper.config.filters import Filter, filter_of
 from canshaper.config.load import limits
@@ -18,25 +16,33 @@ RADIUS_TIMEOUT_MS = 200
 FIRST_MAX_PCT = 40
 # Tail and longest stop: what the run-on of a filter for a swing of two to three seconds takes.
 FIRST_TAIL_S = 2.2
-# Poles beside the frequency of the swing: the first step of the filter is what was asked, no more.
+# Poles next to the frequency of the swing: the first step of the filter is what was asked, no more.
 POLES_TO_OMEGA = (0.9, 1.1)
 # Room for a wrong stopwatch in what may be changed while it works.
 PERIOD_RANGE = (0.7, 1.4)
-# What YAML takes as the text that it is.
-_PLAIN = re.compile(r"(?!(?:true|false|null)$)(?:\.*/)*[^\W\d][\w./-]*", re.IGNORECASE)
 
 
 @dataclass(frozen=True)
 class FirstJoystick:
-    """A joystick: its name, message, switches and alive counter."""
+    """A joystick: its name, message, switches and alive counter; its cycle, where the DBC has none.
+
+    ``switch`` is the message of its enable switch, where that is another one, ``enable_of`` the
+    joystick whose switch enables it; ``node`` the name of its node on CANopen; ``multiplexor`` the
+    value with which a multiplexed message is meant.
+    """
 
     name: str
     message: str
     timeout_ms: int
-    enable: str
+    enable: str | None
     reset: str | None = None
     anti_sway_off: str | None = None
     alive_counter: str | None = None
+    cycle_ms: int | None = None
+    switch: str | None = None
+    node: str | None = None
+    enable_of: str | None = None
+    multiplexor: int | None = None
 
 
 @dataclass(frozen=True)
@@ -62,13 +68,13 @@ class Stopwatch:
     def filter(self) -> Filter:
         """A filter to begin with."""
         omega = 2.0 * math.pi / self.period_s
-        poles = [float(_rounded(-share * omega)) for share in POLES_TO_OMEGA]
+        poles = [float(rounded(-share * omega)) for share in POLES_TO_OMEGA]
         return filter_of("gff", poles_rad_s=poles)
 
     @property
     def sway(self) -> Sway:
         """The same as sway data of an axis."""
-        period, decay = (float(_rounded(v)) for v in (self.period_s, self.decay_per_swing))
+        period, decay = (float(rounded(v)) for v in (self.period_s, self.decay_per_swing))
         speed = self.full_speed_m_s
         return Sway(period_s=period, decay_per_swing=decay, full_speed_m_s=speed)
 
@@ -96,6 +102,53 @@ class FirstMotion:
 
 
 @dataclass(frozen=True)
+class FirstSensor:
+    """A sway sensor, to be watched first; an inclination has a time constant of its fusion."""
+
+    message: str
+    signal: str
+    kind: str
+    timeout_ms: int
+    fusion_s: float | None = None
+    node: str | None = None
+
+
+@dataclass(frozen=True)
+class FirstCanopen:
+    """Our node on a bus of CANopen, and the others: id and longest silence (ms) by name."""
+
+    node: int
+    master: bool
+    nodes: Mapping[str, tuple[int, int]]
+
+
+@dataclass(frozen=True)
+class FirstCia408:
+    """A valve of CiA 408: its control word, and message and signal of its status word."""
+
+    control: str
+    message: str
+    signal: str
+    timeout_ms: int
+    node: str | None = None
+
+
+@dataclass(frozen=True)
+class FirstScaling:
+    """What a signal means where the DBC does not say it.
+
+    ``flags`` are those of neutral, negative and positive, ``negative`` is the second signal of a
+    rocker.
+    """
+
+    full: float | None = None
+    zero: float | None = None
+    invert: bool = False
+    flags: tuple[str, str, str] | None = None
+    negative: str | None = None
+
+
+@dataclass(frozen=True)
 class FirstAxis:
     """An axis: its joystick, its valve, its swing where it has one, and how it turns the crane."""
 
@@ -109,11 +162,16 @@ class FirstAxis:
     status: str | None = None
     swing: Stopwatch | None = None
     slewing: FirstSlewing | None = None
+    sensor: FirstSensor | None = None
+    scaling: FirstScaling = field(default_factory=FirstScaling)
+    valve_scaling: FirstScaling = field(default_factory=FirstScaling)
+    cycle_ms: int | None = None
+    cia408: FirstCia408 | None = None
 
 
 @dataclass(frozen=True)
 class FirstMachine:
-    """Everything that is asked."""
+    """Everything that is asked; ``notes`` are said at the top of the file."""
 
     channel: str
     bitrate: int
@@ -123,19 +181,19 @@ class FirstMachine:
     status: str | None = None
     identity: str | None = None
     motion: FirstMotion | None = None
+    interface: str = "socketcan"
+    canopen: FirstCanopen | None = None
+    data_bitrate: int | None = None
+    """Of a bus of CAN FD."""
+    notes: Sequence[str] = field(default=())
 
 
 def ten_swings_s() -> tuple[float, float]:
     """Shortest and longest time of ten swings whose period may be changed as far as is written."""
     least, most = limits(Sway, "period_s")
     low, high = 10.0 * least / PERIOD_RANGE[0], 10.0 * most / PERIOD_RANGE[1]
-    # In tenths and inwards, so that both are allowed as they are told.
+    # In tenths and inwards, so that both are allowed as they are written.
     return math.ceil(10.0 * low) / 10.0, math.floor(10.0 * high) / 10.0
-
-
-def plain(text: str) -> str:
-    """A text as it stands in YAML: in quotes where it could be read as something else."""
-    return text if _PLAIN.fullmatch(text) else json.dumps(text, ensure_ascii=False)  # YAML too
 
 
 def stop_distance_m(
@@ -157,102 +215,6 @@ def stop_distance_m(
     return math.ceil(10.0 * full_speed_m_s * way_s) / 10.0
 
 
-def first_deployment(machine: FirstMachine) -> str:
-    """The deployment file, with a filter to begin with and reduced speed."""
-    return "\n".join(_lines(machine)) + "\n"
-
-
-def _lines(machine: FirstMachine) -> Iterator[str]:
-    yield "# Written by canshaper init. Every key: docs/deployment.md."
-    yield ""
-    yield "version: 1 # of the file's format"
-    yield "tick_ms: 20 # period of the control loop"
-    yield ""
-    yield "buses:"
-    channel = plain(machine.channel)
-    bus = f"interface: socketcan, channel: {channel}, bitrate: {machine.bitrate}"
-    yield f"  crane: {{ {bus} }}"
-    yield ""
-    yield f"dbc: [{', '.join(plain(path) for path in machine.dbc)}] # relative to this file"
-    yield ""
-    yield "joysticks:"
-    for joystick in machine.joysticks:
-        yield f"  {joystick.name}:"
-        yield "    bus: crane"
-        yield f"    message: {joystick.message}"
-        yield f"    timeout_ms: {joystick.timeout_ms} # five lost messages"
-        yield f"    enable: {joystick.enable}"
-        for key in ("reset", "anti_sway_off", "alive_counter"):
-            if (signal := getattr(joystick, key)) is not None:
-                yield f"    {key}: {signal}"
-    yield ""
-    yield "axes:"
-    timeouts_ms = {joystick.name: joystick.timeout_ms for joystick in machine.joysticks}
-    for axis in machine.axes:
-        yield from _axis(axis, timeouts_ms[axis.joystick])
-        yield ""
-    if machine.motion:
-        yield from _motion(machine.motion)
-        yield ""
-    for key in ("status", "identity"):
-        if (message := getattr(machine, key)) is not None:
-            yield f"{key}: {{ bus: crane, message: {message} }}"
-            yield ""
-    yield "# What `canshaper set` may change while the machine works."
-    yield "control:"
-    yield "  adjustable:"
-    for axis in machine.axes:
-        yield f"    axes.{axis.name}.limits.max_pct: [20, 100]"
-        if axis.swing:
-            low, high = (_rounded(share * axis.swing.period_s) for share in PERIOD_RANGE)
-            yield f"    axes.{axis.name}.sway.period_s: [{low}, {high}]"
-
-
-def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
-    counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
-    valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
-    yield f"  {axis.name}:"
-    command = f"joystick: {axis.joystick}, signal: {axis.command_signal}"
-    yield f"    command: {{ {command}, neutral_pct: 2 }}"
-    yield f"    valve: {{ bus: crane, {valve} }}"
-    if axis.status:
-        yield f"    status: {{ bus: crane, message: {axis.status} }}"
-    limits = f"max_pct: {FIRST_MAX_PCT}, deadband_pct: 0, rise_per_s: 5, fall_per_s: 5"
-    if axis.swing is None:
-        yield "    filter: { kind: off } # it makes nothing swing"
-        yield f"    limits: {{ {limits}, tail_s: 0.5, stop_s: 0.5 }}"
-        return
-    swing = axis.swing
-    if slewing := axis.slewing:
-        speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
-        yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
-    yield f"    # Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
-    sway = swing.sway
-    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
-    yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
-    poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
-    yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
-    yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
-    yield "    # First motion at reduced speed: raise max_pct when all is well."
-    speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
-    distance = stop_distance_m(speed, joystick_timeout_ms, axis.timeout_ms)
-    yield "    # stop_distance_m: farthest that the tip may travel when it stops from max_pct: 100."
-    yield "    # `canshaper check` shows what the filter needs; make tail_s, stop_s and it smaller."
-    tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
-    yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
-
-
-def _motion(motion: FirstMotion) -> Iterator[str]:
-    yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
-    yield "motion:"
-    yield "  crane:"
-    yield f"    slew: {motion.slew}"
-    yield f"    near_far: {motion.near_far}"
-    if motion.radius:
-        message, _, signal = motion.radius.partition(".")
-        where = f"bus: crane, message: {message}, signal: {signal}"
-        yield f"    radius: {{ {where}, timeout_ms: {RADIUS_TIMEOUT_MS} }}"
-
-
-def _rounded(number: float) -> str:
+def rounded(number: float) -> str:
+    """A number as it is written."""
     return f"{number:.4g}"

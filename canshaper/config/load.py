@@ -11,6 +11,7 @@ from pydantic_core import ErrorDetails
 
 from canshaper.config.schema import DeploymentConfig
 from canshaper.config.section import Section
+from canshaper.config.similar import did_you_mean
 from canshaper.config.source import Place, Source
 from canshaper.config.version import moved_keys
 from canshaper.errors import ConfigError, Problem
@@ -77,33 +78,34 @@ def _validated(source: Source, schema: type[_S]) -> tuple[_S | None, list[Proble
 
 def limits(schema: type[Section], key: str) -> tuple[float, float]:
     """Least and most of a number of a section, in its own unit."""
-    found = _Place.of((key,), schema).limits
-    assert found is not None, key
-    return found
+    limits = _Place.of((key,), schema).limits
+    assert limits is not None, key
+    return limits
 
 
 def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Problem:
-    kind, found, context = error["type"], error["input"], error.get("ctx", {})
+    kind, got, context = error["type"], error["input"], error.get("ctx", {})
     place = _Place.of(error["loc"], schema)
     if kind == "extra_forbidden":
         names = ", ".join(place.owner.model_fields)
         text = f"expected one of the keys {names}, got an unknown one"
+        text += did_you_mean(str(error["loc"][-1]), place.owner.model_fields)
     elif kind == "missing":
-        text = f"missing: {place.description}"
+        text = f"missing: {place.owner.description(str(place.path[-1])) or ''}"
     elif kind == "value_error":
         text = str(context["error"])
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
         place.path += ("kind",)
-        found = found.get("kind") if isinstance(found, dict) else found
-        text = f"expected one of {context.get('expected_tags', place.kinds)}, got {found!r}"
+        got = got.get("kind") if isinstance(got, dict) else got
+        text = f"expected one of {context.get('expected_tags', place.kinds)}, got {got!r}"
     elif kind in ("too_short", "too_long"):
         number = context["min_length" if kind == "too_short" else "max_length"]
         most = "or more entries" if kind == "too_short" else "entries at most"
-        text = f"expected {number} {most}, got {_short(found)}"
+        text = f"expected {number} {most}, got {_short(got)}"
     elif kind == "literal_error":
-        text = f"expected {context['expected']}, got {_short(found)}"
+        text = f"expected {context['expected']}, got {_short(got)}"
     else:
-        text = f"expected {place.expected or error['msg']}, got {_short(found)}"
+        text = f"expected {place.expected or error['msg']}, got {_short(got)}"
     return source.problem(place.path, text)
 
 
@@ -112,8 +114,7 @@ class _Place:
 
     def __init__(self, schema: type[Section]) -> None:
         self.path: Place = ()
-        self.owner: type[BaseModel] = schema
-        self.description = ""
+        self.owner: type[Section] = schema
         self._type: Any = schema
         self._metadata: list[Any] = []
 
@@ -132,9 +133,8 @@ class _Place:
             self.path += (part,)
             self.owner = self._type
             field = self._type.model_fields.get(str(part))
-            self.description = field.description or "" if field else ""
             self._is(field.annotation if field else None, field)
-        elif sections and get_origin(self._type) in _UNIONS:  # filters, told apart by their kind
+        elif sections and get_origin(self._type) in _UNIONS:  # filters, distinguished by their kind
             self._is(next(s for s in sections if part in _kinds(s)))
         elif arguments and part != "[key]":
             self.path += (part,)
@@ -182,7 +182,8 @@ class _Place:
             if low == high:
                 return f"{low:g}"
             whole = "a whole number, " if self._type is int else ""
-            return f"{whole}{low:g} to {high:g} {units[0]['unit'] if units else ''}".rstrip()
+            first, last = (f"{end:.10g}" if whole else f"{end:g}" for end in limits)
+            return f"{whole}{first} to {last} {units[0]['unit'] if units else ''}".rstrip()
         if isinstance(self._type, type) and issubclass(self._type, Section):
             return f"a section with the keys {', '.join(self._type.model_fields)}"
         if get_origin(self._type) in _UNIONS:

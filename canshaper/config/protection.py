@@ -17,36 +17,73 @@ class Checksum(Section):
     """Checksum of a message, over all its bits but its own."""
 
     signal: str = Field(description="signal that holds it: half a byte, a byte, or two bytes")
-    kind: Annotated[str, BeforeValidator(known_checksum)] = Field(
-        description="how it is computed", examples=["crc8_sae_j1850"], json_schema_extra=_kinds
+    kind: Annotated[str, BeforeValidator(known_checksum)] | None = Field(
+        None,
+        description="how it is computed",
+        examples=["crc8_sae_j1850"],
+        json_schema_extra=_kinds,
     )
+    polynomial: Annotated[int, number(1, 0xFFFF, "", "polynomial")] | None = None
+    """Instead of a kind: polynomial of a CRC of as many bits as its signal has, 8 or 16."""
+    start: Annotated[int, number(0, 0xFFFF, "", "register before the first byte")] = 0
+    end: Annotated[int, number(0, 0xFFFF, "", "what is changed in the register at the end")] = 0
+    reflected: bool = Field(False, description="the lowest bit of each byte comes first")
+
+    @model_validator(mode="after")
+    def _one(self) -> Self:
+        if (self.kind is None) == (self.polynomial is None):
+            got = "neither" if self.kind is None else "both"
+            raise ValueError(f"expected one of kind and polynomial, got {got}")
+        if self.kind is not None and (self.start or self.end or self.reflected):
+            raise ValueError("start, end and reflected: expected with polynomial, got kind")
+        return self
+
+
+# What says which message it is, by profile.
+_NEEDS = {
+    "p01": ["data_id", "data_id_mode"],
+    "p02": ["data_ids"],
+    "p04": ["data_id"],
+    "p05": ["data_id"],
+    "p06": ["data_id"],
+    "p07": ["data_id"],
+    "p11": ["data_id", "data_id_mode"],
+    "p22": ["data_ids"],
+}
 
 
 class E2e(Section):
-    """Profile 1 or 2 of AUTOSAR E2E: CRC in byte 0, counter in the lower half of byte 1."""
+    """A profile of AUTOSAR E2E: CRC and counter in the first bytes of the message."""
 
-    profile: Literal["p01", "p02"] = Field(description="profile of AUTOSAR E2E")
-    data_id: Annotated[int, number(0, 0xFFFF, "", "data ID of the message, profile 1")] | None = (
-        None
+    profile: Literal["p01", "p02", "p04", "p05", "p06", "p07", "p11", "p22"] = Field(
+        description="profile of AUTOSAR E2E"
     )
+    data_id: Annotated[int, number(0, 0xFFFF_FFFF, "", "data ID of the message")] | None = None
+    """Data ID of the message: of 32 bits in profiles 4 and 7, else of 16."""
     data_id_mode: Literal["both", "low", "alternating", "nibble"] | None = None
-    """Which bytes of the data ID enter the CRC, profile 1."""
+    """Which bytes of the data ID enter the CRC, profiles 1 and 11."""
     data_ids: (
         Annotated[
             list[Annotated[int, number(0, 0xFF, "", "data ID")]],
-            Field(min_length=16, max_length=16, description="data IDs by the counter, profile 2"),
+            Field(min_length=16, max_length=16, description="data IDs by the counter"),
         ]
         | None
     ) = None
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        needs = {"p01": ["data_id", "data_id_mode"], "p02": ["data_ids"]}[self.profile]
+        needs = _NEEDS[self.profile]
         given = [k for k in ("data_id", "data_id_mode", "data_ids") if getattr(self, k) is not None]
         if given != needs:
             got = " and ".join(given) or "no data ID"
             expected = " and ".join(needs)
             raise ValueError(f"expected {expected} with profile {self.profile}, got {got}")
+        if self.profile == "p11" and self.data_id_mode not in ("both", "nibble"):
+            text = "expected both or nibble with profile p11"
+            raise ValueError(f"data_id_mode: {text}, got {self.data_id_mode}")
+        if (self.data_id or 0) > 0xFFFF and self.profile not in ("p04", "p07"):
+            text = f"data_id: expected up to 0xffff with profile {self.profile}"
+            raise ValueError(f"{text}, got {self.data_id:#x}")
         if self.data_id_mode == "nibble" and (self.data_id or 0) > 0xFFF:
             raise ValueError(f"data_id: expected up to 0xfff in mode nibble, got {self.data_id:#x}")
         return self
@@ -62,3 +99,9 @@ class Protected(Section):
     """Checksum of the message."""
     e2e: E2e | None = None
     """Instead of both a profile of AUTOSAR E2E."""
+    cycle_ms: (
+        Annotated[int, number(1, 60_000, "ms", "its period, instead of GenMsgCycleTime")] | None
+    ) = None
+    """Its period (ms), where the DBC has none or a wrong one."""
+    multiplexor: Annotated[int, number(0, 2**32, "", "value of the multiplexor")] | None = None
+    """Of a multiplexed message: the value of its multiplexor with which it is meant."""

@@ -35,7 +35,7 @@ class Profile(Section):
 
 
 class LoadState(Input):
-    """A signal that tells what hangs on the crane: closed or open, weight of the load, period."""
+    """A signal that says what hangs on the crane: closed or open, weight of the load, period."""
 
     signal: str = Field(description="signal with the value that the breakpoints name")
     timeout_ms: Annotated[int, number(10, 60_000, "ms", "age at which it counts as lost")]

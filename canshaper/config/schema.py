@@ -10,11 +10,14 @@ from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
 from canshaper.config.motion import Motion
+from canshaper.config.origin import Origin
 from canshaper.config.protection import Protected
 from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
 from canshaper.config.sway import Sway
 from canshaper.config.sway_sensor import SwaySensor
+from canshaper.config.switch import Switch, SwitchNames
+from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.config.version import VERSION
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS
@@ -24,7 +27,12 @@ from canshaper.shaping.valve_curve import ValveCurve
 class Joystick(Input):
     """A joystick message and the switches in it."""
 
-    enable: str = Field(description="signal of the enable switch: 1 on, 0 off, all else invalid")
+    enable: SwitchNames | None = Field(
+        None,
+        description="signal of the enable switch: 1 on, 0 off, all else invalid; or several"
+        " switches, all needed, that to press first: SIGNAL, JOYSTICK.SIGNAL, or one of switches",
+    )
+    enable_of: str | None = Field(None, description="the joystick whose switches enable this one")
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(
         None, description="signal that asks for the unshaped joystick"
@@ -36,6 +44,13 @@ class Joystick(Input):
     stuck_s: Annotated[
         float, number(1, 3600, "s", "a joystick deflected for so long without change is broken")
     ] = 20.0
+
+    @model_validator(mode="after")
+    def _enabled(self) -> Self:
+        if (self.enable is None) == (self.enable_of is None):
+            got = "neither" if self.enable is None else "both"
+            raise ValueError(f"expected one of enable and enable_of, got {got}")
+        return self
 
 
 class StatusWord(Input):
@@ -53,7 +68,7 @@ class Cia408(Section):
 
 
 class EmergencyStop(Input):
-    """An emergency stop that is told on the bus. It is no replacement for the one that is wired."""
+    """An emergency stop that comes on the bus. It is no replacement for the one that is wired."""
 
     signal: str = Field(description="signal of the stop: 0 free, all else stops")
 
@@ -66,7 +81,22 @@ class DirectionFlags(Section):
     positive: str = Field(description="signal that the velocity is positive")
 
 
-class Command(Section):
+class Scaling(Section):
+    """What the signal of a velocity means, where the DBC does not say it or says it wrong."""
+
+    full: Annotated[float, number(1e-6, 1e9, "", "from zero to full command")] | None = None
+    """From zero to full command in the unit of the signal; by default the end of its DBC range."""
+    zero: Annotated[float, number(-1e9, 1e9, "", "value at zero command")] | None = None
+    """Value of the signal at zero command; by default 0."""
+    invert: bool = Field(False, description="positive is negative")
+
+    @property
+    def corrects(self) -> bool:
+        """Whether it says anything."""
+        return self.full is not None or self.zero is not None or self.invert
+
+
+class Command(Scaling):
     """Where an axis gets its command from."""
 
     joystick: str = Field(description="name of a joystick")
@@ -84,13 +114,15 @@ class Command(Section):
     def _one_direction(self) -> Self:
         if self.flags and self.negative:
             raise ValueError("expected one of flags and negative, got both")
+        if self.invert and (self.flags or self.negative):
+            raise ValueError("invert: expected none where each direction has a signal of its own")
         return self
 
 
 class DirectionCodes(Section):
-    """Direction of a valve command told by codes, as the valve state of ISO 11783-7 does."""
+    """Direction of a valve command by codes, as the valve state of ISO 11783-7 does."""
 
-    signal: str = Field(description="signal that tells the direction")
+    signal: str = Field(description="signal that carries the direction")
     neutral: Annotated[int, number(0, 255, "", "code of no command")]
     positive: Annotated[int, number(0, 255, "", "code of positive commands")]
     negative: Annotated[int, number(0, 255, "", "code of negative commands")]
@@ -104,18 +136,28 @@ class DirectionCodes(Section):
         return self
 
 
-class Valve(Protected):
+class Valve(Scaling, Protected):
     """Valve command message of an axis; its GenMsgCycleTime is the period it is sent at."""
 
     signal: str = Field(description="signal with the command; its DBC range is full command")
     direction: DirectionCodes | None = None
     """Codes of the direction, only where the command has no sign of its own."""
-    also: list[str] = Field([], description="signals that tell the same in another resolution")
+    also: list[str] = Field([], description="signals that carry the same in another resolution")
     timeout_ms: Annotated[
         int, number(10, 5000, "ms", "silence after which the valve closes by itself")
     ]
     cia408: Cia408 | None = None
     """State machine of a valve of CANopen."""
+
+    @model_validator(mode="after")
+    def _sign(self) -> Self:
+        if self.invert and self.direction:
+            raise ValueError("invert: expected none with a direction, which has codes for both")
+        if self.invert and self.also:
+            raise ValueError(
+                "invert: expected none with also, whose signals would stay as they are"
+            )
+        return self
 
 
 class Feedback(Input):
@@ -172,6 +214,7 @@ class Limits(Section):
         list[Annotated[float, number(-100, 100, "% of full speed", "speed at a command")]] | None
     ) = None
     """Of the measured valve: the speed at each of these commands (% of full speed)."""
+    curve_origin: Origin | None = Field(None, description="where this curve comes from")
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
@@ -196,6 +239,8 @@ class Limits(Section):
             raise ValueError(f"min_pct: expected less than max_pct, got {self.min_pct:g}")
         if self.curve() and self.deadband_pct:
             raise ValueError("expected one of deadband_pct and a curve, got both")
+        if self.curve_origin and not self.curve():
+            raise ValueError("curve_origin: expected a curve with it, got none")
         return self
 
     @property
@@ -262,14 +307,25 @@ class AxisConfig(Section):
         return self
 
 
+class Tick(Section):
+    """Where the ticks are in time."""
+
+    follow: str = Field(description="joystick after whose frames the ticks are to come")
+
+
 class DeploymentConfig(Section):
     """A machine: buses, DBC files, joysticks and axes."""
 
     version: Annotated[int, number(VERSION, VERSION, "", "version of the file's format")]
     tick_ms: Annotated[int, number(1, 50, "ms", "period of the control loop")] = 20
+    tick: Tick | None = None
+    """Where the ticks are; without it where the daemon began."""
     buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
+    switches: dict[str, Switch] = Field(
+        {}, description="switches in messages of their own that enable joysticks, by name"
+    )
     axes: dict[str, AxisConfig] = Field(min_length=1, description="axes by name")
     motion: dict[str, Motion] = Field(
         {}, description="slew and near-far of a crane as one motion, by name"
@@ -289,3 +345,7 @@ class DeploymentConfig(Section):
     )
     control: Control | None = None
     """What may be changed while the machine works."""
+    uncertainty: Uncertainty = Uncertainty()
+    """What a campaign of drives draws from."""
+    accept: Accept = Accept()
+    """What it has to show."""

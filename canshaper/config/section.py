@@ -1,10 +1,17 @@
 """Parts of which every configuration file is made."""
 
+import ast
+import inspect
+from collections.abc import Iterable, Iterator
+from functools import cache
+from itertools import pairwise
 from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
+
+from canshaper.config.source import Place
 
 
 def number(low: float, high: float, unit: str, text: str) -> Any:
@@ -21,9 +28,13 @@ def number(low: float, high: float, unit: str, text: str) -> Any:
 class Section(BaseModel):
     """A part of the file: frozen, no unknown keys, no silent conversion of types."""
 
-    model_config = ConfigDict(
-        extra="forbid", frozen=True, strict=True, use_attribute_docstrings=True
-    )
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, defer_build=True)
+
+    @classmethod
+    def description(cls, key: str) -> str | None:
+        """What a key is for: of its field, or the docstring that stands behind it."""
+        field = cls.model_fields.get(key)
+        return (field and field.description) or _docstrings(cls).get(key)
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -31,8 +42,44 @@ class Section(BaseModel):
     ) -> JsonSchemaValue:
         """JSON schema; an optional key without a description has that of what may stand there."""
         found = handler(schema)
-        for key in handler.resolve_ref_schema(found).get("properties", {}).values():
+        for name, key in handler.resolve_ref_schema(found).get("properties", {}).items():
             texts = [one["description"] for one in key.get("anyOf", ()) if "description" in one]
-            if texts:
-                key.setdefault("description", texts[0])
+            if text := cls.description(name) or next(iter(texts), None):
+                key.setdefault("description", text)
         return found
+
+
+@cache
+def _docstrings(section: type[Section]) -> dict[str, str]:
+    """Docstrings of the keys of a section, from its source; of one that has none, none.
+
+    ``use_attribute_docstrings`` of pydantic reads all of them at each start of the daemon.
+    """
+    texts: dict[str, str] = {}
+    for one in reversed(section.__mro__):
+        if not issubclass(one, Section) or one is Section:
+            continue
+        try:
+            (tree,) = ast.parse(inspect.getsource(one)).body
+        except OSError:  # it is made while the program runs
+            continue
+        assert isinstance(tree, ast.ClassDef)
+        for key, text in pairwise(tree.body):
+            if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr):
+                assert isinstance(key.target, ast.Name)
+                assert isinstance(text.value, ast.Constant)
+                texts[key.target.id] = inspect.cleandoc(str(text.value.value))
+    return texts
+
+
+def sections(part: Any, place: Place = ()) -> Iterator[tuple[Place, Section]]:
+    """Every section in a part of a file with where it stands; itself too, where it is one."""
+    if isinstance(part, Section):
+        yield place, part
+        below: Iterable[tuple[str | int, Any]] = part
+    elif isinstance(part, dict):
+        below = part.items()
+    else:
+        below = enumerate(part) if isinstance(part, list) else ()
+    for key, one in below:
+        yield from sections(one, (*place, key))

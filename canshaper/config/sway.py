@@ -2,8 +2,9 @@
 
 from typing import Annotated, Self
 
-from pydantic import model_validator
+from pydantic import Field, model_validator
 
+from canshaper.config.origin import Origin
 from canshaper.config.section import Section, number
 from canshaper.shaping.sway import SwayMode
 
@@ -26,6 +27,7 @@ class Sway(Section):
     decay_per_swing: (
         Annotated[float, number(0, 0.99, "", "part of the amplitude lost over a full swing")] | None
     ) = None
+    origin: Origin | None = Field(None, description="where these numbers come from")
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -38,7 +40,7 @@ class Sway(Section):
         Raises:
             ValueError: the data is incomplete, given twice, or makes no sense.
         """
-        given = self.model_dump(exclude={"full_speed_m_s"}, exclude_none=True).keys()
+        given = self.model_dump(exclude={"full_speed_m_s", "origin"}, exclude_none=True).keys()
         if given == {"length_m", "damping_nms", "mass_kg"}:
             assert self.length_m and self.mass_kg and self.damping_nms is not None
             return SwayMode.from_grapple(self.length_m, self.damping_nms, self.mass_kg)

@@ -7,7 +7,12 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
-from canshaper.controller.events import FeedbackEvent, StateEvent, SwaySensorEvent
+from canshaper.controller.events import (
+    FeedbackEvent,
+    StateEvent,
+    SwaySensorEvent,
+    SwingLengthEvent,
+)
 from canshaper.controller.inputs import MachineInputs, received_by
 from canshaper.controller.motion import MotionRunner
 from canshaper.controller.outputs import ValveOutputs
@@ -16,6 +21,7 @@ from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
 from canshaper.controller.status import status_frames
 from canshaper.inputs.carry_over import Key, Part, carry_over
+from canshaper.inputs.input import EnableGate
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.interface import Event, ForwardingRule, FrameHandler, MessageKey
 from canshaper.protocols.registry import protocols
@@ -225,6 +231,8 @@ class Controller:
     def _connect(self, inputs: MachineInputs, tick_s: float) -> None:
         """Let load state and operator choose filters, sensors show sway, and axes move as one."""
         for runner in self.axes.values():
+            if switches := inputs.gates.get(runner.bound.config.command.joystick):
+                runner.add_interlock(EnableGate(switches))
             if runner.bound.config.gain_schedule or runner.bound.config.profiles:
                 runner.add_chooser(inputs.load_state, inputs.profile)
         for name, message in inputs.sway_sensors.items():
@@ -247,6 +255,10 @@ class Controller:
                 self.counters.add(event.fault)
         if (trust := runner.changed_trust()) is not None:
             self.events.append(SwaySensorEvent(name, trust))
+        if (seen := runner.changed_length()) is not None:
+            sway = runner.bound.config.sway
+            assert sway is not None  # checked with the deployment
+            self.events.append(SwingLengthEvent(name, seen, sway))
 
     def _overruns(self, missed: int) -> bool:
         if missed:

@@ -1,10 +1,14 @@
 """What an administrator wants to read: changes of axes and valves."""
 
+import math
 from dataclasses import dataclass
 
 from canshaper.codec.frame import Frame, FrameFault
+from canshaper.config.sway import Sway
 from canshaper.inputs.feedback import Following
 from canshaper.shaping.states import Transition
+from canshaper.shaping.sway import GRAVITY_M_S2, SwayMode
+from canshaper.shaping.swing_length import SwingLength
 from canshaper.shaping.trust import Trust
 
 FAULT_OF = {
@@ -78,6 +82,35 @@ class SwaySensorEvent:
     def text(self) -> str:
         """For the log."""
         return f"axis={self.axis} sway_sensor={self.trust.name}"
+
+
+@dataclass(frozen=True, slots=True)
+class SwingLengthEvent:
+    """The grapple swings like a pendulum of another length than that of the file, or as it again.
+
+    Attributes:
+        axis: its name in the file.
+        seen: what the sway sensor has shown.
+        file: sway data of the axis.
+    """
+
+    axis: str
+    seen: SwingLength
+    file: Sway
+
+    @property
+    def text(self) -> str:
+        """For the log: what it swings like, what the file says, and the key to set."""
+        seen, mode = self.seen, self.file.mode()
+        key, value, says = "length_m", seen.length_m, self.file.length_m
+        if says is None:
+            as_seen = SwayMode(math.sqrt(GRAVITY_M_S2 / seen.length_m), mode.damping_ratio)
+            key, value, says = "period_s", as_seen.period_s, mode.period_s
+        return (
+            f"axis={self.axis} swings_like_{key}={value:.2f} sd_pct={seen.sd_pct:.0f}"
+            f" damping_ratio={seen.damping_ratio:.2f} file={says:.2f}"
+            f" set=axes.{self.axis}.sway.{key}={value:.2f}"
+        )
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Mapping
 
-from canshaper.inputs.input import EmergencyStopInput, MessageInput
+from canshaper.inputs.input import EmergencyStopInput, MessageInput, Switch, SwitchInput
 from canshaper.inputs.joystick import JoystickInput
 from canshaper.inputs.profile import ProfileButtons, ProfileChoice, ProfileSwitch, profile_names
 from canshaper.inputs.radius import radius_input
@@ -26,6 +26,7 @@ class MachineInputs:
         profile: the operator's choice, where there is one.
         sway_sensors: measurements of sway, by the name of each axis that reads them.
         radii: measured radius of the tip, by the name of its two-axis motion.
+        gates: switches that enable a joystick, but for the one that is pressed, by its name.
         bound: all of them that receive frames, with their messages.
     """
 
@@ -34,6 +35,7 @@ class MachineInputs:
         self.bound: list[BoundHandler] = [
             (bound, self.joysticks[name]) for name, bound in deployment.joysticks.items()
         ]
+        self.gates = self._enable(deployment)
         self.stop: EmergencyStopInput | None = None
         if stop := deployment.emergency_stop:
             self.stop = EmergencyStopInput(stop, stop.config.signal)
@@ -55,6 +57,26 @@ class MachineInputs:
                     messages[key] = SwaySensorInput(sensor.message)
                     self.bound.append((sensor.message, messages[key]))
                 self.sway_sensors[name] = messages[key]
+
+    def _enable(self, deployment: Deployment) -> dict[str, list[Switch]]:
+        """Switches by the joystick that they enable; the one that is pressed is set in it."""
+        named: dict[str, Switch] = {}
+        for bound in deployment.switches:
+            message = SwitchInput(bound, bound.switches)
+            self.bound.append((bound, message))
+            named |= message.switches
+        gates: dict[str, list[Switch]] = {}
+        for name, joystick in deployment.joysticks.items():
+            others = joystick.conditions[0 if joystick.enable is None else 1 :]
+            switches = [
+                self.joysticks[of].watch(switch) if of is not None else named[switch]
+                for of, switch in others
+            ]
+            if joystick.enable is None:
+                self.joysticks[name].pressed = switches.pop(0)
+            if switches:
+                gates[name] = switches
+        return gates
 
     def _profile(self, deployment: Deployment) -> ProfileChoice | None:
         config = deployment.config

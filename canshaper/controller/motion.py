@@ -107,6 +107,7 @@ class MotionRunner:
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
             member.runner.added = member.moving.added
+            member.runner.damps = member.moving.damps
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)

@@ -10,7 +10,7 @@ from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
 from canshaper.inputs.profile import ProfileChoice
-from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
+from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ValueInput
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.protocols.interface import Interlock
@@ -18,7 +18,8 @@ from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
-from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.sway import GRAVITY_M_S2, SwayModel
+from canshaper.shaping.swing_length import SwingLength
 from canshaper.shaping.trust import Trust
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
@@ -26,6 +27,8 @@ from canshaper.shaping.trust import Trust
 FOREIGN_NS = 1_000_000_000
 # Least radius for the speed of a tip: at the pillar it has none, and shows no swing.
 LEAST_RADIUS_M = 0.5
+# A length that differs by this factor from the one that was reported last is reported.
+LENGTH_NEWS = 1.1
 
 
 class CommandSource(Protocol):
@@ -48,6 +51,7 @@ class AxisRunner:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
         added: velocity that a two-axis motion adds to this one, fraction of full speed.
+        damps: the motion makes this axis swing, which a sway sensor may damp.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
@@ -85,12 +89,15 @@ class AxisRunner:
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
         self.added = 0.0
+        self.damps = False
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
         self.radius: ValueInput | None = None
         self._sway_signal: SwaySignal | None = None
         self._reported_trust = Trust.NO_DATA
+        self._seen_length: SwingLength | None = None
+        self._reported_m = 0.0
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
     @property
@@ -119,6 +126,7 @@ class AxisRunner:
     def drop_added(self) -> None:
         """Nothing is added any more, and the next output is not faster for what was."""
         self.added = 0.0
+        self.damps = False
         self.axis.drop_added()
 
     def add_interlock(self, interlock: Interlock) -> None:
@@ -138,6 +146,11 @@ class AxisRunner:
         damps, timing = bound.config.use == "damp", bound.timing(self.period_s)
         self.axis.sensed = SensedSway(sway, timing, bound.limits, damps=damps)
 
+    def measured_by(self, node: SensorNode) -> None:
+        """Count what its sway sensor measures only while this node works."""
+        assert self._sway_signal is not None  # of an axis with a sensor
+        self._sway_signal.node = node
+
     def isolate(self, joystick: CommandSource, axis: Axis | None = None) -> None:
         """For a measurement: another joystick, perhaps another ``Axis``, nothing of other axes.
 
@@ -148,6 +161,7 @@ class AxisRunner:
         self._joystick = joystick
         self.alone = True
         self.added = 0.0
+        self.damps = False
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -217,7 +231,11 @@ class AxisRunner:
         self._releases = joystick.releases
         # A release is more than a fault.
         if fault is not None and (command.enabled or axis.neutral):
-            command = CommandInput(fault=fault, reset=command.reset, trip=trip)
+            # A switch that does not agree does not hide that the one to press is let go of; where
+            # that one is lost, its return is no press.
+            let_go = not command.enabled and command.fault is None
+            enabled = not (let_go and fault is Reason.ENABLE_OFF)
+            command = CommandInput(fault=fault, enabled=enabled, reset=command.reset, trip=trip)
         # Late ticks spoil a filter; in bypass there is none, and the driver keeps the axis.
         late = Reason.LOOP_OVERRUN if overrun and axis.state is not State.BYPASS_ON else None
         if late and command.enabled and command.fault is None:
@@ -226,8 +244,8 @@ class AxisRunner:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.take(), self._scale(now_ns)
-            axis.sensed.measure(value, scale, commanded=axis.commanded)
-        transition = axis.act(command, self.added)
+            axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self.damps)
+        transition = axis.act(command, self.added, damps=self.damps)
         self._put(axis.raw)
         return transition
 
@@ -290,6 +308,34 @@ class AxisRunner:
             return None
         self._reported_trust = trust
         return trust
+
+    @property
+    def swing_length_m(self) -> float:
+        """Length of the pendulum as the sway sensor has shown it last; 0 before it has."""
+        seen = self.axis.sensed.length.result if self.axis.sensed else None
+        return seen.length_m if seen else 0.0
+
+    def changed_length(self) -> SwingLength | None:
+        """How the grapple swings, where that is another length than was reported last.
+
+        Of the load of a breakpoint nothing is: the key that is reported is not that in force.
+        """
+        sensed = self.axis.sensed
+        if sensed is None or (seen := sensed.length.result) is self._seen_length:
+            return None
+        self._seen_length = seen
+        assert seen is not None
+        assert self.bound.config.sway is not None  # checked with the deployment
+        mode = self.bound.config.sway.mode()
+        assert self.axis.sway is not None
+        if self.axis.sway.mode != mode:
+            return None
+        file_m = GRAVITY_M_S2 / mode.omega_rad_s**2
+        other = seen.length_m / (self._reported_m or file_m)
+        if 1.0 / LENGTH_NEWS <= other <= LENGTH_NEWS:
+            return None
+        self._reported_m = seen.length_m
+        return seen
 
     @property
     def active_set(self) -> int:

@@ -1,12 +1,13 @@
-"""The daemon: buses, controller and loop together; signals; what is told to people."""
+"""The daemon: buses, controller and loop together; signals; what people read."""
 
 import logging
+import os
 import signal
 import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import FrameType
-from typing import Any
+from typing import Any, NoReturn
 
 from canshaper.blackbox.keeper import BlackBox
 from canshaper.bus.clock import boottime_ns
@@ -14,9 +15,11 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon.config_reload import ConfigReload
 from canshaper.daemon.control_server import ControlServer
+from canshaper.daemon.follow import TickFollower
 from canshaper.daemon.gateway import InlineGateway
 from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.loop import run_at_deadlines
@@ -34,13 +37,14 @@ from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.filters import unfit
 from canshaper.machine.identity import program_sha256
+from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
 # How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
 NEUTRAL_TRIES_S = 0.1
 SECOND_NS = 1_000_000_000
-# Nobody hears us there, or we nobody.
+# No one receives our frames there, or we no one's.
 OFF_BUS = frozenset(
     (
         BusState.BUS_OFF,
@@ -53,7 +57,7 @@ OFF_BUS = frozenset(
 
 
 class Daemon:
-    """Runs a deployment until it is told to stop.
+    """Runs a deployment until it is asked to stop.
 
     Args:
         load: reads the deployment, at the start and, in another process, at every SIGHUP.
@@ -88,7 +92,7 @@ class Daemon:
         self._control = self._open_control(deployment)
 
     def run(self) -> None:
-        """Run until SIGTERM or SIGINT; then every valve is told neutral and the buses close."""
+        """Run until SIGTERM or SIGINT; then every valve is sent neutral and the buses close."""
         for number in (signal.SIGTERM, signal.SIGINT, signal.SIGHUP):
             signal.signal(number, self._on_signal)
         signal.signal(signal.SIGCHLD, signal.SIG_DFL)  # else its reader's end is lost
@@ -106,7 +110,8 @@ class Daemon:
         self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
-                run_at_deadlines(self._tick_ns, self._body, self._wait if self._line else None)
+                wait = self._wait if self._line else None
+                run_at_deadlines(self._tick_ns, self._body, wait, self._follower)
         finally:
             self._manager.stopping()
             self._send_neutral()
@@ -145,11 +150,12 @@ class Daemon:
         self._line.wait(seconds, self._guarded, self._ports, self._standstill)
 
     def _housekeeping(self, now_ns: int) -> None:
-        """Tell what changed; everything that may take time comes after the frames are out."""
+        """Report what changed; everything that may take time comes after the frames are out."""
         controller = self._controller
         self._manager.ping(now_ns)
         for event in controller.events:
-            log.info("%s", event.text)
+            tripped = isinstance(event, StateEvent) and event.transition.new is State.TRIPPED
+            log.log(logging.WARNING if tripped else logging.INFO, "%s", event.text)
         self._black_box.after_tick(now_ns, controller.events, neutral=controller.neutral)
         controller.events.clear()
         for name, port in self._ports.items():
@@ -222,6 +228,8 @@ class Daemon:
         self._adjuster = Adjuster(self._controller)
         self._bus_states = dict.fromkeys(self._ports, BusState.UP)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
+        follows = deployment.config.tick is not None
+        self._follower = TickFollower(deployment, self._controller) if follows else None
 
     def _in_line(self, deployment: Deployment) -> InlineGateway | None:
         """What passes frames on, where we stand in a line."""
@@ -237,7 +245,7 @@ class Daemon:
         try:
             return ControlServer(path, int(control.mode, 8))
         except OSError as error:
-            log.error("control=none socket=%s %s", path, error.strerror or error)
+            log.warning("control=none socket=%s %s", path, error.strerror or error)
             return None
 
     def _prepare_reload(self) -> None:
@@ -322,7 +330,7 @@ class Daemon:
             self._controller.receive(frame, now_ns)
 
     def _refuse(self, why: str) -> None:
-        """Tell why a reload changes nothing."""
+        """Report why a reload changes nothing."""
         lines = why.splitlines()
         for line in lines:
             log.error("reload=refused %s", line)
@@ -349,7 +357,8 @@ class Daemon:
         for line in self._controller.deployment.identity.lines():
             log.info("identity %s", line)
         if count := self._controller.deployment.messages.warnings()[0]:
-            text = "of messages in the DBC files that are not used; canshaper check shows them"
+            text = "of messages and tables in the DBC files that are not used"
+            text += "; canshaper check shows them"
             log.warning("dbc-warnings=%d %s", count, text)
         for place, fault in unfit(self._controller.deployment.config):
             log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
@@ -369,5 +378,16 @@ class Daemon:
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGHUP:
             self._reload = True
+        elif self._stop:
+            self._leave_at_once(number)
         else:
             self._stop = True
+
+    def _leave_at_once(self, number: int) -> NoReturn:
+        """The second signal to stop: neutral is tried once more, and nothing is waited for."""
+        for frame in self._guarded.neutral_frames():
+            self._ports[frame.bus].send(frame)
+        log.warning("stopped at-once signal=%s", signal.Signals(number).name)
+        for handler in logging.getLogger().handlers:
+            handler.flush()
+        os._exit(128 + number)

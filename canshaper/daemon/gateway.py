@@ -9,8 +9,9 @@ from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 
 from canshaper.bus.device import check_device
+from canshaper.bus.packet import FD_SIZE
 from canshaper.bus.port import Port
-from canshaper.bus.raw import GONE, REOPEN_NS, SIZE
+from canshaper.bus.raw import GONE, REOPEN_NS
 from canshaper.bus.socketcan import CAN_INV_FILTER, RECEIVE_BUFFER_BYTES, filter_words
 from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
@@ -72,6 +73,8 @@ class Bridge:
                 opened[-1].setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, RECEIVE_BUFFER_BYTES)
                 opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_JOIN_FILTERS, 1)
                 opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, self._filters)
+                if bus.fd:
+                    opened[-1].setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FD_FRAMES, 1)
                 opened[-1].bind((bus.channel,))
                 check_device(opened[-1:], bus)
         except (OSError, WrongDeviceError):
@@ -88,7 +91,7 @@ class Bridge:
         for source, destination in zip(self.sockets, self.sockets[::-1], strict=True):
             for _ in range(MOST_AT_ONCE):
                 try:
-                    data = source.recv(SIZE)
+                    data = source.recv(FD_SIZE)
                 except BlockingIOError:
                     break
                 except OSError as error:

@@ -10,11 +10,12 @@ def run_at_deadlines(
     period_ns: int,
     body: Callable[[int, int, int], bool],
     wait: Callable[[float], None] | None = None,
+    steer: Callable[[int], int] | None = None,
 ) -> None:
     """Call ``body`` at every deadline until it returns False.
 
-    The deadlines are fixed in advance, so lateness does not add up. Deadlines that have passed
-    are counted and left out, never caught up in a burst.
+    A deadline is fixed before the sleep that ends at it, so lateness does not add up. Those that
+    have passed are counted and left out, never caught up in a burst.
 
     Args:
         period_ns: time between two deadlines.
@@ -22,6 +23,8 @@ def run_at_deadlines(
             last call, and how late it is, in ns after the first deadline it has not yet been called
             for.
         wait: lets so many seconds pass; by default it sleeps.
+        steer: asked after each call, with where the next deadline would be, by how many ns it is
+            to be moved; much less than a period.
     """
     clock = boottime_ns
     deadline = now = clock()
@@ -32,6 +35,8 @@ def run_at_deadlines(
         if not body(now, missed, late):
             return
         deadline += period_ns
+        if steer:
+            deadline += steer(deadline)
         left = deadline - clock()
         if left > 0:
             (wait or time.sleep)(left / 1e9)

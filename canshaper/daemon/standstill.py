@@ -19,13 +19,11 @@ def longest_gap_ns(deployment: Deployment) -> int:
     A valve that gets a frame in every n-th tick only may have waited for n - 1 ticks before.
     """
     tick_ms = deployment.config.tick_ms
-    limits = [joystick.config.timeout_ms for joystick in deployment.joysticks.values()]
+    limits = [one.config.timeout_ms for one in deployment.stopping_inputs]
     limits += [
         axis.config.valve.timeout_ms - (axis.period_ticks - 1) * tick_ms
         for axis in deployment.axes.values()
     ]
-    if deployment.emergency_stop:
-        limits.append(deployment.emergency_stop.config.timeout_ms)
     return min(limits) * 1_000_000
 
 

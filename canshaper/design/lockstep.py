@@ -4,6 +4,7 @@ The controller is the daemon's own, and everything passes through the same frame
 """
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import Protocol, TypedDict, Unpack
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
@@ -12,6 +13,7 @@ from canshaper.daemon.io_cycle import FrameProcessor, io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.routing import Key
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.grapple import Grapple, Sway
@@ -21,20 +23,42 @@ from canshaper_sim.plant import PlantNode
 from canshaper_sim.recorder import Recorder
 from canshaper_sim.recording import Recording
 
+OnFrame = Callable[[Frame, float], object]
+"""Called with a frame and its time in s."""
+Received = Callable[[Key], bool]
+
+
+class Joysticks(Protocol):
+    """Those who hold joysticks, as ``JoystickNode`` does."""
+
+    def frames_of_tick(self, time_ms: int, tick_ms: int) -> Sequence[Frame]:
+        """Frames that came since the last tick, in order."""
+
 
 class PlantPort:
     """All buses of a machine at once, between the plant and those who hold its joysticks.
 
     Args:
         plant: the crane, which gets what is sent.
-        on_frame: called with every frame and its time in s.
+        received: whether a socket of the machine lets frames of the crane with this bus, id and
+            format through; None where it lets all.
+        on_frame: called with every frame and its time in s; None where no one listens.
+        sends: all that may be sent, by bus, id and format; None without a limit.
 
     Attributes:
         arrived_ns: every frame that waits came just before the tick.
     """
 
-    def __init__(self, plant: PlantNode, on_frame: Callable[[Frame, float], object]) -> None:
+    def __init__(
+        self,
+        plant: PlantNode,
+        received: Received | None,
+        on_frame: OnFrame | None,
+        sends: frozenset[Key] | None = None,
+    ) -> None:
         self.arrived_ns = 0
+        self._sends = sends
+        self._received = received
         self._plant = plant
         self._on_frame = on_frame
         self._waiting: list[Frame] = []
@@ -43,16 +67,21 @@ class PlantPort:
     def begin(self, time_ms: int, frames: Sequence[Frame]) -> None:
         """A tick begins; these come from the joysticks, behind what the plant has sent."""
         self.arrived_ns, self._time_s = time_ms * 1_000_000, time_ms / 1000.0
-        for frame in frames:
-            self._on_frame(frame, self._time_s)
+        self._report(frames, self._time_s)
         self._waiting += frames
 
     def end(self, step_s: float) -> None:
         """It is over: the plant moves until the next one, and sends what it measures."""
         self._plant.advance(step_s)
-        self._waiting = self._plant.feedback()
-        for frame in self._waiting:
-            self._on_frame(frame, self._time_s + step_s)
+        frames = self._plant.feedback()
+        self._report(frames, self._time_s + step_s)
+        received = self._received
+        self._waiting = [one for one in frames if received is None or received(one[:3])]
+
+    def _report(self, frames: Sequence[Frame], time_s: float) -> None:
+        if self._on_frame is not None:
+            for frame in frames:
+                self._on_frame(frame, time_s)
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits."""
@@ -64,9 +93,12 @@ class PlantPort:
         return iter(())
 
     def send(self, frame: Frame) -> bool:
-        """Send to the plant."""
+        """Send to the plant; what may not be sent is left out, as by a port that listens."""
+        if self._sends is not None and frame[:3] not in self._sends:
+            return True
         self._plant.receive(frame)
-        self._on_frame(frame, self._time_s)
+        if self._on_frame is not None:
+            self._on_frame(frame, self._time_s)
         return True
 
 
@@ -78,7 +110,8 @@ class LockStep:
         processor: the controller, or what stands around one.
         plant: the crane.
         joysticks: those who hold the joysticks.
-        on_frame: called with every frame and its time in s.
+        on_frame: called with every frame and its time in s; None where no one listens.
+        received: see ``PlantPort``.
 
     Attributes:
         time_ms: when the next tick is.
@@ -89,14 +122,16 @@ class LockStep:
         deployment: Deployment,
         processor: FrameProcessor,
         plant: PlantNode,
-        joysticks: Sequence[JoystickNode],
-        on_frame: Callable[[Frame, float], object] = lambda _frame, _time_s: None,
+        joysticks: Sequence[Joysticks],
+        on_frame: OnFrame | None = None,
+        *,
+        received: Received | None = None,
     ) -> None:
         self.time_ms = 0
         self._tick_ms = deployment.config.tick_ms
         self._processor = processor
         self._joysticks = joysticks
-        self._port = PlantPort(plant, on_frame)
+        self._port = PlantPort(plant, received, on_frame, _sends(deployment))
         self._ports = dict.fromkeys(deployment.config.buses, self._port)
         self._standstill = Standstill(deployment)
         self._standstill.clock = lambda: 0  # nothing is ever late here
@@ -112,32 +147,136 @@ class LockStep:
         self.time_ms = time_ms + tick_ms
 
 
+def _sends(deployment: Deployment) -> frozenset[Key] | None:
+    """What a deployment that only listens may send; None for one that drives."""
+    if not deployment.listen_only:
+        return None
+    buses = deployment.routing.buses.items()
+    return frozenset((bus, *key) for bus, ids in buses for key in ids.sent | ids.claims)
+
+
+class DriveOptions(TypedDict, total=False):
+    """What may be said of a drive besides its deployment and script.
+
+    Attributes:
+        bypass: drive with anti-sway switched off.
+        parameters: the crane; by default the nominal one.
+        machine: tip, tip-controller or joints; by default what the axes of the deployment say.
+        sway: swing of the grapple at the start; by default it hangs still.
+        loads: times in s at which something else hangs from the tip, and what.
+        prepare: called with the fresh controller, to put another filter in.
+        crane: which one moves, where the deployment has several; the others' joysticks stand still.
+        disturb: puts something between joysticks and bus.
+    """
+
+    bypass: bool
+    parameters: CraneParameters | None
+    machine: str | None
+    sway: Sway | None
+    loads: Sequence[tuple[float, Grapple]]
+    prepare: Callable[[Controller], None] | None
+    crane: str | None
+    disturb: Callable[[Joysticks], Joysticks]
+
+
+def driven_part(deployment: Deployment, crane: str | None) -> Deployment:
+    """The part of a deployment that is one of its cranes; the whole where it has only one.
+
+    Raises:
+        DriveError: no such crane.
+    """
+    try:
+        return one_crane(deployment, crane) if crane else deployment
+    except ValueError as error:
+        raise DriveError(str(error)) from None
+
+
+class Simulation:
+    """Operator, controller and crane of one drive.
+
+    Args:
+        deployment: the machine; its buses are not opened.
+        script: what the operator does.
+        on_frame: called with every frame and its time in s; None where no one listens: then the
+            plant sends nothing that the controller does not receive.
+        options: see ``DriveOptions``.
+
+    Attributes:
+        controller: the daemon's controller.
+        plant: the crane.
+
+    Raises:
+        ConfigError: the deployment does not fit the machine.
+        DriveError: nor does the script, or there is no such machine or start pose.
+    """
+
+    def __init__(
+        self,
+        deployment: Deployment,
+        script: Script,
+        on_frame: OnFrame | None = None,
+        **options: Unpack[DriveOptions],
+    ) -> None:
+        listeners = on_frame is not None
+        self.controller = Controller(deployment if listeners else deployment.unreported)
+        if prepare := options.get("prepare"):
+            prepare(self.controller)
+        crane, machine = options.get("crane"), options.get("machine")
+        parameters, sway = options.get("parameters"), options.get("sway")
+        driven = driven_part(deployment, crane)
+        try:
+            self.plant = PlantNode(driven, parameters, machine, sway, listeners=listeners)
+            hands: list[Joysticks] = [
+                JoystickNode(driven, script, bypass=options.get("bypass", False))
+            ]
+            for other in cranes(deployment):
+                if other != crane:
+                    still = Script("still", (), script.duration_s)
+                    hands.append(JoystickNode(one_crane(deployment, other), still))
+        except ValueError as error:
+            raise DriveError(str(error)) from None
+        if disturb := options.get("disturb"):
+            hands = [*map(disturb, hands)]
+        guarded = Guarded(self.controller)
+        self._lock_step = LockStep(
+            deployment,
+            guarded,
+            self.plant,
+            hands,
+            on_frame,
+            received=deployment.routing.received,
+        )
+        self._loads = [*options.get("loads", ())]
+        self._end_ms = round(script.duration_s * 1000.0)
+
+    def ticks(self) -> Iterator[int]:
+        """Drive the script.
+
+        Yields:
+            The time of each tick in ms, when the crane has moved on until the next one.
+        """
+        lock_step, loads = self._lock_step, self._loads
+        while (time_ms := lock_step.time_ms) < self._end_ms:
+            while loads and time_ms >= 1000.0 * loads[0][0]:
+                self.plant.crane.pick_up(loads.pop(0)[1])
+            lock_step.step()
+            yield time_ms
+            self.controller.events.clear()
+
+
 def drive(
     deployment: Deployment,
     script: Script,
-    *,
-    bypass: bool = False,
-    parameters: CraneParameters | None = None,
-    machine: str | None = None,
-    sway: Sway | None = None,
-    load: tuple[float, Grapple] | None = None,
-    prepare: Callable[[Controller], None] | None = None,
-    crane: str | None = None,
     on_progress: Callable[[float], None] | None = None,
+    **options: Unpack[DriveOptions],
 ) -> Recording:
     """Drive a script through a deployment.
 
     Args:
         deployment: the machine; its buses are not opened.
         script: what the operator does.
-        bypass: drive with anti-sway switched off.
-        parameters: the crane; by default the nominal one.
-        machine: tip, tip-controller or joints; by default what the axes of the deployment say.
-        sway: swing of the grapple at the start; by default it hangs still.
-        crane: which one moves, where the deployment has several; the others' joysticks stand still.
-        load: time in s at which a load is picked up, and what hangs there from then on.
-        prepare: called with the fresh controller, to put another filter in.
         on_progress: called with the simulated seconds now and then.
+        options: see ``DriveOptions``.
 
     Returns:
         The recorded drive, one row a tick.
@@ -146,29 +285,10 @@ def drive(
         ConfigError: the deployment does not fit the machine.
         DriveError: nor does the script, or there is no such machine or start pose.
     """
-    controller = Controller(deployment)
-    if prepare:
-        prepare(controller)
-    guarded = Guarded(controller)
-    try:
-        driven = one_crane(deployment, crane) if crane else deployment
-        plant = PlantNode(driven, parameters, machine, sway)
-        hands = [JoystickNode(driven, script, bypass=bypass)]
-        for other in cranes(deployment):
-            if other != crane:
-                still = Script("still", (), script.duration_s)
-                hands.append(JoystickNode(one_crane(deployment, other), still))
-    except ValueError as error:
-        raise DriveError(str(error)) from None
-    recorder = Recorder(driven, parameters)
-    lock_step = LockStep(deployment, guarded, plant, hands, recorder.receive)
-    end_ms = round(script.duration_s * 1000.0)
-    while (time_ms := lock_step.time_ms) < end_ms:
-        if load and time_ms >= 1000.0 * load[0]:
-            plant.crane.pick_up(load[1])
-            load = None
-        lock_step.step()
-        controller.events.clear()
+    driven = driven_part(deployment, options.get("crane"))
+    recorder = Recorder(driven, options.get("parameters"))
+    simulation = Simulation(deployment, script, recorder.receive, **options)
+    for time_ms in simulation.ticks():
         if on_progress and time_ms % 1000 == 0:
             on_progress(time_ms / 1000.0)
     return recorder.recording()

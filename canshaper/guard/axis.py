@@ -1,6 +1,7 @@
 """What one axis may be sent now, and why not more: limits, what was asked, rates."""
 
 import math
+from collections.abc import Sequence
 
 from canshaper.guard.bits import MOST_KNOWN, CommandBits, JoystickBits
 from canshaper.guard.inputs import (
@@ -10,7 +11,7 @@ from canshaper.guard.inputs import (
     NEUTRAL,
     Asked,
     GuardedJoystick,
-    GuardedStop,
+    GuardedSwitch,
     largest,
 )
 from canshaper.guard.opening import openings
@@ -36,7 +37,7 @@ class GuardedAxis(Asked):
     Attributes:
         name: of the axis.
         bits: its command in the valve frame.
-        span: the bytes of a frame that tell it.
+        span: the bytes of a frame that carry it.
         part: what they were in the last frame that left.
         at: when that was, as ``refusal`` has it.
     """
@@ -62,7 +63,7 @@ class GuardedAxis(Asked):
         "_rise",
         "_silent_ns",
         "_step",
-        "_stop",
+        "_stops",
         "_up",
         "at",
         "bits",
@@ -76,7 +77,7 @@ class GuardedAxis(Asked):
         deployment: Deployment,
         bound: BoundAxis,
         joystick: GuardedJoystick,
-        stop: GuardedStop | None,
+        stops: Sequence[GuardedSwitch],
     ) -> None:
         config, limits = bound.config, bound.config.limits
         message = deployment.joysticks[config.command.joystick].message
@@ -91,10 +92,10 @@ class GuardedAxis(Asked):
         self._length, self.span = bound.valve_message.length, self.bits.span
         self.part = b""
         self.at = BEFORE
-        self._joystick, self._stop = joystick, stop
+        self._joystick, self._stops = joystick, tuple(stops)
         self._adding: tuple[GuardedAxis, ...] = ()
         self._added = 0.0
-        if stop is not None:
+        for stop in stops:
             stop.stops.append(self)
         self._maximum = _ends(deployment, bound, "max_pct")[1] / 100.0
         self._rise = _ends(deployment, bound, "rise_per_s")[1] * period_s
@@ -188,8 +189,8 @@ class GuardedAxis(Asked):
         if joystick.released or heard_ns < now_ns - self._silent_ns:
             return 0.0, 0
         free_ns = heard_ns + self._silent_ns
-        if self._stop is not None:
-            free_ns = min(free_ns, self._stop.free_ns)
+        for stop in self._stops:
+            free_ns = min(free_ns, stop.free_ns)
             if free_ns < now_ns:
                 return 0.0, 0
         if direction == FORTH:
@@ -224,8 +225,8 @@ class GuardedAxis(Asked):
     def _why(self, command: Command, reach: float, allowed: float, now_ns: int) -> str:
         """What a frame is beyond, for the log."""
         direction, size, _, _ = command
-        if self._stop is not None and now_ns > self._stop.free_ns:
-            limit = "emergency-stop"
+        if stops := [stop.limit for stop in self._stops if now_ns > stop.free_ns]:
+            limit = stops[0]
         elif self._joystick.released:
             limit = "enable"
         elif now_ns - self._joystick.heard_ns > self._silent_ns:
@@ -278,7 +279,6 @@ def _ends(deployment: Deployment, bound: BoundAxis, key: str) -> tuple[float, fl
 
 def _standstill_ns(deployment: Deployment) -> int:
     """The longest that the loop may stand still without notice: the shortest of all timeouts."""
-    inputs = [*deployment.joysticks.values(), deployment.emergency_stop]
-    timeouts = [one.config.timeout_ms for one in inputs if one]
+    timeouts = [one.config.timeout_ms for one in deployment.stopping_inputs]
     timeouts += [axis.config.valve.timeout_ms for axis in deployment.axes.values()]
     return min(timeouts) * 1_000_000

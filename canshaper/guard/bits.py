@@ -65,12 +65,15 @@ class Field:
 class Part:
     """Value of a signal as a part of its DBC range."""
 
-    __slots__ = ("_full", "_offset", "_scale", "_special", "field")
+    __slots__ = ("_full", "_high", "_low", "_offset", "_scale", "_special", "field")
 
     def __init__(self, signal: Signal, length: int) -> None:
         self.field = Field(signal, length)
         self._scale, self._offset = signal.scale, signal.offset
-        self._full = float(signal.maximum or 0.0)
+        low, high = signal.minimum or 0.0, signal.maximum or 0.0
+        # One raw step more on one side is full, as two's complement has it.
+        self._full = full = _full(signal)
+        self._low, self._high = min(low / full, -1.0) - ROUNDING, high / full + ROUNDING
         self._special = frozenset(special_codes(signal))
 
     def value(self, data: bytes) -> float:
@@ -78,7 +81,9 @@ class Part:
         raw = self.field.raw(data)
         value = (raw * self._scale + self._offset) / self._full
         # ``not`` first: what is no number is in no range.
-        return 0.0 if not abs(value) <= 1.0 + ROUNDING or raw in self._special else value
+        if not self._low <= value <= self._high or raw in self._special:
+            return 0.0
+        return min(max(value, -1.0), 1.0)
 
 
 class JoystickBits:
@@ -120,7 +125,7 @@ class CommandBits:
 
     Attributes:
         full: steps of the command from zero to full.
-        span: bytes with the signals that tell it.
+        span: bytes with the signals that carry it.
     """
 
     def __init__(self, message: Message, valve: Valve, joystick: Command | None) -> None:
@@ -169,7 +174,7 @@ class CommandBits:
         return steps
 
 
-# (neutral, positive, negative) to the sign that they tell.
+# (neutral, positive, negative) to the sign that they carry.
 _SIGNS: Mapping[tuple[float, ...], int] = {(1, 0, 0): 0, (0, 1, 0): 1, (0, 0, 1): -1}
 
 
@@ -179,8 +184,14 @@ def _signal(message: Message, name: str) -> Signal:
     return signal
 
 
+def _full(signal: Signal) -> float:
+    """The nearer end of a range around 0, else its upper end."""
+    ends = (signal.maximum or 0.0, -(signal.minimum or 0.0))
+    return min(ends) if ends[1] > 0.0 else ends[0]
+
+
 def _steps(signal: Signal, length: int) -> tuple[Field, int, int, int]:
     """Of a command signal its field, raw value of zero, sign of a raw step, and steps to full."""
-    full = math.floor((signal.maximum or 0.0) / abs(signal.scale) + ROUNDING)
+    full = math.floor(_full(signal) / abs(signal.scale) + ROUNDING)
     zero = round(-signal.offset / signal.scale)
     return Field(signal, length), zero, 1 if signal.scale > 0 else -1, full

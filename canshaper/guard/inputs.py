@@ -92,11 +92,15 @@ class GuardedInput(ABC):
         heard_ns: when the last one came.
     """
 
-    __slots__ = ("_check", "_length", "_source", "_source_ns", "heard_ns", "timeout_ns")
+    __slots__ = ("_check", "_choice", "_length", "_source", "_source_ns", "heard_ns", "timeout_ns")
 
     def __init__(self, bound: BoundInput) -> None:
         self._length = bound.message.length
         self._check = bound.protection.check
+        self._choice: tuple[Field, int] | None = None
+        if chosen := bound.codec.chosen:
+            signal = bound.message.get_signal_by_name(chosen.signal)
+            self._choice = Field(signal, self._length), chosen.value
         self.timeout_ns = bound.config.timeout_ms * 1_000_000
         self._source: int | None = None
         self._source_ns = 0
@@ -111,45 +115,83 @@ class GuardedInput(ABC):
         self._source_ns = now_ns
         return False
 
+    def counts(self, data: bytes) -> bool:
+        """Whether a frame is whole, right, and of those that are meant."""
+        if len(data) != self._length or (self._check and not self._check.verify(data)):
+            return False
+        return self._choice is None or self._choice[0].raw(data) == self._choice[1]
+
     @abstractmethod
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
 
 
-class GuardedStop(GuardedInput):
-    """The emergency stop.
+class GuardedSwitch:
+    """A switch that has to agree: the emergency stop, or one that enables a joystick.
+
+    Args:
+        bound: its message.
+        signal: its signal.
+        on: raw value with which it agrees.
+        limit: what it is, for the log.
 
     Attributes:
-        free_ns: until when something may move: it is not pressed, and was heard within its timeout.
+        free_ns: until when something may move: it agrees, and was received within its timeout.
         stops: what it forbids.
     """
 
-    __slots__ = ("_bits", "free_ns", "stops")
+    __slots__ = ("_field", "_on", "_timeout_ns", "free_ns", "limit", "stops")
 
-    def __init__(self, bound: BoundInput, signal: str) -> None:
-        super().__init__(bound)
+    def __init__(self, bound: BoundInput, signal: str, on: int, limit: str) -> None:
         message = bound.message
-        self._bits = Field(message.get_signal_by_name(signal), message.length).bits
+        self._field = Field(message.get_signal_by_name(signal), message.length)
+        self._on, self.limit = on, limit
+        self._timeout_ns = bound.config.timeout_ms * 1_000_000
         self.free_ns = NEVER
         self.stops: list[Asked] = []
 
     def note(self, data: bytes, now_ns: int) -> None:
+        """Take a frame that counts."""
+        if self._field.raw(data) == self._on:
+            self.free_ns = now_ns + self._timeout_ns
+        else:
+            self.free_ns = NEVER
+            for asked in self.stops:
+                asked.forbid()
+
+
+class GuardedSwitches(GuardedInput):
+    """A message with nothing but switches.
+
+    Attributes:
+        switches: them.
+    """
+
+    __slots__ = ("switches",)
+
+    def __init__(self, bound: BoundInput) -> None:
+        super().__init__(bound)
+        self.switches: list[GuardedSwitch] = []
+
+    def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if len(data) == self._length and not (self._check and not self._check.verify(data)):
+        if self.counts(data):
             self.heard_ns = now_ns
-            if int.from_bytes(data, "little") & self._bits:
-                self.free_ns = NEVER
-                for asked in self.stops:
-                    asked.forbid()
-            else:
-                self.free_ns = now_ns + self.timeout_ns
+            for switch in self.switches:
+                switch.note(data, now_ns)
 
 
 class GuardedJoystick(GuardedInput):
     """A joystick: its enable, and what it asks of its axes.
 
+    Args:
+        bound: its message.
+        enable: signal of its own switch that is pressed to enable it, where it has that.
+
     Attributes:
         released: whether its last frame says that enable is released.
+        switches: others in its message, that enable it or other joysticks.
+        needed: the switches that enable it, but for its own.
     """
 
     __slots__ = (
@@ -160,16 +202,23 @@ class GuardedJoystick(GuardedInput):
         "_span",
         "_switch",
         "_switched",
+        "needed",
         "released",
+        "switches",
     )
 
-    def __init__(self, bound: BoundInput, enable: str) -> None:
+    def __init__(self, bound: BoundInput, enable: str | None) -> None:
         super().__init__(bound)
         message = bound.message
-        self._enable = Field(message.get_signal_by_name(enable), message.length)
-        self._bits = self._enable.bits
-        self._switch, self._switched = span_of(self._bits), b""
-        self._span = span_of(self._bits)
+        self._enable: Field | None = None
+        self._bits, self._switch, self._switched = 0, slice(0, 0), b""
+        if enable is not None:
+            self._enable = Field(message.get_signal_by_name(enable), message.length)
+            self._bits = self._enable.bits
+            self._switch = span_of(self._bits)
+        self._span = span_of(self._bits) if self._bits else self._switch
+        self.switches: list[GuardedSwitch] = []
+        self.needed: list[GuardedSwitch] = []
         self._part = b""
         self._asked: list[tuple[slice, dict[bytes, float], Asked]] = []
         self.released = False
@@ -183,13 +232,15 @@ class GuardedJoystick(GuardedInput):
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if len(data) != self._length or (self._check and not self._check.verify(data)):
+        if not self.counts(data):
             return
+        for switch in self.switches:
+            switch.note(data, now_ns)
         part = data[self._span]
         if part != self._part:
             self._part = part
             switched = data[self._switch]
-            if switched != self._switched:
+            if switched != self._switched and self._enable is not None:
                 self._switched = switched
                 self.released = self._enable.raw(data) == 0
             released = self.released

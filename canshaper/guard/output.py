@@ -3,7 +3,8 @@
 It knows nothing of how the frame was made (docs/decisions/0005-output-guard.md). A frame that moves
 a valve passes only if
 
-- no emergency stop is pressed or missing, and the joystick's enable was not seen released,
+- no emergency stop is pressed or missing, the joystick's enable was not seen released, and no other
+  switch that enables it is off or missing,
 - the joystick is not silent for longer than its timeout and the longest stop,
 - it is a command: no signal in it contradicts another,
 - its velocity is not beyond the maximum, nor beyond what a joystick frame within the tail asked in
@@ -17,8 +18,15 @@ from collections.abc import Sequence
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import group_of
+from canshaper.config.enable import Condition
 from canshaper.guard.axis import BEFORE, At, GuardedAxis
-from canshaper.guard.inputs import NEVER, GuardedInput, GuardedJoystick, GuardedStop
+from canshaper.guard.inputs import (
+    NEVER,
+    GuardedInput,
+    GuardedJoystick,
+    GuardedSwitch,
+    GuardedSwitches,
+)
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput
 
@@ -26,7 +34,7 @@ Key = tuple[str, int, bool]
 
 
 class GuardedAxes:
-    """Several axes with their commands in one valve message: each frame is looked at anew."""
+    """Several axes with their commands in one valve message: each frame is looked at again."""
 
     span = slice(0, 0)
     part = None
@@ -59,14 +67,17 @@ class OutputGuard:
 
     def __init__(self, deployment: Deployment) -> None:
         config, bound = deployment.config, deployment.joysticks
-        joysticks = {n: GuardedJoystick(one, one.config.enable) for n, one in bound.items()}
+        joysticks = {n: GuardedJoystick(one, one.enable) for n, one in bound.items()}
         inputs: list[tuple[BoundInput, GuardedInput]] = [
             (one, joysticks[name]) for name, one in bound.items()
         ]
-        stop = None
+        inputs += _switches(deployment, joysticks)
+        stops = []
         if button := deployment.emergency_stop:
-            stop = GuardedStop(button, button.config.signal)
-            inputs.append((button, stop))
+            message = GuardedSwitches(button)
+            stops = [GuardedSwitch(button, button.config.signal, 0, "emergency-stop")]
+            message.switches += stops
+            inputs.append((button, message))
         self.at = BEFORE
         self._stood_still = False
         self._joysticks = list(joysticks.values())
@@ -78,7 +89,7 @@ class OutputGuard:
             else:
                 self.inputs |= dict.fromkeys(one.keys, entry)
         self._own = {name: bus.j1939.address for name, bus in config.buses.items() if bus.j1939}
-        self.valves = _valves(deployment, joysticks, stop)
+        self.valves = _valves(deployment, joysticks, stops)
 
     def note(self, frame: Frame, now_ns: int) -> None:
         """Take a frame that has come in, and is none of ``inputs``."""
@@ -104,14 +115,42 @@ class OutputGuard:
                 joystick.clear()
 
 
+def _switches(
+    deployment: Deployment, joysticks: dict[str, GuardedJoystick]
+) -> list[tuple[BoundInput, GuardedInput]]:
+    """Messages of switches; those that enable a joystick, wherever they are, are noted with it."""
+    messages: list[tuple[BoundInput, GuardedInput]] = []
+    switches: dict[Condition, GuardedSwitch] = {}
+    for bound in deployment.switches:
+        message = GuardedSwitches(bound)
+        messages.append((bound, message))
+        for name, (signal, on) in bound.switches.items():
+            switch = switches[Condition(None, name)] = GuardedSwitch(bound, signal, on, "enable")
+            message.switches.append(switch)
+    for name, joystick in deployment.joysticks.items():
+        for i, condition in enumerate(joystick.conditions):
+            if i == 0 and joystick.enable is not None:
+                continue  # it reads that itself
+            if condition not in switches:
+                assert condition.joystick is not None  # the others are there
+                of = condition.joystick
+                switch = GuardedSwitch(deployment.joysticks[of], condition.name, 1, "enable")
+                switches[condition] = switch
+                joysticks[of].switches.append(switch)
+            joysticks[name].needed.append(switches[condition])
+    return messages
+
+
 def _valves(
-    deployment: Deployment, joysticks: dict[str, GuardedJoystick], stop: GuardedStop | None
+    deployment: Deployment,
+    joysticks: dict[str, GuardedJoystick],
+    stops: Sequence[GuardedSwitch],
 ) -> dict[Key, GuardedAxis | GuardedAxes]:
     axes: dict[str, GuardedAxis] = {}
     by_message: dict[Key, list[GuardedAxis]] = {}
     for name, bound in deployment.axes.items():
         joystick = joysticks[bound.config.command.joystick]
-        axes[name] = GuardedAxis(deployment, bound, joystick, stop)
+        axes[name] = GuardedAxis(deployment, bound, joystick, (*stops, *joystick.needed))
         by_message.setdefault(bound.valve.message.sender.key, []).append(axes[name])
     for motion in (bound.config for bound in deployment.motions.values()):
         if motion.near_far is not None:

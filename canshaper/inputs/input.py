@@ -1,6 +1,7 @@
 """A message that is taken: is it whole, right, in sequence, and still fresh?"""
 
 from abc import ABC, abstractmethod
+from collections.abc import Mapping, Sequence
 from typing import Any, Protocol, Self
 
 from canshaper.codec.frame import FrameFault
@@ -39,7 +40,7 @@ class Input(ABC):
     """
 
     def __init__(self, bound: BoundInput) -> None:
-        self._codec = bound.codec
+        self._codec, self._chosen = bound.codec, bound.codec.chosen
         self._sequence = bound.sequence_checker()
         self._counter = bound.protection.counter
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
@@ -55,6 +56,9 @@ class Input(ABC):
             raw, commands = self._codec.decode(data)
         except WrongLengthError:
             return FrameFault.WRONG_LENGTH
+        chosen, others = self._chosen, False
+        if chosen is not None and (others := raw[chosen.signal] != chosen.value) and chosen.alone:
+            return GOOD
         sequence = self._sequence
         if self._last_frame_ns is None or arrived_ns - self._last_frame_ns > self._timeout_ns:
             sequence.resync()
@@ -63,6 +67,8 @@ class Input(ABC):
             self._refused_ns = arrived_ns
             return fault
         self._last_frame_ns = arrived_ns
+        if others:
+            return fault
         accepted = sequence.qualified and not fault
         content = self.on_frame(raw, commands, arrived_ns, accepted)
         if not accepted:
@@ -91,6 +97,11 @@ class Input(ABC):
             What is wrong with its content.
         """
 
+    @property
+    def received_ns(self) -> int | None:
+        """When the last frame arrived that passed every check; None where none counts."""
+        return self._received_ns
+
     def invalidate(self) -> None:
         """Nothing received so far counts any more."""
         self._received_ns = self._last_frame_ns = None
@@ -107,6 +118,111 @@ class Input(ABC):
         if self._refused_ns is not None and now_ns - self._refused_ns <= self._timeout_ns:
             return Reason.JOYSTICK_UNTRUSTED
         return Reason.JOYSTICK_TIMEOUT
+
+
+class Switch:
+    """A switch that has to agree, in a message that has others or other things too.
+
+    Args:
+        source: the message.
+        signal: its signal.
+        on: raw value that agrees.
+
+    Attributes:
+        agrees: the signal, and that value.
+        releases: how often it was seen not to agree: in every frame of right length and checksum.
+        released: whether it does not, by the last frame that says so or says otherwise.
+    """
+
+    def __init__(self, source: Input, signal: str, on: int) -> None:
+        self._source = source
+        self.agrees = signal, on
+        self.releases = 0
+        self.released = False
+        self._agreed = False  # in the last frame that counts
+        self._doubted = 0  # number of the last release in a frame that does not
+
+    def on_frame(self, raw: dict[str, Any], accepted: bool) -> None:
+        """A released switch needs no trust, however short; only a frame that counts ends it."""
+        signal, on = self.agrees
+        agrees = raw[signal] == on
+        if accepted:
+            self._agreed = agrees
+        if not agrees:
+            self.releases += 1
+            self.released = True
+            if not accepted:
+                self._doubted = self.releases
+        elif accepted:
+            self.released = False
+
+    def doubted(self, releases: int) -> bool:
+        """Whether a frame that does not count said that it is released, and none that does.
+
+        Args:
+            releases: as they were when that was asked last.
+        """
+        return self._agreed and (self.released or self._doubted > releases)
+
+    def lost(self, now_ns: int) -> Reason | None:
+        """Why it is not known; None while its message is fresh."""
+        return self._source.lost(now_ns)
+
+
+class SwitchInput(Input):
+    """A message with switches.
+
+    Attributes:
+        switches: them, by name.
+    """
+
+    def __init__(self, bound: BoundInput, switches: Mapping[str, tuple[str, int]]) -> None:
+        super().__init__(bound)
+        self.switches = {name: Switch(self, *one) for name, one in switches.items()}
+
+    def on_frame(
+        self,
+        raw: dict[str, Any],
+        commands: dict[str, float | Reason],
+        arrived_ns: int,
+        accepted: bool,
+    ) -> FrameFault:
+        """Each of them looks at it."""
+        for switch in self.switches.values():
+            switch.on_frame(raw, accepted)
+        return GOOD
+
+    def copy_state(self, before: Self) -> None:
+        """A switch that is released stays so until a frame that counts says otherwise."""
+        super().copy_state(before)
+        released = {one.agrees: one.released for one in before.switches.values()}
+        for switch in self.switches.values():
+            switch.released = released.get(switch.agrees, False)
+
+
+class EnableGate:
+    """Why an axis may not move, by the switches that enable its joystick, but for the one pressed.
+
+    That they agree again is no press: it resets nothing.
+
+    Args:
+        switches: them.
+    """
+
+    def __init__(self, switches: Sequence[Switch]) -> None:
+        self._switches = tuple(switches)
+        self._releases = self._count()
+
+    def __call__(self, neutral: bool, now_ns: int) -> Reason | None:
+        """The reason, or None; a release since it was asked last counts, however short it was."""
+        releases, self._releases = self._releases, self._count()
+        agree = releases == self._releases
+        if agree and not any(one.released or one.lost(now_ns) for one in self._switches):
+            return None
+        return Reason.ENABLE_OFF if neutral else Reason.ENABLE_LOST
+
+    def _count(self) -> int:
+        return sum(switch.releases for switch in self._switches)
 
 
 class EmergencyStopInput(Input):

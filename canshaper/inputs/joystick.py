@@ -3,7 +3,7 @@
 from typing import Any, Self
 
 from canshaper.codec.frame import FrameFault
-from canshaper.inputs.input import GOOD, Input
+from canshaper.inputs.input import GOOD, Input, Switch
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.states import CommandInput, Reason
 
@@ -14,29 +14,43 @@ class JoystickInput(Input):
     """Takes the frames of one joystick; answers what an axis may use of them at a moment.
 
     Attributes:
-        releases: how often its enable was seen released. A release counts when it is read, however
-            long ago its frame arrived; all that has an age is as old as its arrival.
+        pressed: the switch to press, where it is none of its own.
         presses: how often its button for the next profile was pressed.
     """
 
     def __init__(self, joystick: BoundJoystick) -> None:
         super().__init__(joystick)
         config = joystick.config
-        self._enable = config.enable
+        self._enable = joystick.enable
+        self.pressed: Switch | None = None
+        self._switches: dict[str, Switch] = {}  # others in its message, by signal
         self._reset = config.reset
         self._off = config.anti_sway_off
         self._next = config.next_profile
         self._frozen_ns = round(config.stuck_s * 1e9)
         self._changed_ns: dict[str, int] = {}
-        self.releases = self.presses = 0
+        self._releases = self.presses = 0
         self._next_held = True  # what is held when it is first seen was not pressed
         self._released = False
         self._doubted = 0  # number of the last release in a frame that does not count
 
+    def watch(self, signal: str) -> Switch:
+        """Another switch in its message, that enables it or another joystick."""
+        return self._switches.setdefault(signal, Switch(self, signal, 1))
+
+    @property
+    def releases(self) -> int:
+        """How often its enable was seen released.
+
+        A release counts when it is read, however long ago its frame arrived; all that has an age is
+        as old as its arrival.
+        """
+        return self._releases if self.pressed is None else self.pressed.releases
+
     @property
     def released(self) -> bool:
         """Whether enable is released, by the last frame that says so or says otherwise."""
-        return self._released
+        return self._released if self.pressed is None else self.pressed.released
 
     def on_frame(
         self,
@@ -49,12 +63,14 @@ class JoystickInput(Input):
 
         A released enable needs no trust, however short it is; only a frame that counts ends it.
         """
-        enable = raw[self._enable]
+        for switch in self._switches.values():
+            switch.on_frame(raw, accepted)
+        enable = 1 if self._enable is None else raw[self._enable]
         if enable == 0:
-            self.releases += 1
+            self._releases += 1
             self._released = True
             if not accepted:
-                self._doubted = self.releases
+                self._doubted = self._releases
         elif accepted:
             self._released = False
         if not accepted:
@@ -82,6 +98,9 @@ class JoystickInput(Input):
         """An enable that is released stays so until a frame that counts says otherwise."""
         super().copy_state(before)
         self._released = before._released
+        released = {signal: one.released for signal, one in before._switches.items()}
+        for signal, switch in self._switches.items():
+            switch.released = released.get(signal, False)
 
     def command(
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
@@ -95,13 +114,18 @@ class JoystickInput(Input):
             trip: a cause for neutral at once, handed through.
             neutral_band: |joystick| up to which it counts as neutral and may stand still for ever.
         """
-        released = self._released or self.releases > releases
+        pressed, known = self.pressed, self.releases
+        now_released = self.released
+        released = now_released or known > releases
+        if pressed is not None and (gone := pressed.lost(now_ns)):
+            # Not known is not enabled; that it is known again is no press.
+            return CommandInput(fault=gone, enabled=False, reset=True, trip=trip)
         received_ns = self._received_ns
         if received_ns is None or now_ns - received_ns > self._timeout_ns:
             lost = self.lost(now_ns)
             # Seen released is more than lost: an immediate stop, not the shaped one.
-            released = self.releases > releases or (
-                self._released and lost is Reason.JOYSTICK_UNTRUSTED
+            released = known > releases or (
+                now_released and (pressed is not None or lost is Reason.JOYSTICK_UNTRUSTED)
             )
             # What the switches did meanwhile is not known; one that is held was not pressed.
             return CommandInput(fault=lost, enabled=not released, reset=True, trip=trip)
@@ -109,7 +133,7 @@ class JoystickInput(Input):
         command = self.commands[signal]
         bypass = self._off is not None and raw[self._off] == 1
         reset = self._reset is not None and raw[self._reset] == 1
-        enable = raw[self._enable]
+        enable = 1 if self._enable is None else raw[self._enable]
         if type(command) is Reason:
             fault: Reason | None = command
         elif released:
@@ -120,7 +144,11 @@ class JoystickInput(Input):
             fault = Reason.JOYSTICK_FROZEN
         else:
             return _new(CommandInput, (command, None, True, bypass, reset, trip))
-        if released and enable != 0 and (self._released or self._doubted > releases):
+        if pressed is None:
+            doubted = enable != 0 and (self._released or self._doubted > releases)
+        else:
+            doubted = pressed.doubted(releases)
+        if released and doubted:
             fault = Reason.JOYSTICK_UNTRUSTED  # it moves nothing, and is no press
         elif fault is None:
             return CommandInput(command, enabled=False, reset=reset, trip=trip)

@@ -1,12 +1,19 @@
 """Measurements of sway: one message, and what each axis reads of it."""
 
-from typing import Any
+import math
+from typing import Any, Protocol
 
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input
 from canshaper.inputs.value import MeasuredSignal, measurable
 from canshaper.machine.sway_sensor import BoundSwaySensor, SensorMessage
 from canshaper.shaping.states import Reason
+
+GOOD_MERIT = 0
+"""Figure of merit of SSI: within the specification of the sensor. 1 is degraded, 2 an error."""
+# No grapple swings by a whole turn, nor with one in a second. A signal without a range may say so,
+# and the observer would keep it for hours.
+MOST = 2.0 * math.pi
 
 
 class SwaySensorInput(Input):
@@ -20,6 +27,7 @@ class SwaySensorInput(Input):
     def __init__(self, bound: SensorMessage) -> None:
         super().__init__(bound)
         self._signals = [MeasuredSignal(signal, *measurable(signal)) for signal in bound.signals]
+        self._merits = bound.merits
         self.number = 0
         self.values: dict[str, float | None] = {}
 
@@ -31,16 +39,29 @@ class SwaySensorInput(Input):
         accepted: bool,
     ) -> FrameFault:
         """What is no value is a fault, and no measurement."""
-        values = {signal.name: signal.value(raw) for signal in self._signals}
+        values = {one.name: self._value(one, raw) for one in self._signals}
         if accepted:
             self.number += 1
             self.values = values
         return FrameFault.INVALID_SIGNAL if None in values.values() else GOOD
 
+    def _value(self, signal: MeasuredSignal, raw: dict[str, Any]) -> float | None:
+        """What a signal measures; nothing where its figure of merit is another than good."""
+        merit = self._merits.get(signal.name)
+        return None if merit and raw[merit] != GOOD_MERIT else signal.value(raw)
+
     def invalidate(self) -> None:
         """Nothing received so far counts any more."""
         super().invalidate()
         self.values.clear()
+
+
+class SensorNode(Protocol):
+    """The node of a sensor."""
+
+    @property
+    def works(self) -> bool:
+        """Whether what it sends means something."""
 
 
 class SwaySignal:
@@ -49,10 +70,14 @@ class SwaySignal:
     Args:
         message: the message.
         bound: sway sensor of the axis.
+
+    Attributes:
+        node: its node, where it is known.
     """
 
     def __init__(self, message: SwaySensorInput, bound: BoundSwaySensor) -> None:
         self.bound = bound
+        self.node: SensorNode | None = None
         self._message = message
         self._name, self._factor = bound.signal.name, bound.factor
         self._number = message.number
@@ -63,5 +88,8 @@ class SwaySignal:
         if message.number == self._number:
             return None
         self._number = message.number
-        value = message.values.get(self._name)
-        return None if value is None else value * self._factor
+        value, node = message.values.get(self._name), self.node
+        if value is None or not (node is None or node.works):
+            return None
+        measured = value * self._factor
+        return measured if abs(measured) <= MOST else None

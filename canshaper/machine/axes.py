@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 from canshaper.codec.status import AXIS_STATUS
+from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
 from canshaper.machine.bound_axis import BoundAxis
@@ -49,7 +50,7 @@ def _bind_axis(
     codec, ticks = valve
     period_s = ticks * lookup.config.tick_ms / 1000.0
     check_filters(lookup, place, axis, period_s)
-    timeout_ms = joysticks[axis.command.joystick].timeout_ms
+    timeout_ms = slowest_ms(lookup.config, axis.command.joystick)
     if fault := stated_fault(axis, timeout_ms=timeout_ms, period_s=period_s):
         add((*place, "limits", "stop_distance_m"), fault)
     if len(problems) > before:

@@ -15,7 +15,9 @@ from canshaper.machine.axes import bind_axes
 from canshaper.machine.buses import check_buses, check_gateway
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.enable import bind_switches, check_conditions
 from canshaper.machine.filters import check_control, check_profiles
+from canshaper.machine.following import check_following
 from canshaper.machine.identity import Identity, filter_lines
 from canshaper.machine.inputs import BoundSwitch, bind_emergency_stop, bind_switch
 from canshaper.machine.joysticks import bind_joystick
@@ -41,23 +43,23 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     if messages is None:
         raise ConfigError(diagnostics.problems)
     lookup = Lookup(diagnostics, config, messages)
+    check_conditions(lookup)
     joysticks = {name: bind_joystick(lookup, name, one) for name, one in config.joysticks.items()}
+    switches = bind_switches(lookup)
     axes = bind_axes(lookup)
     motions = bind_motions(lookup)
     stop = bind_emergency_stop(lookup, config.emergency_stop) if config.emergency_stop else None
     load_state = (
         bind_switch(lookup, ("load_state",), config.load_state) if config.load_state else None
     )
-    profile = bind_switch(lookup, ("profile",), config.profile) if config.profile else None
-    if profile and config.profile:
-        codes = config.profile.codes.items()
-        _check_values(lookup, profile, {("profile", "codes", name): code for name, code in codes})
+    profile = _bind_profile(lookup)
     if load_state:
         _check_values(lookup, load_state, _values_of_schedules(config))
     service = bind_status(lookup, ("status",), config.status, SERVICE_STATUS)
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
+    check_following(diagnostics, config, joysticks)
     check_profiles(diagnostics, config)
     check_control(diagnostics, config)
     diagnostics.raise_problems()
@@ -78,9 +80,21 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
         identity,
         load_state,
         profile,
+        switches,
         lookup.on_bus(),
+        lookup.fd(),
         source=source,
     )
+
+
+def _bind_profile(lookup: Lookup) -> BoundSwitch | None:
+    """The switch that says which profile is in force, where there is one."""
+    config = lookup.config.profile
+    profile = bind_switch(lookup, ("profile",), config) if config else None
+    if profile and config:
+        codes = config.codes.items()
+        _check_values(lookup, profile, {("profile", "codes", name): code for name, code in codes})
+    return profile
 
 
 def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
@@ -88,7 +102,7 @@ def _package_lines(config: DeploymentConfig) -> tuple[str, ...]:
 
     The filters of breakpoints are of the kind of their axis or profile.
     """
-    checksums = {s.checksum.kind for s in protected_sections(config) if s.checksum}
+    checksums = {s.checksum.kind or "" for s in protected_sections(config) if s.checksum}
     axes = config.axes.values()
     filters = {axis.filter.kind for axis in axes}
     filters |= {profile.filter.kind for axis in axes for profile in axis.profiles.values()}

@@ -7,6 +7,7 @@ from canshaper.config.bus import LAST_SPN, Bus, J1939Name
 from canshaper.config.gateway import Gateway
 from canshaper.config.schema import DeploymentConfig
 from canshaper.machine.diagnostics import Diagnostics
+from canshaper.machine.interface_options import option_faults
 from canshaper.machine.lookup import Lookup
 
 
@@ -22,9 +23,12 @@ def check_buses(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
         channels[key] = name
         _check_match(diagnostics, config, name, bus)
         _check_node_ids(diagnostics, name, bus)
+        _check_fd(diagnostics, name, bus)
         if bus.network and bus.interface != "udp_multicast":
             text = f"expected true with udp_multicast only, got it with {bus.interface}"
             add(("buses", name, "network"), text)
+        for place, text in option_faults(bus):
+            add(("buses", name, *place), text)
         if bus.j1939 is None:
             continue
         # Behind a gateway both may meet, and no one would know which is meant.
@@ -57,6 +61,20 @@ def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, 
             diagnostics.add(place, f"{text}, got what may be its device")
 
 
+def _check_fd(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
+    """CAN FD has a data bit rate that is none below the other, and no protocol on top."""
+    place = ("buses", name)
+    if bus.data_bitrate is not None and not bus.fd:
+        diagnostics.add((*place, "data_bitrate"), "expected it with fd: true, got it without")
+    elif bus.data_bitrate is not None and bus.data_bitrate < (bus.bitrate or 0):
+        text = f"expected the bitrate of the bus, {bus.bitrate}, or more, got {bus.data_bitrate}"
+        diagnostics.add((*place, "data_bitrate"), text)
+    for protocol in ("j1939", "canopen"):
+        if bus.fd and getattr(bus, protocol):
+            text = f"expected none on a bus of {protocol}, whose frames are classical, got true"
+            diagnostics.add((*place, "fd"), text)
+
+
 def _check_node_ids(diagnostics: Diagnostics, name: str, bus: Bus) -> None:
     """Ids of nodes of CANopen are used once."""
     if bus.canopen is None:
@@ -82,6 +100,12 @@ def check_gateway(lookup: Lookup, gateway: Gateway, valves: list[ValveMessage]) 
         if bus not in buses:
             names = ", ".join(buses)
             add(("gateway", "between", i), f"expected a bus, got {bus!r}; there are {names}")
+    fd = [buses[bus].fd for bus in gateway.between if bus in buses]
+    if len({*fd}) > 1:
+        add(("gateway", "between"), "expected fd: true of both buses or of none, got it of one")
+    elif any(fd) and gateway.forwarding == "kernel":
+        text = "expected daemon with fd: true: our rules of can-gw pass classical frames only"
+        add(("gateway", "forwarding"), f"{text}; got kernel")
     for i, name in enumerate(gateway.blocked):
         if isinstance(result := lookup.messages.find(name), str):
             add(("gateway", "blocked", i), result)

@@ -11,6 +11,7 @@ from cantools.database.can import Message
 from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.bounded import read_bounded
+from canshaper.config.similar import did_you_mean
 from canshaper.errors import MOST_LETTERS, MOST_PROBLEMS, Problem
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
@@ -103,7 +104,7 @@ def load_dbc(
     entries = text.entries
     used = {e.number for e in entries if names is None or e.name in names}
     if names is None:
-        used -= {e.number for e in entries if e.fault} | text.leftover_numbers()
+        used -= {e.number for e in entries if e.fault} | text.without_type()
         used -= {entry.number for entry, _ in _same_id(entries)}
     rest = text.of(used)
     # Of a file of messages alone nothing may be left, which cantools would not have as a file.
@@ -140,7 +141,7 @@ def too_many(files: Sequence[DbcFile]) -> str | None:
 def _checked(file: DbcFile, *, named: bool) -> tuple[DbcFile | None, list[Problem]]:
     """The file, and what is wrong with its messages that cantools does not see.
 
-    Where nobody has named the messages those that cannot be used are left out.
+    Where no one has named the messages those that cannot be used are left out.
     """
     problems = []
     loaded = {(message.frame_id, message.is_extended_frame) for message in file.messages}
@@ -239,8 +240,8 @@ class Messages:
         found = self._files.get(name, [])
         if not found:
             names = ", ".join(sorted(self._files)) or "none"
-            names = names[:MOST_LETTERS]
-            return f"expected a message of the DBC files, got {name!r}; there are {names}"
+            names, similar = names[:MOST_LETTERS], did_you_mean(name, self._files)
+            return f"expected a message of the DBC files, got {name!r}; there are {names}{similar}"
         if len(found) > 1:
             files = ", ".join(str(file.path) for file in found)
             return f"{name!r} stands more than once in the DBC files: {files}"

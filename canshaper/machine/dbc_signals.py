@@ -1,4 +1,4 @@
-"""What is wrong with the signals of a message that nobody uses, from its text in a DBC file.
+"""What is wrong with the signals of a message that no one uses, from its text in a DBC file.
 
 Messages that are used are checked by cantools.
 """
@@ -32,6 +32,7 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
     every = 0  # bits that any signal has; the lowest bit of the first byte is the lowest
     taken: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
     masks: list[tuple[bytes, int]] = []
+    names: set[tuple[bytes, bytes]] = set()
     for name, mark, first, count, order in rows:
         mask = _mask(first, count, order, length)
         if mask is None:
@@ -39,6 +40,9 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
         chosen = b"" if mark.endswith(b"M") else mark
         if chosen and multiplexers > 1:
             continue  # which of them exclude each other is not said here
+        if (name, chosen) in names:
+            return f"has two signals of the name {name.decode()}"
+        names.add((name, chosen))
         before = taken[b""] | taken.get(chosen, 0) if chosen else every
         if before & mask:
             other = next(n for n, m in masks if m & mask & before)

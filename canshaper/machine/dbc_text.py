@@ -19,7 +19,7 @@ MOST_STATEMENTS = 300_000
 WIDE_ID = "an id of 29 bits stands in a DBC file with bit 31 set: 0x80000000 more"
 # Signals that belong to no message stand in one of this name; cantools leaves it out.
 _NO_MESSAGE = b"VECTOR__INDEPENDENT_SIG_MSG"
-_OF_NO_MESSAGE = -1  # in place of an id: value tables, which nobody reads
+_OF_NO_MESSAGE = -1  # in place of an id: value tables, which no one reads
 
 _STRING = r'"[^"\\]*+(?:\\"?[^"\\]*+)*+"'
 _GAP = r"[ \t\n]*+(?://[^\n]*\n[ \t\n]*+)*+"
@@ -72,7 +72,7 @@ _STATEMENTS = {
     "in_node": _row(_REL, _STRING, _word("BU_SG_REL_"), _NAME, _SG, _id("in_node"), _NAME)
     + f"{_GAP}{_VALUE}{_GAP};",
     "no_message": _row(_word("VAL_TABLE_"), _NAME, f"{_TABLE};"),
-    # What no statement has taken: a message that is written as nobody expects, and the others.
+    # What no statement has taken: a message that is written as no one expects, and the others.
     "odd": _row(_BO, r"[-+\d]"),
     "strings": rf'(?:{_STRING}[^"/BCSV]*+)++',
     "comment": r"//[^\n]*+",
@@ -120,7 +120,7 @@ class DbcText:
     _leftover: "array[int]"
 
     def of(self, numbers: Collection[int]) -> str:
-        """The text without what belongs to other messages; every line keeps its number."""
+        """The text without other messages and leftover tables; every line keeps its number."""
         return b"".join(self._parts(numbers)).decode("cp1252", errors="replace")
 
     def whole(self) -> str:
@@ -132,13 +132,13 @@ class DbcText:
         """How many belong to messages, definitions included."""
         return len(self._starts)
 
-    def leftover_numbers(self) -> set[int]:
-        """Messages with tables or types of values that have no signal."""
-        return {self._numbers[i] for i in self._leftover}
+    def without_type(self) -> set[int]:
+        """Messages with types of values that have no signal: they change what the bits mean."""
+        return {self._numbers[i] for i in self._leftover if not self._is_table(i)}
 
     def leftover(self, numbers: Collection[int]) -> list[int]:
-        """Tables and types of values that have no signal, but for those of these messages."""
-        return [i for i in self._leftover if self._numbers[i] not in numbers]
+        """Tables and types of values that have no signal, but for types of these messages."""
+        return [i for i in self._leftover if self._is_table(i) or self._numbers[i] not in numbers]
 
     def leftover_faults(self, found: Iterable[int]) -> Iterator[tuple[int, str]]:
         """Line and fault of what ``leftover`` has found."""
@@ -151,10 +151,15 @@ class DbcText:
             what = f"{match[1].decode()} {self._numbers[i]} {match[2].decode()}"
             yield line + 1, f"{what} is of a signal that there is not"
 
+    def _is_table(self, i: int) -> bool:
+        """Whether a statement is a table of values, which only gives them names."""
+        return self.data.startswith(b"VAL_", self._starts[i])
+
     def _parts(self, numbers: Collection[int]) -> Iterator[bytes]:
         at = 0
+        unnamed = {self._starts[i] for i in self._leftover if self._is_table(i)}
         for start, end, number in zip(self._starts, self._ends, self._numbers, strict=True):
-            if number not in numbers:
+            if number not in numbers or start in unnamed:
                 yield self.data[at:start]
                 yield b"\n" * self.data.count(b"\n", start, end)
                 at = end

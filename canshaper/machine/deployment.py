@@ -15,10 +15,11 @@ from canshaper.config.source import Source
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.bus_load import BusLoad, bus_load
 from canshaper.machine.database import Messages
+from canshaper.machine.enable import BoundSwitches
 from canshaper.machine.identity import Identity
 from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop, BoundSwitch
 from canshaper.machine.motion import BoundMotion
-from canshaper.machine.routing import Routing, build_routing
+from canshaper.machine.routing import Key, Routing, build_routing
 
 
 @dataclass(frozen=True)
@@ -38,16 +39,21 @@ class Deployment:
     identity_status: StatusCodec[int] | None
     load_state: BoundSwitch | None
     profile: BoundSwitch | None
+    switches: list[BoundSwitches]
     on_bus: dict[str, list[Message]]
+    fd: frozenset[Key]
+    """Messages of CAN FD."""
     source: Source = field(compare=False)
     """The file, for the lines of what is wrong with it on this machine."""
     listen_only: bool = False
-    """Nothing is sent but status: another controller drives the machine, or nobody does."""
+    """Nothing is sent but status: another controller drives the machine, or no one does."""
 
     def load(self, bus: str) -> BusLoad | None:
         """Load of a bus by the messages of the deployment; None where its bit rate is not given."""
-        bitrate = self.config.buses[bus].bitrate
-        return bus_load(self.on_bus.get(bus, []), bitrate) if bitrate else None
+        config = self.config.buses[bus]
+        if not config.bitrate:
+            return None
+        return bus_load(self.on_bus.get(bus, []), config.bitrate, config.data_bitrate)
 
     @cached_property
     def routing(self) -> Routing:
@@ -60,6 +66,7 @@ class Deployment:
             statuses=[status.sender.key for status in self._statuses()],
             known=self.messages.ids(),
             j1939=used,
+            fd=self.fd,
             listen_only=self.listen_only,
         )
 
@@ -71,7 +78,13 @@ class Deployment:
         # Several axes may read one message.
         sensors = {s.message.key: s.message for axis in axes if (s := axis.sway_sensor)}.values()
         others = (self.emergency_stop, self.load_state, self.profile, *reports, *radii, *sensors)
-        return [*self.joysticks.values(), *(i for i in others if i)]
+        return [*self.joysticks.values(), *self.switches, *(i for i in others if i)]
+
+    @property
+    def stopping_inputs(self) -> list[BoundInput]:
+        """Those without which nothing may move: joysticks, their switches, emergency stop."""
+        stop = [self.emergency_stop] if self.emergency_stop else []
+        return [*self.joysticks.values(), *self.switches, *stop]
 
     def senders(self) -> list[Sender]:
         """Every message of the DBC files that we send, each once."""
@@ -80,11 +93,11 @@ class Deployment:
         return list({sender.key: sender for sender in (*valves, *statuses)}.values())
 
     def listening(self) -> "Deployment":
-        """The same machine for one who only listens, and tells what it would do.
+        """The same machine for one who only listens, and reports what it would do.
 
         What valves say of themselves, and a swing, answers another controller's commands, so it is
         not compared with ours. A node of ours on J1939 stays where a status message needs its
-        address, which it gives up to whoever has it.
+        address, which it gives up to the node that has it.
         """
         reporting = {s.sender.key[0] for s in self._statuses()}
         buses = {
@@ -97,6 +110,14 @@ class Deployment:
         }
         config = self.config.model_copy(update={"buses": buses})
         return replace(self, config=config, axes=axes, listen_only=True)
+
+    @cached_property
+    def unreported(self) -> "Deployment":
+        """The same machine where no one reads the status: it is not sent."""
+        axes = {
+            name: replace(axis, status=None, status_ticks=0) for name, axis in self.axes.items()
+        }
+        return replace(self, axes=axes, status=None, identity_status=None)
 
     def _statuses(self) -> list[StatusCodec[Any]]:
         """Every status message that is sent."""

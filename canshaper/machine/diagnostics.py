@@ -1,5 +1,8 @@
 """The problems of a deployment's files: all of them are collected, each with its place."""
 
+from collections.abc import Iterable
+
+from canshaper.config.section import Section
 from canshaper.config.source import Place, Source
 from canshaper.errors import ConfigError, Problem
 
@@ -21,6 +24,22 @@ class Diagnostics:
     def add(self, place: Place, text: str) -> None:
         """Note a problem at a place of the deployment file."""
         self.problems.append(self._source.problem(place, text))
+
+    def check_same(
+        self, place: Place, section: Section, keys: Iterable[str], other: Section, text: str
+    ) -> None:
+        """Note a problem at every key in which a section is not as another one.
+
+        Args:
+            place: of the section.
+            section: the section.
+            keys: those that are compared.
+            other: the other section.
+            text: what it is, and what makes them equal.
+        """
+        for key in keys:
+            if getattr(section, key) != getattr(other, key):
+                self.add((*place, key), f"expected the same as {text}")
 
     def raise_problems(self) -> None:
         """End here if there is any problem.

@@ -91,7 +91,7 @@ def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:
 
 
 def check_profiles(diagnostics: Diagnostics, config: DeploymentConfig) -> None:
-    """A button for the next profile needs profiles, and no switch beside it that says which."""
+    """A button for the next profile needs profiles, and no switch next to it that says which."""
     for name, joystick in config.joysticks.items():
         if joystick.next_profile:
             place = ("joysticks", name, "next_profile")

@@ -1,5 +1,6 @@
 """Messages that are received, bound to their DBC messages: all but the velocities of joysticks."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -10,6 +11,7 @@ from canshaper.codec.identifier import NULL, at_every_priority, has_destination,
 from canshaper.codec.layout import is_j1939
 from canshaper.codec.protection import Protection, SequenceChecker
 from canshaper.codec.signals import find_signal, radius_range
+from canshaper.config.enable import Condition
 from canshaper.config.input import Input
 from canshaper.config.motion import Radius
 from canshaper.config.schedule import LoadState, ProfileSwitch
@@ -71,6 +73,13 @@ class BoundJoystick(BoundInput):
 
     config: Joystick
     name: str
+    conditions: tuple[Condition, ...] = ()
+
+    @property
+    def enable(self) -> str | None:
+        """The signal of its own message that is the switch to press; None where it is another."""
+        pressed = self.conditions[0]
+        return pressed.name if pressed.joystick == self.name else None
 
 
 @dataclass(frozen=True)
@@ -118,6 +127,7 @@ def bind_input(
     config: Input,
     switches: tuple[str, ...] = (),
     *,
+    enable: Iterable[tuple[Place, str]] = (),
     value: str | None = None,
 ) -> tuple[UsedMessage, Bound] | None:
     """A message that is received: its switches, its cycle and its protection.
@@ -128,15 +138,18 @@ def bind_input(
         place: of its section in the deployment file.
         config: that section.
         switches: keys of the section that name switches.
+        enable: signals that enable joysticks, with who names them.
         value: name of a signal that is a value and no switch.
     """
-    used = lookup.message(place, config.bus, config.message, received=True, source=config.source)
+    used = lookup.message(place, config, received=True, source=config.source)
     if not used:
         return None
     if used.message.cycle_time or isinstance(config, Radius):  # which may come on change only
         lookup.check_timeout(used, config.timeout_ms)
     else:
-        used.add_fault("has no GenMsgCycleTime")
+        used.add_fault("has no GenMsgCycleTime; cycle_ms may say it")
+    for at, signal in enable:
+        used.integer(at, signal, "enable")
     for key in switches:
         used.integer((*place, key), getattr(config, key), key)
     if value is not None:
@@ -147,7 +160,8 @@ def bind_input(
     if protection.counts and (config.alive_max_step or 0) > most:
         text = f"expected up to {most} with a counter of {protection.counts} values"
         used.add("alive_max_step", f"{text}, got {config.alive_max_step}")
-    return used, kind(config, used.message, JoystickCodec(used.message, []), protection)
+    codec = JoystickCodec(used.message, [], used.chosen)
+    return used, kind(config, used.message, codec, protection)
 
 
 def bind_emergency_stop(lookup: Lookup, config: EmergencyStop) -> BoundStop | None:

@@ -3,8 +3,10 @@
 from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.flags import FlaggedVelocity, RockerVelocity
 from canshaper.codec.signals import VelocitySignal, magnitude_range, symmetrical_range
-from canshaper.config.schema import Command, Joystick
+from canshaper.config.enable import conditions
+from canshaper.config.schema import Command, Joystick, Scaling
 from canshaper.config.source import Place
+from canshaper.machine.enable import signals_of
 from canshaper.machine.inputs import BoundInput, BoundJoystick, bind_input
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
@@ -13,20 +15,34 @@ from canshaper.machine.used_message import UsedMessage
 def bind_joystick(lookup: Lookup, name: str, config: Joystick) -> BoundJoystick | None:
     """A joystick; its velocities are those that the axes name."""
     place: Place = ("joysticks", name)
-    switches = ("enable", "reset", "anti_sway_off", "next_profile")
-    result = bind_input(lookup, BoundInput, place, config, switches)
+    switches = ("reset", "anti_sway_off", "next_profile")
+    enable = signals_of(lookup, name)
+    result = bind_input(lookup, BoundInput, place, config, switches, enable=enable)
     if result is None:
         return None
     used, bound = result
     lookup.check_node(place, config.bus, config.node)
     of_axes = {n: a.command for n, a in lookup.config.axes.items() if a.command.joystick == name}
+    _check_scaling(used, of_axes)
     moves = {s.signal: f"the joystick of {axis}" for axis, s in reversed(of_axes.items())}
     velocities = [
         (_bind_rocker if command.negative else _bind_velocity)(used, axis, command, moves)
         for axis, command in of_axes.items()
     ]
-    codec = JoystickCodec(used.message, [velocity for velocity in velocities if velocity])
-    return BoundJoystick(config, used.message, codec, bound.protection, name)
+    codec = JoystickCodec(used.message, [v for v in velocities if v], used.chosen)
+    return BoundJoystick(
+        config, used.message, codec, bound.protection, name, conditions(lookup.config, name)
+    )
+
+
+def _check_scaling(used: UsedMessage, commands: dict[str, Command]) -> None:
+    """A signal means the same to every axis that reads it."""
+    first: dict[str, str] = {}
+    for axis, command in commands.items():
+        before = first.setdefault(command.signal, axis)
+        text = f"axes.{before}.command, which reads {command.signal} too, got another"
+        place = ("axes", axis, "command")
+        used.diagnostics.check_same(place, command, Scaling.model_fields, commands[before], text)
 
 
 def _bind_velocity(

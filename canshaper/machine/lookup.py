@@ -1,11 +1,9 @@
 """Messages that a deployment file names: loaded, found, and noted as used on their bus."""
 
-from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
 from cantools.database.can import Message
-from pydantic import BaseModel
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.identifier import (
@@ -15,11 +13,13 @@ from canshaper.codec.identifier import (
     service_of,
     with_source,
 )
-from canshaper.codec.layout import is_j1939
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS, is_fd, is_j1939
 from canshaper.codec.protection import Protection
 from canshaper.config.protection import Protected
 from canshaper.config.schema import DeploymentConfig
+from canshaper.config.section import sections
 from canshaper.config.source import Place
+from canshaper.machine.corrections import chosen, corrected, scalings
 from canshaper.machine.database import MOST_BYTES, Messages, load_dbc, too_many
 from canshaper.machine.dbc_parse import MOST_PARSED
 from canshaper.machine.diagnostics import Diagnostics
@@ -43,7 +43,7 @@ class Lookup:
     used: dict[tuple[str, int, bool], UsedMessage] = field(default_factory=dict)
 
     def message(
-        self, place: Place, bus: str, name: str, *, received: bool, source: int | None = None
+        self, place: Place, config: Protected, *, received: bool, source: int | None = None
     ) -> UsedMessage | None:
         """The message; noted as used on that bus, where no other part may use it.
 
@@ -52,12 +52,11 @@ class Lookup:
 
         Args:
             place: of the part of the deployment file that names it.
-            bus: name of its bus.
-            name: its own.
+            config: that part.
             received: whether it is received, and not sent.
             source: the address that the file names.
         """
-        add = self.diagnostics.add
+        add, bus, name = self.diagnostics.add, config.bus, config.message
         if bus not in self.config.buses:
             add(
                 (*place, "bus"),
@@ -67,14 +66,20 @@ class Lookup:
         if isinstance(result, str):
             add((*place, "message"), result)
             return None
-        file, message = result
+        file, in_dbc = result
+        message = corrected(in_dbc, config, scalings(self.config, bus, name))
+        if isinstance(message, str):
+            add((*place, "multiplexor"), message)
+            message = in_dbc
         can_id = message.frame_id
         if j1939 := is_j1939(message):
             own = self.own_address(bus)
             sends = can_id & 0xFF if source is None else source
             can_id = with_source(can_id, sends if received else NULL if own is None else own)
         any_source = j1939 and received and can_id & 0xFF == NULL
-        used = UsedMessage(self.diagnostics, place, file, message, can_id, any_source)
+        used = UsedMessage(
+            self.diagnostics, place, file, message, can_id, any_source, chosen(in_dbc, config)
+        )
         self._check_j1939(used, bus, received=received, source=source)
         self._check_pdo(used, bus)
         key = (bus, can_id & WITHOUT_PRIORITY if j1939 else can_id, message.is_extended_frame)
@@ -82,11 +87,11 @@ class Lookup:
             text = f"{name} has the id {can_id:#x} on bus {bus}, which is used already by"
             used.add("message", f"{text} {key_path(self.used[key].place)}")
         self.used[key] = used
-        if message.length > 8:
-            used.add("message", f"{name}: expected 8 bytes at most, got {message.length}")
-        if message.is_multiplexed():
+        self._check_length(used, in_dbc, config)
+        if message.is_multiplexed() and config.multiplexor is None:
             verb = "taken from" if received else "sent in"
-            used.add("message", f"{name} is multiplexed; nothing can be {verb} it")
+            text = f"{name} is multiplexed; without multiplexor nothing can be {verb} it"
+            used.add("message", text)
         return used
 
     def own_address(self, bus: str) -> int | None:
@@ -97,6 +102,10 @@ class Lookup:
     def sender(self, bus: str, message: Message, protection: Protection) -> Sender:
         """A message that we send, under our address where it has one."""
         return Sender(bus, message, self.own_address(bus), protection)
+
+    def fd(self) -> frozenset[tuple[str, int, bool]]:
+        """Bus, id and format of the messages of CAN FD that are used."""
+        return frozenset(key for key, used in self.used.items() if is_fd(used.message))
 
     def on_bus(self) -> dict[str, list[Message]]:
         """Messages that are used, by bus."""
@@ -132,6 +141,21 @@ class Lookup:
             names = ", ".join(nodes) or "none"
             text = f"expected a node of bus {bus}, got {name!r}; there are {names}"
             self.diagnostics.add((*place, "node"), text)
+
+    def _check_length(self, used: UsedMessage, in_dbc: Message, config: Protected) -> None:
+        """A message fits into one frame of its bus."""
+        name, length = in_dbc.name, in_dbc.length
+        bus = self.config.buses.get(config.bus)
+        most = CLASSICAL_BYTES if is_j1939(in_dbc) else FD_LENGTHS[-1]
+        if length > most:
+            used.add("message", f"{name}: expected {most} bytes at most, got {length}")
+        elif is_fd(in_dbc) and bus and not bus.fd:
+            got = f"{length} bytes" if length > CLASSICAL_BYTES else "one of CAN FD"
+            text = f"{name}: expected a message of classical CAN, 8 bytes at most, got {got}"
+            used.add("message", f"{text}: bus {config.bus} has no fd: true")
+        elif used.message.length != length and (config.checksum or config.e2e):
+            text = f"{name}: expected the length of a frame with checksum or e2e"
+            used.add("message", f"{text}, {used.message.length} bytes, got {length}")
 
     def _check_pdo(self, used: UsedMessage, bus: str) -> None:
         """On a bus of CANopen a message is a PDO: a command in an SDO would change a parameter."""
@@ -203,14 +227,9 @@ def load_messages(
     return Messages(files) if len(files) == len(config.dbc) else None
 
 
-def protected_sections(section: BaseModel) -> Iterator[Protected]:
-    """Every section of a deployment file, and in a section of it, that names a message."""
-    if isinstance(section, Protected):
-        yield section
-    for _, value in section:
-        for part in value.values() if isinstance(value, dict) else [value]:
-            if isinstance(part, BaseModel):
-                yield from protected_sections(part)
+def protected_sections(config: DeploymentConfig) -> list[Protected]:
+    """Every section of a deployment file that names a message."""
+    return [section for _, section in sections(config) if isinstance(section, Protected)]
 
 
 def _size(path: Path) -> int:

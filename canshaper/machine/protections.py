@@ -1,11 +1,12 @@
 """Protection of messages, received and sent, bound to the DBC."""
 
+from collections.abc import Callable, Mapping
 from typing import Literal
 
 from cantools.database.can import Signal
 
-from canshaper.checksums import CHECKSUMS, Checksum
-from canshaper.codec.e2e import E2e, Profile1, Profile2
+from canshaper.checksums import CHECKSUMS, CRC_WIDTHS, Checksum, crc_kind
+from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile4, Profile5, Profile6, Profile7
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.config.protection import Checksum as ChecksumConfig
 from canshaper.config.protection import Protected
@@ -14,6 +15,13 @@ from canshaper.machine.used_message import UsedMessage
 
 # What a checksum of so many bits has to fill.
 PARTS = {4: "half of a byte", 8: "byte", 16: "pair of bytes"}
+# Profiles that need no more than the data ID.
+BY_DATA_ID: Mapping[str, Callable[[int], E2e]] = {
+    "p04": Profile4,
+    "p05": Profile5,
+    "p06": Profile6,
+    "p07": Profile7,
+}
 
 
 def bind_protection(used: UsedMessage, config: Protected) -> Protection:
@@ -31,11 +39,20 @@ def bind_protection(used: UsedMessage, config: Protected) -> Protection:
 
 def _bind_checksum(used: UsedMessage, config: ChecksumConfig) -> Checksum | None:
     place: Place = (*used.place, "checksum", "signal")
-    add, kind, message = used.diagnostics.add, config.kind, used.message
+    add, message = used.diagnostics.add, used.message
     signal = used.find(place, config.signal)
     if signal is None:
         return None
     used.use(place, signal, "checksum")
+    kind = config.kind
+    if kind is None:
+        assert config.polynomial is not None  # checked with the file
+        numbers = (config.polynomial, config.start, config.end)
+        if max(numbers) >> signal.length or signal.length not in CRC_WIDTHS:
+            text = f"{signal.name}: expected 8 or 16 bits, as many as the polynomial has"
+            add(place, f"{text}, got {signal.length}")
+            return None
+        kind = crc_kind(signal.length, *numbers, reflected=config.reflected)
     bits = CHECKSUMS[kind].bits
     if not _fills(signal, bits):
         text = f"{signal.name}: expected an unsigned {PARTS[bits]} of its own"
@@ -62,8 +79,8 @@ def _bind_e2e(used: UsedMessage, config: Protected) -> Protection:
         if getattr(config, key) is not None:
             used.add(key, f"expected one of {key} and e2e, got both")
     profile, message = _profile(config), used.message
-    if message.length < 2:
-        used.add("e2e", f"{message.name}: expected 2 bytes or more, got {message.length}")
+    if (least := (profile.bits + 7) // 8) > message.length:
+        used.add("e2e", f"{message.name}: expected {least} bytes or more, got {message.length}")
         return UNPROTECTED
     for signal in message.signals:
         if min(_bits(signal)) < profile.bits:
@@ -80,8 +97,9 @@ def _profile(config: Protected) -> E2e:
     if e2e.data_ids is not None:
         return Profile2(e2e.data_ids)
     assert e2e.data_id is not None  # checked with the file
-    assert e2e.data_id_mode is not None
-    return Profile1(e2e.data_id, e2e.data_id_mode)
+    if e2e.data_id_mode is not None:
+        return Profile1(e2e.data_id, e2e.data_id_mode)
+    return BY_DATA_ID[e2e.profile](e2e.data_id)
 
 
 def _bits(signal: Signal) -> list[int]:

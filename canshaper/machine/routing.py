@@ -63,15 +63,16 @@ class BusRoutes:
 
     Attributes:
         received: what is received by its id.
-        sent: what we send, and nobody else may.
+        sent: what we send, and no one else may.
         valves: those of them that move something.
         known: all that the DBC files know; one that they do not know is a fault.
         received_groups: groups of J1939 that are received, from whatever address.
-        sent_groups: groups that we send, and nobody else may.
+        sent_groups: groups that we send, and no one else may.
         claims: what we send of the groups that are received: it comes back among them.
         j1939: the bus is one of J1939, where unknown ids of 29 bits are daily life.
         canopen: the bus is one of CANopen, where that is so for SDO, SYNC and the like.
         in_line: the bus is one of an inline gateway, where that is so for all: it forwards them.
+        fd: what is sent in frames of CAN FD, by us and by others.
     """
 
     received: frozenset[tuple[int, bool]]
@@ -84,6 +85,7 @@ class BusRoutes:
     j1939: bool = False
     canopen: bool = False
     in_line: bool = False
+    fd: frozenset[tuple[int, bool]] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -107,8 +109,14 @@ class Routing:
 
     @property
     def sent(self) -> frozenset[Key]:
-        """What we send, and nobody else may."""
+        """What we send, and no one else may."""
         return frozenset(k for k, r in self.routes.items() if r.role in (Role.VALVE, Role.SENT))
+
+    def received(self, key: Key) -> bool:
+        """Whether a message of the DBC files matters to us when others send it."""
+        bus, can_id, extended = key
+        group = extended and (bus, group_of(can_id)) in self.groups
+        return key in self.routes or group or key[1:] not in self.others
 
 
 def exact_inputs(inputs: Iterable[BoundInput]) -> dict[Key, BoundInput]:
@@ -134,6 +142,7 @@ def build_routing(
     statuses: Iterable[Key],
     known: Iterable[tuple[int, bool]],
     j1939: Container[str],
+    fd: Iterable[Key],
     listen_only: bool,
 ) -> Routing:
     """The table of a deployment.
@@ -145,6 +154,7 @@ def build_routing(
         statuses: status messages that are sent.
         known: every message of the DBC files.
         j1939: buses on which a message of J1939 is used.
+        fd: messages of CAN FD that are used.
         listen_only: nothing is sent but status, and the valves are those of another controller.
     """
     axes = list(axes)
@@ -175,6 +185,7 @@ def build_routing(
             bus.j1939 is not None or name in j1939,
             bus.canopen is not None,
             name in in_line,
+            frozenset(key[1:] for key in fd if key[0] == name),
         )
         for name, bus in config.buses.items()
     }

@@ -15,7 +15,7 @@ def bind_status(
     """A status message, and the ticks between two of them; (None, 0) where there is none."""
     if status is None:
         return None, 0
-    used = lookup.message(place, status.bus, status.message, received=False)
+    used = lookup.message(place, status, received=False)
     if not used:
         return None, 0
     for fault in status_faults(used.message, fields):

@@ -5,6 +5,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TypedDict
 
+from canshaper.config.enable import slowest_ms
 from canshaper.config.schema import AxisConfig
 from canshaper.config.source import Place
 from canshaper.machine.deployment import Deployment
@@ -113,7 +114,7 @@ def _when(deployment: Deployment, name: str) -> _When:
     """When an axis sees an event."""
     axis = deployment.axes[name]
     return {
-        "timeout_ms": deployment.config.joysticks[axis.config.command.joystick].timeout_ms,
+        "timeout_ms": slowest_ms(deployment.config, axis.config.command.joystick),
         "period_s": axis.period_ticks * deployment.config.tick_ms / 1000.0,
     }
 

@@ -1,17 +1,24 @@
 """What the messages of a DBC file look like: joysticks, valves, switches. Only a first guess."""
 
+import math
 import re
 from collections.abc import Sequence
 from difflib import SequenceMatcher
 
 from cantools.database.can import Message, Signal
 
-from canshaper.codec.signals import command_fault, raw_limits, symmetrical_range
+from canshaper.codec.layout import is_j1939
+from canshaper.codec.signals import LEAST_STEPS, command_fault, raw_limits, symmetrical_range
 from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, required_names
+from canshaper.machine.sway_sensor import LEAST_SAMPLES, UNITS
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
 ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
+SWAY = re.compile(r"sway|swing|slope|tilt|incl", re.IGNORECASE)
+NEUTRAL = re.compile(r"neutral|centre|center|rest", re.IGNORECASE)
+NEGATIVE = re.compile(r"neg|left|back|down|minus", re.IGNORECASE)
+POSITIVE = re.compile(r"pos|right|forward|fwd|up|plus", re.IGNORECASE)
 RADIUS = re.compile(r"radius|reach", re.IGNORECASE)
 COUNTER = re.compile(r"alive|count|rolling", re.IGNORECASE)
 _JOYSTICK = re.compile(r"lever|joy|joystick", re.IGNORECASE)
@@ -22,8 +29,69 @@ LIKELY = 0.6
 
 
 def axes(message: Message) -> list[Signal]:
-    """Signals of a message that can be the velocity of an axis."""
+    """Signals of a message that can be the velocity of an axis, by its DBC."""
     return [s for s in message.signals if not s.is_float and symmetrical_range(s) is None]
+
+
+def velocities(message: Message) -> list[Signal]:
+    """The same, and those that are with what the deployment file adds."""
+    return [s for s in message.signals if two_sided(s)]
+
+
+def two_sided(signal: Signal) -> bool:
+    """Whether a signal may be a velocity that goes both ways."""
+    if not signal.scale:
+        return False
+    low, high = reach(signal)
+    return low < 0.0 < high
+
+
+def one_sided(message: Message) -> list[Signal]:
+    """Signals of a message that may be a velocity around a middle, or with flags."""
+    return [
+        s
+        for s in message.signals
+        if s.length > _SWITCH_BITS and s.scale and not (two_sided(s) or s.is_float)
+        if not (s.is_multiplexer or COUNTER.search(s.name))
+    ]
+
+
+def direction_flags(message: Message, signal: Signal) -> tuple[str, str, str] | None:
+    """Flags of neutral, negative and positive of a signal, by their names."""
+    flags = switches(message)
+    near = sorted(
+        flags, key=lambda s: (-likeness(s.name, signal.name), abs(s.start - signal.start))
+    )
+    names = [named(near, pattern) for pattern in (NEUTRAL, NEGATIVE, POSITIVE)]
+    if None in names or len({*names}) < len(names):
+        return None
+    return str(names[0]), str(names[1]), str(names[2])
+
+
+def reach(signal: Signal) -> tuple[float, float]:
+    """Least and largest value of a signal, by its bits and by its range where it has one."""
+    low, high = -math.inf, math.inf
+    if not signal.is_float:
+        ends = [raw * signal.scale + signal.offset for raw in raw_limits(signal)]
+        low, high = min(ends), max(ends)
+    least, most = signal.minimum, signal.maximum
+    if least is not None and most is not None and most > least:
+        low, high = max(low, least), min(high, most)
+    return low, high
+
+
+def likely_middle(signal: Signal) -> float:
+    """Value of a one-sided signal at zero: the middle of what it reaches, a half step up."""
+    low, high = reach(signal)
+    steps = math.ceil((high - low) / abs(signal.scale) / 2.0)
+    return low + steps * abs(signal.scale)
+
+
+def likely_full(signal: Signal, zero: float = 0.0) -> float:
+    """Value of a signal at full, from zero on: the nearer end of what it reaches."""
+    low, high = reach(signal)
+    full = min(zero - low, high - zero) if low < zero < high else high - zero
+    return full if math.isfinite(full) else 1.0
 
 
 def switches(message: Message) -> list[Signal]:
@@ -38,25 +106,55 @@ def named(signals: Sequence[Signal], pattern: re.Pattern[str]) -> str | None:
 
 def counter(message: Message) -> str | None:
     """The alive counter of a message, by its name."""
-    found = [s for s in message.signals if not s.is_signed and raw_limits(s)[1] > 1]
-    return named(found, COUNTER)
+    candidates = [s for s in message.signals if not s.is_signed and raw_limits(s)[1] > 1]
+    return named(candidates, COUNTER)
 
 
 def joysticks(messages: Sequence[Message]) -> list[Message]:
-    """Messages that come again and again with a joystick and a switch; the likely ones first."""
-    found = [m for m in messages if m.cycle_time and axes(m) and switches(m)]
-    return sorted(found, key=lambda m: not _JOYSTICK.search(m.name))
+    """Messages that can be of a joystick, the likely ones first."""
+    return sorted(
+        (m for m in messages if not is_status(m) and (velocities(m) or one_sided(m))),
+        key=lambda m: (_tier(m, axes(m) and switches(m)), not _JOYSTICK.search(m.name)),
+    )
+
+
+def likely_joysticks(messages: Sequence[Message]) -> list[Message]:
+    """Those that are as good as the first of them: cyclic with a switch, or two-sided, or all."""
+    candidates = joysticks(messages)
+    tiers = [_tier(m, axes(m) and switches(m)) for m in candidates]
+    return [m for m, tier in zip(candidates, tiers, strict=True) if tier == tiers[0]]
+
+
+def _tier(message: Message, described: object) -> int:
+    """How well a message is described: cyclic with its range, two-sided, or neither."""
+    if message.cycle_time and described:
+        return 0
+    return 1 if velocities(message) else 2
 
 
 def commands(message: Message) -> list[Signal]:
-    """Signals of a message that can command a valve."""
+    """Signals of a message that can command a valve, by its DBC."""
     return [s for s in axes(message) if command_fault(s) is None]
 
 
+def valve_signals(message: Message) -> list[Signal]:
+    """The same, or where there is none those that can with what the deployment file adds."""
+    fine = [
+        s
+        for s in message.signals
+        if s.scale and not s.is_float and (likely_full(s) / abs(s.scale) >= LEAST_STEPS)
+    ]
+    signals = [s for s in fine if two_sided(s)]
+    return commands(message) or signals or [s for s in one_sided(message) if s in fine]
+
+
 def valves(messages: Sequence[Message], joystick: str) -> list[Message]:
-    """Messages that can command a valve; those whose names are like that of its joystick first."""
-    found = [m for m in messages if m.cycle_time and commands(m) and not is_status(m)]
-    return sorted(found, key=lambda m: -likeness(m.name, joystick))
+    """Messages that can command a valve.
+
+    Those that the DBC describes first, of them those whose names are like that of their joystick.
+    """
+    candidates = [m for m in messages if not is_status(m) and valve_signals(m)]
+    return sorted(candidates, key=lambda m: (_tier(m, commands(m)), -likeness(m.name, joystick)))
 
 
 def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
@@ -70,6 +168,22 @@ def radii(messages: Sequence[Message], timeout_ms: int) -> list[str]:
     ]
 
 
+def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Message, Signal]]:
+    """What can measure a swing of so many seconds, the likely ones first.
+
+    Not of J1939 where the sender is to be named besides.
+    """
+    found = [
+        (message, signal)
+        for message in messages
+        if message.cycle_time and message.cycle_time <= 1000.0 * swing_s / LEAST_SAMPLES
+        if not (is_status(message) or is_j1939(message))
+        for signal in message.signals
+        if any(signal.unit in units for units in UNITS.values())
+    ]
+    return sorted(found, key=lambda one: not SWAY.search(f"{one[0].name}.{one[1].name}"))
+
+
 def is_status(message: Message) -> bool:
     """Whether a message carries the status of an axis."""
     return {s.name for s in message.signals} >= required_names(AXIS_STATUS)
@@ -77,8 +191,8 @@ def is_status(message: Message) -> bool:
 
 def status_of(messages: Sequence[Message], axis: str) -> Message | None:
     """The status message of an axis, by its name."""
-    found = [m for m in messages if is_status(m) and m.cycle_time]
-    likely = max(found, key=lambda m: likeness(m.name, axis), default=None)
+    candidates = [m for m in messages if is_status(m) and m.cycle_time]
+    likely = max(candidates, key=lambda m: likeness(m.name, axis), default=None)
     return likely if likely and likeness(likely.name, axis) >= LIKELY else None
 
 

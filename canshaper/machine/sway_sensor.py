@@ -1,7 +1,8 @@
 """Sway sensors of a deployment, bound to the DBC."""
 
 import math
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 from cantools.database.can import Signal
 
@@ -12,9 +13,9 @@ from canshaper.config.sway_sensor import SwaySensor
 from canshaper.machine.inputs import BoundInput, bind_input, check_source
 from canshaper.machine.lookup import Lookup
 from canshaper.machine.used_message import UsedMessage
-from canshaper.shaping.observer import Measured, SensorTiming
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.trust import SensorLimits
+from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 
 _ANGLES = {"deg": math.radians(1.0), "°": math.radians(1.0), "rad": 1.0, "mrad": 1e-3}
 UNITS = {
@@ -26,8 +27,15 @@ UNITS = {
 LEAST_SAMPLES = 6.0
 # Largest delay, part of a swing: what is older says little about the swing now.
 MOST_DELAY = 0.25
+# Least time constant, in swings, with which an inclinometer corrects its gyro. Accelerations show
+# no swing of a free pendulum: with less they hide it, and what is left of it comes ahead of time.
+LEAST_FUSION = 1.5
+# Longest period of a second swing, part of the first: one that is slower cannot be kept apart.
+MOST_SECOND = 0.5
+# A second swing of long logs is about as much damped; the first one's damping says little of it.
+SECOND_DAMPING = 0.04
 # What of a section is about its message: the same for every axis that reads it.
-_OF_MESSAGE = tuple(Input.model_fields)
+_OF_MESSAGE = (*Input.model_fields, "node")
 
 
 @dataclass(frozen=True)
@@ -36,9 +44,11 @@ class SensorMessage(BoundInput):
 
     Attributes:
         signals: those that are read.
+        merits: names of their figures of merit, by their own; of those that have one.
     """
 
     signals: tuple[Signal, ...] = ()
+    merits: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -62,8 +72,11 @@ class BoundSwaySensor:
     @property
     def limits(self) -> SensorLimits:
         """What it may show."""
-        noise, offset = self.config.noise, self.config.offset_max_deg
-        return SensorLimits(math.radians(noise), math.radians(offset))
+        config = self.config
+        noise, offset = math.radians(config.noise), math.radians(config.offset_max_deg)
+        second_s = config.second_period_s
+        second = SwayMode.from_period(second_s, SECOND_DAMPING) if second_s else None
+        return SensorLimits(noise, offset, config.length_range_pct / 100.0, second)
 
     def timing(self, period_s: float) -> SensorTiming:
         """For an axis whose command is sent every so many seconds."""
@@ -92,25 +105,26 @@ def bind_sway_sensors(lookup: Lookup) -> dict[str, BoundSwaySensor]:
 def _bind_message(lookup: Lookup, sensors: dict[str, SwaySensor]) -> dict[str, BoundSwaySensor]:
     """The axes that read one message."""
     first, *others = sensors
-    for other in others:
-        for key in _OF_MESSAGE:
-            if getattr(sensors[other], key) != getattr(sensors[first], key):
-                text = f"expected the same as axes.{first}.sway_sensor, which reads the message too"
-                lookup.diagnostics.add((*_place(other), key), text)
     config = sensors[first]
+    for other in others:
+        text = f"axes.{first}.sway_sensor, which reads the message too"
+        lookup.diagnostics.check_same(_place(other), sensors[other], _OF_MESSAGE, config, text)
     if (result := bind_input(lookup, SensorMessage, _place(first), config)) is None:
         return {}
     used, message = result
     check_source(used, "a sway sensor")
+    lookup.check_node(_place(first), config.bus, config.node)
     factors = {name: _factor(used, name, one) for name, one in sensors.items()}
     for name, one in sensors.items():
         _check(lookup, used, name, one)
-    message = replace(message, signals=tuple(s for s, _ in filter(None, factors.values())))
+    merits = {s.signal: merit for name, s in sensors.items() if (merit := _merit(used, name, s))}
+    signals = tuple(signal for signal, _ in filter(None, factors.values()))
+    message = replace(message, signals=signals, merits=merits)
     cycle_s = (used.message.cycle_time or 0) / 1000.0
     return {
-        name: BoundSwaySensor(sensors[name], message, *found, cycle_s)
-        for name, found in factors.items()
-        if found
+        name: BoundSwaySensor(sensors[name], message, *signal_factor, cycle_s)
+        for name, signal_factor in factors.items()
+        if signal_factor
     }
 
 
@@ -128,10 +142,24 @@ def _factor(used: UsedMessage, axis: str, sensor: SwaySensor) -> tuple[Signal, f
     units = UNITS[sensor.measured]
     factor = units.get((signal.unit or "").strip())
     if factor is None:
-        text = f"has the unit {signal.unit!r}; expected one of {', '.join(units)}"
-        used.add_fault(f"{signal.name} {text} for a sensor of kind {sensor.kind}")
+        text = f"expected one in {', '.join(units)} for the kind {sensor.kind}"
+        used.diagnostics.add(place, f"{text}, got {signal.name!r} in {signal.unit!r}")
         return None
     return signal, -factor if sensor.invert else factor
+
+
+def _merit(used: UsedMessage, axis: str, sensor: SwaySensor) -> str | None:
+    """The figure of merit of the measurements of an axis, which several may share."""
+    place = (*_place(axis), "merit")
+    signal = used.find(place, sensor.merit)
+    if signal is None:
+        return None
+    use = "a figure of merit"
+    if signal.is_float:
+        used.diagnostics.add(place, f"expected a signal of whole numbers, got {signal.name!r}")
+    elif used.uses.get(signal.name) != use:
+        used.use(place, signal, use)
+    return signal.name
 
 
 def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensor) -> None:
@@ -142,16 +170,37 @@ def _check(lookup: Lookup, used: UsedMessage, name: str, sensor: SwaySensor) -> 
         return
     swing_ms = 1000.0 * axis.sway.mode().period_s
     cycle_ms = used.message.cycle_time or 0
-    if cycle_ms > swing_ms / LEAST_SAMPLES:
-        most = f"expected {LEAST_SAMPLES:g} messages or more in a swing of {swing_ms:.0f} ms"
+    second_s, most_s = sensor.second_period_s, swing_ms / 1000.0 * MOST_SECOND
+    if second_s and second_s > most_s:
+        most = f"expected up to {most_s:.2f} s, half of the first swing"
+        add((*_place(name), "second_period_s"), f"{most}, got {second_s:g} s")
+    quickest_ms = 1000.0 * second_s if second_s else swing_ms
+    if cycle_ms > quickest_ms / LEAST_SAMPLES:
+        most = f"expected {LEAST_SAMPLES:g} messages or more in a swing of {quickest_ms:.0f} ms"
         add((*_place(name), "message"), f"{most}, got one in {cycle_ms} ms")
     if sensor.delay_ms > swing_ms * MOST_DELAY:
         most = f"expected up to {swing_ms * MOST_DELAY:.0f} ms, a quarter of a swing"
         add((*_place(name), "delay_ms"), f"{most}, got {sensor.delay_ms:g} ms")
+    if fault := _fusion_fault(sensor, swing_ms / 1000.0):
+        add((*_place(name), "fusion_s"), fault)
     if sensor.use == "damp":
         for kind in _not_limit_aware(axis):
             text = f"expected watch with the filter {kind}: it does not feed the swing back"
             add((*_place(name), "use"), text)
+
+
+def _fusion_fault(sensor: SwaySensor, swing_s: float) -> str | None:
+    """Why an inclinometer shows nothing of a swing, or why this is none."""
+    fusion_s, least_s = sensor.fusion_s, LEAST_FUSION * swing_s
+    if sensor.kind != "inclination":
+        text = f"expected it with the kind inclination only, got it with {sensor.kind}"
+        return text if fusion_s is not None else None
+    least = f"expected {least_s:.1f} s or more, {LEAST_FUSION:g} swings"
+    if fusion_s is None:
+        return f"{least}, got none"
+    if not fusion_s:
+        return f"{least}, got 0: without a gyro an inclinometer shows nothing on a free pendulum"
+    return f"{least}, got {fusion_s:g} s" if fusion_s < least_s else None
 
 
 def _not_limit_aware(axis: AxisConfig) -> list[str]:

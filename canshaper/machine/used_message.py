@@ -5,7 +5,9 @@ from dataclasses import dataclass, field
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.canopen import STATE_BITS
+from canshaper.codec.codecs import Chosen
 from canshaper.codec.signals import find_signal
+from canshaper.config.similar import did_you_mean
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
@@ -22,6 +24,7 @@ class UsedMessage:
         message: the message.
         can_id: its identifier on the bus; in J1939 with the source address, 254 for any.
         any_source: whether it may come from any source address.
+        chosen: which frames are meant, where the message is multiplexed.
         uses: what its signals are used for, by name: each has one use, or a switch could move an
             axis.
     """
@@ -32,6 +35,7 @@ class UsedMessage:
     message: Message
     can_id: int
     any_source: bool
+    chosen: Chosen | None = None
     uses: dict[str, str] = field(default_factory=dict)
 
     def add(self, key: str, text: str) -> None:
@@ -49,8 +53,9 @@ class UsedMessage:
             return None
         signal = find_signal(self.message, name)
         if signal is None:
-            names = ", ".join(s.name for s in self.message.signals)
-            text = f"expected a signal of {self.message.name}, got {name!r}; there are {names}"
+            names = [s.name for s in self.message.signals]
+            there = f"there are {', '.join(names)}{did_you_mean(name, names)}"
+            text = f"expected a signal of {self.message.name}, got {name!r}; {there}"
             self.diagnostics.add(place, text)
         return signal
 

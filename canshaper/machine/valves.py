@@ -17,6 +17,7 @@ from canshaper.codec.signals import (
     symmetrical_range,
 )
 from canshaper.codec.valve import Direction, DirectionCodec, FlagsCodec, ValveCodec, ValveMessage
+from canshaper.config.enable import own_switch
 from canshaper.config.schema import Command, DeploymentConfig, DirectionCodes, Valve
 from canshaper.config.source import Place
 from canshaper.machine.lookup import Lookup
@@ -27,7 +28,8 @@ from canshaper.machine.used_message import UsedMessage, key_path
 SLOWEST_VALVE_MS = 200
 # Frames that a valve may miss but one before it closes by itself.
 FRAMES_PER_TIMEOUT = 3
-PROTECTION_KEYS = ("alive_counter", "checksum", "e2e")
+# What is about a message, not about one of the axes in it.
+MESSAGE_KEYS = ("alive_counter", "checksum", "e2e", "cycle_ms", "multiplexor")
 _FLOAT = re.compile("float", re.IGNORECASE)
 
 
@@ -134,13 +136,12 @@ def _check_rewritten(
             text = f"expected {valve.message} on bus {valve.bus}, as the frames of joystick {name}"
             text += f" leave with this command in them, got {other.valve.message!r}"
             add(("axes", axis, "valve", "message"), text)
-    for key in ("direction", "cia408"):
-        if getattr(valve, key) is not None:
+    for key in ("direction", "cia408", "full", "zero", "invert", "multiplexor"):
+        if getattr(valve, key) not in (None, False):
             text = f"expected none in the message of joystick {name}, which has that of the command"
             add((*place, key), f"{text}, got one")
-    for key in PROTECTION_KEYS:
-        if getattr(valve, key) != getattr(joystick, key):
-            add((*place, key), f"expected the same as joystick {name}, got another")
+    text = f"joystick {name}, got another"
+    lookup.diagnostics.check_same(place, valve, MESSAGE_KEYS, joystick, text)
     if valve.timeout_ms <= joystick.timeout_ms:
         text = f"expected more than the {joystick.timeout_ms} ms of joystick {name}, whose receiver"
         text += f" must not give up before we do, got {valve.timeout_ms}"
@@ -153,20 +154,17 @@ def _bind_message(
     """The message of a valve, new or already that of another axis."""
     key = (valve.bus, valve.message)
     if shared := shared_valves.get(key):
-        for part in PROTECTION_KEYS:
-            if getattr(valve, part) != getattr(shared.config, part):
-                text = f"expected the same as the other axes of {valve.message}, got another"
-                lookup.diagnostics.add((*place, part), text)
+        text = f"the other axes of {valve.message}, got another"
+        lookup.diagnostics.check_same(place, valve, MESSAGE_KEYS, shared.config, text)
         return shared
     # A joystick's message keeps the address of its sender, who is not on this bus.
-    rewritten = lookup.config.joysticks[joystick] if joystick is not None else None
-    source = rewritten.source if rewritten else None
-    used = lookup.message(place, *key, received=rewritten is not None, source=source)
+    source = lookup.config.joysticks[joystick].source if joystick is not None else None
+    used = lookup.message(place, valve, received=joystick is not None, source=source)
     if not used:
         return None
     ticks, protection = lookup.period(used), bind_protection(used, valve)
-    if rewritten:
-        codec = _rewritten_message(lookup.config, used, valve, rewritten.enable, protection)
+    if joystick is not None:
+        codec = _rewritten_message(lookup.config, used, valve, joystick, protection)
     else:
         codec = ValveMessage(lookup.sender(valve.bus, used.message, protection))
     shared_valves[key] = SharedValve(used, ticks, valve, codec)
@@ -174,9 +172,12 @@ def _bind_message(
 
 
 def _rewritten_message(
-    config: DeploymentConfig, used: UsedMessage, valve: Valve, enable: str, protection: Protection
+    config: DeploymentConfig, used: UsedMessage, valve: Valve, joystick: str, protection: Protection
 ) -> ValveMessage:
-    """The message of a joystick as it leaves, with the joystick's signal ``enable``."""
+    """The message of a joystick as it leaves, with the switch that enables it."""
+    if (enable := own_switch(config, joystick)) is None:
+        text = "expected one switch of its own message, where its frames leave through the gateway"
+        used.diagnostics.add(("joysticks", joystick, "enable"), f"{text}, got another")
     if used.any_source:
         text = f"in the DBC {used.message.name} may come from any source address; where its frames"
         used.add("message", f"{text} leave, its joystick needs the key source")
@@ -188,7 +189,7 @@ def _rewritten_message(
             ours |= {command.negative} if command.negative else set()
             ours |= {*command.flags.model_dump().values()} if command.flags else set()
     sender = Sender(valve.bus, used.message, used.can_id & 0xFF, protection)
-    if find_signal(used.message, enable) is None:  # noted with the joystick
+    if enable is None or find_signal(used.message, enable) is None:  # noted with the joystick
         return ValveMessage(sender)
     return RewrittenMessage(sender, enable, frozenset(ours))
 

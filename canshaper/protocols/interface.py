@@ -7,6 +7,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.inputs.carry_over import Key, Part
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import MessageInput
+from canshaper.inputs.sway_sensor import SensorNode
 from canshaper.machine.bound_axis import BoundAxis
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.states import Reason
@@ -52,6 +53,9 @@ class DrivenAxis(Protocol):
 
     def add_interlock(self, interlock: Interlock) -> None:
         """Let something else agree before it may move; asked after those that were added before."""
+
+    def measured_by(self, node: SensorNode) -> None:
+        """Count what its sway sensor measures only while this node works."""
 
 
 class FrameHandler(Protocol):

@@ -1,29 +1,35 @@
-"""Logs that are not text: BLF and MF4, read by python-can."""
+"""Logs that are not text: BLF, MF4 and python-can's database, read by python-can."""
 
+import sqlite3
 import struct
 from collections.abc import Iterator
 from typing import BinaryIO
 
 import can
 
-from canshaper.recording.frames import Place, TimedFrame, fits
+from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame
 
 # A float of that many seconds still holds nanoseconds; a date holds microseconds.
 FINE_S = 4e6
+_new = tuple.__new__  # TimedFrame(...) in half the time
 # The start of every object of a BLF file, containers too: LOBJ, sizes and versions, length, kind.
 _OBJECT = struct.Struct("<4sHHLL")
+_LENGTH = struct.Struct("<L")
 
 
 class _Reader(can.BLFReader):
     """python-can's, which never ends where an object of a damaged file has no length."""
 
     def _parse_data(self, data: bytes) -> Iterator[can.Message]:
-        at = data.find(b"LOBJ", 0, 8)
-        while 0 <= at <= len(data) - _OBJECT.size:
-            length = _OBJECT.unpack_from(data, at)[3]
-            if length < _OBJECT.size:
+        find, length_at, least = data.find, _LENGTH.unpack_from, _OBJECT.size
+        at, last = find(b"LOBJ", 0, 8), len(data) - least
+        while 0 <= at <= last:
+            (length,) = length_at(data, at + 8)
+            if length < least:
                 raise ValueError(f"an object of {length} bytes")
-            at = data.find(b"LOBJ", at + length, at + length + 8)
+            at += length
+            at = find(b"LOBJ", at, at + 8)
         return super()._parse_data(data)
 
 
@@ -78,35 +84,46 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         raise place.error(_told(error), "an MF4 log that is whole") from error
 
 
+def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+    """The database of python-can's logger; it has no channels."""
+    try:
+        reader = can.SqliteReader(place.path)
+        try:
+            yield from _frames(reader, place, 0, 0)
+        finally:
+            reader.stop()
+    except (sqlite3.Error, TypeError, ValueError) as error:
+        raise place.error(_told(error), "a database of python-can's logger") from error
+
+
 def _frames(
     reader: can.io.generic.MessageReader, place: Place, start_ns: int, first: int
 ) -> Iterator[TimedFrame]:
     """Its data frames; ``first`` is the number of the first channel for people.
 
-    Raises:
-        ValueError: a frame that none can be; python-can takes it as it stands.
+    A frame that none can be, which python-can takes as it stands, is left out too.
     """
-    for message in reader:
-        place.number += 1
-        if message.is_error_frame or message.is_remote_frame or message.is_fd:
-            kind = "error" if message.is_error_frame else "remote"
-            place.left_out["CAN FD" if message.is_fd else kind] += 1
+    names: dict[object, str] = {}
+    left_out = place.left_out
+    number = 0
+    for number, message in enumerate(reader, start=1):
+        place.number = number
+        if message.is_error_frame or message.is_remote_frame:
+            left_out["error" if message.is_error_frame else "remote"] += 1
             continue
-        can_id, data = message.arbitration_id, bytes(message.data)
-        if not fits(can_id, extended=message.is_extended_id):
-            raise ValueError(f"id {can_id:#x}")
-        if len(data) > 8:
-            raise ValueError(f"{len(data)} bytes in a classical frame")
+        can_id, extended, data = message.arbitration_id, message.is_extended_id, message.data
+        most = MOST_BYTES if message.is_fd else CLASSICAL_BYTES
+        if can_id >> (29 if extended else 11) or len(data) > most:
+            left_out["impossible"] += 1
+            continue
         channel = message.channel
-        name = str(channel + first) if isinstance(channel, int) else str(channel or "")
-        yield TimedFrame(
-            start_ns + _ns(message.timestamp), name, can_id, message.is_extended_id, data
-        )
+        if (name := names.get(channel)) is None:
+            name = str(channel + first) if isinstance(channel, int) else str(channel or "")
+            names[channel] = name
+        time_s = message.timestamp
+        ns = round(time_s * 1e9) if time_s < FINE_S else round(time_s * 1e6) * 1000
+        yield _new(TimedFrame, (start_ns + ns, name, can_id, extended, bytes(data)))
 
 
 def _told(error: Exception) -> str:
     return f"{type(error).__name__} {error}".rstrip()
-
-
-def _ns(time_s: float) -> int:
-    return round(time_s * 1e9) if time_s < FINE_S else round(time_s * 1e6) * 1000

@@ -9,17 +9,18 @@ from canshaper.errors import CutOffError, LogError
 
 # No clock is there, whether it counts from 1970 or from the start of the log: the year 2286.
 LATEST_S = 10_000_000_000
+MOST_BYTES = 64  # of a frame, which is one of CAN FD where it has more than 8
 
 
 class TimedFrame(NamedTuple):
-    """A classical CAN data frame with the time of its reception.
+    """A data frame with the time of its reception.
 
     Attributes:
         time_ns: on the clock of the log, whatever that counts from.
         channel: as the log names it; empty where the format has no channels.
         can_id: 11 or 29 bits.
         extended: whether it has 29.
-        data: up to 8 bytes.
+        data: up to 8 bytes, of CAN FD up to 64.
     """
 
     time_ns: int
@@ -42,7 +43,7 @@ class Place:
         path: the log.
         unit: what is counted: lines or frames.
         number: the one that is being read, from 1.
-        left_out: frames that are no classical data frames, by kind.
+        left_out: frames that are no data frames, by kind.
     """
 
     path: Path

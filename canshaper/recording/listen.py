@@ -10,8 +10,9 @@ from typing import Any, NamedTuple
 import can
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.bus.port import open_python_can
-from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.packet import BRS, FD_SIZE, FDF, Packet
+from canshaper.bus.port import not_opened
+from canshaper.bus.python_can import open_python_can
 from canshaper.bus.socketcan import dropped_frames, open_sockets
 from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
 from canshaper.config.bus import Bus
@@ -26,16 +27,17 @@ UNTOLD_S = 0.01
 
 
 class Heard(NamedTuple):
-    """One frame, as it was heard.
+    """One frame, as it was received.
 
     Attributes:
-        time_ns: wall clock, by the kernel where it tells.
+        time_ns: wall clock, by the kernel where it has it.
         bus: name in the deployment.
         channel: its channel.
         can_id: with the error flag of SocketCAN where it is an error frame.
         extended: whether the id has 29 bits, or is an error class.
         data: its bytes.
-        kind: empty for a classical data frame, else what it is.
+        kind: empty for a data frame, else what it is.
+        flags: of a frame of CAN FD, as SocketCAN has them; None of a classical one.
     """
 
     time_ns: int
@@ -45,14 +47,15 @@ class Heard(NamedTuple):
     extended: bool
     data: bytes
     kind: str
+    flags: int | None = None
 
     def line(self) -> str:
         """As ``candump -L`` writes it."""
         seconds, ns = divmod(self.time_ns, 10**9)
         can_id = f"{self.can_id:08X}" if self.extended else f"{self.can_id:03X}"
         data = "R" if self.kind == "remote" else self.data.hex().upper()
-        if self.kind == "CAN FD":
-            data = f"#0{data}"
+        if self.flags is not None:
+            data = f"#{self.flags & 0xF:X}{data}"
         return f"({seconds}.{ns // 1000:06d}) {self.channel} {can_id}#{data}\n"
 
 
@@ -78,10 +81,7 @@ class Listener:
                 self._open(name, bus)
             except Exception as error:  # each interface raises its own kinds
                 self.close()
-                where = f"{bus.interface} channel {bus.channel}"
-                text = (error.strerror if isinstance(error, OSError) else None) or str(error)
-                text = text or type(error).__name__
-                raise BusError(f"bus {name}: cannot open {where}: {text}") from error
+                raise not_opened(name, bus, error) from error
 
     def _open(self, name: str, bus: Bus) -> None:
         if bus.interface == "socketcan":
@@ -136,20 +136,19 @@ class Listener:
 def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
     """The next frame of SocketCAN; None when none waits."""
     try:
-        data, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
+        data, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
     except BlockingIOError:
         return None
     stamp = stamp_ns(ancillary)
     time_ns = time.time_ns() if stamp is None else stamp
-    word, length, payload = CAN_FRAME.unpack(data)
-    payload = payload[: min(length, 8)]
+    word, payload, flags = Packet.unpack(data)
     if word & ERR_FLAG:
         can_id = ERR_FLAG | word & EFF_MASK
         return Heard(time_ns, bus, channel, can_id, True, payload, "error")
     extended = bool(word & EFF_FLAG)
     can_id = word & (EFF_MASK if extended else SFF_MASK)
     remote = "remote" if word & RTR_FLAG else ""
-    return Heard(time_ns, bus, channel, can_id, extended, payload, remote)
+    return Heard(time_ns, bus, channel, can_id, extended, payload, remote, flags)
 
 
 def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
@@ -159,10 +158,11 @@ def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
         return None
     time_ns = round(message.timestamp * 1e6) * 1000
     can_id, extended, kind = message.arbitration_id, message.is_extended_id, ""
+    flags = None
     if message.is_error_frame:
         can_id, extended, kind = ERR_FLAG | can_id, True, "error"
     elif message.is_remote_frame:
         kind = "remote"
     elif message.is_fd:
-        kind = "CAN FD"
-    return Heard(time_ns, bus, channel, can_id, extended, bytes(message.data), kind)
+        flags = FDF | (BRS if message.bitrate_switch else 0)
+    return Heard(time_ns, bus, channel, can_id, extended, bytes(message.data), kind, flags)

@@ -1,4 +1,4 @@
-"""A log of CAN frames, one frame at a time: candump, ASC, BLF, MF4, CSV, also packed with gzip.
+"""A log of CAN frames, one frame at a time, in the formats of ``READERS``, also packed with gzip.
 
 A million lines take no more memory than a hundred.
 """
@@ -12,19 +12,21 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import binary, text
+from canshaper.recording import asc, binary, candump, tables, trc
 from canshaper.recording.frames import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 
 READERS: dict[str, Callable[[BinaryIO, Place], Iterator[TimedFrame]]] = {
-    ".log": text.candump,
-    ".asc": text.asc,
+    ".log": candump.candump,
+    ".asc": asc.asc,
     ".blf": binary.blf,
-    ".csv": text.csv,
+    ".csv": tables.csv,
+    ".db": binary.database,
     ".mf4": binary.mf4,
+    ".trc": trc.trc,
 }
-BINARY = frozenset((".blf", ".mf4"))
+BINARY = frozenset((".blf", ".db", ".mf4"))
 # Two sockets of one logger are not read in the order in which their frames came.
 OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
@@ -40,11 +42,11 @@ class LogFile:
     """One log; each iteration reads it from its beginning.
 
     Args:
-        path: the log; its suffix tells the format, ``.gz`` behind it that it is packed.
+        path: the log; its suffix is the format, ``.gz`` behind it that it is packed.
         progress: called now and then with the part that is read, 0 to 1.
 
     Attributes:
-        left_out: frames that are no classical data frames, by kind; of the last iteration.
+        left_out: frames that are no data frames, by kind; of the last iteration.
         disordered: frames that stand behind a later one, by up to ``OUT_OF_ORDER_NS``; they are
             handed out in the order of the file, with the time of that later one.
     """
@@ -104,9 +106,17 @@ class LogFile:
                     if self._progress and not raw.closed:
                         self._progress(raw.tell() / size)
         if last_ns is None:
-            raise place.error("no data frame", "a log with frames, its suffix that of its format")
+            raise self._empty(place)
         if self._progress:
             self._progress(1.0)
+
+    @staticmethod
+    def _empty(place: Place) -> LogError:
+        """What a log had that has no data frame."""
+        if place.left_out:
+            kinds = ", ".join(f"{n} {kind}" for kind, n in place.left_out.items())
+            return place.error(f"other frames only: {kinds}", "a data frame")
+        return place.error("no frame", "a log with frames, its suffix that of its format")
 
     def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
         """The time of a frame that does not follow that of the one before."""
@@ -168,7 +178,7 @@ def _format(place: Place) -> tuple[bool, str]:
     packed = suffixes[-1:] == [".gz"]
     suffix = "".join(suffixes[:-1] if packed else suffixes)
     suffix = f".{suffix.rpartition('.')[2]}"
-    if suffix not in READERS:
+    if suffix not in READERS or (packed and suffix == ".db"):
         known = ", ".join(READERS)
         got = repr(suffix) if suffix != "." else "none"
         expected = f"the suffix {known}, each also with .gz behind"

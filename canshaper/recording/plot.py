@@ -1,97 +1,220 @@
-"""The picture of a replay: joystick and command above predicted sway, each deployment in a colour.
+"""The picture of a replay: joystick and command, predicted sway, and the states of each deployment.
 
-The only module here that needs matplotlib; it draws through the object API, so no display and no
-global state is involved.
+It draws through the object API, so no display and no global state is involved.
 """
 
-from collections.abc import Sequence
-from pathlib import Path
+import re
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+from typing import Any, NamedTuple
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from canshaper.recording.report import Replayed
 from canshaper.report.style import (
-    DPI,
+    DASHED,
     JOYSTICK_COLOUR,
+    PRINT_DPI,
     RAW_COLOUR,
     SHAPED_COLOUR,
     TEXT_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
     coloured_words,
     command_scale,
     new_figure,
     plain,
-    save,
+    titled,
     zero_line,
 )
 from canshaper.report.table import axis_title
+from canshaper.shaping.reasons import REASON_TEXTS
+from canshaper.shaping.states import MOVING, Reason, State
 from canshaper_sim.recording import Recording
 
-# The first deployment, the second; all others. Of Okabe and Ito, as in the other pictures.
-COLOURS = (SHAPED_COLOUR, RAW_COLOUR, "#009E73", "#CC79A7")
-STRAIGHT_COLOUR = "#888888"
-WIDTH_PX, BLOCK_IN = 1600, 4.2
+
+class _Look(NamedTuple):
+    """Of a deployment; the later ones are thinner and lie above the others."""
+
+    colour: str
+    width: float
+    style: Any
 
 
-def draw(replays: Sequence[Replayed], path: Path) -> None:
-    """Draw all axes of all replays (PNG).
+# Of Okabe and Ito, as in the other pictures.
+LOOKS = (
+    _Look(SHAPED_COLOUR, 2.2, "solid"),
+    _Look(RAW_COLOUR, 1.0, DASHED),
+    _Look("#009E73", 1.0, (0, (1.0, 1.0))),
+    _Look("#CC79A7", 0.8, "solid"),
+)
+STRAIGHT = _Look("#888888", 0.8, "solid")
+_COMMAND_PX, _SWAY_PX, _LANE_PX, _HEAD_PX, _FOOT_PX = 250, 330, 40, 185, 105
+_GAPS_PX = {"command": 125, "sway": 22, "lanes": 52}  # above; reasons stand over the lanes
+# Fill and hatch of a lane while an axis is in a state; the others stay white.
+_LANES: dict[State, tuple[str, str]] = {
+    State.READY: ("#E3E3E3", ""),
+    **dict.fromkeys(MOVING, ("#9CC9E8", "")),
+    State.STOPPING: ("#F5C28B", "////"),
+    State.TRIPPED: ("#B03A2E", "xxxx"),
+}
+_KEY = "lanes: grey ready, blue moving, orange hatched stopping, red crossed tripped; ▼ others"
+_NUMBERS = (
+    ("largest sway", "peak_deg", "°"),
+    ("residual", "residual_deg", "°"),
+    ("run-on", "run_on_s", " s"),
+)
+_EVENT = re.compile(r"axis=(\S+) state=(\S+) .*reason=(\S+)")
+_MOVES = 1e-6
+
+
+def figure(replays: Sequence[Replayed]) -> Figure:
+    """The picture of all axes that move, of all replays.
 
     Args:
         replays: at least one, with rows.
-        path: file to write.
     """
     recordings = [one.trace.recording() for one in replays]
     straight = replays[0].trace.straight()
     names = list(dict.fromkeys(name for recording in recordings for name in recording.axes))
-    swinging = {n for r in recordings for n, trace in r.axes.items() if trace.sway_deg is not None}
-    rows = [(n, sway) for n in names for sway in ((False, True) if n in swinging else (False,))]
-    heights = [1.6 if sway else 1.0 for _, sway in rows]
-    inches = 0.7 + BLOCK_IN * sum(heights) / 2.6
-    fig = new_figure(WIDTH_PX, inches * DPI)
-    words = [("joystick straight to the valve", STRAIGHT_COLOUR)]
-    words += [(one.name, COLOURS[i % len(COLOURS)]) for i, one in enumerate(replays)]
-    coloured_words(fig, words, (0.052, 1.0 - 0.08 / inches), size=15, sep=14)
-    grid = fig.add_gridspec(
-        len(heights), 1, left=0.052, right=0.988, top=1.0 - 0.7 / inches, bottom=0.5 / inches,
-        height_ratios=heights, hspace=0.28,
-    )  # fmt: skip
+    moved = [name for name in names if any(_moves(r, name) for r in recordings)] or names[:1]
+    lanes_px = _LANE_PX * len(replays)
+    rows: list[tuple[str, str, int]] = []
+    for name in moved:
+        swings = any(r.axes[name].sway_deg is not None for r in recordings if name in r.axes)
+        rows += [(name, "command", _COMMAND_PX), *[(name, "sway", _SWAY_PX)] * swings]
+        rows.append((name, "lanes", lanes_px))
+    followed = [kind for _, kind, _ in rows[1:]] + ["command"]
+    gaps = [_GAPS_PX[kind] for kind in followed]
+    height = _HEAD_PX + sum(h + gap for (_, _, h), gap in zip(rows, gaps, strict=True)) + _FOOT_PX
+    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    _head(fig, replays, [name for name in names if name not in moved], height)
+    top = height - _HEAD_PX
     panels: list[Axes] = []
-    for row, (name, sway) in enumerate(rows):
-        panel = fig.add_subplot(grid[row], sharex=panels[0] if panels else None)
+    for (name, kind, tall), gap in zip(rows, gaps, strict=True):
+        place = (0.1, (top - tall) / height, 0.885, tall / height)
+        panel = fig.add_axes(place, sharex=panels[0] if panels else None)
+        top -= tall + gap
         panels.append(panel)
-        (_draw_sway if sway else _draw_command)(panel, name, recordings, straight)
-        plain(panel)
+        if kind == "lanes":
+            _draw_lanes(panel, name, replays)
+            continue
+        (_draw_sway if kind == "sway" else _draw_command)(panel, name, recordings, straight)
+        if kind == "command":
+            titled(panel, _title(name, replays), TITLE_PT)
+        plain(panel, size=TEXT_PT)
         zero_line(panel)
-        panel.tick_params(labelbottom=row == len(rows) - 1)
-    panels[-1].set_xlabel("time since the first tick, s", color=TEXT_COLOUR)
+        panel.tick_params(labelbottom=False)
+    panels[-1].tick_params(labelbottom=True, labelsize=TEXT_PT)
+    panels[-1].set_xlabel("time since the first tick, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
     panels[0].set_xlim(straight.t_s[0], straight.t_s[-1])
-    save(fig, path)
+    return fig
+
+
+def _moves(recording: Recording, name: str) -> bool:
+    trace = recording.axes.get(name)
+    return trace is not None and any(abs(v) > _MOVES for v in (*trace.joystick, *trace.sent))
+
+
+def _head(fig: Figure, replays: Sequence[Replayed], idle: Sequence[str], height: float) -> None:
+    """Name the curves, the lanes, and what is left out."""
+    words = [("joystick straight to the valve (thin)", STRAIGHT.colour)]
+    styles = ("solid", "dashed", "dotted", "thin solid")
+    for i, one in enumerate(replays):
+        words.append((f"{one.name} ({styles[i % len(LOOKS)]})", LOOKS[i % len(LOOKS)].colour))
+    coloured_words(fig, words, (0.012, 1.0 - 14 / height), size=TEXT_PT, sep=12)
+    left_out = f"; idle, left out: {', '.join(idle)}" if idle else ""
+    at = 1.0 - 58 / height
+    fig.text(0.012, at, _KEY + left_out, fontsize=TEXT_PT, color=TEXT_COLOUR, va="top")
+
+
+def _title(name: str, replays: Sequence[Replayed]) -> str:
+    """Name of an axis, its sway and below its run-on, straight and of each deployment."""
+    having = [one for one in replays if name in one.measures]
+    texts = []
+    for words, key, unit in _NUMBERS:
+        values = [getattr(having[0].straight[name], key)] if having else []
+        values += [getattr(one.measures[name], key) for one in having]
+        shown = ["-" if value is None else f"{value:.1f}{unit}" for value in values]
+        if any(value is not None for value in values):
+            texts.append(f"{words} {shown[0]} straight, {', '.join(shown[1:])}")
+    if not texts:
+        return axis_title(name)
+    return "\n".join([f"{axis_title(name)}: {'; '.join(texts[:2])}", *texts[2:]])
 
 
 def _draw_command(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
     """Draw the command of the valve, over the joystick as a filled step."""
-    panel.set_title(axis_title(name), loc="left", fontsize=13, weight="bold", color=TEXT_COLOUR)
     if name in straight.axes:
         joystick = straight.axes[name].joystick
         panel.fill_between(straight.t_s, joystick, step="post", color=JOYSTICK_COLOUR, linewidth=0)
     command_scale(panel, 1.1)
-    panel.set_ylabel("command, %", color=TEXT_COLOUR)
+    panel.set_ylabel("command, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
     for i, recording in enumerate(recordings):
         if name in recording.axes:
-            colour = COLOURS[i % len(COLOURS)]
             sent = recording.axes[name].sent
-            panel.plot(recording.t_s, sent, color=colour, linewidth=1.4, drawstyle="steps-post")
+            _plot(panel, recording.t_s, sent, LOOKS[i % len(LOOKS)], drawstyle="steps-post")
 
 
 def _draw_sway(
     panel: Axes, name: str, recordings: Sequence[Recording], straight: Recording
 ) -> None:
     """Draw the predicted sway, and that of the joystick straight to the valve."""
-    panel.set_ylabel("predicted sway, degrees", color=TEXT_COLOUR)
+    panel.set_ylabel("predicted\nsway, degrees", fontsize=TEXT_PT, color=TEXT_COLOUR)
     joystick = straight.axes.get(name)
     if joystick is not None and joystick.sway_deg is not None:
-        panel.plot(straight.t_s, joystick.sway_deg, color=STRAIGHT_COLOUR, linewidth=1.0)
+        _plot(panel, straight.t_s, joystick.sway_deg, STRAIGHT)
     for i, recording in enumerate(recordings):
         if name in recording.axes and (sway := recording.axes[name].sway_deg) is not None:
-            panel.plot(recording.t_s, sway, color=COLOURS[i % len(COLOURS)], linewidth=1.8)
+            _plot(panel, recording.t_s, sway, LOOKS[i % len(LOOKS)])
+
+
+def _plot(panel: Axes, x: Sequence[float], y: Sequence[float], look: _Look, **options: Any) -> None:
+    panel.plot(x, y, color=look.colour, linewidth=look.width, linestyle=look.style, **options)
+
+
+def _draw_lanes(panel: Axes, name: str, replays: Sequence[Replayed]) -> None:
+    """A lane a deployment: the states of the axis, and other events as marks."""
+    for i, one in enumerate(replays):
+        low = len(replays) - 1 - i
+        for start_s, end_s, state, reason in _spans(one, name):
+            if i == 0 and state in (State.STOPPING, State.TRIPPED):
+                words = REASON_TEXTS[reason].words
+                panel.text(start_s, len(replays) + 0.12, words, fontsize=TEXT_PT, va="bottom")
+            if state in _LANES:
+                colour, hatch = _LANES[state]
+                spans = [(start_s, end_s - start_s)]
+                panel.broken_barh(
+                    spans, (low + 0.08, 0.84), facecolor=colour, hatch=hatch, edgecolor="white",
+                    linewidth=0,
+                )  # fmt: skip
+        others = [_seconds(one, at) for at, text in one.events if not _EVENT.match(text)]
+        panel.plot(others, [low + 0.5] * len(others), "v", color=TEXT_COLOUR, markersize=3.5)
+        look = LOOKS[i % len(LOOKS)]
+        panel.plot([0.0, 0.0], [low + 0.1, low + 0.9], color=look.colour, linewidth=4.0)
+    panel.set_ylim(0.0, len(replays))
+    panel.set_yticks([])
+    panel.spines[["top", "right", "left"]].set_visible(False)
+    panel.tick_params(labelbottom=False, labelcolor=TEXT_COLOUR)
+
+
+def _spans(one: Replayed, axis: str) -> Iterator[tuple[float, float, State, Reason]]:
+    """From and to when an axis was in which state, s, and why; before its first event: unknown."""
+    changes = [(_seconds(one, at), m[2], m[3]) for at, m in _matches(one) if m[1] == axis]
+    end = (_seconds(one, one.trace.end_ns), "", "")
+    for (start_s, state, reason), (end_s, *_) in pairwise([*changes, end]):
+        yield start_s, end_s, State[state], Reason[reason]
+
+
+def _matches(one: Replayed) -> Iterator[tuple[int, re.Match[str]]]:
+    for at_ns, text in one.events:
+        if match := _EVENT.match(text):
+            yield at_ns, match
+
+
+def _seconds(one: Replayed, at_ns: int) -> float:
+    return (at_ns - (one.trace.start_ns or 0)) / 1e9

@@ -17,7 +17,7 @@ class Recording:
     """A recording under way, or done.
 
     Attributes:
-        frames: by kind, the empty one for classical data frames.
+        frames: by kind, the empty one for data frames.
         lost: frames that the kernel could not keep for us.
         history: what the status messages told.
         seconds: how long.

@@ -190,7 +190,7 @@ class Replay:
             yield f"no joystick frame of {name}"
         if self.log.left_out:
             counts = ", ".join(f"{count} {kind}" for kind, count in self.log.left_out.items())
-            yield f"frames that are no classical data frames are left out: {counts}"
+            yield f"frames that are no data frames are left out: {counts}"
         if self.log.disordered:
             yield f"{self.log.disordered} frames stand behind later ones; the log's order counts"
 

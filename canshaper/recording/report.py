@@ -6,13 +6,13 @@ from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
-from rich.table import Table
 from rich.text import Text
 
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.replay import Replay
 from canshaper.recording.ticks import Difference
 from canshaper.recording.trace import Trace
+from canshaper.report.console import WholeTable
 from canshaper.report.metrics import AxisMetrics, axis_metrics
 from canshaper.report.table import NOTHING, axis_title
 
@@ -37,7 +37,7 @@ class Replayed:
         deployment: the machine.
         replay: it.
         trace: its rows.
-        events: (time in the log, ns; text) of what the daemon would have told.
+        events: (time in the log, ns; text) of what the daemon would have reported.
         ticks: how many.
         missed: deadlines that the daemon missed.
         measures: by axis; None for an axis that cannot be measured.
@@ -98,7 +98,7 @@ class Replayed:
 def print_replays(replays: Sequence[Replayed], console: Console) -> None:
     """A table an axis: the joystick straight to the valve, then each deployment."""
     for axis in _axes(replays):
-        table = Table(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title_justify="left")
+        table = WholeTable(box=SIMPLE_HEAD, padding=(0, 1), pad_edge=False, title_justify="left")
         table.add_column(axis_title(axis), no_wrap=True)
         having = [one for one in replays if axis in one.measures]
         columns = [(STRAIGHT, having[0].straight[axis])]

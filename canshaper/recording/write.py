@@ -1,9 +1,11 @@
 """A replay as a log of its own, which can be replayed again."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import TextIO
 
 from canshaper.codec.frame import Frame
+from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.machine.routing import Key
 from canshaper.recording.ticks import Result, Tick
 
 
@@ -13,10 +15,13 @@ class LogWriter:
     Args:
         file: where to.
         channel_of: channel by bus.
+        fd: messages of CAN FD; what is longer than classical frames is one, too.
     """
 
-    def __init__(self, file: TextIO, channel_of: Mapping[str, str]) -> None:
-        self._file = file
+    def __init__(
+        self, file: TextIO, channel_of: Mapping[str, str], fd: Collection[Key] = ()
+    ) -> None:
+        self._file, self._fd = file, fd
         # A log without channels gets the names of the buses.
         self._channel_of = {bus: channel or bus for bus, channel in channel_of.items()}
         self._last_ns = 0
@@ -35,5 +40,6 @@ class LogWriter:
         seconds, ns = divmod(time_ns, 10**9)
         can_id = f"{frame.can_id:08X}" if frame.extended else f"{frame.can_id:03X}"
         channel = self._channel_of[frame.bus]
-        text = f"({seconds}.{ns // 1000:06d}) {channel} {can_id}#{frame.data.hex().upper()}\n"
-        self._file.write(text)
+        fd = "#0" if frame[:3] in self._fd or len(frame.data) > CLASSICAL_BYTES else ""
+        data = f"{fd}{frame.data.hex().upper()}"
+        self._file.write(f"({seconds}.{ns // 1000:06d}) {channel} {can_id}#{data}\n")

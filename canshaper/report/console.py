@@ -5,12 +5,14 @@ from contextlib import contextmanager
 from typing import Any, Protocol
 
 from rich.box import SIMPLE_HEAD
-from rich.console import Console, ConsoleOptions, RenderableType
+from rich.console import Console, ConsoleOptions, RenderableType, RenderResult
 from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.segment import Segment
 from rich.table import Table
 
 from canshaper.config.printable import printable
+
+MOST_COLUMNS = 10_000  # of a terminal that takes any table
 
 
 class SafeConsole(Console):
@@ -31,9 +33,51 @@ class SafeConsole(Console):
             yield Segment(text if control else printable(text), style, control)
 
 
+class WholeTable(Table):
+    """A table that loses no digit on a narrow terminal: several below each other instead."""
+
+    def __rich_console__(self, console: Console, options: ConsoleOptions) -> RenderResult:
+        """Itself where it fits, else its first column with as many others as fit, and so on."""
+        if len(self.columns) < 2 or self._width(console, options) <= options.max_width:
+            yield from super().__rich_console__(console, options)
+            return
+        groups: list[list[int]] = [[]]
+        for number in range(1, len(self.columns)):
+            wider = self._part([*groups[-1], number])
+            if groups[-1] and wider._width(console, options) > options.max_width:
+                groups.append([])
+            groups[-1].append(number)
+        for number, group in enumerate(groups):
+            part = self._part(group)
+            part.title = None if number else self.title
+            yield from Table.__rich_console__(part, console, options)
+
+    def _width(self, console: Console, options: ConsoleOptions) -> int:
+        """Columns of a terminal that it needs."""
+        return self.__rich_measure__(console, options.update(max_width=MOST_COLUMNS)).maximum
+
+    def _part(self, numbers: list[int]) -> "WholeTable":
+        """The first column and these; the first is wrapped where it has to be."""
+        part = WholeTable(
+            title_justify="left", box=self.box, padding=self.padding, pad_edge=self.pad_edge
+        )
+        chosen = [self.columns[0], *(self.columns[number] for number in numbers)]
+        for column in chosen:
+            part.add_column(
+                column.header,
+                justify=column.justify,
+                width=column.width,
+                no_wrap=column is not self.columns[0],
+            )
+        cells = zip(*(column.cells for column in chosen), strict=True)
+        for row, texts in zip(self.rows, cells, strict=True):
+            part.add_row(*texts, style=row.style, end_section=row.end_section)
+        return part
+
+
 def new_table(first: str, *heads: str, title: str | None = None) -> Table:
     """A table without rows: a column of words, then columns of figures; no cell is wrapped."""
-    table = Table(
+    table = WholeTable(
         title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0), pad_edge=False
     )
     table.add_column(first, no_wrap=True)

@@ -1,21 +1,34 @@
 """The comparison of filters as a picture: how soon the crane stops against what swing is left."""
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from pathlib import Path
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
 from matplotlib.ticker import LogLocator, NullFormatter
 from matplotlib.transforms import Bbox
 
-from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, new_figure, plain, save
+from canshaper.report.style import (
+    HEAD_PT,
+    PRINT_DPI,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
+    new_figure,
+    plain,
+)
 
-LIMIT_COLOUR = "#666666"
-_SIZE_PX = (2000, 950)
-# Of the labels, at 100 dots per inch: width of a character, and heights to try next to a dot.
-_CHARACTER_PX = 8.5
-_OFFSETS_PX = (0.0, 18.0, -18.0, 38.0, -38.0, 58.0, -58.0, 80.0, -80.0, 104.0, -104.0)
+LIMIT_COLOUR = "#555555"
+_HEIGHT_PX = 2040
+_RECT = (0.0, 0.022, 1.0, 0.978)  # of the figure: the stamp is below
+# Of the labels: width of a character and height of a line, and places to try next to a dot.
+_CHARACTER_PX, _LINE_PX, _DOT_PX = 16.0, 30.0, 20.0
+_HEIGHTS = tuple(1.1 * sign * k for k in range(10) for sign in ((1, -1) if k else (1,)))
+_ASIDE_PX = tuple(float(sign * px) for px in (24, 90, 170, 260) for sign in (1, -1))
 
 
 @dataclass(frozen=True)
@@ -43,21 +56,18 @@ class Limits:
     time_optimal_s: float
 
 
-def draw(points: Sequence[Point], limits: Limits, title: str, path: Path) -> None:
-    """Write the picture."""
-    drawn = figure(points, limits, title)
-    save(drawn, path)
-
-
 def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
-    """The picture as a figure: run-on at the left, rise at the right; direct labels."""
-    drawn = new_figure(*_SIZE_PX, layout="constrained")
-    drawn.suptitle(title, x=0.01, ha="left", fontsize=17, fontweight="bold")
-    panels = drawn.subplots(1, 2, sharey=True)
-    panels[0].set_title(
-        "blue: ours, orange: the others; further down and left is better", loc="left", fontsize=12
+    """The picture: run-on above, rise below; direct labels."""
+    drawn = new_figure(
+        WIDTH_PX, _HEIGHT_PX, dpi=PRINT_DPI, layout=ConstrainedLayoutEngine(rect=_RECT)
     )
-    panels[0].set_ylabel("largest residual swing at ±30 % pendulum length, degrees", fontsize=12)
+    drawn.suptitle(title, x=0.01, ha="left", fontsize=HEAD_PT, fontweight="bold")
+    panels = drawn.subplots(2, 1, sharey=True)
+    panels[0].set_title(
+        "blue dots: ours, orange squares: the others; further down and left is better",
+        loc="left",
+        fontsize=TITLE_PT,
+    )
     values = [p.worst_deg for p in points]
     for axes, label, seconds in (
         (panels[0], "run-on of the tip after release, s", [p.stop_s for p in points]),
@@ -71,12 +81,16 @@ def figure(points: Sequence[Point], limits: Limits, title: str) -> Figure:
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.set_xlabel(label, fontsize=12)
-        plain(axes)
+        axes.set_xlabel(label, fontsize=TEXT_PT)
+        axes.set_ylabel(
+            "largest residual swing at\n±30 % pendulum length, degrees", fontsize=TEXT_PT
+        )
+        plain(axes, size=TEXT_PT)
         axes.set_xlim(0.0, max(seconds) * 1.3)
         axes.set_ylim(0.5 * min(values), 1.5 * max(values))
     _limits(panels[0], limits)
-    drawn.draw_without_rendering()  # the layout decides where the dots are, in pixels
+    drawn.draw_without_rendering()  # the layout decides where the dots are, in pixels, for good
+    drawn.set_layout_engine("none")
     _points(panels[0], points, [p.stop_s for p in points])
     _points(panels[1], points, [p.rise_s for p in points])
     return drawn
@@ -90,54 +104,87 @@ def _limits(axes: Axes, limits: Limits) -> None:
         axes.annotate(
             "limit of every shaper\nwithin the valve's rate,\nnear-far alone",
             (x[3], y[3]),
-            xytext=(-8, -6),
+            xytext=(-6, -4),
             textcoords="offset points",
             va="top",
             ha="right",
             color=LIMIT_COLOUR,
-            fontsize=11,
+            fontsize=TEXT_PT,
         )
     axes.axvline(limits.time_optimal_s, color=LIMIT_COLOUR, linestyle=":", linewidth=1.2)
     axes.annotate(
         "time-optimal limit",
-        (limits.time_optimal_s, 1.0),
+        (limits.time_optimal_s, 0.0),
         xycoords=("data", "axes fraction"),
-        xytext=(-4, -4),
+        xytext=(-4, 4),
         textcoords="offset points",
-        va="top",
+        va="bottom",
         ha="right",
         rotation=90,
         color=LIMIT_COLOUR,
-        fontsize=11,
+        fontsize=TEXT_PT,
     )
 
 
 def _points(axes: Axes, points: Sequence[Point], seconds: Sequence[float]) -> None:
-    """Dots with names; a name goes where it covers neither a dot nor another name."""
-    spots_s = [(s, p.worst_deg) for s, p in zip(seconds, points, strict=True)]
-    places = [tuple(axes.transData.transform(spot)) for spot in spots_s]
-    taken = [Bbox.from_bounds(x - 7, y - 7, 14, 14) for x, y in places]
-    order = sorted(range(len(points)), key=lambda i: places[i])
-    for point, spot, (x, y) in ((points[i], spots_s[i], places[i]) for i in order):
-        colour = SHAPED_COLOUR if point.ours else RAW_COLOUR
-        axes.plot(*spot, "o", color=colour, markersize=9)
-        width = _CHARACTER_PX * len(point.name)
-        spots = [
-            (dx if dx > 0 else dx - width, dy) for dy in _OFFSETS_PX for dx in (11.0, -11.0, 34.0)
-        ]
-        boxes = [Bbox.from_bounds(x + dx, y + dy - 8, width, 16) for dx, dy in spots]
-        free = (i for i, box in enumerate(boxes) if not any(box.overlaps(t) for t in taken))
-        chosen = next(free, 0)
-        taken.append(boxes[chosen])
-        dx, dy = spots[chosen]
-        far = abs(dy) > 20 or dx > 20
+    """Dots with names; no name covers a dot, another name or a line to a name, nor its line one."""
+    spots = [(s, p.worst_deg) for s, p in zip(seconds, points, strict=True)]
+    places = [tuple(axes.transData.transform(spot)) for spot in spots]
+    half = 0.5 * _DOT_PX
+    dots = [Bbox.from_bounds(x - half, y - half, _DOT_PX, _DOT_PX) for x, y in places]
+    names = [text.get_window_extent() for text in axes.texts]
+    lines: list[Bbox] = []
+
+    def room(i: int) -> float:
+        return sum(min(math.dist(places[i], one), 400.0) for one in places)
+
+    for i in sorted(range(len(points)), key=room):  # the most crowded first
+        point, (x, y) = points[i], places[i]
+        colour, marker = (SHAPED_COLOUR, "o") if point.ours else (RAW_COLOUR, "s")
+        axes.plot(*spots[i], marker, color=colour, markersize=4.5)
+        others = [*names, *dots[:i], *dots[i + 1 :]]
+        tries = [_Try(x, y, dx, h * _LINE_PX, point.name) for h in _HEIGHTS for dx in _ASIDE_PX]
+        tries.sort(key=lambda one: len(one.line) and math.hypot(one.dx, one.dy))
+        covered = [*others, dots[i]]
+        # Where there is no room, two lines may cross.
+        free = [one for one in tries if one.is_free(covered, others, lines)]
+        best = (one for one in free if one.is_free(covered, lines, lines))
+        chosen = next(best, (free or tries)[0])
+        names.append(chosen.box)
+        lines += chosen.line
         axes.annotate(
             point.name,
-            spot,
-            xytext=(dx, dy),
+            spots[i],
+            xytext=(chosen.dx, chosen.dy),
             textcoords="offset pixels",
+            ha="left" if chosen.dx > 0 else "right",
             va="center",
             color=colour,
-            fontsize=11,
-            arrowprops={"arrowstyle": "-", "color": colour, "linewidth": 0.6} if far else None,
+            fontsize=TEXT_PT,
+            arrowprops=_line(colour, chosen.dx) if chosen.line else None,
         )
+
+
+def _line(colour: str, dx: float) -> dict[str, object]:
+    """A line from the near end of a name to its dot."""
+    near = (0.0 if dx > 0 else 1.0, 0.5)
+    return {"arrowstyle": "-", "color": colour, "linewidth": 0.6, "shrinkA": 0, "relpos": near}
+
+
+class _Try:
+    """A place for a name: its box, and its line to the dot in small pieces where it is far."""
+
+    def __init__(self, x: float, y: float, dx: float, dy: float, name: str) -> None:
+        self.dx, self.dy = dx, dy
+        width = _CHARACTER_PX * len(name)
+        left = x + (dx if dx > 0 else dx - width)
+        self.box = Bbox.from_bounds(left, y + dy - 0.5 * _LINE_PX, width, _LINE_PX)
+        far = abs(dy) > 1.2 * _LINE_PX or abs(dx) > 1.2 * _LINE_PX
+        parts = range(1, 20) if far else ()
+        self.line = [Bbox.from_bounds(x + dx * k / 20, y + dy * k / 20, 3.0, 3.0) for k in parts]
+
+    def is_free(self, taken: list[Bbox], others: list[Bbox], lines: list[Bbox]) -> bool:
+        """Whether the name covers nothing, and its line none of the others."""
+        if any(self.box.overlaps(one) for one in (*taken, *lines)):
+            return False
+        return not any(piece.overlaps(one) for piece in self.line for one in others)

@@ -5,7 +5,6 @@ through the object API, so no display and no global state is involved.
 """
 
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
@@ -22,16 +21,21 @@ from canshaper.report.strokes import (
     rests,
 )
 from canshaper.report.style import (
+    DASHED,
+    HEAD_PT,
     JOYSTICK_COLOUR,
     MINUS,
+    PRINT_DPI,
     RAW_COLOUR,
     SHAPED_COLOUR,
     TEXT_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
     coloured_words,
     command_scale,
     new_figure,
     plain,
-    save,
     titled,
     zero_line,
 )
@@ -40,36 +44,24 @@ from canshaper.report.top_view import draw_top_views
 from canshaper_sim.recording import Recording
 
 WINDOW_COLOUR = "#FBE5A6"
-# In print 170 mm wide, with letters of 8 points and more; colours differ in width and dash too.
-WIDTH_PX = 1600
-_DPI = WIDTH_PX / (170.0 / 25.4)
-_BLOCK_PX, _HEAD_PX, _FOOT_PX = 590, 230, 150
-_TEXT, _TITLE, _HEAD = 8.0, 8.5, 10.5
+_BLOCK_PX, _HEAD_PX, _FOOT_PX = 590, 230, 184
 _EDGE, _LEFT, _RIGHT = 0.012, 0.1, 0.988  # of the figure: room for the units at the left
 _TIME_RIGHT, _VIEW_LEFT = 0.612, 0.668  # where there are views from above
-_DASHED = (0, (3.5, 1.5))
 
 
-def draw(raw: Recording, shaped: Recording, report: Mapping[str, Any], path: Path) -> None:
-    """Draw the two drives and write the picture to ``path`` (PNG, ``WIDTH_PX`` wide).
+def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figure:
+    """The picture of two drives.
+
+    Per axis with sway a block of command above sway, all on one time; next to them the paths of
+    tip and grapple from above, where the drives know them.
 
     Args:
         raw: drive with the filters off.
         shaped: the same operator script with the filters on.
         report: ``metrics.report_dict`` of the two; the titles carry its numbers.
-        path: file to write.
 
     Raises:
         ValueError: no axis has sway, or the drives cannot be compared (see ``aligned``).
-    """
-    save(figure(raw, shaped, report), path)
-
-
-def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figure:
-    """Return the picture.
-
-    Per axis with sway a block of command above sway, all on one time; next to them the paths of
-    tip and grapple from above, where the drives know them.
     """
     raw, shaped = aligned(raw, shaped)
     names = [name for name, trace in raw.axes.items() if trace.sway_deg is not None]
@@ -78,10 +70,10 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     views = [(drive.crane, rests(drive)) for drive in (raw, shaped) if drive.crane]
     blocks = max(len(names), 2 if views else 1)
     height = _HEAD_PX + blocks * _BLOCK_PX + _FOOT_PX
-    fig = new_figure(WIDTH_PX, height, dpi=_DPI)
+    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
     _head(fig, report["crane"], height)
     if _windows(raw):
-        _explain_shade(fig)
+        _explain_shade(fig, height)
     top, bottom = 1.0 - _HEAD_PX / height, _FOOT_PX / height
     right = _TIME_RIGHT if views else _RIGHT
     grid = fig.add_gridspec(
@@ -92,7 +84,7 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     if views:
         low = 1.0 - (_HEAD_PX + 2 * _BLOCK_PX) / height
         box = (_VIEW_LEFT, low, _RIGHT, top)
-        draw_top_views(fig, views, box, sizes=(_TEXT, _TITLE))
+        draw_top_views(fig, views, box, sizes=(TEXT_PT, TITLE_PT))
     return fig
 
 
@@ -110,9 +102,9 @@ def _draw_blocks(
         command = fig.add_subplot(block[0], sharex=time)
         sway = fig.add_subplot(block[1], sharex=command, sharey=panels[1] if panels else None)
         panels += [command, sway]
-        titled(command, title, _TITLE)
+        titled(command, title, TITLE_PT)
         for panel in (command, sway):
-            plain(panel, size=_TEXT)
+            plain(panel, size=TEXT_PT)
             zero_line(panel)
             _shade(panel, raw, windows)
         _draw_command(command, raw, shaped, name, strokes[name])
@@ -122,7 +114,7 @@ def _draw_blocks(
         panel.tick_params(labelbottom=False)
     panels[0].set_xlim(0.0, min(raw.t_s[-1], shaped.t_s[-1]))
     panels[1].set_ylim(-1.45 * largest, 1.45 * largest)
-    panels[-1].set_xlabel("time, s", fontsize=_TEXT, color=TEXT_COLOUR)
+    panels[-1].set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
 
 
 def finding(name: str, axis: Mapping[str, Any]) -> str:
@@ -149,8 +141,8 @@ def _change(measures: Mapping[str, Any], measure: str) -> str:
 
 def _windows(drive: Recording) -> list[range]:
     """Where residual swing shows, whatever axes were moved before."""
-    found = (residual_window(drive.t_s, rest) for rest in rests(drive))
-    return [window for window in found if window]
+    every = (residual_window(drive.t_s, rest) for rest in rests(drive))
+    return [window for window in every if window]
 
 
 def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
@@ -161,10 +153,10 @@ def _head(fig: Figure, crane: Mapping[str, Any] | None, height: float) -> None:
         ("and", TEXT_COLOUR),
         ("filters on (solid)", SHAPED_COLOUR),
     )
-    coloured_words(fig, words, (_EDGE, 1.0 - 14 / height), size=_HEAD, sep=4)
+    coloured_words(fig, words, (_EDGE, 1.0 - 14 / height), size=HEAD_PT, sep=4)
     if crane and crane["raw"]["run_on_m"] is not None:
         text = gain_and_price(crane)
-        fig.text(_EDGE, 1.0 - 70 / height, text, fontsize=_TITLE, color=TEXT_COLOUR, va="top")
+        fig.text(_EDGE, 1.0 - 70 / height, text, fontsize=TITLE_PT, color=TEXT_COLOUR, va="top")
 
 
 def gain_and_price(crane: Mapping[str, Any]) -> str:
@@ -182,13 +174,13 @@ def gain_and_price(crane: Mapping[str, Any]) -> str:
     )
 
 
-def _explain_shade(fig: Figure) -> None:
+def _explain_shade(fig: Figure, height: float) -> None:
     fig.text(
         _LEFT,
-        0.008,
+        46 / height,  # the stamp is below
         f"shaded: residual swing, from {RESIDUAL_DWELL_S:g} s after release to the next move",
         va="bottom",
-        fontsize=_TEXT,
+        fontsize=TEXT_PT,
         color=TEXT_COLOUR,
         bbox={"facecolor": WINDOW_COLOUR, "edgecolor": "none", "pad": 3.0},
     )
@@ -211,17 +203,17 @@ def _draw_command(
     )
     _draw_pair(panel, raw, shaped, lambda drive: drive.axes[name].sent, drawstyle="steps-post")
     command_scale(panel, 1.2)
-    panel.set_ylabel("command, %", fontsize=_TEXT, color=TEXT_COLOUR)
+    panel.set_ylabel("command, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
     if strokes:
         first, last = strokes[0].plateau
         middle_s = 0.5 * (raw.t_s[first] + raw.t_s[last])
         level = -0.5 * strokes[0].direction
-        panel.text(middle_s, level, "joystick", ha="center", va="center", fontsize=_TEXT)
+        panel.text(middle_s, level, "joystick", ha="center", va="center", fontsize=TEXT_PT)
 
 
 def _draw_sway(panel: Axes, raw: Recording, shaped: Recording, name: str) -> None:
     _draw_pair(panel, raw, shaped, lambda drive: _sway(drive, name))
-    panel.set_ylabel("sway, degrees", fontsize=_TEXT, color=TEXT_COLOUR)
+    panel.set_ylabel("sway, degrees", fontsize=TEXT_PT, color=TEXT_COLOUR)
 
 
 def _draw_pair(
@@ -232,7 +224,7 @@ def _draw_pair(
     **options: Any,
 ) -> None:
     """Draw a curve of both drives: raw thin and dashed, shaped solid, so that grey is enough."""
-    looks = ((raw, RAW_COLOUR, 1.0, _DASHED), (shaped, SHAPED_COLOUR, 1.7, "solid"))
+    looks = ((raw, RAW_COLOUR, 1.0, DASHED), (shaped, SHAPED_COLOUR, 1.7, "solid"))
     for drive, colour, width, style in looks:
         panel.plot(
             drive.t_s, values(drive), color=colour, linewidth=width, linestyle=style, **options
@@ -242,7 +234,7 @@ def _draw_pair(
 def _mark_residual(
     panel: Axes, raw: Recording, shaped: Recording, name: str, height_deg: float
 ) -> None:
-    """Mark the swing the title tells of on both curves, and name the curves there.
+    """Mark the swing the title speaks of on both curves, and name the curves there.
 
     The names stand above and below all curves, at ``height_deg``: the raw one on the side of its
     extreme, the shaped one on the other.
@@ -263,7 +255,7 @@ def _mark_residual(
             xytext=(t, height),
             ha=align,
             va="center",
-            fontsize=_TEXT,
+            fontsize=TEXT_PT,
             weight="bold",
             color=colour,
             arrowprops={

@@ -3,12 +3,12 @@
 import math
 import statistics
 from dataclasses import dataclass
+from itertools import groupby
 
 from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
 
-NEUTRAL_BAND = (
-    0.02  # joystick: two steps of a joystick frame of 1/125 and a little, never a command
-)
+# Deflection: two steps of a frame of 1/125 and a little, never a command.
+NEUTRAL_BAND = 0.02
 PLATEAU = 0.95  # of the largest deflection of a stroke: a hand holding still wanders this far
 RESIDUAL_DWELL_S = 2.5  # the slowest shapers have stopped the crane by then (stop 2.4 s)
 RESIDUAL_WINDOW_MIN_S = 1.0  # half a period of a 1 m tool: a shorter look may fall on a zero
@@ -84,8 +84,8 @@ def rests(recording: Recording) -> list[range]:
         return any(s.press <= k and (s.release is None or k < s.release) for s in strokes)
 
     # Two that are released in one sample begin the same rest.
-    found = {s.rest for s in strokes if s.rest and not moved(s.rest[0])}
-    return sorted(found, key=lambda rest: rest.start)
+    still = {s.rest for s in strokes if s.rest and not moved(s.rest[0])}
+    return sorted(still, key=lambda rest: rest.start)
 
 
 def aligned(raw: Recording, shaped: Recording) -> tuple[Recording, Recording]:
@@ -135,13 +135,12 @@ def _side(joystick: float) -> int:
 
 def _spans(joystick: list[float]) -> list[tuple[int, int]]:
     """Return runs of samples on one side of neutral, as (first, one past the last)."""
-    spans = []
-    start = 0
-    for k in range(1, len(joystick) + 1):
-        if k == len(joystick) or _side(joystick[k]) != _side(joystick[start]):
-            if _side(joystick[start]):
-                spans.append((start, k))
-            start = k
+    spans, start = [], 0
+    for side, run in groupby(map(_side, joystick)):
+        end = start + len([*run])
+        if side:
+            spans.append((start, end))
+        start = end
     return spans
 
 

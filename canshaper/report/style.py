@@ -10,13 +10,20 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.offsetbox import AnchoredOffsetbox, HPacker, TextArea
 
-# Vermilion and blue of Okabe and Ito: told apart by colour-blind eyes too.
+# Vermilion and blue of Okabe and Ito: distinct for colour-blind eyes too.
 RAW_COLOUR: Final = "#D55E00"
 SHAPED_COLOUR: Final = "#0072B2"
 JOYSTICK_COLOUR: Final = "#D5D5D5"
 TEXT_COLOUR: Final = "#333333"
 MINUS: Final = "\N{MINUS SIGN}"
 DPI: Final = 100
+# A picture in print is 170 mm wide, with letters of 8 points and more; curves differ in grey.
+WIDTH_PX: Final = 1600
+PRINT_DPI: Final = WIDTH_PX / (170.0 / 25.4)
+TEXT_PT: Final = 8.0
+TITLE_PT: Final = 8.5
+HEAD_PT: Final = 10.5
+DASHED: Final = (0, (3.5, 1.5))
 
 
 def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options: Any) -> Figure:
@@ -28,8 +35,14 @@ def new_figure(width_px: float, height_px: float, *, dpi: float = DPI, **options
 
 
 def save(fig: Figure, path: Path) -> None:
-    """Write a picture as PNG."""
-    fig.savefig(path, dpi=fig.dpi, format="png")
+    """Write a picture in the format of its suffix: PNG, SVG or PDF."""
+    fig.savefig(path, dpi=fig.dpi, format=path.suffix[1:])
+
+
+def stamp(fig: Figure, text: str) -> None:
+    """Put where a picture comes from into its lower right corner, 8 points in print."""
+    points = TEXT_PT * float(fig.get_size_inches()[0]) / (170.0 / 25.4)
+    fig.text(0.996, 0.004, text, ha="right", va="bottom", fontsize=points, color="#666666")
 
 
 def plain(panel: Axes, *, size: float = 10) -> None:

@@ -84,7 +84,9 @@ class Axis:
         self._limited = 0.0  # what was sent, before rounding: the rate limit must not stick
         self._own = 0.0  # the same without what is added
         self._added = 0.0
+        self._path = 0.0  # of what is added, the part that makes no swing
         self._carry = 0.0  # quantisation error of an added velocity
+        self._dropped = 0.0  # the output as it was when the right to add was lost
 
     @property
     def state(self) -> State:
@@ -112,7 +114,9 @@ class Axis:
         self.advance()
         return transition
 
-    def act(self, joystick: CommandInput, added: float) -> Transition | None:
+    def act(
+        self, joystick: CommandInput, added: float, *, damps: bool = False
+    ) -> Transition | None:
         """Take the input of this tick; afterwards ``raw`` and ``sent`` are what to send.
 
         Args:
@@ -122,21 +126,25 @@ class Axis:
                 ``range_with_added`` says. The sway model is not driven by it: it is there to cause
                 no swing, so the model swings with what is left for the axis itself. One that is no
                 velocity trips the axis.
+            damps: the motion of two axes makes this one swing: what its filter makes of a swing
+                that a trusted sensor shows is carried out too, within the same bounds.
 
         Returns:
             The change of state of this tick, or None.
         """
         states = self._states
-        if not self._largest_added or joystick.bypass or not self._may_add(added):
-            added = 0.0
+        if damps:
+            damps = self.sensed is not None and self.sensed.weight > 0.0 and not self.commanded
+        if not self._largest_added or joystick.bypass or not self._may_add(added or damps):
+            added, damps = 0.0, False
         old = states.state
-        state = states.step(joystick, added, self.raw == 0 and not self.commanded)
+        state = states.step(joystick, added or damps, self.raw == 0 and not self.commanded)
         if state is not old:
             self._transfer.entered(state, old)
             if state is not ACTIVE:
                 self._small.lose()
         if state is not ACTIVE:
-            added = 0.0
+            added, damps = 0.0, False
         command = 0.0
         try:
             if state is ACTIVE or state is BYPASS_ON:
@@ -150,13 +158,16 @@ class Axis:
             unlimited = self._transfer.unlimited(
                 command, self._limits.maximum, self._limited, added
             )
+            self._path = added
+            if damps and not command:
+                added += within(unlimited, -self._largest_added, self._largest_added, 0.0)
             if state in MOVING:
                 self._drive(command, unlimited, added)
             else:
                 self._rest()
         except Exception:  # a filter of another package may raise anything
             state = self._output_invalid()
-        self.applied = self.sent - self._added
+        self.applied = self.sent - self._path
         return None if state is old else Transition(old, state, states.reason)
 
     def advance(self) -> None:
@@ -164,10 +175,10 @@ class Axis:
         if self.sway is not None:
             self.sway.step(self.applied)
         if self.sensed is not None:
-            self.sensed.step(self.applied, self.command, self._added)
+            self.sensed.step(self.applied, self.command, self._path)
 
     def hold(self, ticks: int) -> None:
-        """Tell the axis that the last output was held for ``ticks`` missed ticks.
+        """Count that the last output was held for ``ticks`` missed ticks.
 
         They count as time: late ticks lengthen neither the run-on nor a stop, and the filter saw
         the last command in each of them. Only the rates do not catch up.
@@ -223,8 +234,8 @@ class Axis:
 
     def drop_added(self) -> None:
         """Who adds has lost the right to: nothing of it makes the next output faster."""
-        own, limited = self._own, self._limited
-        self._limited = within(own, min(0.0, limited), max(0.0, limited), 0.0)
+        self._dropped = limited = self._limited
+        self._limited = within(self._own, min(0.0, limited), max(0.0, limited), 0.0)
         self._carry = 0.0
 
     def limit(self, limits: OutputLimits) -> None:
@@ -255,7 +266,7 @@ class Axis:
             if self.sensed is None or not self.sensed.weight:  # else there is swing to damp
                 target = one_movement
         self._added = added
-        if added or self._own != self._limited:
+        if added or self._own != self._limited or self._dropped:
             low, high, wish = self._drive_both(command, target)
         else:
             wish = 0.0
@@ -296,13 +307,17 @@ class Axis:
             if aim:
                 aim = within(aim + within(self._carry, -step, step, 0.0), low, high, 0.0)
         self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
+        if self._dropped * self._limited < 0.0:  # the way to the other side begins at rest
+            self._limited = 0.0
+        self._dropped = 0.0
         return low, high, wish
 
     def _rest(self) -> None:
         self._recent.clear()
         self._small.clear()
         self._transfer.rest()
-        self._limited = self._own = self._added = self._carry = self.sent = 0.0
+        self._limited = self._own = self.sent = 0.0
+        self._added = self._path = self._carry = self._dropped = 0.0
         self.raw = 0
 
     def _output_invalid(self) -> State:

@@ -52,6 +52,8 @@ class MovingAxis:
         commanded: the operator asked for motion within the tail.
         able: it may carry out what is added.
         added: velocity to add now, [-1, 1]; the result.
+        damps: the other axis makes this one swing, which may be damped; a result.
+        damped: how far the tip was moved for that, m.
         reached: position that the added velocities reach at the end of the period, rad or m.
         stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
         lag_s: 2 zeta / w.
@@ -65,6 +67,8 @@ class MovingAxis:
     commanded: bool = False
     able: bool = False
     added: float = 0.0
+    damps: bool = False
+    damped: float = 0.0
     reached: float = 0.0
     stiffness: float = field(init=False)
     damping: float = field(init=False)
@@ -157,6 +161,8 @@ class TwoAxisMotion:
         if not commanded or not weight:
             self._rest()
             return
+        if near_far is not None:
+            self._damp(near_far, elapsed_s)
         if near_far is None:
             radius_m = None
         elif circle_m is None:
@@ -190,7 +196,16 @@ class TwoAxisMotion:
         self._radius_m = None
         for axis in (self._slew, self._near_far):
             if axis is not None:
-                axis.added = axis.reached = 0.0
+                axis.added = axis.reached = axis.damped = 0.0
+                axis.damps = False
+
+    def _damp(self, near_far: MovingAxis, elapsed_s: float) -> None:
+        """Let near-far damp what slewing makes it swing, no farther than it may be moved."""
+        if near_far.commanded:
+            near_far.damps, near_far.damped = False, 0.0
+            return
+        near_far.damped += near_far.applied * near_far.full_speed * elapsed_s
+        near_far.damps = self._weight == 1.0 and abs(near_far.damped) < self._path_m
 
     def _carried_m(
         self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None

@@ -1,7 +1,10 @@
 """A sway sensor at work on one axis: what it adds to the sway model, as far as it is trusted."""
 
-from canshaper.shaping.observer import FreeSwing, SensorTiming, SwayObserver
+from canshaper.shaping.free_swing import FreeSwing
+from canshaper.shaping.observer import SwayObserver
 from canshaper.shaping.sway import SwayModel
+from canshaper.shaping.sway_sensor import SensorLimits, SensorTiming
+from canshaper.shaping.swing_length import SwingLengthEstimate
 from canshaper.shaping.trust import (
     LATCHED,
     PROVED,
@@ -9,7 +12,6 @@ from canshaper.shaping.trust import (
     SURPRISE_PER_S,
     Evidence,
     Restlessness,
-    SensorLimits,
     Standstill,
     Trust,
     largest_jump,
@@ -18,8 +20,13 @@ from canshaper.shaping.trust import (
 # Time in which what the sensor adds comes in and fades.
 FADE_S = 0.6
 # The same where the grapple leans on something: what it shows there drives the crane.
-CONTACT_FADE_S = 0.15
+CONTACT_FADE_S = 0.1
+# How much of the free swing is fed back beside a second mode: that of the first one is not known
+# as well, and a command that follows it drives the second one.
+BESIDE_WEIGHT = 0.75
 
+# Nothing of these speaks against a grapple that hangs free, and a sensor that shows it.
+HANGING = (Trust.UNPROVED, Trust.TRUSTED)
 # These are seen in the measurements themselves: they replace what was thought of their sense.
 UNDOUBTED = (Trust.LOST, Trust.JUMP, Trust.UNPROVED)
 
@@ -36,6 +43,7 @@ class SensedSway:
     Attributes:
         state: what is thought of the sensor.
         weight: how much of the free swing is fed back, 0 to 1.
+        length: how long the pendulum seems to be.
     """
 
     def __init__(
@@ -44,22 +52,27 @@ class SensedSway:
         measured, tick_s = timing.measured, sway.tick_s
         self.state = Trust.NO_DATA
         self.weight = 0.0
-        self._sway, self._damps, self._limits = sway, damps, limits
-        self._observer = SwayObserver(sway, timing)
+        self._sway, self._limits = sway, limits
+        self._most = (BESIDE_WEIGHT if limits.second else 1.0) if damps else 0.0
+        self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
+        self._observer = SwayObserver(sway, timing, limits)
         self._evidence = Evidence(measured, limits.noise, timing.period_s)
         self._standstill = Standstill(measured, limits.noise, timing.period_s, sway.mode.period_s)
         self._restlessness = Restlessness(tick_s)
+        self.length = SwingLengthEstimate(sway.mode, measured, limits, timing.period_s)
         self._jump = largest_jump(measured, limits.noise, timing.period_s)
         self._tick_s = tick_s
         self._lost_s = timing.lost_s
         self._age_s = 0.0  # since the last measurement
-        self._begun = False
+        self._begun = self._asked = self._commanded = False
         self._needed = PROVED
         # The free swing that is fed back; after trust is lost it swings on as it was.
-        self._fading = FreeSwing(measured, (0.0, 0.0, 0.0))
+        self._fading = FreeSwing(measured, [(0.0, 0.0, 0.0)])
         self._left = 0.0  # what the last measurement left unexplained
 
-    def measure(self, value: float | None, scale: float, *, commanded: bool) -> None:
+    def measure(
+        self, value: float | None, scale: float, *, commanded: bool, damps: bool = False
+    ) -> None:
         """Take what has come for this tick, before the filter runs.
 
         Args:
@@ -67,13 +80,16 @@ class SensedSway:
             scale: rad per normalised angle of the model.
             commanded: the operator asked for motion within the tail. Else nothing is fed back to
                 the valve, and swing that another axis makes says nothing about the sensor.
+            damps: it damps a swing that another axis makes.
         """
+        self._commanded = commanded
         if not commanded and self.state is not Trust.CONTACT:
             self._needed = PROVED
         if value is not None:
-            passed_s, self._age_s = self._age_s, 0.0
+            self._age_s = 0.0
             if self._begun:
-                self._compare(value, scale, passed_s, commanded)
+                self._compare(value, scale, commanded or (damps and self.weight > 0.0))
+                self._estimate(value, scale, commanded)
             elif not commanded or self.state not in LATCHED:
                 self._begin(value, scale)
         elif self._age_s > self._lost_s and self.state not in (Trust.NO_DATA, Trust.LOST):
@@ -89,7 +105,10 @@ class SensedSway:
             added: what a motion of two axes added.
         """
         self._age_s += self._tick_s
-        if self._restlessness.add(velocity, command) and self.state is Trust.TRUSTED:
+        self._asked = command != 0.0
+        # What another axis makes this one do has bounds of its own.
+        own = velocity if self._commanded else 0.0
+        if self._restlessness.add(own, command) and self.state is Trust.TRUSTED:
             self._doubt(Trust.RESTLESS, again=True)
         self._observer.step(velocity, added)
         if self.weight:
@@ -98,6 +117,7 @@ class SensedSway:
     def retune(self, sway: SwayModel) -> None:
         """Go on with another model of the axis."""
         self._sway = sway
+        self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer.retune(sway)
 
     def restart(self) -> None:
@@ -111,27 +131,26 @@ class SensedSway:
         observer = self._observer
         observer.begin(value, scale)
         self._evidence.clear()
-        self._standstill.clear(value)
+        self._standstill.clear()
         self._left = 0.0
         self._begun = True
         if self.state in (Trust.NO_DATA, Trust.LOST):
             self.state = Trust.UNPROVED
 
-    def _compare(self, value: float, scale: float, passed_s: float, commanded: bool) -> None:
+    def _compare(self, value: float, scale: float, commanded: bool) -> None:
         observer, evidence, trusted = self._observer, self._evidence, self.state is Trust.TRUSTED
         errors = observer.errors(value, scale)
         if not abs(errors[0] - self._left) <= self._jump:
             self._doubt(Trust.JUMP, again=True)
             return
         before = observer.free.rate
-        observer.correct(errors)
+        self._left = observer.correct(errors)
         bent = observer.free.rate - before
-        self._left = observer.free.error(value - observer.own(scale))
         if not commanded:
-            self._standstill.clear(value)
+            self._standstill.clear()
             return
         evidence.add(errors)
-        if fault := self._standstill.check(value, bent, passed_s):
+        if fault := self._standstill.check(value, bent, asked=self._asked):
             self._doubt(fault, again=True)
         elif fault := evidence.fault(0.0 if trusted else -PROVED):
             self._doubt(fault)
@@ -139,9 +158,17 @@ class SensedSway:
             self._doubt(Trust.CONTACT)
         elif evidence.proved(self._needed):
             if abs(observer.free.offset) > self._limits.offset:
-                self._doubt(Trust.OFFSET, again=True)
+                self._doubt(Trust.OFFSET)
             elif not trusted and not self.weight:
                 self.state = Trust.TRUSTED
+
+    def _estimate(self, value: float, scale: float, commanded: bool) -> None:
+        observer = self._observer
+        # What a model angle of 1 means is the speed of the tip by the mode.
+        speed_m_s = observer.late.speed * scale * self._speed_per_angle
+        free = self.state in HANGING
+        offset = observer.free.offset
+        self.length.add(value, offset, speed_m_s, pressed=commanded, free=free)
 
     def _doubt(self, why: Trust, *, again: bool = False) -> None:
         """It is trusted no longer, or not yet; perhaps the observer has to begin again."""
@@ -159,7 +186,7 @@ class SensedSway:
             fading.angle, fading.rate = free.angle, free.rate
         else:
             fade = -fade
-        weight = self.weight = min(max(self.weight + fade, 0.0), 1.0) if self._damps else 0.0
+        weight = self.weight = min(max(self.weight + fade, 0.0), self._most)
         if weight:
             angle, rate = self._observer.ahead(fading)
             part = weight / scale

@@ -1,4 +1,4 @@
-"""May the sway sensor be believed? Named states, from what it shows beside the model.
+"""May the sway sensor be believed? Named states, from what it shows and the model does not.
 
 It is believed once driven motion has proved that it shows the swing of this axis with this sign,
 and no longer when it contradicts motion, stands still, jumps, or the load does not hang free.
@@ -6,10 +6,10 @@ and no longer when it contradicts motion, stands still, jumps, or the load does 
 
 import math
 from collections import deque
-from dataclasses import dataclass
 from enum import IntEnum
 
-from canshaper.shaping.observer import TICK_OF_NOISE_S, Measured
+from canshaper.shaping.observer import Errors
+from canshaper.shaping.sway_sensor import TICK_OF_NOISE_S, Measured
 
 
 class Trust(IntEnum):
@@ -32,14 +32,14 @@ class Trust(IntEnum):
     WRONG_SIGN = 6
     """It shows the opposite of what motion makes."""
     OFFSET = 7
-    """Its offset is larger than configured; until the axis is at rest."""
+    """Its offset is larger than configured."""
     CONTACT = 8
     """It shows nothing of what motion makes: the grapple leans on something."""
     RESTLESS = 9
     """The command moves far more than the operator asks for; until the axis is at rest."""
 
 
-LATCHED = (Trust.JUMP, Trust.OFFSET, Trust.RESTLESS)
+LATCHED = (Trust.JUMP, Trust.RESTLESS)
 """They stay until the axis is at rest."""
 
 # Log-likelihood ratios: from here on it is proved, the same after a fault in this motion, and most
@@ -53,28 +53,16 @@ COMMON_SHARE, MOST_STEP, ENERGY_S, FAR = 8.0, 2.0, 0.08, 4.0
 # Largest error, as an acceleration that free swing needs for it: full speeds a second.
 SURPRISE_PER_S = 2.0
 # A grapple does not jump so far beyond what was expected within 20 ms, and noise: deg, deg/s.
-JUMP_DEG, JUMP_DEG_S, JUMP_NOISE = 2.5, 3.0, 5.0
-# The same value for so long, or three of them, while a swing would change its rate by that: deg/s.
-STUCK_S, STUCK_DEG_S = 0.12, 3.0
-# The same for a value that stays within so much, for so much of a swing. Of angle, and of rate,
-# where an offset that is not yet known does the same for a while: deg or deg/s, deg/s.
-HELD_SWINGS, HELD_ANGLE, HELD_RATE = 0.12, (0.35, 6.0), (1.0, 20.0)
+JUMP_DEG, JUMP_DEG_S, JUMP_NOISE = 1.5, 2.5, 5.0
+# The same value for so long, or this often, while a swing would change its rate by that: deg/s.
+STUCK_S, LEAST_STILL, STUCK_DEG_S = 0.12, 3, 2.5
+# The same for a value that stays within so much and so many times the noise, for so much of a
+# swing. Of angle, and of rate, where an offset that is not yet known does the same for a while: deg
+# or deg/s, deg/s.
+HELD_SWINGS, HELD_NOISE, HELD_ANGLE, HELD_RATE = 0.1, 3.0, (0.35, 5.0), (1.0, 20.0)
 
 # Path of the velocity over so long, against that of the command: times, and full speeds besides.
 RESTLESS_S, RESTLESS_SHARE, RESTLESS_MORE = 2.0, 1.5, 1.0
-
-
-@dataclass(frozen=True, slots=True)
-class SensorLimits:
-    """What a sensor may show.
-
-    Attributes:
-        noise: standard deviation, rad or rad/s.
-        offset: largest offset, rad or rad/s.
-    """
-
-    noise: float
-    offset: float
 
 
 class Evidence:
@@ -88,9 +76,10 @@ class Evidence:
     Attributes:
         sign: for the sign against the opposite one.
         own: for own motion against none.
+        free: for a grapple that hangs against one that is dragged.
     """
 
-    __slots__ = ("_count", "_energies", "_fade", "_least", "own", "sign")
+    __slots__ = ("_count", "_energies", "_fade", "_least", "free", "own", "sign")
 
     def __init__(self, measured: Measured, noise: float, period_s: float) -> None:
         model = MODEL_DEG_S if measured is Measured.RATE else MODEL_DEG
@@ -98,17 +87,21 @@ class Evidence:
         # Errors of the model last: fewer measurements each say more.
         self._count = 0.5 * period_s / TICK_OF_NOISE_S
         self._fade = -math.expm1(-period_s / ENERGY_S)
-        self.sign = self.own = 0.0
-        self._energies = [0.0, 0.0, 0.0]
+        self.sign = self.own = self.free = 0.0
+        self._energies = 0.0, 0.0, 0.0, 0.0
 
-    def add(self, errors: tuple[float, float, float]) -> None:
-        """A measurement: its errors under the three ideas, see ``SwayObserver.errors``."""
-        fade, energies = self._fade, self._energies
-        for i, error in enumerate(errors):
-            energies[i] += fade * (error * error - energies[i])
-        known, negated, alone = energies
+    def add(self, errors: Errors) -> None:
+        """A measurement: its errors under the four ideas, see ``SwayObserver.errors``."""
+        fade = self._fade
+        known, negated, alone, dragged = self._energies
+        known += fade * (errors[0] * errors[0] - known)
+        negated += fade * (errors[1] * errors[1] - negated)
+        alone += fade * (errors[2] * errors[2] - alone)
+        dragged += fade * (errors[3] * errors[3] - dragged)
+        self._energies = known, negated, alone, dragged
         self.sign = self._added(self.sign, negated, known)
         self.own = self._added(self.own, alone, known)
+        self.free = self._added(self.free, dragged, known)
 
     @property
     def surprise(self) -> float:
@@ -118,26 +111,33 @@ class Evidence:
     def _added(self, ratio: float, other: float, known: float) -> float:
         """The ratio against another idea, with the mean squares of the last errors of both."""
         # What neither explains, an undriven swing of another period, speaks for none of them.
-        spread = self._least + COMMON_SHARE * min(known, other)
+        if other >= known:
+            step = (other - known) / (self._least + COMMON_SHARE * known)
+            ratio += self._count * (step if step < MOST_STEP else MOST_STEP)
+            return ratio if ratio < BOUND else BOUND
         # The other one is ahead only where its error is far the smaller one.
-        step = other - known if other >= known else min(0.0, FAR * other - known)
-        step = self._count * min(max(step / spread, -MOST_STEP), MOST_STEP)
-        return min(max(ratio + step, -BOUND), BOUND)
+        if FAR * other < known:
+            step = (known - FAR * other) / (self._least + COMMON_SHARE * other)
+            ratio -= self._count * (step if step < MOST_STEP else MOST_STEP)
+        return ratio if ratio > -BOUND else -BOUND
 
     def proved(self, least: float) -> bool:
-        """Whether both other ideas are ruled out, by ratios beyond ``least``."""
+        """Whether sign and own motion are beyond ``least``; a dragged grapple begins as one that
+        hangs does."""
         return self.sign > least and self.own > least
 
     def fault(self, least: float) -> Trust | None:
         """Which of the others is the better one, by a ratio below ``least``."""
-        if min(self.sign, self.own) >= least:
+        contact = min(self.own, self.free)
+        if min(self.sign, contact) >= least:
             return None
-        return Trust.WRONG_SIGN if self.sign < self.own else Trust.CONTACT
+        return Trust.WRONG_SIGN if self.sign < contact else Trust.CONTACT
 
     def clear(self) -> None:
         """Begin again; what speaks against the sensor stays."""
         self.sign, self.own = min(self.sign, 0.0), min(self.own, 0.0)
-        self._energies = [0.0, 0.0, 0.0]
+        self.free = min(self.free, 0.0)
+        self._energies = 0.0, 0.0, 0.0, 0.0
 
 
 def largest_jump(measured: Measured, noise: float, period_s: float) -> float:
@@ -160,52 +160,66 @@ class Standstill:
 
     def __init__(self, measured: Measured, noise: float, period_s: float, swing_s: float) -> None:
         within, least = HELD_RATE if measured is Measured.RATE else HELD_ANGLE
-        held_s = max(HELD_SWINGS * swing_s, 4.0 * period_s)
-        self._stuck = Still(0.0, max(STUCK_S, 3.0 * period_s), math.radians(STUCK_DEG_S))
-        self._held = Still(2.0 * noise + math.radians(within), held_s, math.radians(least))
+        self._stuck = Still(STUCK_S, period_s, 0.0, STUCK_DEG_S)
+        within = HELD_NOISE * noise + math.radians(within)
+        self._held = Still(HELD_SWINGS * swing_s, period_s, within, least)
 
-    def clear(self, value: float) -> None:
-        """Begin with a measurement."""
-        self._stuck.clear(value)
-        self._held.clear(value)
+    def clear(self) -> None:
+        """Begin again."""
+        self._stuck.clear()
+        self._held.clear()
 
-    def check(self, value: float, bent: float, passed_s: float) -> Trust | None:
+    def check(self, value: float, bent: float, *, asked: bool) -> Trust | None:
         """What a measurement says.
 
         Args:
             value: the measurement.
             bent: what it changed the rate of the free swing by, rad/s.
-            passed_s: time since the one before.
+            asked: the operator asks for motion now. Else a swing that turns, of a pendulum that is
+                far shorter than the model, counts for more than a contact: the tail ends.
         """
-        if self._stuck.check(value, bent, passed_s):
-            return Trust.STUCK
-        return Trust.CONTACT if self._held.check(value, bent, passed_s) else None
+        stuck, held = self._stuck.check(value, bent), self._held.check(value, bent)
+        return Trust.STUCK if stuck else Trust.CONTACT if held and asked else None
 
 
 class Still:
-    """A value that stays where it is, though a swing would not."""
+    """A value that stays where it is, though a swing would not.
 
-    __slots__ = ("_bent", "_high", "_least", "_least_s", "_low", "_time_s", "_within")
+    Args:
+        least_s: for how long; at least so many measurements as ``LEAST_STILL``.
+        period_s: time between two measurements.
+        within: how far it may move in that time.
+        least_deg_s: what a swing would change its rate by in that time.
+    """
 
-    def __init__(self, within: float, least_s: float, least: float) -> None:
-        self._within, self._least_s, self._least = within, least_s, least
-        self.clear(0.0)
+    __slots__ = ("_bends", "_bent", "_count", "_least", "_stays", "_values", "_within")
 
-    def clear(self, value: float) -> None:
-        """Begin with a value."""
-        self._low = self._high = value
-        self._bent = self._time_s = 0.0
+    def __init__(self, least_s: float, period_s: float, within: float, least_deg_s: float) -> None:
+        self._count = max(math.ceil(least_s / period_s), LEAST_STILL) + 1
+        self._values: deque[float] = deque(maxlen=self._count)
+        self._bends: deque[float] = deque(maxlen=self._count)
+        self._within, self._least = within, math.radians(least_deg_s)
+        self._bent = 0.0  # in the time in which it stays
+        self._stays = False
 
-    def check(self, value: float, bent: float, passed_s: float) -> bool:
+    def clear(self) -> None:
+        """Begin again."""
+        self._values.clear()
+        self._bends.clear()
+        self._stays = False
+
+    def check(self, value: float, bent: float) -> bool:
         """Whether it has stayed too long; see ``Standstill.check``."""
-        low, high = min(self._low, value), max(self._high, value)
-        if high - low > self._within:
-            self.clear(value)
+        values, bends = self._values, self._bends
+        values.append(value)
+        bends.append(bent)
+        within = self._within
+        if abs(value - values[0]) > within or max(values) - min(values) > within:
+            self._stays = False
             return False
-        self._low, self._high = low, high
-        self._time_s += passed_s
-        self._bent += bent
-        return self._time_s >= self._least_s and abs(self._bent) > self._least
+        self._bent = self._bent + bent if self._stays else sum(bends)
+        self._stays = True
+        return len(values) == self._count and abs(self._bent) > self._least
 
 
 class Restlessness:

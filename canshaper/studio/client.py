@@ -10,6 +10,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from canshaper.errors import ControlError, PageMessageError
 from canshaper.studio.cab import Cab, is_number
+from canshaper.studio.numbers_channel import NumbersChannel
 from canshaper.studio.stage import Stage
 
 SHOW_S = 1.0 / 30.0
@@ -52,10 +53,14 @@ class Client:
         self._filled_s = time.monotonic()
         self._wanted: dict[str, float] = {}
         self._slid = asyncio.Event()
+        self._numbers = NumbersChannel(stage.numbers, number) if stage.numbers else None
 
     async def serve(self) -> None:
         """Serve the page until it is gone."""
-        tasks = [asyncio.create_task(t) for t in (self._receive(), self._show(), self._slide())]
+        work = [self._receive(), self._show(), self._slide()]
+        if self._numbers:
+            work.append(self._numbers.run(self._refusals.append))
+        tasks = [asyncio.create_task(one) for one in work]
         try:
             await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
         finally:
@@ -113,6 +118,8 @@ class Client:
             self._stage.with_cab(_action(word, number))
         elif isinstance(on := message.get("antisway"), bool):
             self._stage.with_cab(lambda cab, _: cab.switch_anti_sway(number, on))
+        elif "numbers" in message and self._numbers:
+            self._numbers.receive(message)
         else:
             name, factor = message.get("slide"), message.get("to")
             known = isinstance(name, str) and name in self._stage.sliders
@@ -149,8 +156,11 @@ class Client:
             if events:
                 last = events[-1].number
                 shown["events"] = [list(event) for event in events]
+            if self._numbers:
+                shown |= self._numbers.news()
             if self._refusals:
-                shown["refused"], self._refusals = self._refusals[-5:], []
+                shown["refused"] = self._refusals[-5:]
+                self._refusals.clear()
             await self._send(shown)
             await asyncio.sleep(SHOW_S)
 

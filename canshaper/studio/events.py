@@ -18,6 +18,7 @@ class Event(NamedTuple):
         source: a crane, or "page".
         text: what happened.
         level: "info", "warn" or "bad".
+        clock_s: the studio's clock then, that of its pictures.
     """
 
     number: int
@@ -25,6 +26,7 @@ class Event(NamedTuple):
     source: str
     text: str
     level: str
+    clock_s: float
 
 
 class Events:
@@ -39,7 +41,9 @@ class Events:
         """Add one."""
         with self._lock:
             self._count += 1
-            self._events.append(Event(self._count, time.time(), source, text, level))
+            self._events.append(
+                Event(self._count, time.time(), source, text, level, time.monotonic())
+            )
 
     def since(self, number: int) -> list[Event]:
         """Those after this one, in order."""

@@ -2,6 +2,7 @@
 
 import itertools
 import socket
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -9,8 +10,14 @@ import uvicorn
 from starlette.applications import Starlette
 from starlette.datastructures import URL, Headers, MutableHeaders
 from starlette.requests import HTTPConnection
-from starlette.responses import FileResponse, PlainTextResponse, RedirectResponse, Response
-from starlette.routing import Mount, Route, WebSocketRoute
+from starlette.responses import (
+    FileResponse,
+    JSONResponse,
+    PlainTextResponse,
+    RedirectResponse,
+    Response,
+)
+from starlette.routing import BaseRoute, Mount, Route, WebSocketRoute
 from starlette.staticfiles import StaticFiles
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 from starlette.websockets import WebSocket
@@ -18,8 +25,10 @@ from starlette.websockets import WebSocket
 from canshaper import __version__
 from canshaper.studio.access import Access
 from canshaper.studio.client import MOST_BYTES, TRY_AGAIN_LATER, Client
+from canshaper.studio.commission import Commission
+from canshaper.studio.residuals import residuals
 from canshaper.studio.sliders import RANGES
-from canshaper.studio.stage import MACHINE, Stage
+from canshaper.studio.stage import MACHINE, RAW, Stage
 from canshaper.studio.unfinished import MOST_CONNECTIONS, MOST_HEAD_BYTES, BoundedHttp
 from canshaper.studio.view import SWAY_OF
 from canshaper_sim.crane import CraneParameters
@@ -37,20 +46,20 @@ HEADERS = {
 }
 
 
-def build_app(stage: Stage, access: Access, parameters: CraneParameters) -> ASGIApp:
+def build_app(
+    stage: Stage, access: Access, parameters: CraneParameters, commission: Commission
+) -> ASGIApp:
     """The page of a stage.
 
     Args:
         stage: what is driven or watched.
         access: who may.
         parameters: the crane that is drawn.
+        commission: of its file.
     """
     hello = _hello(stage, parameters)
     numbers = itertools.count(1)
     open_pages: set[int] = set()
-
-    async def page(_request: HTTPConnection) -> Response:
-        return FileResponse(STATIC / "index.html")
 
     async def connection(websocket: WebSocket) -> None:
         await websocket.accept()
@@ -64,12 +73,32 @@ def build_app(stage: Stage, access: Access, parameters: CraneParameters) -> ASGI
         finally:
             open_pages.discard(number)
 
-    routes = [
-        Route("/", page),
-        WebSocketRoute("/ws", connection),
-        Mount("/static", StaticFiles(directory=STATIC)),
-    ]
-    return Guard(Starlette(routes=routes), access)
+    def left(_request: HTTPConnection) -> Response:
+        return JSONResponse(residuals(stage.deployment, stage.in_force()))
+
+    routes = [WebSocketRoute("/ws", connection), Route("/residuals.json", left)]
+    routes += commission.routes()
+    return page_app(routes, "main.js", access)
+
+
+def page_app(routes: Sequence[BaseRoute], script: str, access: Access) -> ASGIApp:
+    """The page with a script behind it.
+
+    Args:
+        routes: what the script asks for.
+        script: its file.
+        access: who may.
+    """
+
+    async def page(_request: HTTPConnection) -> Response:
+        return FileResponse(STATIC / "index.html")
+
+    async def begin(_request: HTTPConnection) -> Response:
+        return FileResponse(STATIC / script)
+
+    fixed = [Route("/", page), Route("/page.js", begin)]
+    static = Mount("/static", StaticFiles(directory=STATIC))
+    return Guard(Starlette(routes=[*fixed, *routes, static]), access)
 
 
 class Guard:
@@ -104,7 +133,7 @@ class Guard:
         host = headers.get("host", "")
         fault = self._access.host_fault(host)
         fault = fault or self._access.token_fault(connection.query_params, connection.cookies)
-        if not fault and scope["type"] == "websocket":
+        if not fault and (scope["type"] == "websocket" or scope["method"] == "POST"):
             fault = self._access.origin_fault(host, headers.get("origin"))
         return fault
 
@@ -120,22 +149,31 @@ def _with_headers(send: Send) -> Send:
 
 def _hello(stage: Stage, parameters: CraneParameters) -> dict[str, Any]:
     """The first message to a page: what there is, and how long the links are."""
-    joints, grapple = parameters.joints, parameters.grapple
     return {
         "version": __version__,
         "file": stage.deployment.path.name,
         "axes": list(stage.deployment.axes),
         "sway_of": SWAY_OF,
         "cranes": list(stage.cranes),
+        "colors": {name: "--raw" if name == RAW else "--shaped" for name in stage.cranes},
         "drives": stage.cab is not None,
         "machine": MACHINE in stage.cranes,
+        "numbers": stage.numbers is not None,
         "profiles": any(j.next_profile for j in stage.deployment.config.joysticks.values()),
-        "boom": joints.boom._asdict(),
-        "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
+        **links_of(parameters),
         "sliders": {
             name: {"range": RANGES[name], "numbers": [list(n) for n in _numbers(stage, name)]}
             for name in stage.sliders
         },
+    }
+
+
+def links_of(parameters: CraneParameters) -> dict[str, Any]:
+    """How long the links of the crane are that is drawn."""
+    grapple = parameters.grapple
+    return {
+        "boom": parameters.joints.boom._asdict(),
+        "grapple": {"l1": grapple.l1_m, "l2": grapple.l2_m},
     }
 
 

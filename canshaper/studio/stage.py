@@ -1,24 +1,26 @@
 """The loop behind the page: joysticks out, frames in, every 20 ms in a thread of its own."""
 
 import contextlib
-import os
 import threading
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-from canshaper.bus.port import Port
 from canshaper.codec.frame import Frame
-from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY
 from canshaper.daemon import control_client as client
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.design.processes import Transport, on_transport
+from canshaper.errors import ControlError
 from canshaper.machine.deployment import Deployment
 from canshaper.studio.cab import Cab
 from canshaper.studio.crane import CANSHAPER, Crane
 from canshaper.studio.events import Events
+from canshaper.studio.in_process import InProcessCrane
+from canshaper.studio.numbers import LiveNumbers
+from canshaper.studio.priority import before_the_rest
+from canshaper.studio.seen import Seen
 from canshaper.studio.sliders import Number, sliders, values
 from canshaper.studio.view import CraneView
 from canshaper_sim.hand import Hand, Held
@@ -28,28 +30,6 @@ SHAPED, RAW, MACHINE = "shaped", "raw", "machine"
 """The two simulated cranes, and the real one that is only listened to."""
 WATCH_MS = 20
 MS = 1_000_000
-
-
-def before_the_rest() -> None:
-    """Let this thread come after the daemon and before all else, where that is permitted.
-
-    A browser that draws without a graphics card takes every processor, and joysticks that are late
-    are a fault. What is started from here does not inherit it.
-    """
-    with contextlib.suppress(OSError):
-        policy = os.SCHED_FIFO | os.SCHED_RESET_ON_FORK
-        os.sched_setscheduler(0, policy, os.sched_param(JOYSTICKS_PRIORITY))
-
-
-@dataclass
-class Seen:
-    """A crane that is listened to; ``hand`` where the page drives it."""
-
-    view: CraneView
-    ports: Mapping[str, Port]
-    hand: Hand | None = None
-    crane: Crane | None = None
-    shaped: bool = True
 
 
 class Stage:
@@ -67,6 +47,7 @@ class Stage:
         self.cab: Cab | None = None
         self.sliders: dict[str, list[Number]] = {}
         self.positions: dict[str, float] = {}
+        self.numbers: LiveNumbers | None = None
         self._control: Path | None = None
         self._starts = 0
         self._lock = threading.Lock()
@@ -77,13 +58,22 @@ class Stage:
         self._failed: Callable[[], None] = lambda: None
         self._time_ms = 0
         self._cycle_ms = WATCH_MS
+        self._driver: int | None = None
+        self._resets: list[threading.Thread] = []
 
-    def watch(self) -> None:
-        """Listen to the buses of the deployment; nothing is ever sent.
+    def watch(self, control: Path | None = None) -> None:
+        """Listen to the buses of the deployment; nothing is ever sent there.
+
+        Args:
+            control: socket of the daemon whose numbers the page may change; None for none.
 
         Raises:
             BusError: a bus cannot be opened.
         """
+        if control:
+            path = self.deployment.path
+            report = lambda text: self.events.add(MACHINE, text, "warn")  # noqa: E731
+            self.numbers = LiveNumbers(path, control, report)
         self.cranes[MACHINE] = Seen(self._view(MACHINE), open_ports(self.deployment))
 
     def drive(
@@ -104,9 +94,7 @@ class Stage:
         Raises:
             BusError: a bus cannot be opened.
         """
-        self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
-        self.sliders = sliders(self.deployment.config) if self.deployment.config.control else {}
-        self.positions = dict.fromkeys(self.sliders, 1.0)
+        self._seat()
         for name, transport in zip((SHAPED, RAW), transports, strict=False):
             deployment = on_transport(self.deployment, transport)
             view = self._view(name)
@@ -126,6 +114,27 @@ class Stage:
             if name == SHAPED:
                 self._control = crane.control
 
+    def drive_here(self, changes: Sequence[str] = ()) -> None:
+        """Put both simulated cranes into this process: where there are no buses to share.
+
+        Args:
+            changes: parameters of the cranes, NAME=VALUE.
+
+        Raises:
+            DriveError: no simulated crane fits the deployment.
+        """
+        self._seat()
+        for name in (SHAPED, RAW):
+            crane = InProcessCrane(self.deployment, changes)
+            self._cycle_ms = crane.cycle_ms
+            self.cranes[name] = Seen(self._view(name), {}, shaped=name == SHAPED, here=crane)
+
+    def _seat(self) -> None:
+        """A driver's seat, and the sliders."""
+        self.cab = Cab(self.deployment.axes, lambda text: self.events.add("page", text))
+        self.sliders = sliders(self.deployment.config) if self.deployment.config.control else {}
+        self.positions = dict.fromkeys(self.sliders, 1.0)
+
     def start(self, failed: Callable[[], None]) -> None:
         """Begin.
 
@@ -134,6 +143,8 @@ class Stage:
         """
         self._failed = failed
         self._thread.start()
+        if self.numbers:
+            self.numbers.start()
 
     def stop(self) -> None:
         """End: joysticks in neutral, then daemons, cranes and buses.
@@ -144,6 +155,8 @@ class Stage:
         self._stop.set()
         if self._thread.is_alive():
             self._thread.join()
+        if self.numbers:
+            self.numbers.stop()
         if self._error:
             raise self._error
 
@@ -163,11 +176,32 @@ class Stage:
             ControlError: the daemon refuses, or there is none.
         """
         changed = values(self.sliders, name, factor)
-        assert self._control is not None
+        here = self.cranes[SHAPED].here
         with self._control_lock:
-            client.change(self._control, changed)
+            if here:
+                with self._lock:
+                    here.change(changed)
+            else:
+                assert self._control is not None
+                client.change(self._control, changed)
             self.positions[name] = factor
         self.events.add(SHAPED, ", ".join(f"{key} = {v:.4g}" for key, v in changed.items()))
+
+    def in_force(self) -> dict[str, float]:
+        """Numbers that may be others than those of the file, by key."""
+        if self.numbers:
+            return self.numbers.in_force()
+        values_by_key: dict[str, float] = {}
+        for name, factor in self.positions.items():
+            values_by_key |= values(self.sliders, name, factor)
+        return values_by_key
+
+    def _reset_sliders(self) -> None:
+        """Put back what the driver has moved: the next one finds what the file says."""
+        for name, factor in list(self.positions.items()):
+            if factor != 1.0:
+                with contextlib.suppress(ControlError):  # it starts again, with those of the file
+                    self.slide(name, 1.0)
 
     def snapshot(self) -> dict[str, Any]:
         """What a page shows now."""
@@ -194,6 +228,8 @@ class Stage:
             self._error = error
             self._failed()
         finally:
+            for reset in self._resets:
+                reset.join()
             for seen in self.cranes.values():
                 if seen.crane:
                     seen.crane.stop()
@@ -203,11 +239,19 @@ class Stage:
 
     def _tick(self, _now_ns: int, missed: int, _late_ns: int) -> bool:
         now_s = time.monotonic()
-        self._time_ms += (1 + missed) * self._cycle_ms
+        passed_ms = (1 + missed) * self._cycle_ms
+        self._time_ms += passed_ms
         with self._lock:
             held = self.cab.held(now_s) if self.cab else Held()
+            driver = self.cab.driver if self.cab else None
             for seen in self.cranes.values():
-                self._exchange(seen, held, now_s)
+                self._exchange(seen, held, now_s, passed_ms)
+        if self._driver not in (None, driver):
+            # The daemon's answer may take longer than a tick.
+            self._resets = [one for one in self._resets if one.is_alive()]
+            self._resets.append(threading.Thread(target=self._reset_sliders, name="sliders"))
+            self._resets[-1].start()
+        self._driver = driver
         for seen in self.cranes.values():
             if seen.crane:
                 seen.crane.check(now_s)
@@ -219,13 +263,15 @@ class Stage:
                     self.positions = dict.fromkeys(self.sliders, 1.0)  # it has those of the file
         return not self._stop.is_set()
 
-    def _exchange(self, seen: Seen, held: Held, now_s: float) -> None:
+    def _exchange(self, seen: Seen, held: Held, now_s: float, passed_ms: int) -> None:
         """Take what waits on the buses of a crane; where the page drives it, move its joysticks."""
         frames: list[Frame] = []
         for port in seen.ports.values():
             frames += port.frames()
+        asked = held if seen.shaped else replace(held, anti_sway=False)
+        if seen.here:
+            frames = seen.here.frames(asked, passed_ms)
         if seen.hand:
-            asked = held if seen.shaped else replace(held, anti_sway=False)
             for frame in seen.hand.frames(self._time_ms, asked):
                 seen.ports[frame.bus].send(frame)
                 frames.append(frame)

@@ -1,9 +1,7 @@
 """From the frames of one crane to what the page shows of it. No clock, no sockets."""
 
 import math
-from collections import deque
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from typing import Any
 
 from cantools.database.can import Message
@@ -17,14 +15,15 @@ from canshaper.inputs.profile import OWN
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.limits import without_deadband
-from canshaper.shaping.states import MOVING, Reason, State
-from canshaper.studio.words import fault_words, reason_words, state_words
+from canshaper.shaping.states import Reason
+from canshaper.studio.axis_view import AxisView, rounded
+from canshaper.studio.sources import Sources
+from canshaper.studio.swing import Swing
+from canshaper.studio.words import fault_words, reason_words, state_level, state_words
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW
 
 SILENT_S = 0.5
 """A daemon or a crane that has sent nothing for so long is shown as silent."""
-LEAST_SWING_S = 1.0
-"""Shortest time over which the largest sway counts as the swing."""
 
 ACROSS, ALONG = "across", "along"
 SWAY_OF = {
@@ -38,18 +37,6 @@ SWAY_OF = {
 
 Report = Callable[[str, str], None]
 """Takes a text and how bad that is: "info", "warn" or "bad"."""
-
-
-@dataclass
-class AxisView:
-    """What is known of an axis; fractions of full, degrees."""
-
-    joystick: float | None = None
-    valve: float | None = None
-    state: int | None = None
-    reason: int | None = None
-    predicted_deg: float | None = None
-    profile: str | None = None
 
 
 class CraneView:
@@ -68,27 +55,33 @@ class CraneView:
         self.sway_deg: tuple[float, float] | None = None
         self.pose: tuple[float, float, float] | None = None
         self.joints: tuple[float, ...] | None = None
+        self.simulated = False
         self.missed = 0
         self.fault = 0
         self.late_us: int | None = None
         self._daemon_s = self._crane_s = -math.inf
         self._daemon_there = self._crane_there = False
-        self._swings: deque[tuple[float, float]] = deque()
-        modes = [axis.config.sway.mode() for axis in deployment.axes.values() if axis.config.sway]
-        periods = [2.0 * math.pi / mode.omega_rad_s for mode in modes]
-        self._swing_s = max([LEAST_SWING_S, *periods])
+        models = [axis.config.sway for axis in deployment.axes.values()]
+        self._swing = Swing(model for model in models if model)
         self._joysticks = InputFinder(deployment.config.buses, deployment.joysticks.values())
         self._handlers: dict[tuple[str, int, bool], list[Any]] = {}
         self._find_messages()
+        names = [_source_of(joystick) for joystick in deployment.joysticks.values()]
+        for entries in self._handlers.values():
+            names += [message for _, _, message in entries]
+        self.sources = Sources(names)
 
     def _find_messages(self) -> None:
         deployment = self._deployment
         for name, axis in deployment.axes.items():
-            self._on(axis.valve.message.sender.key, self._valve, name)
-            if axis.status:
-                self._on(axis.status.sender.key, self._axis_status, (name, axis.status))
-        if deployment.status:
-            self._on(deployment.status.sender.key, self._service_status, deployment.status)
+            self._on(axis.valve.message.sender.key, self._valve, name, axis.valve_message.name)
+            if axis.status and (status := axis.config.status):
+                what = (name, axis.status)
+                self._on(axis.status.sender.key, self._axis_status, what, status.message)
+        service = deployment.config.status
+        if deployment.status and service:
+            key = deployment.status.sender.key
+            self._on(key, self._service_status, deployment.status, service.message)
         for message_name, handler in (
             ("GrappleSway", self._sway),
             ("TipPosition", self._position),
@@ -98,40 +91,63 @@ class CraneView:
             if message is not None:
                 for bus in deployment.config.buses:
                     key = (bus, message.frame_id, message.is_extended_frame)
-                    self._on(key, handler, message)
+                    self._on(key, handler, message, message_name)
 
     def _message(self, name: str) -> Message | None:
         found = self._deployment.messages.find(name)
         return None if isinstance(found, str) else found[1]
 
-    def _on(self, key: tuple[str, int, bool], handler: Any, what: Any) -> None:
-        self._handlers.setdefault(key, []).append((handler, what))
+    def _on(self, key: tuple[str, int, bool], handler: Any, what: Any, message: str) -> None:
+        self._handlers.setdefault(key, []).append((handler, what, message))
 
     def receive(self, frame: Frame, now_s: float) -> None:
         """Take a frame, one that the page's joysticks sent too; what is none of ours is passed."""
         entries = self._handlers.get(frame[:3])
         if joystick := self._joysticks.find(frame, round(now_s * 1e9)):
-            entries = [*(entries or ()), (self._joystick, joystick)]
+            entries = [*(entries or ()), (self._joystick, joystick, _source_of(joystick))]
         if entries is None and frame.extended:  # of J1939, from any address
             entries = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
-        for handler, what in entries or ():
+        sources = set()
+        for handler, what, source in entries or ():
             try:
                 handler(what, frame.data, now_s)
             except Exception:  # a frame shorter than its message: cantools has no base class
                 continue
+            sources.add(source)
+        for source in sources:
+            self.sources.on_frame(source, now_s)
+
+    def simulate(
+        self,
+        pose: tuple[float, float, float],
+        joints: tuple[float, ...] | None,
+        sway_deg: tuple[float, float],
+        now_s: float,
+    ) -> None:
+        """Take pose and sway from a simulated crane that is on no bus: no one measured them."""
+        self.simulated = True
+        self.pose, self.joints = pose, joints
+        self._sway_at(sway_deg, now_s)
 
     def report_lateness(self, late_us: int) -> None:
-        """Take what the daemon tells its service manager: how late it was in the last second."""
+        """What the daemon reports to its service manager: how late it was in the last second."""
         self.late_us = late_us
 
     def check(self, now_s: float) -> None:
-        """Report when the daemon or the crane falls silent, and when it is back."""
+        """Report when the daemon or the crane falls silent, and when it is back.
+
+        A joystick position that is old is shown no more.
+        """
+        for joystick in self._deployment.joysticks.values():
+            age_s = self.sources.age_s(_source_of(joystick), now_s)
+            if age_s is None or age_s >= SILENT_S:
+                self._joystick_at(joystick.name, {})
         if self.crane_there(now_s) is not self._crane_there:
             self._crane_there = not self._crane_there
             if not self._crane_there:
                 self._report("the crane is silent; its pose is the last one", "bad")
                 self.sway_deg = None
-                self._swings.clear()
+                self._swing.forget()
         there = self.daemon_there(now_s)
         if there is not self._daemon_there:
             self._daemon_there = there
@@ -143,6 +159,11 @@ class CraneView:
                 for axis in self.axes.values():
                     axis.state = axis.reason = axis.valve = axis.profile = None
 
+    @property
+    def heard(self) -> bool:
+        """Whether the daemon or the crane was ever heard."""
+        return max(self._daemon_s, self._crane_s) > -math.inf
+
     def daemon_there(self, now_s: float) -> bool:
         """Whether the daemon has been heard lately."""
         return now_s - self._daemon_s < SILENT_S
@@ -151,37 +172,22 @@ class CraneView:
         """Whether the crane's own messages have been heard lately."""
         return now_s - self._crane_s < SILENT_S
 
-    def swing_deg(self, now_s: float) -> float | None:
-        """Largest sway, in any direction, of the last full swing; None before there is any."""
-        while self._swings and self._swings[0][0] < now_s - self._swing_s:
-            self._swings.popleft()
-        return max((swing for _, swing in self._swings), default=None)
-
     def values(self, now_s: float) -> dict[str, Any]:
         """Everything for the page."""
-        axes = {}
-        for name, a in self.axes.items():
-            axes[name] = {
-                "joystick": _rounded(a.joystick),
-                "valve": _rounded(a.valve),
-                "predicted": _rounded(a.predicted_deg, 2),
-                "state": None if a.state is None else state_words(a.state),
-                "level": _level(a.state),
-                "reason": None if a.reason is None else reason_words(a.reason),
-                "profile": a.profile,
-            }
         return {
             "daemon": self.daemon_there(now_s),
             "crane": self.crane_there(now_s),
             "pose": self.pose,
             "joints": self.joints,
             "sway": self.sway_deg or self._predicted(),
-            "measured": self.sway_deg is not None,
-            "swing": _rounded(self.swing_deg(now_s), 2),
+            "measured": self.sway_deg is not None and not self.simulated,
+            "simulated": self.simulated,
+            "swing": rounded(self._swing.largest_deg(now_s), 2),
             "missed": self.missed,
             "fault": fault_words(self.fault),
             "late_us": self.late_us,
-            "axes": axes,
+            "axes": {name: axis.values() for name, axis in self.axes.items()},
+            "sources": self.sources.values(now_s),
         }
 
     def _predicted(self) -> tuple[float, float] | None:
@@ -198,9 +204,14 @@ class CraneView:
 
     def _joystick(self, joystick: BoundJoystick, data: bytes, _now_s: float) -> None:
         _, commands = joystick.codec.decode(data)
+        if commands:  # none in other frames of a multiplexed message
+            self._joystick_at(joystick.name, commands)
+
+    def _joystick_at(self, joystick: str, commands: Mapping[str, float | Reason]) -> None:
+        """Keep the commands of a joystick by signal; one that is invalid or missing is unknown."""
         for name, axis in self._deployment.axes.items():
-            if axis.config.command.joystick == joystick.name:
-                command = commands[axis.config.command.signal]
+            if axis.config.command.joystick == joystick:
+                command = commands.get(axis.config.command.signal)
                 self.axes[name].joystick = None if isinstance(command, Reason) else command
 
     def _valve(self, name: str, data: bytes, now_s: float) -> None:
@@ -209,6 +220,7 @@ class CraneView:
         command = (axis.valve.read(raw) or 0) / axis.valve.steps
         limits = axis.config.limits.output_limits()
         curve = limits.curve
+        self.axes[name].opening = command
         self.axes[name].valve = (
             curve.velocity(command) if curve else without_deadband(command, limits.deadband)
         )
@@ -223,9 +235,9 @@ class CraneView:
         sign = -1.0 if SWAY_OF.get(name) == ACROSS else 1.0
         view.predicted_deg = sign * values["PredictedSway"]
         if self.sway_deg is None and (predicted := self._predicted()):
-            self._swings.append((now_s, math.hypot(*predicted)))
+            self._swing.add(predicted, now_s)
         if view.state is not None and (state, reason) != (view.state, view.reason):
-            level = {"bad": "bad", "stop": "warn"}.get(_level(state), "info")
+            level = {"bad": "bad", "stop": "warn"}.get(state_level(state), "info")
             self._report(f"{name}: {state_words(state)} — {reason_words(reason)}", level)
         view.state, view.reason = state, reason
         view.profile = self._profile(name, values.get("ActiveSet"))
@@ -248,8 +260,11 @@ class CraneView:
 
     def _sway(self, message: Message, data: bytes, now_s: float) -> None:
         values: Any = message.decode(data)
-        self.sway_deg = (float(values["SwayPerpendicular"]), float(values["SwayParallel"]))
-        self._swings.append((now_s, math.hypot(*self.sway_deg)))
+        self._sway_at((float(values["SwayPerpendicular"]), float(values["SwayParallel"])), now_s)
+
+    def _sway_at(self, sway_deg: tuple[float, float], now_s: float) -> None:
+        self.sway_deg = sway_deg
+        self._swing.add(sway_deg, now_s)
         self._crane_s = now_s
 
     def _position(self, message: Message, data: bytes, now_s: float) -> None:
@@ -264,20 +279,9 @@ class CraneView:
         self._crane_s = now_s
 
 
+def _source_of(joystick: BoundJoystick) -> str:
+    return f"joystick {joystick.name}"
+
+
 def _raw(message: Message, data: bytes) -> Any:
     return message.decode(data, decode_choices=False, scaling=False)
-
-
-def _level(state: int | None) -> str:
-    """How a state is shown: off, wait, ready, move, stop or bad."""
-    if state == State.TRIPPED:
-        return "bad"
-    if state == State.STOPPING:
-        return "stop"
-    if state in MOVING:
-        return "move"
-    return "off" if state is None else ("ready" if state == State.READY else "wait")
-
-
-def _rounded(value: float | None, digits: int = 4) -> float | None:
-    return None if value is None else round(value, digits)

@@ -2,7 +2,7 @@
 
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
-from canshaper.shaping.states import Reason, State
+from canshaper.shaping.states import MOVING, Reason, State
 
 FAULTS = {
     fault: "" if fault is FrameFault.NONE else fault.name.lower().replace("_", " ")
@@ -13,6 +13,17 @@ FAULTS = {
 def state_words(number: int) -> str:
     """A state by its number."""
     return STATE_TEXTS[State(number)].words if number in _STATES else f"state {number}"
+
+
+def state_level(state: int | None) -> str:
+    """How a state is shown: off, wait, ready, move, stop or bad."""
+    if state == State.TRIPPED:
+        return "bad"
+    if state == State.STOPPING:
+        return "stop"
+    if state in MOVING:
+        return "move"
+    return "off" if state is None else ("ready" if state == State.READY else "wait")
 
 
 def reason_words(number: int) -> str:

@@ -48,18 +48,16 @@ class Actuator:
 
     def advance(self, step_s: float) -> None:
         """Move on by step_s seconds."""
-        valve = self.valve
         full_speed = self._full_speed
         start = self.position
         start_speed = self.speed
-        self.start_acceleration = full_speed * valve.speed_rate
-        valve.advance(0.5 * step_s)
-        middle_speed = full_speed * valve.speed
-        valve.advance(0.5 * step_s)
-        speed = full_speed * valve.speed
+        start_rate, middle_speed, speed, end_rate = self.valve.advance(step_s)
+        start_acceleration = full_speed * start_rate
+        middle_speed *= full_speed
+        speed *= full_speed
         end = start + step_s / 6.0 * (start_speed + 4.0 * middle_speed + speed)
-        self.at_stop = not self._low <= end <= self._high
-        if self.at_stop:
+        at_stop = not self._low <= end <= self._high
+        if at_stop:
             end = self._low if end < self._low else self._high
             speed = 0.0
             middle_speed = 0.25 * (6.0 * (end - start) / step_s - start_speed)
@@ -67,20 +65,21 @@ class Actuator:
             # change of speed: with a1 = 0 both are met.
             travel = 6.0 * ((end - start) / step_s - start_speed) / step_s
             middle_acceleration = 0.5 * (-6.0 * start_speed / step_s - travel)
-            self.start_acceleration = travel - 2.0 * middle_acceleration
-            self.end_acceleration = 0.0
+            start_acceleration = travel - 2.0 * middle_acceleration
+            end_acceleration = 0.0
         else:
-            self.end_acceleration = full_speed * valve.speed_rate
+            end_acceleration = full_speed * end_rate
             middle_acceleration = 0.25 * (
-                6.0 * (speed - start_speed) / step_s
-                - self.start_acceleration
-                - self.end_acceleration
+                6.0 * (speed - start_speed) / step_s - start_acceleration - end_acceleration
             )
         # The parabola of the speed through start, middle and end, integrated to the middle.
         self.middle_position = start + step_s / 24.0 * (
             5.0 * start_speed + 8.0 * middle_speed - speed
         )
+        self.at_stop = at_stop
+        self.start_acceleration = start_acceleration
         self.middle_speed = middle_speed
         self.middle_acceleration = middle_acceleration
+        self.end_acceleration = end_acceleration
         self.position = end
         self.speed = speed

@@ -16,7 +16,7 @@ STEPS = (ValveState.INIT, ValveState.DISABLED, ValveState.HOLD, ValveState.ACTIV
 
 
 class _Node:
-    """A node that boots, and works when it is told to, or at once where there is no master."""
+    """A node that boots, and works when it is started, or at once where there is no master."""
 
     def __init__(self, bus: str, number: int, timeout_ms: int, *, waits: bool) -> None:
         self._key = bus, HEARTBEAT + number
@@ -33,7 +33,7 @@ class _Node:
 
 
 class _ValveStates:
-    """A valve that goes one step up, or any number down, to the state that it is told."""
+    """A valve that goes one step up, or any number down, to the state that it is commanded."""
 
     def __init__(self, axis: BoundAxis, node: _Node | None) -> None:
         assert axis.status_word
@@ -64,8 +64,8 @@ class _ValveStates:
         if self._operational and len(data) == self._message.length:
             raw = self._message.decode(data, decode_choices=False, scaling=False)
             word = int(raw[self._control])
-            told = STEPS.index(ValveState(word)) if word in STEPS else self._step
-            self._step = min(told, self._step + 1)
+            commanded = STEPS.index(ValveState(word)) if word in STEPS else self._step
+            self._step = min(commanded, self._step + 1)
 
     def frames(self, passed_s: float) -> Iterator[Frame]:
         self._left_s -= passed_s
@@ -76,27 +76,34 @@ class _ValveStates:
 
 
 class CanopenSide:
-    """Every node that the deployment watches, and every valve of CiA 408."""
+    """Every node that the deployment watches, and every valve of CiA 408.
+
+    Attributes:
+        present: whether there is any.
+    """
 
     def __init__(self, deployment: Deployment) -> None:
         self._nodes = {
-            (bus, node.id): _Node(bus, node.id, node.heartbeat_ms, waits=config.canopen.master)
+            (bus, name): _Node(bus, node.id, node.heartbeat_ms, waits=config.canopen.master)
             for bus, config in deployment.config.buses.items()
             if config.canopen
-            for node in config.canopen.nodes.values()
+            for name, node in config.canopen.nodes.items()
         }
         self._valves = {
-            name: _ValveStates(axis, self._node_of(deployment, axis))
+            name: _ValveStates(axis, self._node_of(axis))
             for name, axis in deployment.axes.items()
             if axis.status_word
         }
+        self.present = bool(self._nodes or self._valves)
 
-    def _node_of(self, deployment: Deployment, axis: BoundAxis) -> _Node | None:
+    def _node_of(self, axis: BoundAxis) -> _Node | None:
         valve = axis.config.valve
-        canopen = deployment.config.buses[valve.bus].canopen
-        if canopen is None or valve.cia408 is None or valve.cia408.node is None:
-            return None
-        return self._nodes[valve.bus, canopen.nodes[valve.cia408.node].id]
+        name = valve.cia408.node if valve.cia408 else None
+        return self._nodes[valve.bus, name] if name else None
+
+    def works(self, bus: str, node: str | None) -> bool:
+        """Whether a node of that name sends its PDOs; without a name no one watches it."""
+        return node is None or self._nodes[bus, node].state is NodeState.OPERATIONAL
 
     def closed(self, axis: str) -> bool:
         """Whether the valve of an axis does not follow its set point."""
@@ -109,8 +116,8 @@ class CanopenSide:
             if valve.key == frame[:3]:
                 valve.receive(frame.data)
         if frame.can_id == NMT and not frame.extended and frame.data[:1] == bytes((START,)):
-            for (bus, number), node in self._nodes.items():
-                if bus == frame.bus and frame.data[1] in (0, number):
+            for (bus, _), node in self._nodes.items():
+                if bus == frame.bus and frame.data[1] in (0, node.number):
                     node.state = NodeState.OPERATIONAL
 
     def frames(self, passed_s: float) -> Iterator[Frame]:

@@ -2,22 +2,25 @@
 
 Two booms are there. `TipBoom` moves the tip directly in cylindrical coordinates about the pillar
 (slew angle theta1, radius x, height z), one valve a coordinate; `JointBoom` moves the joints, and
-the tip by their kinematics. Both follow their valves exactly: boom flexibility and pump pressure
-are left out, as in the paper.
+the tip by their kinematics. Both follow their valves exactly: pump pressure is left out, and by
+default that a boom bends, as in the paper.
 """
 
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Final, NamedTuple, Protocol
+from typing import Final, NamedTuple
 
-from canshaper_sim.actuator import Actuator
-from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
+from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
-from canshaper_sim.grapple import Grapple, Sway, TipMotion, advance
+from canshaper_sim.bend import Bend, BendParameters
+from canshaper_sim.contact import ContactParameters
+from canshaper_sim.grapple import Grapple, Sway, TipMotion, accelerations, advance, new_tuple
 from canshaper_sim.joints import JointBoom, JointParameters
+from canshaper_sim.log import LogParameters, SecondSwing
 from canshaper_sim.ranges import check_ranges
 from canshaper_sim.sway_sensor import SwaySensorParameters
+from canshaper_sim.tip_boom import CraneBoom, TipBoom
 from canshaper_sim.tip_controller import TipControllerParameters
 from canshaper_sim.valve import ValveParameters
 
@@ -55,6 +58,8 @@ _ALLOWED = {
 class CraneParameters:
     """Grapple, valves, full speeds, end stops, start pose and sway sensors of one crane.
 
+    And how the boom bends, what the grapple meets, and what it grips.
+
     Full speed is the speed of the tip (slew: of theta1) when the valve lets full flow through.
     """
 
@@ -76,6 +81,9 @@ class CraneParameters:
     joints: JointParameters = field(default_factory=JointParameters)
     tip_controller: TipControllerParameters = field(default_factory=TipControllerParameters)
     sway_sensor: SwaySensorParameters = field(default_factory=SwaySensorParameters)
+    boom: BendParameters = field(default_factory=BendParameters)
+    contact: ContactParameters = field(default_factory=ContactParameters)
+    log: LogParameters = field(default_factory=LogParameters)
 
     def __post_init__(self) -> None:
         start = {
@@ -83,6 +91,18 @@ class CraneParameters:
             "start_height_m": (self.height_min_m, self.height_max_m),
         }
         check_ranges("crane", self, _ALLOWED | start)
+
+    @property
+    def full_speeds(self) -> dict[str, float]:
+        """Full speed of every axis that a crane may have, rad/s or m/s."""
+        return {
+            SLEW: self.slew_full_speed_rad_s,
+            NEAR_FAR: self.near_far_full_speed_m_s,
+            LIFT: self.lift_full_speed_m_s,
+            LIFT_CYLINDER: self.joints.lift_cylinder_full_speed_rad_s,
+            KNUCKLE: self.joints.knuckle_full_speed_rad_s,
+            EXTENSION: self.joints.extension_full_speed_m_s,
+        }
 
 
 class CraneState(NamedTuple):
@@ -101,94 +121,20 @@ class CraneState(NamedTuple):
     theta6_rate_rad_s: float
 
 
-class CraneBoom(Protocol):
-    """What carries the grapple: its actuators by axis name, and how they move the tip."""
-
-    axes: dict[str, Actuator]
-
-    @property
-    def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius, height and their rates; rad, m, per second."""
-
-    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
-
-
-class TipBoom:
-    """The tip itself, moved by a valve in each cylindrical coordinate."""
-
-    __slots__ = ("_lift", "_near_far", "_slew", "axes")
-
-    def __init__(self, parameters: CraneParameters) -> None:
-        p = parameters
-        self._slew = Actuator(
-            p.slew, p.slew_full_speed_rad_s, p.start_theta1_rad, -math.inf, math.inf
-        )
-        self._near_far = Actuator(
-            p.near_far,
-            p.near_far_full_speed_m_s,
-            p.start_radius_m,
-            p.radius_min_m,
-            p.radius_max_m,
-        )
-        self._lift = Actuator(
-            p.lift, p.lift_full_speed_m_s, p.start_height_m, p.height_min_m, p.height_max_m
-        )
-        self.axes = {SLEW: self._slew, NEAR_FAR: self._near_far, LIFT: self._lift}
-
-    @property
-    def pose(self) -> tuple[float, float, float, float, float, float]:
-        """theta1, radius, height and their rates; rad, m, per second."""
-        slew, near_far, lift = self._slew, self._near_far, self._lift
-        return (
-            slew.position,
-            near_far.position,
-            lift.position,
-            slew.speed,
-            near_far.speed,
-            lift.speed,
-        )
-
-    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
-        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
-        slew, near_far, lift = self._slew, self._near_far, self._lift
-        start_radius, start_radius_rate = near_far.position, near_far.speed
-        start_slew_rate = slew.speed
-        slew.advance(step_s)
-        near_far.advance(step_s)
-        lift.advance(step_s)
-        return (
-            TipMotion(
-                start_radius,
-                start_radius_rate,
-                near_far.start_acceleration,
-                start_slew_rate,
-                slew.start_acceleration,
-                lift.start_acceleration,
-            ),
-            TipMotion(
-                near_far.middle_position,
-                near_far.middle_speed,
-                near_far.middle_acceleration,
-                slew.middle_speed,
-                slew.middle_acceleration,
-                lift.middle_acceleration,
-            ),
-            TipMotion(
-                near_far.position,
-                near_far.speed,
-                near_far.end_acceleration,
-                slew.speed,
-                slew.end_acceleration,
-                lift.end_acceleration,
-            ),
-        )
-
-
 class Crane:
     """Crane and grapple in motion: `step` with the values in the valve frames, read `state`."""
 
-    __slots__ = ("_axes", "_sway", "_time_s", "boom", "parameters", "swung_over")
+    __slots__ = (
+        "_accelerations",
+        "_axes",
+        "_bend",
+        "_second",
+        "_sway",
+        "_time_s",
+        "boom",
+        "parameters",
+        "swung_over",
+    )
 
     def __init__(
         self,
@@ -206,7 +152,11 @@ class Crane:
         p = self.parameters = parameters or CraneParameters()
         self.boom = boom or TipBoom(p)
         self._axes = self.boom.axes
+        self._bend = Bend(p.boom) if p.boom.frequency_hz else None
+        grounded = p.contact.ground_m > -math.inf
+        self._accelerations = self._pulled if grounded else accelerations
         self._sway = sway or Sway()
+        self._second: SecondSwing | None = None
         self._time_s = 0.0
         # Set for good once a joint has passed 90 deg: the grapple is above the horizontal, where a
         # real one falls into its rotator and the numbers mean nothing any more.
@@ -215,12 +165,28 @@ class Crane:
     @property
     def state(self) -> CraneState:
         """The present state."""
-        return CraneState(self._time_s, *self.boom.pose, *self._sway)
+        pose = self.boom.pose
+        if bend := self._bend:
+            ahead, faster = zip(bend.slew, bend.radius, bend.height, strict=True)
+            pose = (
+                pose[0] + ahead[0],
+                pose[1] + ahead[1],
+                pose[2] + ahead[2],
+                pose[3] + faster[0],
+                pose[4] + faster[1],
+                pose[5] + faster[2],
+            )
+        sway = self._second.shown(self._sway) if self._second else self._sway
+        return new_tuple(CraneState, (self._time_s, *pose, *sway))
 
     @property
     def axes_at_stop(self) -> tuple[str, ...]:
         """The axes that are held by an end stop just now."""
         return tuple(name for name, axis in self._axes.items() if axis.at_stop)
+
+    def speed(self, axis: str) -> float:
+        """Speed of an axis that it has, rad/s or m/s."""
+        return self._axes[axis].speed
 
     def opening(self, axis: str) -> float:
         """How far the valve of an axis is open, -1 .. 1; 0 for an axis that has none."""
@@ -251,10 +217,34 @@ class Crane:
         step_s = dt_s / count
         for _ in range(count):
             tips = self.boom.advance(step_s)
-            self._sway = advance(self.parameters.grapple, self._sway, step_s, tips)
+            if self._bend:
+                tips = self._bend.advance(step_s, tips)
+            if self._second:
+                self._second.advance(step_s, tips)
+            self._sway = advance(
+                self.parameters.grapple, self._sway, step_s, tips, self._accelerations
+            )
         self._time_s += dt_s
+        if self.parameters.log.gripped(self._time_s):
+            self._grip(self.parameters.log)
         if abs(self._sway.theta5_rad) > _HORIZONTAL or abs(self._sway.theta6_rad) > _HORIZONTAL:
             self.swung_over = True
+
+    def _grip(self, log: LogParameters) -> None:
+        """Grip it, once."""
+        grapple = self.parameters.grapple
+        if log.second_period_s:
+            self._second = SecondSwing(log, grapple.g_m_s2, self._sway)
+        self.pick_up(log.loaded(grapple))
+        self.parameters = replace(self.parameters, log=LogParameters())
+
+    def _pulled(
+        self, grapple: Grapple, sway: tuple[float, float, float, float], tip: TipMotion
+    ) -> tuple[float, float]:
+        """What gravity, tip and ground make of the sway: (theta5'', theta6'')."""
+        free = accelerations(grapple, sway, tip)
+        held = self.parameters.contact.accelerations(grapple, sway, tip)
+        return free[0] + held[0], free[1] + held[1]
 
 
 def joint_crane(parameters: CraneParameters | None = None, sway: Sway | None = None) -> Crane:

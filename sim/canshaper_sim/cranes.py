@@ -37,9 +37,14 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
         for name, axis in deployment.axes.items()
         if name.startswith(f"{crane}_")
     }
-    joysticks = {axis.config.command.joystick for axis in axes.values()}
+    moving = {axis.config.command.joystick for axis in axes.values()}
+    # And those whose switches enable them.
+    needed = {c for name in moving for c in deployment.joysticks[name].conditions}
+    joysticks = moving | {condition.joystick for condition in needed}
+    switches = [one for one in deployment.switches if {*one.switches} & {c.name for c in needed}]
     own = {n: joystick for n, joystick in deployment.joysticks.items() if n in joysticks}
-    buses = {axis.config.valve.bus for axis in axes.values()} | {one.key[0] for one in own.values()}
+    buses = {axis.config.valve.bus for axis in axes.values()}
+    buses |= {one.key[0] for one in (*own.values(), *switches)}
     config = deployment.config.model_copy(
         update={"buses": {n: b for n, b in deployment.config.buses.items() if n in buses}}
     )
@@ -49,5 +54,6 @@ def one_crane(deployment: Deployment, crane: str) -> Deployment:
         config=config,
         axes=axes,
         joysticks=own,
+        switches=switches,
         emergency_stop=stop if stop and stop.key[0] in buses else None,
     )

@@ -14,10 +14,14 @@ swings inwards, towards the pillar.
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import NamedTuple, Self
 
 from canshaper_sim.ranges import check_ranges
+
+new_tuple = tuple.__new__
+"""``new_tuple(Sway, (...))`` is ``Sway(...)`` in half the time."""
 
 
 class TipMotion(NamedTuple):
@@ -29,6 +33,10 @@ class TipMotion(NamedTuple):
     slew_rate_rad_s: float
     slew_acceleration_rad_s2: float
     height_acceleration_m_s2: float
+    # Where it is matters only to what stands on the ground.
+    slew_rad: float = 0.0
+    height_m: float = 0.0
+    height_rate_m_s: float = 0.0
 
 
 class Sway(NamedTuple):
@@ -115,7 +123,7 @@ def accelerations(
 ) -> tuple[float, float]:
     """(theta5'', theta6'') in rad/s^2 at a Sway under a tip motion (paper Eq. 7-9, corrected)."""
     theta5, theta6, rate5, rate6 = sway
-    radius, radius_rate, radius_acc, slew_rate, slew_acc, height_acc = tip
+    radius, radius_rate, radius_acc, slew_rate, slew_acc, height_acc, _, _, _ = tip
     l1 = grapple.l1_m
     l2 = grapple.l2_m
     m1 = grapple.m1_kg
@@ -151,11 +159,18 @@ def accelerations(
     return -torque5 / inertia5, -specific6 / l2
 
 
+Accelerations = Callable[
+    [Grapple, tuple[float, float, float, float], TipMotion], tuple[float, float]
+]
+"""As `accelerations`: of grapple, sway and tip."""
+
+
 def advance(
     grapple: Grapple,
     sway: Sway,
     step_s: float,
     tips: tuple[TipMotion, TipMotion, TipMotion],
+    accelerations: Accelerations = accelerations,
 ) -> Sway:
     """One classical Runge-Kutta step of step_s seconds; tip motion at its start, middle and end.
 
@@ -177,9 +192,10 @@ def advance(
     sway_d = (theta5 + h * rate5_c, theta6 + h * rate6_c, rate5_d, rate6_d)
     a5_d, a6_d = accelerations(grapple, sway_d, tip_end)
     sixth = h / 6.0
-    return Sway(
+    end = (
         theta5 + sixth * (rate5 + 2.0 * (rate5_b + rate5_c) + rate5_d),
         theta6 + sixth * (rate6 + 2.0 * (rate6_b + rate6_c) + rate6_d),
         rate5 + sixth * (a5 + 2.0 * (a5_b + a5_c) + a5_d),
         rate6 + sixth * (a6 + 2.0 * (a6_b + a6_c) + a6_d),
     )
+    return new_tuple(Sway, end)

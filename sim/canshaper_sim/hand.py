@@ -6,7 +6,9 @@ from dataclasses import dataclass, field
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.signals import full_scale
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.enable import BoundSwitches
 from canshaper.machine.inputs import BoundInput, BoundJoystick, BoundStop
 
 # Source address of a joystick on J1939 where any will do; 0x33 to 0x38 are what makers use.
@@ -15,7 +17,7 @@ JOYSTICK_ADDRESS = 0x33
 
 @dataclass(frozen=True)
 class Held:
-    """What a hand does with the joysticks.
+    """What a hand does with the joysticks; it does not change, another one takes its place.
 
     Attributes:
         joysticks: position by axis, -1 .. 1; an axis that is not there stands in neutral.
@@ -33,7 +35,7 @@ class Held:
 
 
 class Hand:
-    """All joysticks of a deployment, and its emergency stop, which is never pressed.
+    """All joysticks of a deployment, what enables them, and its emergency stop, never pressed.
 
     Args:
         deployment: names the joystick messages and their switches.
@@ -47,9 +49,15 @@ class Hand:
         for behind in [one for one in joysticks if one.next_profile][1:]:
             behind.next_profile = None  # pressed on both it would be two presses
         self._messages: list[_Message] = [*joysticks]
+        self._messages += [_Switches(one, deployment) for one in deployment.switches]
         if deployment.emergency_stop:
             self._messages.append(_Stop(deployment.emergency_stop))
         self.cycle_ms = math.gcd(*(message.cycle_ms for message in self._messages))
+
+    def due(self, time_ms: int, tick_ms: int) -> range:
+        """When frames came since the last tick, ms."""
+        first_ms = (time_ms - tick_ms) // self.cycle_ms * self.cycle_ms + self.cycle_ms
+        return range(max(0, first_ms), time_ms + 1, self.cycle_ms)
 
     def frames(self, time_ms: int, held: Held) -> list[Frame]:
         """Frames that are due at this time."""
@@ -64,10 +72,14 @@ class _Message:
         # Of J1939 from the address that is asked for.
         source = JOYSTICK_ADDRESS if bound.any_source else bound.key[1] & 0xFF
         self._sender = Sender(bound.config.bus, bound.message, source, bound.protection)
+        self._held: Held | None = None
+        self._values: dict[str, int] = {}
 
     def frame(self, held: Held) -> Frame:
         """The next frame."""
-        return self._sender.frame(self._raw(held))
+        if held is not self._held:
+            self._held, self._values = held, self._raw(held)
+        return self._sender.frame(self._values)
 
     def _raw(self, held: Held) -> dict[str, int]:
         """Raw values of the signals that a hand moves."""
@@ -86,17 +98,25 @@ class _Joystick(_Message):
             for name, axis in deployment.axes.items()
             if axis.config.command.joystick == joystick.name
         }
-        self._full = {s.name: float(s.maximum or 0.0) for s in joystick.message.signals}
+        self._enable = {
+            one.name: i == 0
+            for bound in deployment.joysticks.values()
+            for i, one in reversed([*enumerate(bound.conditions)])
+            if one.joystick == joystick.name
+        }
+        self._full = {s.name: full_scale(s) for s in joystick.message.signals}
         # Joysticks that no axis listens to stand in neutral too.
         self._base = {
-            s.name: 0
+            s.name: self._sender.fields.raw(s.name, 0.0)
             for s in joystick.message.signals
-            if s.maximum is not None and s.minimum is not None and s.minimum < 0 < s.maximum
+            if not s.is_float
+            and (s.maximum is not None and s.minimum is not None and s.minimum < 0 < s.maximum)
         }
 
     def _raw(self, held: Held) -> dict[str, int]:
         raw, fields, config = dict(self._base), self._sender.fields, self._config
-        raw[config.enable] = int(held.enable)
+        for signal, pressed in self._enable.items():
+            raw[signal] = int(held.enable or not pressed)
         if config.reset:
             raw[config.reset] = int(held.reset)
         if config.anti_sway_off:
@@ -120,6 +140,22 @@ class _Joystick(_Message):
                 joystick.signal, self._full[joystick.signal] * command
             )
         return raw
+
+
+class _Switches(_Message):
+    """Switches that enable joysticks: one that is pressed is held with enable, the others agree."""
+
+    def __init__(self, bound: BoundSwitches, deployment: Deployment) -> None:
+        super().__init__(bound)
+        self._on = dict(bound.switches.values())
+        pressed = {one.conditions[0].name for one in deployment.joysticks.values()}
+        self._pressed = {one[0] for name, one in bound.switches.items() if name in pressed}
+
+    def _raw(self, held: Held) -> dict[str, int]:
+        return {
+            signal: on if held.enable or signal not in self._pressed else int(on == 0)
+            for signal, on in self._on.items()
+        }
 
 
 class _Stop(_Message):

@@ -180,11 +180,11 @@ class JointBoom:
         slew, lift, knuckle, extension = self.axes.values()
         radius, radius_rate = self._radius_m, self._radius_rate_m_s
         height, height_rate = self.height_m, self.height_rate_m_s
-        slew_rate = slew.speed
+        heading, slew_rate = slew.position, slew.speed
         for joint in (slew, lift, knuckle, extension):
             joint.advance(step_s)
         boom = self._boom
-        middle_radius, middle_radius_rate = self._radius_at_middle()
+        at_middle = self._at_middle()
         end = (lift.position, knuckle.position, extension.position)
         rates = (lift.speed, knuckle.speed, extension.speed)
         accelerations = lift.end_acceleration, knuckle.end_acceleration, extension.end_acceleration
@@ -201,23 +201,12 @@ class JointBoom:
         height_start, height_middle = _stages(
             step_s, self.height_m - height, height_rate, self.height_rate_m_s, height_end
         )
+        turn = (slew_rate, slew.start_acceleration), (slew.middle_speed, slew.middle_acceleration)
+        out = (radius, radius_rate, radius_start), (*at_middle[:2], radius_middle)
+        up = (heading, height, height_rate), (slew.middle_position, *at_middle[2:])
         return (
-            TipMotion(
-                radius,
-                radius_rate,
-                radius_start,
-                slew_rate,
-                slew.start_acceleration,
-                height_start,
-            ),
-            TipMotion(
-                middle_radius,
-                middle_radius_rate,
-                radius_middle,
-                slew.middle_speed,
-                slew.middle_acceleration,
-                height_middle,
-            ),
+            TipMotion(*out[0], *turn[0], height_start, *up[0]),
+            TipMotion(*out[1], *turn[1], height_middle, *up[1]),
             TipMotion(
                 self._radius_m,
                 self._radius_rate_m_s,
@@ -225,21 +214,20 @@ class JointBoom:
                 slew.speed,
                 slew.end_acceleration,
                 height_end,
+                slew.position,
+                self.height_m,
+                self.height_rate_m_s,
             ),
         )
 
-    def _radius_at_middle(self) -> tuple[float, float]:
-        """Radius and its rate in the middle of the step that was made."""
+    def _at_middle(self) -> tuple[float, float, float, float]:
+        """Radius, its rate, height and its rate in the middle of the step that was made."""
         _, lift, knuckle, extension = self.axes.values()
         middle = (lift.middle_position, knuckle.middle_position, extension.middle_position)
+        rates = (lift.middle_speed, knuckle.middle_speed, extension.middle_speed)
         jacobian = self._boom.jacobian(*middle)
-        radius, _ = self._boom.tip(*middle)
-        rate = (
-            jacobian.r_lift * lift.middle_speed
-            + jacobian.r_knuckle * knuckle.middle_speed
-            + jacobian.r_extension * extension.middle_speed
-        )
-        return radius, rate
+        radius, height = self._boom.tip(*middle)
+        return radius, _dot(jacobian[:3], rates), height, _dot(jacobian[3:], rates)
 
 
 def _dot(row: Iterable[float], column: Iterable[float]) -> float:

@@ -32,19 +32,17 @@ class JoystickNode:
         self.script = script
         self._hand, self._axes, self._bypass = Hand(deployment), list(deployment.axes), bypass
         self.cycle_ms = self._hand.cycle_ms
+        self._held = Held()
 
     def frames(self, time_ms: int) -> list[Frame]:
         """Frames that are due at this time of the script."""
         if time_ms % self.cycle_ms:
             return []
         joysticks = {axis: self.script.command(axis, time_ms / 1000.0) for axis in self._axes}
-        held = Held(joysticks, enable=True, anti_sway=not self._bypass)
-        return self._hand.frames(time_ms, held)
+        if not self._held.enable or joysticks != self._held.joysticks:
+            self._held = Held(joysticks, enable=True, anti_sway=not self._bypass)
+        return self._hand.frames(time_ms, self._held)
 
     def frames_of_tick(self, time_ms: int, tick_ms: int) -> list[Frame]:
         """Frames that came since the last tick, in order; the newest of each joystick counts."""
-        return [
-            frame
-            for ms in range(max(0, time_ms - tick_ms + 1), time_ms + 1)
-            for frame in self.frames(ms)
-        ]
+        return [frame for ms in self._hand.due(time_ms, tick_ms) for frame in self.frames(ms)]

@@ -4,6 +4,7 @@ import math
 import random
 from collections.abc import Sequence
 
+from canshaper.config.similar import did_you_mean
 from canshaper.errors import DesignError
 from canshaper_sim.axes import (
     ALL_AXES,
@@ -45,7 +46,7 @@ def random_script(seed: int, duration_s: float = 30.0, axes: Sequence[str] = AXE
 # How far from the start the strokes of an axis may add up to, in seconds of full speed, and the
 # largest level. With more reach or faster slewing an unshaped grapple swings above the horizontal,
 # where no operator takes it and the model ends; the default crane's stops are farther away.
-_REACH_S = {
+REACH_S = {
     SLEW: (-math.inf, math.inf),
     NEAR_FAR: (-0.6, 1.0),
     LIFT: (-1.8, 1.8),
@@ -53,7 +54,7 @@ _REACH_S = {
     KNUCKLE: (-0.6, 1.4),
     EXTENSION: (0.0, 1.8),
 }
-_LARGEST_LEVEL = {
+LARGEST_LEVEL = {
     SLEW: 0.6,
     NEAR_FAR: 1.0,
     LIFT: 1.0,
@@ -68,7 +69,7 @@ _PAUSE_SHARE = 0.33
 
 def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stroke]:
     strokes: list[Stroke] = []
-    low_s, high_s = _REACH_S[axis]
+    low_s, high_s = REACH_S[axis]
     travel_s = 0.0
     start_s = source.uniform(0.2, 1.0)
     # One ramp for all strokes up to the next pause, so that level to level is one movement.
@@ -80,7 +81,7 @@ def _random_strokes(source: random.Random, axis: str, end_s: float) -> list[Stro
             start_s += duration_s + 0.4  # the joystick first needs the ramp to get to neutral
             continue
         # A fifth of the strokes is full deflection.
-        level = _LARGEST_LEVEL[axis] * min(1.0, source.uniform(0.25, 1.2))
+        level = LARGEST_LEVEL[axis] * min(1.0, source.uniform(0.25, 1.2))
         level *= source.choice((-1.0, 1.0))
         if not low_s <= travel_s + level * duration_s <= high_s:
             level = math.copysign(level, 0.5 * (low_s + high_s) - travel_s)
@@ -108,4 +109,5 @@ def script_named(name: str, axes: Sequence[str] = AXES) -> Script:
     kind, _, seed = name.partition("-")
     if kind == "random" and seed.isdecimal():
         return random_script(int(seed), axes=axes)
-    raise DesignError(f"script: expected one of {', '.join(SCRIPTS)}, random-<seed>, got {name!r}")
+    names = f"{', '.join(SCRIPTS)}, random-<seed>"
+    raise DesignError(f"script: expected one of {names}, got {name!r}{did_you_mean(name, SCRIPTS)}")

@@ -3,6 +3,7 @@
 import dataclasses
 from typing import Any
 
+from canshaper.config.similar import did_you_mean
 from canshaper.errors import DesignError
 from canshaper_sim.crane import CraneParameters
 
@@ -31,9 +32,8 @@ def changed_parameters(changes: list[str]) -> CraneParameters:
     for change in changes:
         name, _, text = change.partition("=")
         if name not in known:
-            raise DesignError(
-                f"--set {change}: no parameter {name!r}, there are {', '.join(known)}"
-            )
+            names = did_you_mean(name, known) or f"; there are {', '.join(known)}"
+            raise DesignError(f"--set {change}: expected a parameter, got {name!r}{names}")
         try:
             value = float(text)
         except ValueError:

@@ -2,7 +2,6 @@
 
 import math
 from collections.abc import Iterator, Mapping
-from typing import Any
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
@@ -14,7 +13,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import USUAL_MAX_STEP, BoundFeedback
 from canshaper_sim.axes import ROTATOR
 from canshaper_sim.canopen import CanopenSide
-from canshaper_sim.crane import Crane, CraneParameters
+from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.joints import JointBoom
 from canshaper_sim.machines import AXES_OF, JOINTS, TIP, build_machine, machine_for
@@ -33,6 +32,9 @@ JOINT_FEEDBACK: Mapping[str, tuple[str, ...]] = {
     "JointVelocity": ("SlewRate", "LiftRate", "KnuckleRate", "ExtensionSpeed"),
 }
 
+# Frames of a valve that are kept once read.
+MOST_KNOWN = 4096
+
 # Source address of the valves on J1939; 0x80 to 0x8F are what a maker uses.
 VALVE_ADDRESS = 0x80
 
@@ -46,7 +48,7 @@ class _ValveInput:
     def __init__(self, axis: str, deployment: Deployment) -> None:
         bound = deployment.axes[axis]
         self.axis = axis
-        self._message = bound.valve_message
+        self._layout = bound.valve.message.sender.fields.layout
         self._codec: ValveCodec = bound.valve
         protection = bound.valve.message.sender.protection
         self._counter = protection.counter
@@ -56,19 +58,29 @@ class _ValveInput:
         self.timeout_s = bound.config.valve.timeout_ms / 1000.0
         self.command = 0.0
         self.age_s = 0.0
+        self._known: dict[bytes, tuple[int, float]] = {}
 
     def receive(self, data: bytes) -> None:
         """Take a command; what is none (wrong length, no velocity) closes the valve."""
-        steps = None
-        if len(data) == self._message.length:
-            raw: Any = self._message.decode(data, decode_choices=False, scaling=False)
+        command = 0.0
+        if len(data) == self._layout.length:
+            known = self._known.get(data) or self._read(data)
             if self.age_s >= self.timeout_s:
                 self._sequence.resync()
-            if self._sequence.check(data, raw[self._counter] if self._counter else 0):
+            if self._sequence.check(data, known[0]):
                 return
-            steps = self._codec.read(raw)
+            command = known[1]
         self.age_s = 0.0
-        self.command = 0.0 if steps is None else steps / self._codec.steps
+        self.command = command
+
+    def _read(self, data: bytes) -> tuple[int, float]:
+        """Alive counter and command of a frame, kept for when the same bytes come again."""
+        if len(self._known) >= MOST_KNOWN:
+            self._known.clear()
+        raw = self._layout.decode(data)
+        command = (self._codec.read(raw) or 0) / self._codec.steps
+        known = self._known[data] = raw[self._counter] if self._counter else 0, command
+        return known
 
 
 class _ValveFeedback:
@@ -98,10 +110,12 @@ class PlantNode:
     """Valves, crane and grapple behind the valve messages of a deployment.
 
     Args:
-        deployment: names the valve messages; its axes tell the machine where none is named.
+        deployment: names the valve messages; its axes name the machine where none is named.
         parameters: the crane; by default the nominal one.
         machine: one of `machines.MACHINES`.
         sway: swing of the grapple at the start; by default it hangs still.
+        listeners: whether others than the controller listen; without them pose, speeds and sway
+            are only sent where the controller receives them.
 
     Raises:
         ConfigError: an axis that this machine does not have, or no feedback messages in the
@@ -115,6 +129,8 @@ class PlantNode:
         parameters: CraneParameters | None = None,
         machine: str | None = None,
         sway: Sway | None = None,
+        *,
+        listeners: bool = True,
     ) -> None:
         name = machine_for(deployment.axes, machine)
         problems = _axis_problems(deployment, name, named=machine is not None)
@@ -135,6 +151,13 @@ class PlantNode:
                 self._senders[message] = Sender(bus, found[1], protection=protection)
         if problems:
             raise ConfigError(problems)
+        if not listeners:
+            received = deployment.routing.received
+            self._feedback = {
+                message: signals
+                for message, signals in self._feedback.items()
+                if received(self._senders[message].key)
+            }
         self._machine = build_machine(name, parameters, sway)
         self._valve_feedback = [
             _ValveFeedback(axis, bound.feedback)
@@ -145,9 +168,9 @@ class PlantNode:
         self._sway_sensors = sensor_messages(deployment, sensors)
         self._canopen = CanopenSide(deployment)
         self._passed_s = 0.0
-        inputs = [_ValveInput(axis, deployment) for axis in deployment.axes]
+        self._inputs = {axis: _ValveInput(axis, deployment) for axis in deployment.axes}
         self._valves: dict[tuple[str, int, bool], list[_ValveInput]] = {}
-        for valve in inputs:
+        for valve in self._inputs.values():
             key = deployment.axes[valve.axis].valve.message.sender.key
             self._valves.setdefault(key, []).append(valve)
 
@@ -156,21 +179,26 @@ class PlantNode:
         """Crane and grapple."""
         return self._machine.crane
 
+    def command(self, axis: str) -> float:
+        """What the last frame of a valve says, -1 .. 1; 0 once it has closed by itself."""
+        return self._inputs[axis].command
+
     def receive(self, frame: Frame) -> None:
         """Take a frame from a bus; those that are no valve commands are passed over."""
         for valve in self._valves.get(frame[:3], ()):
             valve.receive(frame.data)
-        self._canopen.receive(frame)
+        if self._canopen.present:
+            self._canopen.receive(frame)
 
     def advance(self, dt_s: float) -> None:
         """Let time pass with the last commands held, as long as the valves hold them."""
         self._passed_s += dt_s
-        commands = {}
-        for valve in (one for shared in self._valves.values() for one in shared):
+        commands, canopen = {}, self._canopen
+        for valve in self._inputs.values():
             if valve.age_s >= valve.timeout_s:
                 valve.command = 0.0
             valve.age_s += dt_s
-            closed = self._canopen.closed(valve.axis)
+            closed = canopen.present and canopen.closed(valve.axis)
             if valve.axis != ROTATOR:
                 commands[valve.axis] = 0.0 if closed else valve.command
         self._machine.step(dt_s, commands)
@@ -178,29 +206,41 @@ class PlantNode:
     def feedback(self) -> list[Frame]:
         """What the valves say of themselves, pose, speeds and sway as frames."""
         state = self.crane.state
-        values: dict[str, tuple[float, ...]] = {
-            "TipPosition": (_heading_deg(state.theta1_rad), state.radius_m, state.height_m),
-            "TipVelocity": (state.theta1_rate_rad_s, state.radius_rate_m_s, state.height_rate_m_s),
-            "GrappleSway": (math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)),
-        }
-        boom = self.crane.boom
-        if isinstance(boom, JointBoom):
-            slew, lift, knuckle, extension = boom.joints
-            angles = (math.degrees(angle) for angle in (slew, lift, knuckle))
-            values["JointPosition"] = (*angles, extension)
-            values["JointVelocity"] = boom.joint_rates
-        frames = []
-        for name, signals in self._feedback.items():
-            sender = self._senders[name]
-            raw = {s: sender.fields.raw(s, v) for s, v in zip(signals, values[name], strict=True)}
-            frames.append(sender.frame(raw))
+        frames = self._measured(state) if self._feedback else []
         for valve in self._valve_feedback:
             frames += valve.frames(self.crane, self._passed_s)
         for sensors in self._sway_sensors:
-            frames += sensors.frames(state, self._passed_s)
-        frames += self._canopen.frames(self._passed_s)
+            due = sensors.frames(state, self._passed_s)
+            frames += [frame for frame in due if self._canopen.works(frame.bus, sensors.node)]
+        if self._canopen.present:
+            frames += self._canopen.frames(self._passed_s)
         self._passed_s = 0.0
         return frames
+
+    def _measured(self, state: CraneState) -> list[Frame]:
+        """Pose, speeds and sway as frames."""
+        frames = []
+        for name, signals in self._feedback.items():
+            sender = self._senders[name]
+            values = self._values(name, state)
+            raw = {s: sender.fields.raw(s, v) for s, v in zip(signals, values, strict=True)}
+            frames.append(sender.frame(raw))
+        return frames
+
+    def _values(self, name: str, state: CraneState) -> tuple[float, ...]:
+        """Of the signals of a feedback message, in its order."""
+        if name == "TipPosition":
+            return _heading_deg(state.theta1_rad), state.radius_m, state.height_m
+        if name == "TipVelocity":
+            return state.theta1_rate_rad_s, state.radius_rate_m_s, state.height_rate_m_s
+        if name == "GrappleSway":
+            return math.degrees(state.theta5_rad), math.degrees(state.theta6_rad)
+        boom = self.crane.boom
+        assert isinstance(boom, JointBoom)
+        if name == "JointVelocity":
+            return boom.joint_rates
+        slew, lift, knuckle, extension = boom.joints
+        return math.degrees(slew), math.degrees(lift), math.degrees(knuckle), extension
 
 
 def _heading_deg(theta1_rad: float) -> float:

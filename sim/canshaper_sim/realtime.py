@@ -38,7 +38,10 @@ def open_ports(deployment: Deployment) -> dict[str, Port]:
     def ignore(_fault: FrameFault) -> None:
         pass
 
-    return {name: open_port(name, bus, ignore) for name, bus in deployment.config.buses.items()}
+    return {
+        name: open_port(name, bus, ignore, fd=deployment.routing.buses[name].fd)
+        for name, bus in deployment.config.buses.items()
+    }
 
 
 def run_plant(
@@ -69,8 +72,8 @@ def run_plant(
             port.close()
 
 
-def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> None:
-    """Play a script once on the joysticks, then leave them in neutral."""
+def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> bool:
+    """Play a script once on the joysticks, then leave them in neutral; whether all was played."""
     node = JoystickNode(deployment, script, bypass=bypass)
     ports = open_ports(deployment)
     stop = StopFlag()
@@ -90,3 +93,4 @@ def run_operator(deployment: Deployment, script: Script, *, bypass: bool) -> Non
     finally:
         for port in ports.values():
             port.close()
+    return not stop.set

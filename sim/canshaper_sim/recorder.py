@@ -6,19 +6,23 @@ none. With joint commands the three boom joints thus show the same sway, each wi
 """
 
 import math
-from typing import Any
+from collections.abc import Callable, Mapping
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, with_source
+from canshaper.codec.signals import FieldSet
+from canshaper.machine.bound_axis import BoundAxis
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundJoystick
-from canshaper.shaping.limits import without_deadband
+from canshaper.shaping.limits import OutputLimits, without_deadband
 from canshaper.shaping.states import Reason
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recording import AxisTrace, CraneTrace, Point, Recording
 
-# Slewing is told by both; a machine moved by its tip need not send JointVelocity.
+_Handler = Callable[[bytes, float], None]  # data of the right length, time in s
+
+# Slewing is in both; a machine moved by its tip need not send JointVelocity.
 _SPEED_SIGNALS = {
     "TipVelocity": {SLEW: "SlewRate", NEAR_FAR: "RadialSpeed", LIFT: "VerticalSpeed"},
     "JointVelocity": {
@@ -27,13 +31,8 @@ _SPEED_SIGNALS = {
         EXTENSION: "ExtensionSpeed",
     },
 }
-_SWAY_SIGNAL = {
-    SLEW: "SwayPerpendicular",
-    NEAR_FAR: "SwayParallel",
-    LIFT_CYLINDER: "SwayParallel",
-    KNUCKLE: "SwayParallel",
-    EXTENSION: "SwayParallel",
-}
+_SWAY_SIGNALS = ACROSS, ALONG = "SwayPerpendicular", "SwayParallel"
+_SWAY_SIGNAL = {SLEW: ACROSS, **dict.fromkeys((NEAR_FAR, LIFT_CYLINDER, KNUCKLE, EXTENSION), ALONG)}
 
 
 class Recorder:
@@ -41,47 +40,41 @@ class Recorder:
 
     def __init__(self, deployment: Deployment, parameters: CraneParameters | None = None) -> None:
         crane = parameters or CraneParameters()
-        self._full = {
-            SLEW: crane.slew_full_speed_rad_s,
-            NEAR_FAR: crane.near_far_full_speed_m_s,
-            LIFT: crane.lift_full_speed_m_s,
-            LIFT_CYLINDER: crane.joints.lift_cylinder_full_speed_rad_s,
-            KNUCKLE: crane.joints.knuckle_full_speed_rad_s,
-            EXTENSION: crane.joints.extension_full_speed_m_s,
-        }
+        self._full = crane.full_speeds
         self._grapple = crane.grapple
         self._tip = (0.0, 0.0)  # slew angle in rad, radius in m
-        self._axes = deployment.axes
-        self._handlers: dict[tuple[str, int, bool], Any] = {}
-        self._joysticks: dict[str, BoundJoystick] = {}
+        self._start_s: float | None = None
+        # Of each axis: joystick, sent, speed, sway.
+        self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in deployment.axes}
+        self._t_s: list[float] = []
+        self._rows: dict[str, list[list[float]]] = {name: [] for name in deployment.axes}
+        self._crane: list[tuple[Point, Point, float]] = []  # tip, grapple, total swing
+        self.missed_deadlines = 0
+        self.seen: set[str] = set()
+        self._handlers: dict[tuple[str, int, bool], tuple[str, int, _Handler]] = {}
         for joystick in deployment.joysticks.values():
-            self._handlers[joystick.key] = (self._joystick, joystick.message)
-            self._joysticks[joystick.message.name] = joystick
-        self._valves: dict[str, list[str]] = {}
+            handler = self._joystick(joystick, deployment.axes)
+            self._handlers[joystick.key] = joystick.message.name, joystick.message.length, handler
+        valves: dict[tuple[str, int, bool], dict[str, BoundAxis]] = {}
         for name, axis in deployment.axes.items():
-            message = axis.valve_message
-            self._handlers[axis.valve.message.sender.key] = (self._valve, message)
-            self._valves.setdefault(message.name, []).append(name)
-        for message_name, handler in (
+            valves.setdefault(axis.valve.message.sender.key, {})[name] = axis
+        for key, axes in valves.items():
+            message = next(iter(axes.values())).valve_message
+            self._handlers[key] = message.name, message.length, self._valve(axes)
+        for name, feedback in (
             ("TipVelocity", self._speed),
             ("JointVelocity", self._speed),
             ("TipPosition", self._position),
             ("GrappleSway", self._sway),
             ("ShaperStatus", self._status),
         ):
-            found = deployment.messages.find(message_name)
+            found = deployment.messages.find(name)
             if not isinstance(found, str):
                 message = found[1]
+                handler = feedback(FieldSet(message))
                 for bus in deployment.config.buses:
                     key = (bus, message.frame_id, message.is_extended_frame)
-                    self._handlers[key] = (handler, message)
-        self._start_s: float | None = None
-        self._now = {name: [0.0, 0.0, 0.0, 0.0] for name in self._axes}
-        self._t_s: list[float] = []
-        self._rows: dict[str, list[list[float]]] = {name: [] for name in self._axes}
-        self._crane: list[tuple[Point, Point, float]] = []  # tip, grapple, total swing
-        self.missed_deadlines = 0
-        self.seen: set[str] = set()
+                    self._handlers[key] = name, message.length, handler
 
     def receive(self, frame: Frame, time_s: float) -> None:
         """Take a frame seen at this time (any origin, increasing)."""
@@ -90,9 +83,10 @@ class Recorder:
             entry = self._handlers.get((frame.bus, with_source(frame.can_id, NULL), True))
         if entry is None:
             return
-        handler, message = entry
-        self.seen.add(message.name)
-        handler(message, frame.data, time_s)
+        name, length, handler = entry
+        if len(frame.data) == length:
+            self.seen.add(name)
+            handler(frame.data, time_s)
 
     def recording(self) -> Recording:
         """Everything so far."""
@@ -106,59 +100,97 @@ class Recorder:
         )
         return Recording(list(self._t_s), traces, CraneTrace(tip, grapple, sway))
 
-    @staticmethod
-    def _raw(message: Any, data: bytes) -> Any:
-        return message.decode(data, decode_choices=False, scaling=False)
+    def _joystick(self, joystick: BoundJoystick, axes: Mapping[str, BoundAxis]) -> _Handler:
+        commanded = [
+            (self._now[name], axis.config.command.signal)
+            for name, axis in axes.items()
+            if axis.config.command.joystick == joystick.name
+        ]
 
-    def _joystick(self, message: Any, data: bytes, time_s: float) -> None:
-        if self._start_s is None:
-            self._start_s = time_s
-        joystick = self._joysticks[message.name]
-        _, commands = joystick.codec.decode(data)
-        for name, axis in self._axes.items():
-            if axis.config.command.joystick == joystick.name:
-                command = commands[axis.config.command.signal]
-                self._now[name][0] = 0.0 if isinstance(command, Reason) else command
+        def receive(data: bytes, time_s: float) -> None:
+            if self._start_s is None:
+                self._start_s = time_s
+            _, commands = joystick.codec.decode(data)
+            for now, signal in commanded if commands else ():
+                command = commands[signal]
+                now[0] = 0.0 if isinstance(command, Reason) else command
 
-    def _valve(self, message: Any, data: bytes, _time_s: float) -> None:
-        raw = self._raw(message, data)
-        for name in self._valves[message.name]:
-            axis = self._axes[name]
-            command = (axis.valve.read(raw) or 0) / axis.valve.steps
-            limits = axis.config.limits.output_limits()
-            self._now[name][1] = (
-                limits.curve.velocity(command)
-                if limits.curve
-                else without_deadband(command, limits.deadband)
-            )
+        return receive
 
-    def _speed(self, message: Any, data: bytes, _time_s: float) -> None:
-        values = message.decode(data)
-        for name, signal in _SPEED_SIGNALS[message.name].items():
-            if name in self._now:
-                self._now[name][2] = values[signal] / self._full[name]
+    def _valve(self, axes: Mapping[str, BoundAxis]) -> _Handler:
+        driven = [
+            (self._now[name], axis.valve, axis.config.limits.output_limits())
+            for name, axis in axes.items()
+        ]
+        layout = next(iter(axes.values())).valve.message.sender.fields.layout
 
-    def _position(self, message: Any, data: bytes, _time_s: float) -> None:
-        values = message.decode(data)
-        self._tip = (math.radians(values["SlewAngle"]), values["Radius"])
+        def receive(data: bytes, _time_s: float) -> None:
+            raw = layout.decode(data)
+            for now, valve, limits in driven:
+                now[1] = meant((valve.read(raw) or 0) / valve.steps, limits)
 
-    def _sway(self, message: Any, data: bytes, time_s: float) -> None:
-        if self._start_s is None:
-            return
-        values = message.decode(data)
-        self._t_s.append(time_s - self._start_s)
-        across, along = values["SwayPerpendicular"], values["SwayParallel"]
-        heading, radius_m = self._tip
-        offset = self._grapple.offset_m(math.radians(across), math.radians(along))
-        tip = _from_above(heading, radius_m, 0.0)
-        grapple = _from_above(heading, radius_m + offset[0], offset[1])
-        self._crane.append((tip, grapple, math.hypot(across, along)))
-        for name, now in self._now.items():
-            now[3] = values.get(_SWAY_SIGNAL.get(name), 0.0)
-            self._rows[name].append(list(now))
+        return receive
 
-    def _status(self, message: Any, data: bytes, _time_s: float) -> None:
-        self.missed_deadlines = int(self._raw(message, data)["MissedDeadlines"])
+    def _speed(self, fields: FieldSet) -> _Handler:
+        value = fields.value
+        speeds = [
+            (self._now[name], signal, self._full[name])
+            for name, signal in _SPEED_SIGNALS[fields.message.name].items()
+            if name in self._now
+        ]
+
+        def receive(data: bytes, _time_s: float) -> None:
+            raw = fields.layout.decode(data)
+            for now, signal, full in speeds:
+                now[2] = value(signal, raw[signal]) / full
+
+        return receive
+
+    def _position(self, fields: FieldSet) -> _Handler:
+        value = fields.value
+
+        def receive(data: bytes, _time_s: float) -> None:
+            raw = fields.layout.decode(data)
+            heading = math.radians(value("SlewAngle", raw["SlewAngle"]))
+            self._tip = heading, value("Radius", raw["Radius"])
+
+        return receive
+
+    def _sway(self, fields: FieldSet) -> _Handler:
+        rows = [
+            (self._now[name], self._rows[name], _SWAY_SIGNAL.get(name, "")) for name in self._now
+        ]
+
+        def receive(data: bytes, time_s: float) -> None:
+            if self._start_s is None:
+                return
+            raw = fields.layout.decode(data)
+            sways = {signal: fields.value(signal, raw[signal]) for signal in _SWAY_SIGNALS}
+            self._t_s.append(time_s - self._start_s)
+            across, along = sways.values()
+            heading, radius_m = self._tip
+            offset = self._grapple.offset_m(math.radians(across), math.radians(along))
+            tip = _from_above(heading, radius_m, 0.0)
+            grapple = _from_above(heading, radius_m + offset[0], offset[1])
+            self._crane.append((tip, grapple, math.hypot(across, along)))
+            for now, kept, signal in rows:
+                now[3] = sways.get(signal, 0.0)
+                kept.append(now.copy())
+
+        return receive
+
+    def _status(self, fields: FieldSet) -> _Handler:
+        def receive(data: bytes, _time_s: float) -> None:
+            self.missed_deadlines = int(fields.layout.decode(data)["MissedDeadlines"])
+
+        return receive
+
+
+def meant(command: float, limits: OutputLimits) -> float:
+    """Velocity that a deployment means by a command of a valve frame."""
+    if limits.curve:
+        return limits.curve.velocity(command)
+    return without_deadband(command, limits.deadband)
 
 
 def _from_above(heading: float, out_m: float, across_m: float) -> Point:

@@ -7,7 +7,6 @@ from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
 from canshaper.machine.deployment import Deployment
 from canshaper.machine.sway_sensor import BoundSwaySensor
-from canshaper.shaping.observer import Measured
 from canshaper_sim.axes import SLEW
 from canshaper_sim.crane import CraneState
 from canshaper_sim.grapple import Sway
@@ -20,16 +19,20 @@ class SensorMessage:
     Args:
         axes: the sensors of the deployment that are read from it, by axis.
         parameters: what they make of the swing.
+
+    Attributes:
+        node: name of the node of CANopen that sends it; None without one that is watched.
     """
 
     def __init__(
         self, axes: Mapping[str, BoundSwaySensor], parameters: SwaySensorParameters
     ) -> None:
         first = next(iter(axes.values()))
-        message = first.message
+        message, self.node = first.message, first.config.node
         self._sender = Sender(
             message.config.bus, message.message, message.key[1] & 0xFF, message.protection
         )
+        self._merits = dict.fromkeys(message.merits.values(), 0)
         self._cycle_s = self._left_s = first.cycle_s
         self._lost_s = parameters.lost_s
         self._sensors = {
@@ -39,7 +42,7 @@ class SensorMessage:
                     parameters,
                     name,
                     across=name == SLEW,
-                    rate=bound.config.measured is Measured.RATE,
+                    kind=bound.config.kind,
                 ),
             )
             for name, bound in axes.items()
@@ -63,7 +66,7 @@ class SensorMessage:
                 name: fields.raw(name, math.radians(sensor.value(time_s)) / unit)
                 for name, (unit, sensor) in self._sensors.items()
             }
-            yield self._sender.frame(raw)
+            yield self._sender.frame(raw | self._merits)
 
 
 def sensor_messages(

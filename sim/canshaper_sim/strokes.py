@@ -14,6 +14,9 @@ from canshaper_sim.axes import ALL_AXES
 
 _HUMAN_RAMP_S = 0.12  # a trained hand moves a joystick from neutral to full in 0.1 .. 0.15 s
 
+# So long after its end a stroke is over, however start, duration and ramp were rounded.
+_PAST_S = 1e-6
+
 # name -> (lowest, highest) value of a stroke.
 _ALLOWED = {
     "start_s": (0.0, math.inf),
@@ -73,7 +76,9 @@ class Script:
     name: str
     strokes: tuple[Stroke, ...]
     duration_s: float
-    _by_axis: dict[str, tuple[Stroke, ...]] = field(init=False, repr=False, compare=False)
+    _by_axis: dict[str, tuple[tuple[float, float, Stroke], ...]] = field(
+        init=False, repr=False, compare=False
+    )
 
     def __post_init__(self) -> None:
         for stroke in self.strokes:
@@ -83,10 +88,9 @@ class Script:
                     f"script {self.name}: end of a {stroke.axis} stroke: expected up to"
                     f" duration_s = {self.duration_s}, got {stroke.end_s}"
                 )
+        in_order = sorted(self.strokes, key=lambda stroke: stroke.start_s)
         by_axis = {
-            axis: tuple(
-                sorted((s for s in self.strokes if s.axis == axis), key=lambda s: s.start_s)
-            )
+            axis: tuple((s.start_s, s.end_s + _PAST_S, s) for s in in_order if s.axis == axis)
             for axis in self.axes
         }
         object.__setattr__(self, "_by_axis", by_axis)
@@ -99,9 +103,13 @@ class Script:
 
     def command(self, axis: str, time_s: float) -> float:
         """Joystick value -1 .. 1 of one axis; neutral for an axis the script does not move."""
+        strokes = self._by_axis.get(axis)
+        if strokes is None:
+            return 0.0
         value = 0.0
-        for stroke in self._by_axis.get(axis, ()):
-            if time_s < stroke.start_s:
+        for start_s, past_s, stroke in strokes:
+            if time_s < start_s:
                 break
-            value += stroke.command(time_s)
-        return max(-1.0, min(1.0, value))
+            if time_s <= past_s:
+                value += stroke.command(time_s)
+        return -1.0 if value < -1.0 else 1.0 if value > 1.0 else value

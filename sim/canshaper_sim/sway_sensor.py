@@ -6,6 +6,7 @@ from collections import deque
 from dataclasses import dataclass
 from typing import Final
 
+from canshaper.config.sway_sensor import Kind
 from canshaper_sim.grapple import Sway
 from canshaper_sim.ranges import check_ranges
 
@@ -18,6 +19,7 @@ _ALLOWED = {
     "delay_s": (0.0, 1.0),
     "gain": (-5.0, 5.0),
     "resolution_deg": (0.0, 10.0),
+    "fusion_s": (0.0, 1000.0),
     "seed": (0.0, 1e9),
     "lost_s": (0.0, math.inf),
     "stuck_s": (0.0, math.inf),
@@ -39,6 +41,8 @@ class SwaySensorParameters:
     delay_s: float = 0.02
     gain: float = 1.0  # -1: mounted the wrong way round
     resolution_deg: float = 0.0  # 0: that of the signal
+    # Of an inclinometer: accelerations correct its gyro with this time constant; 0: no gyro.
+    fusion_s: float = 5.0
     seed: float = 1
     lost_s: float = math.inf  # no frame comes any more
     stuck_s: float = math.inf  # the same value for ever
@@ -57,30 +61,46 @@ class SwaySensor:
         parameters: what it makes of the swing.
         name: of its own, for noise of its own.
         across: it measures across the boom (theta5), else along it (theta6).
-        rate: it measures the rate, else the angle.
+        kind: what it measures.
     """
 
     def __init__(
-        self, parameters: SwaySensorParameters, name: str, *, across: bool, rate: bool
+        self,
+        parameters: SwaySensorParameters,
+        name: str,
+        *,
+        across: bool,
+        kind: Kind,
     ) -> None:
-        self._parameters, self._across, self._rate = parameters, across, rate
+        self._parameters, self._across, self._kind = parameters, across, kind
+        self._hidden = 0.0  # of the angle, by accelerations that correct a gyro
         self._noise = random.Random(f"{parameters.seed:g} {name}")
         self._past: deque[tuple[float, float]] = deque()
         self._stuck: float | None = None
 
     def swing(self, time_s: float, sway: Sway) -> None:
         """The grapple has moved on."""
+        rate = self._kind == "rate"
         if self._across:
-            swing = sway.theta5_rate_rad_s if self._rate else sway.theta5_rad
+            swing = sway.theta5_rate_rad_s if rate else sway.theta5_rad
         else:
-            swing = sway.theta6_rate_rad_s if self._rate else sway.theta6_rad
+            swing = sway.theta6_rate_rad_s if rate else sway.theta6_rad
         past = self._past
+        if self._kind == "inclination":
+            swing = self._fused(swing, time_s - past[-1][0] if past else math.inf)
         if not past:  # it has long swung like that
             past.append((-math.inf, math.degrees(swing)))
         past.append((time_s, math.degrees(swing)))
         before_s = time_s - self._parameters.delay_s + _SAME_TIME_S
         while len(past) > 1 and past[1][0] <= before_s:
             past.popleft()
+
+    def _fused(self, angle: float, passed_s: float) -> float:
+        """An angle by a gyro that accelerations correct: they show 0 on a free pendulum."""
+        fusion_s = self._parameters.fusion_s
+        share = -math.expm1(-passed_s / fusion_s) if fusion_s else 1.0
+        self._hidden += share * (angle - self._hidden)
+        return angle - self._hidden
 
     def value(self, time_s: float) -> float:
         """What it shows, degrees or degrees per second."""

@@ -1,9 +1,10 @@
 """One proportional valve with its actuator: from the value in the valve frame to a speed.
 
-The command goes, in this order, through dead time (bus, valve electronics), the deadband of the
-spool, the flow limit, the rate limit of the spool and the first-order lag of oil and actuator.
-All values are fractions of the full speed of the axis. Between two changes of the command the
-spool moves on straight lines, so rate limit and lag are solved exactly for any step length.
+The command goes, in this order, through dead time (bus, valve electronics), the hysteresis of the
+magnet, the deadband of the spool, the flow limit, the rate limit of the spool and the first-order
+lag of oil and actuator. All values are fractions of the full speed of the axis. Between two changes
+of the command the spool moves on straight lines, so rate limit and lag are solved exactly for any
+step length.
 """
 
 import math
@@ -20,6 +21,7 @@ _ALLOWED = {
     "dead_time_s": (0.0, 0.2),
     "deadband": (0.0, 0.5),
     "negative_more_deadband": (-0.3, 0.3),
+    "hysteresis": (0.0, 0.2),
     "negative_gain": (0.2, 1.0),
     "flow_limit": (0.05, 1.0),
     "rate_limit_1_s": (0.1, math.inf),  # inf: no rate limit
@@ -34,6 +36,7 @@ class ValveParameters:
     dead_time_s: float = 0.0  # delay of the whole command
     deadband: float = 0.05  # fraction of full stroke in which no oil flows
     negative_more_deadband: float = 0.0  # what negative commands need besides to open it
+    hysteresis: float = 0.0  # play between command and spool, fraction of full stroke
     negative_gain: float = 1.0  # speed at full negative command, fraction of full speed
     flow_limit: float = 1.0  # largest |speed|, fraction of full speed
     rate_limit_1_s: float = 5.0  # full speeds per second of spool travel
@@ -59,13 +62,15 @@ class ValveParameters:
 
 
 class Valve:
-    """A valve in motion: `set_command`, then `advance` in steps, read `speed` and `speed_rate`."""
+    """A valve in motion: `set_command`, then `advance` in steps, read `speed`."""
 
     __slots__ = (
+        "_command",
         "_decay",
         "_decay_step_s",
         "_lag_s",
         "_pending",
+        "_played",
         "_ramp_1_s",
         "_requested",
         "_spool",
@@ -80,6 +85,8 @@ class Valve:
         self.speed = 0.0  # achieved speed, fraction of full speed
         self._lag_s = self.parameters.lag_s
         self._ramp_1_s = self.parameters.rate_limit_1_s
+        self._command = 0.0  # the last one
+        self._played = 0.0  # command that the spool has followed, behind its play
         self._spool = 0.0  # flow after the rate limit, before the lag
         self._target = 0.0  # flow the spool moves to
         self._requested = 0.0  # flow of the last command, still in the dead time
@@ -88,19 +95,19 @@ class Valve:
         self._decay_step_s = 0.0  # step length for which _decay is valid
         self._decay = 1.0
 
-    @property
-    def speed_rate(self) -> float:
-        """Derivative of `speed` in full speeds per second, just after the present instant."""
-        return (self._spool - self.speed) / self._lag_s
-
     def set_command(self, command: float) -> None:
         """The valve frame carries `command` from now on; -1 .. 1, larger values meet the limit.
 
         Raises ValueError for a value that is not finite.
         """
+        if command == self._command:
+            return
         if not math.isfinite(command):
             raise ValueError(f"valve: command: expected a finite value, got {command}")
-        flow = self.parameters.flow(command)
+        self._command = command
+        half = 0.5 * self.parameters.hysteresis
+        self._played = min(max(self._played, command - half), command + half)
+        flow = self.parameters.flow(self._played)
         if flow == self._requested:
             return
         self._requested = flow
@@ -109,7 +116,28 @@ class Valve:
         else:
             self._move_to(flow)
 
-    def advance(self, step_s: float) -> None:
+    def advance(self, step_s: float) -> tuple[float, float, float, float]:
+        """Let step_s seconds pass, in two halves.
+
+        Returns:
+            Derivative of ``speed`` just after the start, full speeds per second; ``speed`` in the
+            middle; ``speed`` at the end, and its derivative there.
+        """
+        speed, spool, half_s, lag_s = self.speed, self._spool, 0.5 * step_s, self._lag_s
+        start_rate = (spool - speed) / lag_s
+        if spool == self._target and not self._pending:  # nearly always: the lag alone is left
+            decay = self._decay_over(half_s)
+            middle = spool + (speed - spool) * decay
+            self.speed = speed = spool + (middle - spool) * decay
+            self._time_s = self._time_s + half_s + half_s
+            return start_rate, middle, speed, (spool - speed) / lag_s
+        self._pass(half_s)
+        middle = self.speed
+        self._pass(half_s)
+        speed = self.speed
+        return start_rate, middle, speed, (self._spool - speed) / lag_s
+
+    def _pass(self, step_s: float) -> None:
         """Let step_s seconds pass."""
         rest_s = step_s
         while self._pending:
@@ -138,8 +166,7 @@ class Valve:
         spool = self._spool
         gap = self._target - spool
         if gap == 0.0:
-            if self.speed != spool:
-                self.speed = spool + (self.speed - spool) * self._decay_over(step_s)
+            self.speed = spool + (self.speed - spool) * self._decay_over(step_s)
             return
         ramp = math.copysign(self._ramp_1_s, gap)
         arrival_s = gap / ramp

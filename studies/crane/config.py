@@ -73,9 +73,9 @@ class Joints(Section):
     @model_validator(mode="after")
     def _in_one_plane(self) -> Self:
         for name, twist in _PLANE.items():
-            found = getattr(self, name).alpha_deg
-            if found != twist:
-                raise DesignError(f"{name}.alpha_deg: expected {twist:g} (Eq. 3), got {found:g}")
+            angle = getattr(self, name).alpha_deg
+            if angle != twist:
+                raise DesignError(f"{name}.alpha_deg: expected {twist:g} (Eq. 3), got {angle:g}")
         for name, value in (
             ("slew.a_m", self.slew.a_m),
             ("lift.d_m", self.lift.d_m),

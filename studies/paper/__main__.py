@@ -11,8 +11,8 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from canshaper.cli.common import (
     echo,
     fail,
+    install_line,
     loader,
-    picture_line,
 )
 from canshaper.report.console import SafeConsole
 from canshaper.shipped import data_directory
@@ -108,7 +108,7 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
     for finding, path in drawn:
         console.print(f"{path}: {finding}")
     if not drawn:
-        console.print(picture_line(None))
+        console.print(f"Pictures: none, matplotlib is missing: {install_line('matplotlib')}")
 
 
 def _picture(study: "Study", number: int) -> "tuple[str, Figure | None]":

@@ -212,7 +212,7 @@ def _name_raw(panel: Axes, run: Run, plane: Plane) -> None:
 
 
 def _commands(panel: Axes, runs: Sequence[Run]) -> None:
-    """The joystick as a filled step, and what was sent; a command beyond full speed is told."""
+    """The joystick as a filled step, and what was sent; a command beyond full speed is noted."""
     raw = runs[0].raw
     joystick = [100.0 * v for v in raw.axes[runs[0].axis].joystick]
     zero_line(panel)

@@ -21,10 +21,11 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.sway import SwayMode, SwayModel
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
-from canshaper_sim.crane import Crane, CraneParameters, TipBoom
+from canshaper_sim.crane import Crane, CraneParameters
 from canshaper_sim.grapple import Grapple
 from canshaper_sim.recording import AxisTrace, Recording
 from canshaper_sim.strokes import Script, Stroke
+from canshaper_sim.tip_boom import TipBoom
 from canshaper_sim.valve import ValveParameters
 from studies.paper.runs import Run
 

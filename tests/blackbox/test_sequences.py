@@ -4,6 +4,7 @@ import os
 from collections import Counter
 from functools import cached_property
 from pathlib import Path
+from types import FunctionType
 from unittest.mock import patch
 
 import pytest
@@ -13,12 +14,13 @@ from canshaper.blackbox.records import records
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.daemon import daemon
+from canshaper.machine.binding import load_deployment
 from canshaper.recording import play
 from tests.blackbox.kept import Kept, unpacked
 from tests.faults import variants
 from tests.faults.guarded import Unrefused
 from tests.faults.sequence import Sequence
-from tests.faults.shipped import NAMES
+from tests.faults.shipped import CONFIG, NAMES
 
 COUNT = int(os.environ.get("CANSHAPER_BOXES", "6"))
 
@@ -63,11 +65,14 @@ def test_what_is_played_is_the_same(name: str, tmp_path: Path) -> None:
 
 
 def held(one: object, seen: dict[int, object]) -> None:
-    """Note every object of ours that can be reached."""
-    if id(one) in seen or isinstance(one, (*state.FIXED, type, str, bytes, int, float)):
+    """Note every object of ours that can be reached, and every function."""
+    if id(one) in seen or isinstance(one, (type, str, bytes, int, float)):
         return
-    seen[id(one)] = one
-    if isinstance(one, dict):
+    if not isinstance(one, state.FIXED) or isinstance(one, FunctionType):
+        seen[id(one)] = one
+    if isinstance(one, state.FIXED):
+        parts: list[object] = []
+    elif isinstance(one, dict):
         parts = [*one.keys(), *one.values()]
     elif isinstance(one, (list, tuple, set, frozenset)):
         parts = list(one)
@@ -91,6 +96,14 @@ def test_no_attribute_of_a_state_is_left_out(name: str) -> None:
             assert vars(one).keys() - cached <= set(names), kind
             looked_at[kind.__name__] += 1
     assert looked_at["Axis"] and looked_at["AxisRunner"] and looked_at["Controller"]
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_no_function_of_a_state_holds_on_to_another_controller(name: str) -> None:
+    """Functions are kept by number: such a one would ask the parts of the controller before."""
+    seen: dict[int, object] = {}
+    held(Guarded(Controller(load_deployment(CONFIG / f"{name}.yaml"))), seen)
+    assert not [one for one in seen.values() if getattr(one, "__closure__", None)]
 
 
 def test_a_frame_that_is_too_long_stays_so(tmp_path: Path) -> None:

@@ -15,11 +15,11 @@ class FakeDevices:
 
     Attributes:
         root: of the file system.
-        kinds: kind and bit rate by the index of the interface.
+        kinds: kind and bit rates by the index of the interface.
     """
 
     root: Path
-    kinds: dict[int, tuple[str | None, int | None]] = field(default_factory=dict)
+    kinds: dict[int, tuple[str | None, int | None, int | None]] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         (self.root / "sys/class/net").mkdir(parents=True)
@@ -32,6 +32,7 @@ class FakeDevices:
         *,
         driver: str = "peak_usb",
         bitrate: int | None = 250_000,
+        data_bitrate: int | None = None,
         dev_port: str = "0",
         dev_id: str = "0x0",
     ) -> None:
@@ -44,7 +45,7 @@ class FakeDevices:
         for file, text in files.items():
             (net / file).write_text(f"{text}\n")
         (self.root / "sys/class/net" / name).symlink_to(net)
-        self.kinds[index] = ("can" if place else driver, bitrate)
+        self.kinds[index] = ("can" if place else driver, bitrate, data_bitrate)
         if place:
             (net / "device").symlink_to(devices / place)
             self._link(devices / place / "driver", f"bus/drivers/{driver}")

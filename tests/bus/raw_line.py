@@ -11,13 +11,15 @@ from typing import Any
 import can
 from can.interfaces.socketcan.socketcan import build_can_frame
 
-from canshaper.bus.raw import SIZE, RawPort
+from canshaper.bus.packet import FD_SIZE
+from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
 TICK_NS = 20_000_000
 MARK_AT = 5  # a byte of the structure that is padding
+MARK = 0x80  # of CAN FD these are flags, of which this is none
 
 VALVE = Frame("crane", 0x200, False, b"\x05\x01")
 OTHER = Frame("crane", 0x201, False, b"\x00\x01")
@@ -36,7 +38,7 @@ class Near(socket.socket):
     def recvmsg(self, *arguments: int) -> Any:
         self._fail()
         data, ancillary, flags, sender = super().recvmsg(*arguments)
-        if data[MARK_AT : MARK_AT + 1] == b"\1":
+        if data[MARK_AT : MARK_AT + 1] >= bytes((MARK,)):
             flags |= socket.MSG_CONFIRM
         return data, ancillary, flags, sender
 
@@ -59,16 +61,28 @@ class Line:
     Args:
         ids: the messages of the port, which then has three sockets; without, it has one.
         matched: the deployment names the device of the bus.
+        fd: the bus is one of CAN FD.
+        brs: its data have a bit rate of their own.
     """
 
-    def __init__(self, ids: BusRoutes | None = IDS, *, matched: bool = False) -> None:
+    def __init__(
+        self,
+        ids: BusRoutes | None = IDS,
+        *,
+        matched: bool = False,
+        fd: bool = False,
+        brs: bool = False,
+    ) -> None:
         self.faults: list[FrameFault] = []
         self.asked: list[BusRoutes | None] = []
         self.refuse: OSError | WrongDeviceError | None = None
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
         self.now_ns = 10**12
-        options = {"matched": True} if matched else {}
+        options: dict[str, Any] = {"matched": True} if matched else {}
+        if fd:
+            options["fd"] = ids.fd if ids else {(0x200, False)}
+            options |= {"brs": True} if brs else {}
         self.port = RawPort(
             "crane", self._open, ids, self.faults.append, confirms=ids is not None, **options
         )
@@ -98,13 +112,14 @@ class Line:
         message = can.Message(arbitration_id=kind, is_error_frame=True, dlc=8, data=data)
         self.put(message, len(self.far) // 2)
 
-    def confirm(self, frame: Frame, size: int = SIZE) -> None:
+    def confirm(self, frame: Frame | can.Message, size: int = FD_SIZE) -> None:
         """One of our own frames comes back, or no more of it than ``size`` bytes."""
-        message = can.Message(
-            arbitration_id=frame.can_id, is_extended_id=frame.extended, data=frame.data
-        )
-        data = bytearray(build_can_frame(message))
-        data[MARK_AT] = 1
+        if isinstance(frame, Frame):
+            frame = can.Message(
+                arbitration_id=frame.can_id, is_extended_id=frame.extended, data=frame.data
+            )
+        data = bytearray(build_can_frame(frame))
+        data[MARK_AT] |= MARK
         self.far[SENT_BACK].send(data[:size])
 
     def heard(self) -> list[Frame]:

@@ -16,7 +16,8 @@ from hypothesis import strategies as st
 from canshaper.bus import arrival, raw
 from canshaper.bus.arrival import SO_TIMESTAMPNS, Arrivals, stamp_ns
 from canshaper.bus.clock import boottime_ns
-from canshaper.bus.port import MOST_FAILURES, ListeningPort, Port, PythonCanPort, open_port
+from canshaper.bus.port import ListeningPort, Port, open_port
+from canshaper.bus.python_can import MOST_FAILURES, PythonCanPort
 from canshaper.bus.raw import MOST_FRAMES, REOPEN_NS
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
@@ -265,7 +266,7 @@ def adapter(clocks: Clocks, monkeypatch: pytest.MonkeyPatch) -> Adapter:
 
 @pytest.fixture
 def port(adapter: Adapter) -> Port:
-    made = open_port("crane", Bus(interface="slcan", channel="/dev/ttyUSB0"), lambda _fault: None)
+    made = open_port("crane", Bus(interface="virtual", channel="x"), lambda _fault: None)
     assert isinstance(made, PythonCanPort)
     return made
 

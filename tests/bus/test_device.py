@@ -15,7 +15,7 @@ from canshaper.bus.device import (
     Device,
     check_device,
     device_fault,
-    kind_and_bitrate,
+    kind_and_bitrates,
     match_fault,
     read_device,
     whereabouts,
@@ -236,24 +236,30 @@ def link_message(kind: bytes | None, data: bytes | None) -> bytes:
     return bytes(16) + name + (field(18 | 0x8000, info) if info else b"") + field(4, bytes(4))
 
 
-def timing(bitrate: int) -> bytes:
+def timing(bitrate: int, kind: int = 1) -> bytes:
     """can_bittiming behind the clock, as the driver orders them."""
-    return field(5, bytes(4)) + field(1, struct.pack("=8I", bitrate, 875, 250, 6, 7, 2, 1, 2))
+    return field(5, bytes(4)) + field(kind, struct.pack("=8I", bitrate, 875, 250, 6, 7, 2, 1, 2))
 
 
 @pytest.mark.parametrize(
     ("message", "expected"),
     [
-        (link_message(b"can", timing(250_000)), ("can", 250_000)),
-        (link_message(b"can", field(5, bytes(4))), ("can", None)),  # none set
-        (link_message(b"can", None), ("can", None)),
-        (link_message(b"vcan", None), ("vcan", None)),
-        (link_message(b"vlan", field(1, b"\x01\0\0\0")), ("vlan", None)),
-        (link_message(None, None), (None, None)),
+        (link_message(b"can", timing(250_000)), ("can", 250_000, None)),
+        (
+            link_message(b"can", timing(500_000) + timing(2_000_000, kind=9)),
+            ("can", 500_000, 2_000_000),
+        ),
+        (link_message(b"can", field(5, bytes(4))), ("can", None, None)),  # none set
+        (link_message(b"can", None), ("can", None, None)),
+        (link_message(b"vcan", None), ("vcan", None, None)),
+        (link_message(b"vlan", field(1, b"\x01\0\0\0")), ("vlan", None, None)),
+        (link_message(None, None), (None, None, None)),
     ],
 )
 def test_kind_and_bit_rate_of_an_interface(
-    monkeypatch: pytest.MonkeyPatch, message: bytes, expected: tuple[str | None, int | None]
+    monkeypatch: pytest.MonkeyPatch,
+    message: bytes,
+    expected: tuple[str | None, int | None, int | None],
 ) -> None:
     asked: list[tuple[int, int, bytes]] = []
 
@@ -262,15 +268,15 @@ def test_kind_and_bit_rate_of_an_interface(
         yield message
 
     monkeypatch.setattr(module, "ask", ask)
-    assert kind_and_bitrate(7) == expected
+    assert kind_and_bitrates(7) == expected
     assert asked == [(18, 4, struct.pack("=BxHiII", 0, 0, 7, 0, 0))]
 
 
 def test_the_kernel_itself_is_asked() -> None:
     """The loopback interface is on every machine, and has no kind."""
-    assert kind_and_bitrate(socket.if_nametoindex("lo")) == (None, None)
+    assert kind_and_bitrates(socket.if_nametoindex("lo")) == (None, None, None)
     with pytest.raises(OSError, match="No such device") as caught:
-        kind_and_bitrate(999_999)
+        kind_and_bitrates(999_999)
     assert caught.value.errno == errno.ENODEV
 
 
@@ -365,4 +371,4 @@ def test_a_port_knows_whether_its_device_is_named(
     options: dict[str, Any] = {}
     monkeypatch.setattr("canshaper.bus.port.RawPort", lambda *_, **given: options.update(given))
     open_port("crane", asked, lambda _fault: None)
-    assert options == {"confirms": False, "matched": matched}
+    assert options == {"confirms": False, "matched": matched, "fd": None, "brs": False}

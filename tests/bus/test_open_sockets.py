@@ -2,15 +2,18 @@
 
 import errno
 import socket
+import sys
 from collections.abc import Iterator
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import can
 import pytest
 
 from canshaper.bus import port as bus_module
-from canshaper.bus import socketcan
+from canshaper.bus import python_can, socketcan
+from canshaper.bus.device import check_mtu
 from canshaper.bus.port import ListeningPort, open_port
 from canshaper.bus.socketcan import open_sockets, set_filters
 from canshaper.codec.frame import BusState, Frame, FrameFault
@@ -96,6 +99,62 @@ def test_three_sockets_each_for_its_frames(made: list[Made]) -> None:
     others = options(unknown, RAW)
     assert others.pop(socket.CAN_RAW_JOIN_FILTERS) == 1
     assert others.keys() == {socket.CAN_RAW_FILTER}
+
+
+def test_on_a_bus_of_can_fd_every_socket_has_its_frames(made: list[Made]) -> None:
+    fd = BUS.model_copy(update={"fd": True})
+    open_sockets(fd, IDS)
+    open_sockets(fd, None)
+    assert [options(one, RAW).get(socket.CAN_RAW_FD_FRAMES) for one in made] == [1] * 4
+    made.clear()
+    open_sockets(BUS, IDS)
+    assert [options(one, RAW).get(socket.CAN_RAW_FD_FRAMES) for one in made] == [None] * 3
+
+
+def test_an_interface_that_is_not_set_up_for_can_fd_is_told(
+    made: list[Made], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    there = tmp_path / "sys/class/net/can0"
+    there.mkdir(parents=True)
+    monkeypatch.setattr(socketcan, "check_mtu", lambda bus: check_mtu(bus, tmp_path))
+    fd = BUS.model_copy(update={"fd": True})
+    (there / "mtu").write_text("16\n")
+    with pytest.raises(BusError) as caught:
+        open_port("crane", fd, lambda _: None, IDS)
+    assert str(caught.value) == (
+        "bus crane: cannot open socketcan channel can0: expected an interface with CAN FD, which"
+        " has the MTU 72, got 16"
+    )
+    assert all(one.closed for one in made)
+    open_sockets(BUS, IDS)  # classical frames it has
+    (there / "mtu").write_text("72\n")
+    open_sockets(fd, IDS)
+
+
+@pytest.mark.parametrize(
+    ("bus", "ids", "fd", "brs"),
+    [
+        (BUS, IDS, None, False),
+        (BUS, None, None, False),
+        (BUS.model_copy(update={"fd": True}), IDS, {(0x200, False)}, False),
+        (BUS.model_copy(update={"fd": True}), None, {(0x300, False)}, False),
+        (
+            BUS.model_copy(update={"fd": True, "data_bitrate": 2_000_000}),
+            IDS,
+            {(0x200, False)},
+            True,
+        ),
+    ],
+)
+def test_a_port_knows_the_messages_of_can_fd(
+    monkeypatch: pytest.MonkeyPatch, bus: Bus, ids: BusRoutes | None, fd: Any, brs: bool
+) -> None:
+    """Those of the deployment, else those that are named; of a classical bus none."""
+    given: dict[str, Any] = {}
+    monkeypatch.setattr(bus_module, "RawPort", lambda *_, **options: given.update(options))
+    routes = replace(ids, fd=frozenset({(0x200, False)})) if ids else None
+    open_port("crane", bus, lambda _: None, routes, fd={(0x300, False)})
+    assert (given["fd"], given["brs"]) == (fd, brs)
 
 
 def filters(one: Made) -> set[tuple[int, int]]:
@@ -204,6 +263,21 @@ def test_a_kernel_without_can_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     )
 
 
+def test_a_system_without_socketcan_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delattr(socket, "AF_CAN")
+    monkeypatch.setattr(sys, "platform", "darwin")
+    with pytest.raises(BusError) as error:
+        open_port("crane", BUS, lambda _: None, IDS)
+    assert str(error.value) == (
+        "bus crane: cannot open socketcan channel can0: it needs Linux, got darwin; python-can has"
+        " other interfaces"
+    )
+    other = Bus(interface="slcan", channel="/dev/none")
+    with pytest.raises(BusError) as error:  # in its own words
+        open_port("crane", other, lambda _: None, IDS)
+    assert "Linux" not in str(error.value)
+
+
 def test_a_port_of_another_device_says_which_bus_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*_: object) -> None:
         raise WrongDeviceError("expected serial number 1, found 2")
@@ -243,7 +317,7 @@ def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPa
     def none(*_: object) -> None:
         raise ValueError
 
-    monkeypatch.setattr(bus_module, "open_python_can", none)
+    monkeypatch.setattr(python_can, "open_python_can", none)
     with pytest.raises(BusError, match="cannot open slcan channel ttyS0: ValueError"):
         open_port("crane", Bus(interface="slcan", channel="ttyS0"), lambda _: None)
 
@@ -348,13 +422,62 @@ def test_what_is_no_data_frame_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> No
     ]
     monkeypatch.setattr(can, "Bus", lambda **_: Adapter(messages))
     faults: list[FrameFault] = []
-    port = open_port("crane", Bus(interface="slcan", channel="ttyS0"), faults.append)
+    port = open_port("crane", Bus(interface="virtual", channel="ttyS0"), faults.append)
     assert list(port.frames()) == []
     wrong = FrameFault.WRONG_LENGTH
     assert faults == [FrameFault.ERROR_FRAME, wrong, wrong]
     assert list(port.background()) == []
     port.watch("second", IDS)
     assert (port.name, port.fileno()) == ("second", 9)
+
+
+def test_a_bus_of_can_fd_takes_and_sends_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The interface is asked for it, with its bit rate; which message is one says the id."""
+    adapter = Adapter(
+        [can.Message(arbitration_id=0x110, is_extended_id=False, is_fd=True, data=bytes(12))]
+    )
+    opened: list[dict[str, Any]] = []
+
+    def bus(**options: Any) -> Adapter:
+        opened.append(options)
+        return adapter
+
+    monkeypatch.setattr(can, "Bus", bus)
+    faults: list[FrameFault] = []
+    config = Bus(interface="virtual", channel="x", fd=True, data_bitrate=2_000_000)
+    ids = replace(IDS, fd=frozenset({(0x200, False)}))
+    port = open_port("crane", config, faults.append, ids)
+    assert list(port.frames()) == [Frame("crane", 0x110, False, bytes(12))]
+    assert port.send(Frame("crane", 0x200, False, bytes(8)))
+    assert port.send(Frame("crane", 0x300, False, bytes(8)))
+    assert [(m.is_fd, m.bitrate_switch) for m in adapter.sent] == [(True, True), (False, False)]
+    port.watch("crane", IDS)
+    assert port.send(Frame("crane", 0x200, False, bytes(8)))
+    assert adapter.sent[-1].is_fd is False
+    port = open_port("crane", config.model_copy(update={"data_bitrate": None}), faults.append, ids)
+    assert port.send(Frame("crane", 0x200, False, bytes(64)))
+    assert (adapter.sent[-1].is_fd, adapter.sent[-1].bitrate_switch) == (True, False)
+    assert faults == []
+    asked = [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened]
+    assert asked == [{}, {}]  # virtual always has it
+
+
+@pytest.mark.parametrize(
+    ("fd", "data_bitrate", "asked"),
+    [
+        (False, None, {}),
+        (True, None, {"fd": True}),
+        (True, 2_000_000, {"fd": True, "data_bitrate": 2_000_000}),
+    ],
+)
+def test_other_interfaces_are_asked_for_can_fd(
+    monkeypatch: pytest.MonkeyPatch, fd: bool, data_bitrate: int | None, asked: dict[str, Any]
+) -> None:
+    opened: list[dict[str, Any]] = []
+    monkeypatch.setattr(can, "Bus", lambda **options: opened.append(options))
+    config = Bus(interface="kvaser", channel="0", fd=fd, data_bitrate=data_bitrate)
+    python_can.open_python_can(config)
+    assert [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened] == [asked]
 
 
 def test_multicast_beyond_this_machine_hears_one_group_and_nothing_old(
@@ -371,7 +494,7 @@ def test_multicast_beyond_this_machine_hears_one_group_and_nothing_old(
         return adapter
 
     monkeypatch.setattr(can, "Bus", bus)
-    monkeypatch.setattr(bus_module, "receive_one_group", groups.append)
+    monkeypatch.setattr(python_can, "receive_one_group", groups.append)
     config = Bus(interface="udp_multicast", channel="239.1.2.3", network=True)
     port = open_port("crane", config, lambda _: None)
     assert groups == [9]

@@ -6,8 +6,9 @@ from typing import Any
 import can
 import pytest
 
-from canshaper.bus import port as bus_module
-from canshaper.bus.port import MOST_ECHOES, MOST_FAILURES, Port, open_port
+from canshaper.bus import python_can as bus_module
+from canshaper.bus.port import Port, open_port
+from canshaper.bus.python_can import MOST_ECHOES, MOST_FAILURES
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
 
@@ -63,7 +64,7 @@ def faults() -> list[FrameFault]:
 
 @pytest.fixture
 def port(adapter: Adapter, faults: list[FrameFault]) -> Iterator[Port]:
-    yield open_port("crane", Bus(interface="slcan", channel="/dev/ttyUSB0"), faults.append)
+    yield open_port("crane", Bus(interface="virtual", channel="/dev/ttyUSB0"), faults.append)
     adapter.always = None
 
 
@@ -110,9 +111,11 @@ def test_the_bit_rate_of_the_file_is_that_of_the_adapter(
     adapter: Adapter, bitrate: int | None, passed: dict[str, int]
 ) -> None:
     """Without one it is the adapter's own."""
-    port = open_port("crane", Bus(interface="slcan", channel="x", bitrate=bitrate), lambda _: None)
+    port = open_port(
+        "crane", Bus(interface="virtual", channel="x", bitrate=bitrate), lambda _: None
+    )
     assert port.state is BusState.UP
-    options = {"interface": "slcan", "channel": "x", "ignore_config": True}
+    options = {"interface": "virtual", "channel": "x", "ignore_config": True}
     assert adapter.options == {**options, "receive_own_messages": False, **passed}
 
 

@@ -3,7 +3,8 @@
 import pytest
 
 from canshaper.bus import raw
-from canshaper.bus.raw import PROBE_NS, SIZE
+from canshaper.bus.packet import SIZE
+from canshaper.bus.raw import PROBE_NS
 from canshaper.codec.frame import BusState, FrameFault
 from tests.bus.raw_line import (
     IDS,

@@ -50,6 +50,16 @@ def test_without_a_file_it_is_the_recommended_deployment_with_its_price(tmp_path
         )
 
 
+def test_with_a_sensor_a_wrong_length_costs_little(tmp_path: Path) -> None:
+    longer = ("--set", "grapple.l2_m=1.5")
+    left = [demo(tmp_path, *one, *longer)[1] for one in ((), ("--sensor",))]
+    assert left[1]["deployment"] == "forwarder-sensor.yaml"
+    plain, sensed = (one["crane"]["shaped"]["residual_deg"] for one in left)
+    assert sensed < 0.5 * plain
+    text, _ = demo(tmp_path, "forwarder.yaml", "--sensor", code=2)
+    assert "--sensor: expected without FILE, got forwarder.yaml" in text
+
+
 def test_readme_shows_what_the_demo_prints(tmp_path: Path) -> None:
     text, _ = demo(tmp_path)
     printed = [line.rstrip() for line in text.splitlines()]

@@ -1,5 +1,6 @@
 """Verbs: a new one is one file, errors end each of them alike, --help loads none of their work."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -15,6 +16,10 @@ from canshaper import errors
 
 def greet_crane(kind: str) -> None:
     """Greet the crane, or fail."""
+    if kind == "interrupted":
+        raise KeyboardInterrupt
+    if kind == "refused":
+        raise PermissionError(13, "Permission denied", "/there")
     if kind in vars(errors):
         raise vars(errors)[kind]("no luck")
     print(f"hello {kind}")
@@ -37,6 +42,12 @@ def test_a_new_verb_is_one_file() -> None:
     assert "Greet the crane" in runner.invoke(app, "greet-crane -h").stdout
 
 
+def test_help_cuts_no_sentence_off() -> None:
+    shown = CliRunner().invoke(app, ["--help"], prog_name="canshaper").output
+    assert "..." not in shown.replace("COMMAND [ARGS]...", "")
+    assert "say how sure the result is." in " ".join(shown.split())
+
+
 @pytest.mark.usefixtures("with_another")
 @pytest.mark.parametrize(
     ("kind", "code"),
@@ -55,6 +66,33 @@ def test_a_new_verb_is_one_file() -> None:
 def test_an_error_for_a_person_is_one_line_and_an_exit_code(kind: str, code: int) -> None:
     result = CliRunner().invoke(app, f"greet-crane {kind}")
     assert (result.exit_code, result.stderr, result.stdout) == (code, "no luck\n", "")
+
+
+@pytest.mark.usefixtures("with_another")
+def test_a_file_that_is_refused_and_ctrl_c_end_any_verb_in_one_line() -> None:
+    for kind, code, text in (
+        ("refused", 2, "/there: Permission denied\n"),
+        ("interrupted", 130, "interrupted\n"),
+    ):
+        result = CliRunner().invoke(app, f"greet-crane {kind}")
+        assert (result.exit_code, result.stderr, result.stdout) == (code, text, "")
+
+
+def test_ctrl_c_while_modules_are_loaded_is_no_traceback() -> None:
+    code = """
+import sys
+from canshaper.__main__ import main
+
+class Interrupted:
+    def find_spec(self, name, *_):
+        if name == "canshaper.cli.app":
+            raise KeyboardInterrupt
+
+sys.meta_path.insert(0, Interrupted())
+main()
+"""
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "")
 
 
 def test_an_unknown_verb_is_answered_with_one_like_it() -> None:
@@ -79,6 +117,16 @@ def loaded_by(*arguments: str) -> set[str]:
 @pytest.mark.parametrize("arguments", [("--help",), ("run", "--help"), ("--version",)])
 def test_help_loads_nothing_of_the_work(arguments: tuple[str, ...]) -> None:
     assert not loaded_by(*arguments) & {*NOT_FOR_HELP}
+
+
+def test_the_daemon_does_not_load_asammdf_through_python_can(tmp_path: Path) -> None:
+    (tmp_path / "asammdf.py").write_text("MDF = SignalSource = object\nimport os; os._exit(99)\n")
+    run = [sys.executable, "-m", "canshaper", "run", str(tmp_path / "none.yaml")]
+    environment = os.environ | {"PYTHONPATH": str(tmp_path)}
+    done = subprocess.run(run, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 2, done.stderr  # there is no such file
+    load = [sys.executable, "-c", "import can"]
+    assert subprocess.run(load, check=False, env=environment).returncode == 99
 
 
 def test_the_work_would_be_seen() -> None:

@@ -87,12 +87,13 @@ def reversal(axis: str) -> Script:
 
 
 def judged(
-    name: str, found: tuple[float, float, float], mean: float, worst: float, peak: float = 90.0
+    name: str, residuals: tuple[float, float, float], mean: float, worst: float, peak: float = 90.0
 ) -> None:
-    print(f"{name}: {found[0]:.2f} in the mean, {found[1]:.2f} at worst, peak {found[2]:.1f}")
-    assert found[0] <= mean
-    assert found[1] <= worst
-    assert found[2] <= peak
+    in_the_mean, at_worst, highest = residuals
+    print(f"{name}: {in_the_mean:.2f} in the mean, {at_worst:.2f} at worst, peak {highest:.1f}")
+    assert in_the_mean <= mean
+    assert at_worst <= worst
+    assert highest <= peak
 
 
 def test_the_twin_swings_as_a_pendulum_does() -> None:
@@ -132,8 +133,8 @@ def test_other_filters_at_fourteen_timings(tmp_path: Path, kind: str, mean: floa
 
 @pytest.mark.long
 def test_far_out() -> None:
-    found = figures(shipped(), FAR_OUT, TwinCrane(radius_m=6.8))
-    judged("6.8 to 9 m", found, 1.8, 1.8)
+    residuals = figures(shipped(), FAR_OUT, TwinCrane(radius_m=6.8))
+    judged("6.8 to 9 m", residuals, 1.8, 1.8)
 
 
 @pytest.mark.long
@@ -149,18 +150,18 @@ def test_twenty_operators(tmp_path: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize("length", [0.85, 1.15])
 def test_a_length_that_is_wrong(length: float) -> None:
-    found = figures(shipped(), TIMINGS, TwinCrane(length=length))
-    judged(f"length x {length}", found, 3.0, 90.0)
+    residuals = figures(shipped(), TIMINGS, TwinCrane(length=length))
+    judged(f"length x {length}", residuals, 3.0, 90.0)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("lag_s", [(0.2, 0.1), (0.1, 0.2)], ids=["slew", "near_far"])
 def test_a_valve_that_is_slow(lag_s: tuple[float, float]) -> None:
-    found = figures(shipped(), TIMINGS, TwinCrane(lag_s=lag_s))
-    judged(f"valves of {lag_s} s", found, 1.5, 1.5)
+    residuals = figures(shipped(), TIMINGS, TwinCrane(lag_s=lag_s))
+    judged(f"valves of {lag_s} s", residuals, 1.5, 1.5)
 
 
 @pytest.mark.long
 def test_a_radius_that_is_lost_in_motion() -> None:
-    found = figures(shipped(), TIMINGS, TwinCrane(radius_until_s=2.0))
-    judged("radius lost after 2 s", found, 0.6, 0.6)
+    residuals = figures(shipped(), TIMINGS, TwinCrane(radius_until_s=2.0))
+    judged("radius lost after 2 s", residuals, 0.6, 0.6)

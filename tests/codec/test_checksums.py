@@ -1,5 +1,6 @@
 """Every row of the table of checksums: published values, and each place that one may have."""
 
+import pickle
 from hashlib import sha256
 from importlib.metadata import EntryPoint
 from pathlib import Path
@@ -184,6 +185,13 @@ def test_a_kind_of_a_package_joins_the_table_when_it_is_named(packages: Any) -> 
     assert known_checksum("always5") == known_checksum("always5") == "always5"
     assert module.CHECKSUMS["always5"] is OWN
     assert checksum_names() == [*VALUES, "always5", "broken"]
+
+
+def test_it_joins_that_of_the_process_to_which_a_deployment_is_handed(packages: Any) -> None:
+    packages(always5=f"{__name__}:OWN")
+    handed_over = pickle.dumps(Checksum("always5", 0))
+    assert "always5" not in module.CHECKSUMS
+    assert pickle.loads(handed_over).protect(bytes(2), 0) == b"\5\0"
 
 
 def test_what_runs_names_the_module_of_a_package(packages: Any) -> None:

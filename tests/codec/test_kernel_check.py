@@ -1,4 +1,4 @@
-"""Checks that can-gw makes are those that we make: reckoned here as net/can/gw.c of Linux does."""
+"""Checks that can-gw makes are those that we make: computed here as net/can/gw.c of Linux does."""
 
 import struct
 

@@ -14,8 +14,8 @@ Load = Callable[[str | bytes], DeploymentConfig]
 Problems = Callable[[str | bytes], list[str]]
 
 TOP = (
-    "version, tick_ms, buses, dbc, joysticks, axes, motion, gateway, emergency_stop, load_state,"
-    " profile, status, identity, control"
+    "version, tick_ms, tick, buses, dbc, joysticks, switches, axes, motion, gateway,"
+    " emergency_stop, load_state, profile, status, identity, control, uncertainty, accept"
 )
 AXIS = ", ".join(AxisConfig.model_fields)
 SWAY = (
@@ -34,7 +34,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
     ("old", "new", "says"),
     [
         # unknown keys, wherever they stand, with those allowed there
-        ("tick_ms", "tick", f"tick: expected one of the keys {TOP}"),
+        ("tick_ms", "ticks", f"ticks: expected one of the keys {TOP}"),
         (
             "channel: vcan0",
             "channel: a, speed: 1",
@@ -44,15 +44,14 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
             "enable: Enable",
             "enable: Enable\n    on: X",
             "joysticks.left.on: expected one of the keys bus, message, alive_counter, checksum,"
-            " e2e, source, timeout_ms, alive_max_step, qualify, enable, reset, anti_sway_off,"
-            " next_profile, node,"
-            " stuck_s",
+            " e2e, cycle_ms, multiplexor, source, timeout_ms, alive_max_step, qualify, enable,"
+            " enable_of, reset, anti_sway_off, next_profile, node, stuck_s",
         ),
         (
             "{ joystick: left,",
             "{ joystick: left, deadzone: 1,",
-            "axes.slew.command.deadzone: expected one of the keys joystick, signal, flags,"
-            " negative, neutral_pct",
+            "axes.slew.command.deadzone: expected one of the keys full, zero, invert, joystick,"
+            " signal, flags, negative, neutral_pct",
         ),
         (
             "kind: gff,",
@@ -115,8 +114,8 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         (
             "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
             "vcan0",
-            "buses.crane: expected a section with the keys interface, channel, bitrate, match,"
-            " network, j1939, canopen, got 'vcan0'",
+            "buses.crane: expected a section with the keys interface, channel, bitrate, fd,"
+            " data_bitrate, options, match, network, j1939, canopen, got 'vcan0'",
         ),
         (
             "{ kind: off }",
@@ -221,7 +220,8 @@ def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
         f"machine.yaml:{line}: axes.{name}.stik: expected one of the keys {AXIS}, got an unknown"
         " one",
         f"machine.yaml:{line + 1}: axes.{name}.command.joistick: expected one of the keys"
-        " joystick, signal, flags, negative, neutral_pct, got an unknown one",
+        " full, zero, invert, joystick, signal, flags, negative, neutral_pct, got an unknown one;"
+        " did you mean joystick?",
         f"machine.yaml:{line + 1}: axes.{name}.command.joystick: missing: name of a joystick",
     ]
 

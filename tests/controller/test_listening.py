@@ -63,7 +63,7 @@ def listening_rig(rig: Rig) -> Rig:
     return rig
 
 
-def test_it_reckons_the_same_as_one_that_drives(changed_rig: Callable[..., Rig]) -> None:
+def test_it_computes_the_same_as_one_that_drives(changed_rig: Callable[..., Rig]) -> None:
     rig, driving = listening_rig(changed_rig()), changed_rig()
     for number in range(300):
         joystick = (0, 1000, -500)[number // 50 % 3]
@@ -121,7 +121,7 @@ def test_whoever_has_the_address_keeps_it(difference: int, when: int) -> None:
     rig.receive(rig.claim(difference))
     assert set(sent_ids(rig, 50)) <= {j1939.NO_CLAIM}
     assert sent_ids(rig, 50, X=100.0) == []
-    assert rig.state() is State.ACTIVE  # it reckons all the same, for the log
+    assert rig.state() is State.ACTIVE  # it computes all the same, for the log
 
 
 def test_after_an_outage_it_is_asked_for_again() -> None:

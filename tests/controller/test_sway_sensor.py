@@ -2,6 +2,7 @@
 
 import math
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,8 +13,12 @@ from canshaper.design.lockstep import LockStep, drive
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.swing_length import SwingLength
 from canshaper.shaping.trust import Trust
 from canshaper_sim.crane import CraneParameters
+from canshaper_sim.grapple import Grapple
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.operator import SCRIPTS
 from canshaper_sim.plant import PlantNode
@@ -83,6 +88,59 @@ def test_the_status_message_says_it() -> None:
     trusts = [value["SwaySensor"] for value in values if value]
     assert trusts[-1] is Trust.TRUSTED
     assert Trust.UNPROVED in trusts
+
+
+def test_it_is_reported_and_shown_how_long_the_pendulum_seems() -> None:
+    deployment = load_deployment(FILE)
+    run = Run(deployment, PULSE, CraneParameters(grapple=Grapple(l2_m=1.56)))
+    (event,) = [one for one in run.events if "swings_like" in one]
+    match = re.fullmatch(
+        r"axis=near_far swings_like_length_m=(1\.\d\d) sd_pct=\d damping_ratio=0\.0\d file=1\.20"
+        r" set=axes\.near_far\.sway\.length_m=\1",
+        event,
+    )
+    assert match
+    assert float(match[1]) == pytest.approx(1.56, rel=0.07)
+    status = deployment.axes["near_far"].status
+    assert status is not None
+    frames = [frame for frame in run.frames if frame[:3] == status.sender.key]
+    shown = [(status.decode(frame.data) or {})["SwingLength"] for frame in frames]
+    assert shown[0] == 0.0
+    assert shown[-1] == pytest.approx(1.56, rel=0.05)
+
+
+def test_of_a_period_it_is_reported_as_one() -> None:
+    slew = Script("slew", (Stroke("slew", 0.5, 2.5, 1.0, 0.1),), 5.0)
+    run = Run(load_deployment(FILE), slew, CraneParameters(grapple=Grapple(l2_m=1.56)))
+    (event,) = [one for one in run.events if "swings_like" in one]
+    match = re.match(
+        r"axis=slew swings_like_period_s=(\d\.\d\d) .* file=2\.36 set=axes\.slew\.", event
+    )
+    assert match
+    real_s = 2.0 * math.pi / Grapple(l2_m=1.56).mode5.omega_rad_s
+    assert float(match[1]) == pytest.approx(real_s, rel=0.04)
+
+
+def test_the_length_of_a_breakpoint_is_no_other_one_than_that_of_the_file() -> None:
+    """A load that hangs deeper: to set the key of the empty grapple to it would be wrong."""
+    runner = Controller(load_deployment(FILE)).axes["near_far"]
+    axis, seen = runner.axis, SwingLength(2.0, 0.04, 3.0)
+    assert axis.sensed is not None
+    assert axis.sway is not None
+    of_file, loaded = axis.sway.mode, SwayMode.from_grapple(2.0, 120.0, 900.0)
+    axis.retune(loaded, lambda _sway: Off())
+    axis.sensed.length.result = seen
+    assert runner.changed_length() is None
+    axis.retune(of_file, lambda _sway: Off())
+    assert runner.changed_length() is None  # seen before, with the other load
+    axis.sensed.length.result = again = SwingLength(2.0, 0.04, 3.0)
+    assert runner.changed_length() is again
+
+
+def test_the_length_of_the_file_is_no_news_and_its_return_is() -> None:
+    assert not any(
+        "swings_like" in one for one in Run(load_deployment(FILE), PULSE, crane()).events
+    )
 
 
 @pytest.mark.parametrize(
@@ -172,3 +230,55 @@ def test_a_frame_that_does_not_count_is_no_measurement() -> None:
     message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)
     assert signal.take() == pytest.approx(math.radians(1.0))
     assert signal.take() is None
+
+
+@pytest.mark.parametrize(("merit", "counts"), [(0, True), (1, False), (2, False), (3, False)])
+def test_only_a_good_figure_of_merit_measures(merit: int, counts: bool) -> None:
+    """Of SSI2: that of the roll angle says nothing of the pitch angle in the same frame."""
+    deployment = load_deployment(ROOT / "config" / "j1939-sensor.yaml")
+    sensors = [deployment.axes[name].sway_sensor for name in ("slew", "near_far")]
+    roll, pitch = (one for one in sensors if one is not None)
+    message = SwaySensorInput(roll.message)
+    across, along = SwaySignal(message, roll), SwaySignal(message, pitch)
+    middle = 250 * (1 << 15)  # no angle
+    raw = {"RollAngle": middle, "PitchAngle": middle, "RollMerit": merit, "PitchMerit": 0}
+    fault = message.on_frame(raw, {}, 0, accepted=True)
+    assert fault is (FrameFault.NONE if counts else FrameFault.INVALID_SIGNAL)
+    assert (across.take() is not None) == counts
+    assert along.take() == pytest.approx(0.0)
+
+
+@pytest.mark.parametrize(
+    ("turns", "counts"), [(0.9, True), (1.1, False), (-1.1, False), (1e30, False)]
+)
+def test_more_than_a_turn_is_no_measurement(turns: float, counts: bool) -> None:
+    sensor = load_deployment(FILE).axes["near_far"].sway_sensor
+    assert sensor is not None
+    message = SwaySensorInput(sensor.message)
+    signal = SwaySignal(message, replace(sensor, factor=math.tau * turns))
+    message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)  # 1 in its unit
+    assert (signal.take() is not None) == counts
+
+
+HEARTBEAT, EMERGENCY = (
+    Frame("crane", 0x730, False, bytes((5,))),
+    Frame("crane", 0xB0, False, bytes((0, 0x50, 1, 0, 0, 0, 0, 0))),
+)
+
+
+@pytest.mark.parametrize(
+    ("said", "trust"),
+    [
+        ((), Trust.NO_DATA),
+        ((HEARTBEAT,), Trust.UNPROVED),
+        ((HEARTBEAT, EMERGENCY), Trust.NO_DATA),
+        ((HEARTBEAT, HEARTBEAT._replace(data=bytes((0x7F,)))), Trust.NO_DATA),
+    ],
+)
+def test_it_measures_while_its_node_works(said: tuple[Frame, ...], trust: Trust) -> None:
+    deployment = load_deployment(ROOT / "config" / "canopen-sensor.yaml")
+    controller = Controller(deployment)
+    for frame in (*said, Frame("crane", 0x1B0, False, bytes(4))):
+        controller.receive(frame, 0)
+    assert list(controller.tick(0))
+    assert [controller.axes[name].trust for name in ("slew", "near_far")] == [trust, trust]

@@ -240,7 +240,7 @@ def test_without_a_place_for_the_socket_the_machine_works(
     control(bench, path)
     at(bench, {})
     assert [line for line in log() if "control=none" in line] == [
-        f"ERROR control=none socket={path} No such file or directory"
+        f"WARNING control=none socket={path} No such file or directory"
     ]
     assert log()[-1] == "INFO stopped valves=neutral"
 
@@ -500,3 +500,44 @@ def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
     number = 1 + next(i for i, line in enumerate(lines) if "match:" in line)
     assert str(error.value).startswith(f"{bench.file}:{number}: buses.crane.match:")
     assert str(error.value).endswith("expected serial number 1, found 2")
+
+
+class Left(Exception):
+    """In place of the end of the process."""
+
+
+@pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
+def test_a_second_signal_to_stop_leaves_at_once_with_neutral_valves(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]], number: int
+) -> None:
+    codes: list[int] = []
+
+    def leave(code: int) -> None:
+        codes.append(code)
+        raise Left
+
+    monkeypatch.setattr(module.os, "_exit", leave)
+
+    def script(tick: int) -> None:
+        bench.joysticks()
+        if tick == 5:
+            bench.sent.clear()
+            for _ in range(2):
+                bench._handlers[number](number, None)
+
+    with pytest.raises(Left):
+        bench.run(script)
+    valves = {frame.can_id for frame in bench.rig.controller.neutral_frames()}
+    assert {frame.can_id for frame in bench.sent} >= valves
+    assert codes == [128 + number]
+    assert f"WARNING stopped at-once signal={signal.Signals(number).name}" in log()
+
+
+def test_a_trip_is_a_warning_and_other_states_are_not(
+    bench: Bench, log: Callable[[], list[str]]
+) -> None:
+    foreign = Frame("crane", 0x200, False, b"\0\0")
+    at(bench, {10: lambda: bench.put(foreign)})
+    states = [line for line in log() if "axis=slew state=" in line]
+    assert states[0].startswith("INFO axis=slew state=READY")
+    assert states[1].startswith("WARNING axis=slew state=TRIPPED")

@@ -8,8 +8,9 @@ from typing import Any
 
 import pytest
 
+from canshaper.bus.packet import CAN_FRAME
 from canshaper.bus.port import open_port
-from canshaper.bus.raw import CAN_FRAME, RawPort
+from canshaper.bus.raw import RawPort
 from canshaper.codec.frame import FrameFault
 from canshaper.daemon import gateway
 from canshaper.daemon.gateway import CHECK_NS, MOST_EMPTY, InlineGateway

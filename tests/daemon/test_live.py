@@ -95,6 +95,9 @@ def test_set_shows_and_changes_and_a_reload_takes_it_back(daemon: Daemon) -> Non
 
 
 def test_set_writes_when_asked(daemon: Daemon) -> None:
+    """What was measured before is gone, and where it came from."""
+    speed, origin = "full_speed_m_s: 1.5", ", origin: { date: 2026-11-23, by: me }"
+    daemon.file.write_text(daemon.text.replace(speed, speed + origin, 1), encoding="utf-8")
     status, told = canshaper("set", str(daemon.file), f"{PERIOD}=2.5", "--write")
     assert (status, told.splitlines()[-1]) == (0, f"Written to {daemon.file}.")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text.replace(

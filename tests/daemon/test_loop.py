@@ -168,3 +168,42 @@ def test_who_waits_otherwise_is_told_for_how_long() -> None:
         loop.run_at_deadlines(PERIOD_NS, lambda *_: next(left), wait)
     assert waited == [0.02, 0.02]
     assert clock.slept == []
+
+
+@given(
+    work_ms=st.lists(st.integers(0, 200), max_size=60),
+    late_us=st.lists(st.integers(0, 90_000), min_size=1, max_size=60),
+    steps_us=st.lists(st.integers(-200, 200), min_size=1, max_size=60),
+)
+def test_deadlines_that_are_moved_are_counted_as_others(
+    work_ms: list[int], late_us: list[int], steps_us: list[int]
+) -> None:
+    """Each is a period behind the one before, moved as asked; none is called for twice."""
+    clock = Clock(*(us * 1000 for us in late_us))
+    steps = iter(steps_us)
+    asked: list[tuple[int, int]] = []
+
+    def steer(deadline_ns: int) -> int:
+        asked.append((deadline_ns, next(steps, 0) * 1000))
+        return asked[-1][1]
+
+    deadline = START_NS
+    left = iter(work_ms)
+
+    def body(now_ns: int, missed: int, late_ns: int) -> bool:
+        nonlocal deadline
+        if asked:
+            before, step = asked[-1]
+            assert before == deadline + PERIOD_NS
+            deadline = before + step
+        assert late_ns == now_ns - deadline
+        assert missed == max(late_ns // PERIOD_NS, 0)
+        deadline += missed * PERIOD_NS
+        work = next(left, None)
+        clock.now_ns += (work or 0) * 1_000_000
+        return work is not None
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(loop, "time", clock)
+        patch.setattr(loop, "boottime_ns", clock.boottime_ns)
+        loop.run_at_deadlines(PERIOD_NS, body, steer=steer)

@@ -113,7 +113,7 @@ class Bench:
         monkeypatch.setattr(
             module,
             "run_at_deadlines",
-            lambda period_ns, body, wait: run_at_deadlines(period_ns, self._before(body), wait),
+            lambda period_ns, body, *rest: run_at_deadlines(period_ns, self._before(body), *rest),
         )
 
     def monotonic(self) -> float:
@@ -462,7 +462,8 @@ def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
     with caplog.at_level("INFO", "canshaper"):
         bench.run(script)
     assert "reload=applied" in caplog.text
-    told = "of messages in the DBC files that are not used; canshaper check shows them"
+    told = "of messages and tables in the DBC files that are not used"
+    told += "; canshaper check shows them"
     assert [text for text in caplog.messages if "dbc-warnings" in text] == [
         f"dbc-warnings=1 {told}"
     ]

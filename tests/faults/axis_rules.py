@@ -3,9 +3,9 @@
 from collections import deque
 
 from canshaper.codec.frame import Frame
-from tests.faults.heard import LONG_AGO, HeardJoystick
-from tests.faults.judge import FOREIGN_NS, ROUNDING
-from tests.faults.machine import Axis
+from tests.faults.axis import Axis
+from tests.faults.axis_judge import FOREIGN_NS, ROUNDING
+from tests.faults.received import LONG_AGO, ReceivedJoystick
 
 # Where the daemon may be a tick, and the wait for it, behind what is on the bus.
 SLACK_NS = 2_000_000
@@ -15,7 +15,7 @@ RELEASED = "enable released"
 class AxisRules:
     """What one axis may do."""
 
-    def __init__(self, axis: Axis, joystick: HeardJoystick, tick_ns: int) -> None:
+    def __init__(self, axis: Axis, joystick: ReceivedJoystick, tick_ns: int) -> None:
         self.axis, self.joystick = axis, joystick
         self.velocity = 0.0
         self.raw = 0
@@ -24,14 +24,16 @@ class AxisRules:
         self.armed = self.latched = False
         self._tick_ns = tick_ns
         self._stop_until_ns: int | None = None
-        self._asks: deque[tuple[int, float]] = deque()
+        self._asks: deque[tuple[int, float, bool]] = deque()
+        self._moved = False  # since it was armed
         self._low = self._high = self._command = 0.0
         self._asks_down = self._asks_up = False
         self._why = ""
-        self._releases = 0
-        self._presses = 0
+        self._releases = self._disagreements = 0
+        self._presses = self._resets = 0
         self._pressed_again = False
         self._skipped = 0
+        self.partner: AxisRules | None = None  # of a two-axis motion
         self.lost = 0  # frames that were not sent since the last one
         self._count: int | None = None
 
@@ -50,11 +52,19 @@ class AxisRules:
             self._stop_until_ns = None
         if joystick.releases > self._releases or joystick.enable() == 0:
             causes.add(RELEASED)
+        # Silence of a switch, too, counts a tick later, when the loop looks.
+        seen = joystick.disagreements > self._disagreements
+        if seen or joystick.disagree(now_ns - self._tick_ns - SLACK_NS):
+            causes.add("a switch does not agree")
+        elif joystick.disagree(now_ns):
+            self.may_stop(now_ns)
+        self._disagreements = joystick.disagreements
         if now_ns - self.contested_ns < FOREIGN_NS - 2 * self._tick_ns:
             causes.add("another sender")
-        presses = joystick.presses[axis.name] + joystick.resets
+        presses, resets = joystick.presses[axis.name] + joystick.resets, joystick.resets
         pressed = presses > self._presses or self._pressed_again
-        self._releases, self._presses = joystick.releases, presses
+        reset = resets > self._resets
+        self._releases, self._presses, self._resets = joystick.releases, presses, resets
         # Released and pressed again between two ticks is a press, though a release too.
         self._pressed_again = pressed and causes == {RELEASED} and joystick.enable() == 1
         # Silence counts a tick later, when the loop looks.
@@ -65,6 +75,9 @@ class AxisRules:
         if faults or joystick.faults(axis, now_ns):  # the loop may take it for silent already
             self.may_stop(now_ns)
         if causes:
+            # The reset button counts with enable off, too.
+            reset &= causes == {RELEASED} and not faults and abs(deflection) <= axis.band
+            self.latched &= not reset
             self.latched |= self.velocity != 0.0 or "another sender" in causes
             self.armed, self._stop_until_ns = False, None
         elif self.latched:
@@ -88,21 +101,23 @@ class AxisRules:
     def _ask(self, now_ns: int, command: float) -> None:
         axis, asks = self.axis, self._asks
         self._command = command
-        asks.append((now_ns, command))
+        # The daemon may not have been ready in the tick in which it was armed here.
+        self._moved = self.armed and (self._moved or self.raw != 0)
+        asks.append((now_ns, command, self._moved))
         tail_ns = (axis.tail + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
         # What was asked until the next entry counts up to there.
         while len(asks) > 1 and asks[1][0] < now_ns - tail_ns:
             asks.popleft()
-        commands = [c for _, c in asks]
+        commands = [c for _, c, _ in asks]
         self._low, self._high = min(0.0, *commands), max(0.0, *commands)
         # And what it counts for certain: an added part waits until this is nothing.
         certain_ns = tail_ns - 4 * axis.period_ticks * self._tick_ns - 2 * SLACK_NS
-        still = [c for since_ns, c in asks if since_ns >= now_ns - certain_ns]
-        self._asks_down, self._asks_up = min(0.0, *still) < 0.0, max(0.0, *still) > 0.0
+        still = [c for since_ns, c, sure in asks if sure and since_ns >= now_ns - certain_ns]
+        self._asks_down, self._asks_up = min((0.0, *still)) < 0.0, max((0.0, *still)) > 0.0
 
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
-        self.velocity, self.armed, self.latched = 0.0, False, False
+        self.velocity, self.armed, self.latched, self._moved = 0.0, False, False, False
         self._stop_until_ns = None
 
     def after(self, gap_ns: int, now_ns: int, *, longest_ns: int) -> None:
@@ -173,8 +188,10 @@ class AxisRules:
         if not low <= now <= high:
             return f"{now:.4f} after {before:.4f}, allowed is {low:.4f} to {high:.4f}"
         most = ticks * max(axis.rise, axis.fall) + slack
-        if axis.largest_added and abs(now) < abs(before):  # an added part may end at once
-            most += axis.largest_added
+        # An added part may end at once; what goes to the other side begins at rest.
+        if axis.largest_added and abs(now) < abs(before) and now * before >= 0.0:
+            ends = self.partner is None or not self.partner.armed  # however large it was
+            most += 1.0 if ends else axis.largest_added
         if abs(now - before) > most:
             return f"{now:.4f} after {before:.4f}, a jump: rates allow {most:.4f}"
         return ""

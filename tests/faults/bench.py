@@ -56,7 +56,7 @@ class BenchPort:
         while waiting:
             frame, arrived_ns = waiting.popleft()
             self._bench.tell(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
-            self._bench.rules.hear(frame, arrived_ns)
+            self._bench.rules.receive(frame, arrived_ns)
             self.arrived_ns = BEGIN_NS + arrived_ns  # by the clock of the daemon
             if (seen := self._bench.incoming(frame)) is not None:
                 yield seen

@@ -10,11 +10,13 @@ from typing import Any, Protocol
 
 from canshaper.codec.frame import Frame
 from tests.faults import inject
+from tests.faults.axis_judge import FOREIGN_NS
+from tests.faults.fault import Fault
 from tests.faults.guarded import guarded
 from tests.faults.hand import path
-from tests.faults.inject import Fault
 from tests.faults.inputs import Joystick
-from tests.faults.judge import FOREIGN_NS, Judge, Violation
+from tests.faults.joystick_faults import joystick_frames
+from tests.faults.judge import Judge, Violation
 from tests.faults.machine import Machine
 from tests.faults.senders import Sender, radius_frames
 from tests.faults.variants import NAMES, machine
@@ -65,6 +67,7 @@ class Drive:
         tick_ms = self.machine.tick_ms
         self.joysticks = {v.name: Sender(v, tick_ms, rng) for v in self.machine.joysticks.values()}
         self.stop = Sender(self.machine.stop, tick_ms, rng) if self.machine.stop else None
+        self.switches = [Sender(one, tick_ms, rng) for one in self.machine.switches]
         self.paths = {
             name: path(rng, self.ticks, axis.signal.full, int(axis.band * axis.signal.full))
             for name, axis in self.machine.axes.items()
@@ -121,7 +124,7 @@ class Drive:
             self._step(missed, active)
 
     def _switches(self, joystick: Joystick, tick: int) -> dict[str, int]:
-        raw = {joystick.enable.name: 1}
+        raw = joystick.pressed()
         first, second = self.toggles[joystick.name]
         if self.toggled and joystick.off and min(first, second) <= tick < max(first, second):
             raw[joystick.off.name] = 1
@@ -150,7 +153,7 @@ class Drive:
                 missed = fault.rng.randint(1, limit - 1)
                 return 1 + missed, missed, False
             if fault.kind == "loop: late, told later":
-                # A loop that was held up in its sleep hears of it after the next body.
+                # A loop that was held up in its sleep learns of it after the next body.
                 fault.memory["done"] = True
                 late = fault.rng.randint(2, limit)
                 self._untold = late - 1
@@ -171,22 +174,19 @@ class Drive:
         frames: list[Frame] = []
         for name, joystick in self.machine.joysticks.items():
             sender = self.joysticks[name]
-            mine = [f for f in active if f.joystick is joystick]
-            sent = []
-            for _ in range(sender.due(self.tick_number)):
-                raw = dict(switches[name])
-                for axis in joystick.axes:
-                    raw |= axis.raw(joysticks[axis.name])
-                raw = sender.counted(raw)
-                for fault in mine:
-                    if act := inject.RAW.get(fault.kind):
-                        act(fault, raw)
-                sent.append(joystick.data(raw))
-            for fault in mine:
-                if spoil := inject.WIRE.get(fault.kind):
-                    sent = spoil(fault, sent)
+            raw = dict(switches[name])
+            for axis in joystick.axes:
+                raw |= axis.raw(joysticks[axis.name])
+            due = range(sender.due(self.tick_number))
+            sent = joystick_frames(joystick, [sender.counted(raw) for _ in due], active)
             frames += [Frame(*joystick.key, data) for data in sender.passed(sent)]
         frames += self._stop_frames(active)
+        for sender in self.switches:
+            source = sender.source
+            for _ in range(sender.due(self.tick_number)):
+                raw = sender.counted(dict(source.codes))
+                sent = inject.input_frames(source, raw, active, inject.SWITCHES)
+                frames += [Frame(*source.key, data) for data in sender.passed(sent)]
         frames += radius_frames(self.machine, self._radius, active)
         for fault in active:
             if extra := inject.EXTRA.get(fault.kind):
@@ -194,26 +194,20 @@ class Drive:
         self._waiting += frames
 
     def _stop_frames(self, active: list[Fault]) -> list[Frame]:
-        stop, sender = self.machine.stop, self.stop
-        if stop is None or sender is None:
+        if (sender := self.stop) is None:
             return []
-        frames = []
+        frames: list[bytes] = []
         for _ in range(sender.due(self.tick_number)):
             raw = sender.counted({self.machine.stop_field.name: 0})
-            data = stop.data(raw)
-            for fault in active:
-                if change := inject.STOP.get(fault.kind):
-                    data = change(fault, stop, raw)
-            if data:
-                frames.append(data)
-        return [Frame(*stop.key, data) for data in sender.passed(frames)]
+            frames += inject.input_frames(sender.source, raw, active, inject.STOP)
+        return [Frame(*sender.source.key, data) for data in sender.passed(frames)]
 
     def _step(self, missed: int, active: list[Fault]) -> None:
         """One body of the loop."""
         now_ns = self.now_ns
         for frame in self._waiting:
             self._tell(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
-            self.judge.hear(frame, now_ns)
+            self.judge.receive(frame, now_ns)
             self.controller.receive(frame, now_ns)
         self._waiting = []
         fails = {f.axis.valve_key for f in active if f.kind == "loop: valve not sent"}
@@ -271,7 +265,7 @@ class Drive:
         joysticks = {a.name: deflected * a.signal.full for a in axes}
         switches = {}
         for name, joystick in self.machine.joysticks.items():
-            switches[name] = {joystick.enable.name: enable}
+            switches[name] = joystick.pressed(enable)
             if joystick.reset:
                 switches[name][joystick.reset.name] = reset
         for _ in range(ticks):
@@ -286,8 +280,7 @@ class Drive:
         if frames.keys() != self.machine.valves.keys():
             raise Violation("neutral frames at the end: not those of every valve")
         for key, axis in self.machine.valves.items():
-            values: Any = axis.valve_message.decode(frames[key].data, decode_choices=False)
-            if values[axis.valve.name] != 0:
+            if axis.sent(frames[key].data)[0] != 0:
                 raise Violation(f"{axis.name}: the last frame is not neutral")
 
     # -- told to a reader -------------------------------------------------------------------------

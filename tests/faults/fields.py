@@ -2,7 +2,8 @@
 
 import functools
 import operator
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from typing import Any
 
 from cantools.database.can import Signal
 
@@ -10,28 +11,39 @@ from cantools.database.can import Signal
 class Field:
     """The bits of one little-endian integer signal, in a frame read as one number."""
 
-    __slots__ = ("full", "high", "low", "mask", "name", "scale", "sign", "special", "start")
+    __slots__ = (
+        *("full", "high", "low", "mask", "name", "scale"),
+        *("sign", "special", "start", "turn", "zero"),
+    )
 
-    def __init__(self, signal: Signal) -> None:
+    def __init__(self, signal: Signal, section: Mapping[str, Any] | None = None) -> None:
+        """``section`` is what the deployment file says of its scaling."""
         assert signal.byte_order == "little_endian", signal.name
         assert not signal.is_float, signal.name
         self.name = signal.name
         self.start = signal.start
         self.mask = (1 << signal.length) - 1
         self.sign = 1 << (signal.length - 1) if signal.is_signed else 0
-        self.low, self.high = -self.sign, self.mask - self.sign
+        said = section or {}
         self.scale = signal.scale
-        # raw value of full deflection; offsets are not used in these machines
+        # raw value of full deflection; offsets are not used in the DBC files of these machines
         assert not signal.offset, signal.name
-        self.full = round((signal.maximum or 0) / signal.scale)
+        self.zero = round(said.get("zero", 0) / signal.scale)
+        self.turn = -1 if said.get("invert") else 1
+        self.low, self.high = -self.sign - self.zero, self.mask - self.sign - self.zero
+        self.full = round(said.get("full", signal.maximum or 0) / signal.scale)
         self.special = {int(raw): str(name) for raw, name in (signal.choices or {}).items()}
 
     def get(self, word: int) -> int:
         value = (word >> self.start) & self.mask
-        return value - 2 * self.sign if value & self.sign else value
+        return self.read(value - 2 * self.sign if value & self.sign else value)
 
-    def put(self, raw: int) -> int:
-        return (raw & self.mask) << self.start
+    def read(self, raw: int) -> int:
+        """Steps from zero of a raw value."""
+        return self.turn * (raw - self.zero)
+
+    def put(self, steps: int) -> int:
+        return (self.turn * steps + self.zero & self.mask) << self.start
 
     def code(self, kind: str) -> int | None:
         """Raw value that the DBC names so, such as Error."""

@@ -7,213 +7,22 @@ A fault acts from tick ``start`` to tick ``stop`` and lies at one of these place
     EXTRA   frames that someone else sends
     LOOP    on the loop of the daemon: ticks that come late, frames that do not go out
     STOP    on the emergency stop, where there is one
+    SWITCHES  on a message with switches that have to agree, where there is one
     RADIUS  on the measured radius, where there is one
+    SENSOR  on a sway sensor and the tool that it watches, where there is one
 """
 
 import random
-from collections.abc import Callable
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable
 from typing import Any
 
 from canshaper.codec.frame import Frame
-from tests.faults.inputs import Input, Joystick
-from tests.faults.machine import Axis, Machine
-
-Raw = dict[str, int]
-
-
-@dataclass
-class Fault:
-    """One fault of a drive."""
-
-    kind: str
-    start: int
-    stop: int
-    machine: Machine
-    rng: random.Random
-    joystick: Joystick
-    axis: Axis
-    memory: dict[str, Any] = field(default_factory=dict)
-
-    def active(self, tick: int) -> bool:
-        return self.start <= tick < self.stop
-
-    def __str__(self) -> str:
-        return f"{self.kind} {self.joystick.name}/{self.axis.name} {self.start}..{self.stop}"
-
-
-# -- raw values of a joystick ---------------------------------------------------------------------
-
-
-def _code(name: str) -> Callable[[Fault, Raw], None]:
-    def act(fault: Fault, raw: Raw) -> None:
-        code = fault.axis.signal.code(name)
-        if code is not None:
-            raw[fault.axis.signal.name] = code
-
-    return act
-
-
-def _out_of_range(fault: Fault, raw: Raw) -> None:
-    joystick, rng = fault.axis.signal, fault.rng
-    least = min(joystick.full + 1, joystick.high)  # one that fills its bits has no more
-    beyond = (least, -joystick.full - 1, joystick.low, rng.randint(least, joystick.high))
-    raw[joystick.name] = rng.choice(beyond)
-
-
-def _frozen_joystick(fault: Fault, raw: Raw) -> None:
-    for axis in fault.joystick.axes:
-        for signal in (axis.signal, *(axis.flags or ())):
-            raw[signal.name] = fault.memory.setdefault(signal.name, raw[signal.name])
-
-
-def _jumping_joystick(fault: Fault, raw: Raw) -> None:
-    full = fault.axis.signal.full
-    raw[fault.axis.signal.name] = fault.rng.randint(-full, full)
-
-
-def _flags(*values: int) -> Callable[[Fault, Raw], None]:
-    def act(fault: Fault, raw: Raw) -> None:
-        for flag in fault.axis.flags or ():
-            raw[flag.name] = fault.rng.choice(values)
-
-    return act
-
-
-def _enable(*values: int, share: float = 1.0) -> Callable[[Fault, Raw], None]:
-    def act(fault: Fault, raw: Raw) -> None:
-        if fault.rng.random() < share:
-            raw[fault.joystick.enable.name] = fault.rng.choice(values)
-
-    return act
-
-
-def _reset(*values: int) -> Callable[[Fault, Raw], None]:
-    def act(fault: Fault, raw: Raw) -> None:
-        if fault.joystick.reset:
-            raw[fault.joystick.reset.name] = fault.rng.choice(values)
-
-    return act
-
-
-def _anti_sway_off(*values: int) -> Callable[[Fault, Raw], None]:
-    def act(fault: Fault, raw: Raw) -> None:
-        if fault.joystick.off:
-            raw[fault.joystick.off.name] = fault.rng.choice(values)
-
-    return act
-
-
-def _frozen_counter(fault: Fault, raw: Raw) -> None:
-    if counter := fault.joystick.counter:
-        raw[counter.name] = fault.memory.setdefault("count", raw[counter.name])
-
-
-def _jumping_counter(fault: Fault, raw: Raw) -> None:
-    if counter := fault.joystick.counter:
-        raw[counter.name] = fault.rng.randint(0, counter.mask)
-
-
-def _stepping_counter(fault: Fault, raw: Raw) -> None:
-    """Every frame a few steps too far: up to the largest step it is still the next one."""
-    if counter := fault.joystick.counter:
-        step = fault.memory.setdefault("step", fault.rng.randint(1, 5))
-        count = fault.memory.get("count", raw[counter.name]) + step
-        raw[counter.name] = fault.memory["count"] = count & counter.mask
-
-
-RAW: dict[str, Callable[[Fault, Raw], None]] = {
-    "joystick: error": _code("Error"),
-    "joystick: not available": _code("NotAvailable"),
-    "joystick: out of range": _out_of_range,
-    "joystick: frozen": _frozen_joystick,
-    "joystick: jumping": _jumping_joystick,
-    "flags: contradictory": _flags(0, 1),
-    "flags: anything": _flags(0, 1, 2, 3),
-    "enable: released": _enable(0),
-    "enable: flickers": _enable(0, share=0.3),
-    "enable: invalid": _enable(2, 3),
-    "enable: anything": _enable(0, 1, 2, 3),
-    "reset: held": _reset(1),
-    "reset: anything": _reset(0, 1, 2, 3),
-    "anti-sway: off": _anti_sway_off(1),
-    "anti-sway: anything": _anti_sway_off(0, 1, 2, 3),
-    "counter: frozen": _frozen_counter,
-    "counter: jumping": _jumping_counter,
-    "counter: stepping": _stepping_counter,
-}
-
-
-# -- frames of a joystick -------------------------------------------------------------------------
-
-
-def _silent(_fault: Fault, _frames: list[bytes]) -> list[bytes]:
-    return []
-
-
-def _lossy(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    return [f for f in frames if fault.rng.random() < 0.5]
-
-
-def _twice(_fault: Fault, frames: list[bytes]) -> list[bytes]:
-    return [f for frame in frames for f in (frame, frame)]
-
-
-def _held_up(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    """The frames come later, all at once."""
-    waiting: list[bytes] = fault.memory.setdefault("waiting", [])
-    waiting += frames
-    if fault.rng.random() < 0.8:
-        return []
-    frames, fault.memory["waiting"] = waiting, []
-    return frames
-
-
-def _wrong_length(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    rng = fault.rng
-    return [(f + bytes(4))[: rng.choice([0, 1, len(f) - 1, len(f) + 1])] for f in frames]
-
-
-def _old(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    """Someone plays frames again that were sent before."""
-    kept: list[bytes] = fault.memory.setdefault("kept", [])
-    kept += frames
-    return [fault.rng.choice(kept) for _ in frames]
-
-
-def _bit_errors(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    def spoil(data: bytes) -> bytes:
-        spoiled = bytearray(data)
-        for _ in range(fault.rng.randint(1, 4)):
-            spoiled[fault.rng.randrange(len(data))] ^= 1 << fault.rng.randrange(8)
-        return bytes(spoiled)
-
-    return [spoil(f) if f and fault.rng.random() < 0.5 else f for f in frames]
-
-
-def _wrong_checksum(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    if fault.joystick.checksum is None:
-        return frames
-    at = fault.joystick.checksum_byte
-    return [f[:at] + bytes([f[at] ^ 0x40]) + f[at + 1 :] if len(f) > at else f for f in frames]
-
-
-def _noise(fault: Fault, frames: list[bytes]) -> list[bytes]:
-    return [fault.rng.randbytes(len(f)) for f in frames]
-
-
-WIRE: dict[str, Callable[[Fault, list[bytes]], list[bytes]]] = {
-    "frames: none": _silent,
-    "frames: lost": _lossy,
-    "frames: twice": _twice,
-    "frames: held up": _held_up,
-    "frames: wrong length": _wrong_length,
-    "frames: old": _old,
-    "frames: bit errors": _bit_errors,
-    "frames: wrong checksum": _wrong_checksum,
-    "frames: noise": _noise,
-}
-
+from tests.faults.fault import Fault, Raw
+from tests.faults.inputs import Input, Switches
+from tests.faults.joystick_faults import RAW, WIRE
+from tests.faults.machine import Machine
+from tests.faults.sensor import KINDS as SENSOR_FAULTS
+from tests.faults.swing import KINDS as TOOL_FAULTS
 
 # -- frames of others ------------------------------------------------------------------------------
 
@@ -293,9 +102,48 @@ STOP: dict[str, Callable[[Fault, Input, Raw], bytes]] = {
     "stop: wrong checksum": lambda _fault, stop, raw: stop.data(raw, spoiled=1),
 }
 
+
+def _switches(share: float, *, every: bool = False) -> Callable[[Fault, Switches, Raw], bytes]:
+    def act(fault: Fault, switches: Switches, raw: Raw) -> bytes:
+        which = fault.memory.setdefault("which", fault.rng.choice([*switches.codes]))
+        for name, code in switches.codes.items():
+            if every or which == name:
+                field = switches.fields[name]
+                if fault.rng.random() < share:
+                    raw[name] = fault.rng.choice([n for n in range(field.mask + 1) if n != code])
+        return switches.data(raw)
+
+    return act
+
+
+SWITCHES: dict[str, Callable[[Fault, Switches, Raw], bytes]] = {
+    "switch: off": _switches(1.0),
+    "switch: flickers": _switches(0.3),
+    "switch: anything": _switches(0.5, every=True),
+    "switch: no frames": lambda _fault, _switches, _raw: b"",
+    "switch: wrong checksum": lambda _fault, one, raw: one.data(raw, spoiled=1),
+}
+
+
+def input_frames(
+    source: Input,
+    raw: Raw,
+    active: Iterable[Fault],
+    kinds: dict[str, Callable[[Fault, Any, Raw], bytes]],
+) -> list[bytes]:
+    """A frame of an input by its raw values, with those faults of STOP or SWITCHES that act."""
+    data = source.data(raw)
+    for fault in active:
+        if change := kinds.get(fault.kind):
+            data = change(fault, source, dict(raw))
+    return [data] if data else []
+
+
 RADIUS = ("radius: none", "radius: jumping", "radius: anything", "radius: wrong length")
 
-KINDS = (*RAW, *WIRE, *EXTRA, *LOOP, *STOP, *RADIUS)
+SENSOR = (*SENSOR_FAULTS, *TOOL_FAULTS)
+
+KINDS = (*RAW, *WIRE, *EXTRA, *LOOP, *STOP, *SWITCHES, *RADIUS, *SENSOR)
 
 
 def kinds_for(machine: Machine) -> list[str]:
@@ -304,6 +152,9 @@ def kinds_for(machine: Machine) -> list[str]:
     impossible = {
         "stop": machine.stop is None,
         "radius": machine.radius is None,
+        "switch": not machine.switches,
+        "sensor": not machine.sensors,
+        "tool": not machine.sensors,
         "flags": not any(a.flags for a in axes),
         "reset": not any(v.reset for v in joysticks),
         "counter": not any(v.counter for v in joysticks),
@@ -312,8 +163,8 @@ def kinds_for(machine: Machine) -> list[str]:
     return [k for k in KINDS if not (impossible.get(k) or impossible.get(k.split(":")[0]))]
 
 
-COMMON = {k for k in KINDS if k.split(":")[0] not in ("stop", "radius", "flags")}
-COMMON -= {"frames: wrong checksum"}
+RARE = ("stop", "radius", "flags", "switch", "sensor", "tool")
+COMMON = {k for k in KINDS if k.split(":")[0] not in RARE} - {"frames: wrong checksum"}
 
 
 def random_faults(machine: Machine, rng: random.Random, ticks: int) -> list[Fault]:

@@ -57,7 +57,7 @@ class EnableForced(Honest):
     """Sees the enable switch on, always."""
 
     def receive(self, frame: Frame, now_ns: int) -> None:
-        if (joystick := self.joystick(frame)) and joystick.checksum is None:
+        if (joystick := self.joystick(frame)) and joystick.checksum is None and joystick.enable:
             word = int.from_bytes(frame.data, "little")
             word += joystick.enable.put(1) - joystick.enable.put(joystick.enable.get(word))
             frame = frame._replace(data=word.to_bytes(joystick.length, "little"))

@@ -6,8 +6,9 @@ They stand between the daemon and its buses, so they stay what they are however 
 from collections.abc import Callable
 
 from canshaper.codec.frame import Frame
+from tests.faults.axis import Axis
 from tests.faults.inputs import Joystick
-from tests.faults.machine import Axis, Machine
+from tests.faults.machine import Machine
 from tests.faults.sequence import Sequence
 
 JOYSTICKS = "forwarder"
@@ -47,7 +48,8 @@ def _steps(change: Callable[[Axis, int], int]) -> Callable[[Sequence], None]:
 
 def _enabled(machine: Machine, frame: Frame) -> Frame:
     """Enable is on, whatever the frame says."""
-    if (joystick := _joystick(machine, frame)) is None:
+    joystick = _joystick(machine, frame)
+    if joystick is None or joystick.enable is None:
         return frame
     word = int.from_bytes(frame.data, "little")
     word += joystick.enable.put(1) - joystick.enable.put(joystick.enable.get(word))

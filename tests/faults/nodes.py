@@ -4,7 +4,8 @@ import random
 from typing import TYPE_CHECKING
 
 from canshaper.codec.frame import Frame
-from tests.faults.machine import Machine, Node
+from tests.faults.axis import Node
+from tests.faults.machine import Machine
 from tests.rigs.canopen import (
     ACTIVE,
     BOOT_UP,
@@ -58,7 +59,9 @@ class CanopenNode:
         if self.axis and self.valve and self.operational and not self.mute:
             assert self.axis.words
             word = self.axis.words.status.put(self.valve.state)
-            self._world.put(Frame(*self.axis.words.key, word.to_bytes(2, "little")))
+            self._world.put(
+                Frame(*self.axis.words.key, word.to_bytes(self.axis.words.length, "little"))
+            )
 
     def command(self, frame: Frame) -> None:
         """Take what the daemon sends."""

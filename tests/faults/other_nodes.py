@@ -1,8 +1,8 @@
 """What other nodes have said, by CiA 301, CiA 408 and SAE J1939-81, and what follows from it."""
 
 from canshaper.codec.frame import Frame
-from tests.faults.heard import LONG_AGO
-from tests.faults.machine import Node, Words
+from tests.faults.axis import Node, Words
+from tests.faults.received import LONG_AGO
 
 BOOT_UP, OPERATIONAL = 0, 5
 ACTIVE, STATE_BITS = 0xF, 0xF
@@ -22,7 +22,7 @@ class NodeRules:
         self._since: set[str] = set()
         self._limit_ns = node.timeout_ns + 3 * tick_ns
 
-    def hear(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: Frame, now_ns: int) -> None:
         """A frame was read."""
         if frame.bus != self.node.bus or frame.extended:
             return
@@ -70,9 +70,9 @@ class WordRules:
         self._left = False
         self._limit_ns = words.timeout_ns + 2 * tick_ns
 
-    def hear(self, frame: Frame, now_ns: int) -> None:
+    def receive(self, frame: Frame, now_ns: int) -> None:
         """A frame was read."""
-        if frame[:3] == self.words.key and len(frame.data) == 2:
+        if frame[:3] == self.words.key and len(frame.data) == self.words.length:
             word = self.words.status.get(int.from_bytes(frame.data, "little"))
             self._state, self._heard_ns = word & STATE_BITS, now_ns
             self._left |= self._state != ACTIVE
@@ -103,7 +103,7 @@ class AddressRules:
         if self._unanswered is not None:
             self._unanswered += 1
 
-    def hear(self, frame: Frame) -> None:
+    def receive(self, frame: Frame) -> None:
         """A frame was read: is it a claim for our address?"""
         if frame[:3] != self._claim or len(frame.data) != 8 or self._name is None:
             return
@@ -125,6 +125,11 @@ class AddressRules:
             self.lost, self._unanswered = False, None
             return ""
         return self._under_it(now_ns) if frame.can_id & 0xFF == self._own else ""
+
+    def usable(self, now_ns: int) -> bool:
+        """Whether anything may be sent under our address."""
+        waited = self._name is not None and now_ns - self._claimed_ns >= WAIT_NS - SLACK_NS
+        return waited and not self.lost
 
     def _under_it(self, now_ns: int) -> str:
         """What is wrong with sending anything under our address now."""

@@ -17,10 +17,10 @@ A reload, a change of a number: nothing of this ends with them, so the rules do 
 
 from canshaper.codec.frame import Frame
 from tests.faults.axis_rules import SLACK_NS, AxisRules
-from tests.faults.heard import HeardJoystick
 from tests.faults.judge import Violation
 from tests.faults.machine import Key, Machine
 from tests.faults.other_nodes import AddressRules, NodeRules, WordRules
+from tests.faults.received import Received, ReceivedJoystick, ReceivedSwitches
 
 
 class Rules:
@@ -28,12 +28,19 @@ class Rules:
 
     def __init__(self, machine: Machine) -> None:
         self.machine = machine
-        joysticks = {name: HeardJoystick(v) for name, v in machine.joysticks.items()}
-        self._joysticks = {v.source.key: v for v in joysticks.values()}
+        joysticks = {name: ReceivedJoystick(v) for name, v in machine.joysticks.items()}
+        switches = {one: ReceivedSwitches(one) for one in machine.switches}
+        for one in joysticks.values():
+            one.connect(joysticks, switches)
+        inputs = (*joysticks.values(), *switches.values())
+        self._inputs: dict[Key, Received] = {v.source.key: v for v in inputs}
         self.axes = {
             name: AxisRules(axis, joysticks[axis.joystick.name], machine.tick_ns)
             for name, axis in machine.axes.items()
         }
+        for one in self.axes.values():
+            if one.axis.moves_with:
+                one.partner = self.axes[one.axis.moves_with.name]
         self._by_valve: dict[Key, list[AxisRules]] = {}
         for one in self.axes.values():
             self._by_valve.setdefault(one.axis.valve_key, []).append(one)
@@ -77,19 +84,19 @@ class Rules:
         """The daemon begins to read."""
         self._pending_ns = now_ns
 
-    def hear(self, frame: Frame, arrived_ns: int) -> None:
+    def receive(self, frame: Frame, arrived_ns: int) -> None:
         """The daemon has read a frame."""
-        if joystick := self._joysticks.get(frame[:3]):
-            joystick.hear(frame.data, arrived_ns)
+        if entry := self._inputs.get(frame[:3]):
+            entry.receive(frame.data, arrived_ns)
         for one in self.commanded(frame):
             one.contested_ns = arrived_ns
             one.causes.add("another sender")
         for node in self._nodes.values():
-            node.hear(frame, arrived_ns)
+            node.receive(frame, arrived_ns)
         for words in self._words.values():
-            words.hear(frame, arrived_ns)
+            words.receive(frame, arrived_ns)
         for address in self.addresses.values():
-            address.hear(frame)
+            address.receive(frame)
 
     def failed(self, frame: Frame, now_ns: int) -> None:
         """A frame did not get onto its bus."""
@@ -121,7 +128,7 @@ class Rules:
                 one.may_stop(now_ns)
             one.decide(now_ns, joystick_works=works)
             address = self.addresses.get(one.axis.valve_key[0])
-            if address and address.lost:
+            if address and not address.usable(now_ns):
                 one.silenced()
         for node_rules in self._nodes.values():
             node_rules.looked_at()

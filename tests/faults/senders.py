@@ -4,7 +4,7 @@ import random
 from collections.abc import Iterable
 
 from canshaper.codec.frame import Frame
-from tests.faults.inject import Fault
+from tests.faults.fault import Fault
 from tests.faults.inputs import Input
 from tests.faults.machine import Machine
 

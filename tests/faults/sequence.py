@@ -12,14 +12,15 @@ from typing import Any
 
 from tests.faults import inject
 from tests.faults.bench import Bench, Loader
-from tests.faults.inject import Fault
+from tests.faults.fault import Fault
 from tests.faults.judge import Violation
 from tests.faults.machine import Key, Machine
 from tests.faults.rules import Rules
 from tests.faults.shipped import shipped
 from tests.faults.world import World
 
-BODY_TICKS = (80, 200)
+# A sensor is trusted after some motion; with one they are longer.
+BODY_TICKS, SENSOR_TICKS = (80, 200), (120, 320)
 # Bringing a valve of CiA 408 to work takes longer than claiming an address.
 SETTLE_S, SETTLE_CANOPEN_S = 1.3, 5.0
 MOVES_WITHIN_S = 1.6
@@ -121,7 +122,9 @@ def kinds_for(machine: Machine) -> list[str]:
             k for k in ACTS if k.startswith(("emerg", "heart", "boot", "valve", "status"))
         }
     if not machine.addresses:
-        impossible |= {k for k in ACTS if k.startswith(("claim", "others"))}
+        impossible |= {k for k in ACTS if k.startswith("claim")}
+    if not (machine.addresses and all(axis.valve_key[2] for axis in machine.axes.values())):
+        impossible |= {k for k in ACTS if k.startswith("others")}
     return own + [k for k in ACTS if k not in impossible]
 
 
@@ -135,7 +138,7 @@ class Sequence:
         self.rng = rng = random.Random(f"canshaper sequence {name} {seed}")
         # A machine of CANopen or J1939 takes its time before anything can move.
         self._first = 80 if machine.nodes else 20 if machine.addresses else 3
-        self.ticks = self._first + rng.randint(*BODY_TICKS)
+        self.ticks = self._first + rng.randint(*(SENSOR_TICKS if machine.sensors else BODY_TICKS))
         self.faults = self._plan()
         self.world = World(machine, rng, self.ticks, self.faults, self._put)
         self.rules = Rules(machine)
@@ -158,7 +161,10 @@ class Sequence:
             if faults and rng.random() < 0.6:  # one fault in another, or right behind it
                 start = faults[-1].start + rng.choice((0, 0, 1, 1, 2, 3, 5, 8, 15))
             kind = rng.choice(acts if rng.random() < 0.6 else kinds)
-            length = rng.choice((1, 1, 2, 3, 5, 7, 12, 30)) + (30 if kind in LONG else 0)
+            if machine.sensors and rng.random() < 0.4:
+                kind = rng.choice(inject.SENSOR)
+            long = kind in LONG or kind in inject.SENSOR
+            length = rng.choice((1, 1, 2, 3, 5, 7, 12, 30)) + (30 if long else 0)
             axis = rng.choice(list(machine.axes.values()))
             stop = min(start + length, self.ticks)
             if start < stop:
@@ -208,6 +214,7 @@ class Sequence:
         seen = Counter({f"fault {f.kind}": 1 for f in self.faults})
         seen.update(frames=self.rules.frames, moves=self.rules.moves, sequences=1)
         seen.update({f"deployment {self.name}": 1, "ways back": int(self.patient)})
+        seen.update({f"sway sensor {state}": n for state, n in self.world.sensed.items()})
         seen.update({"reloads applied": self.bench.applied, "sets refused": self.bench.refused})
         return seen
 

@@ -17,9 +17,20 @@ NAMES = (
     "forwarder-joints",
     "j1939-forwarder",
     "j1939-profiles",
+    "j1939-rollers",
+    "ecu-forwarder",
+    "j1939-sensor",
     "canopen-forwarder",
+    "canopen-sensor",
     "gateway-forwarder",
     "two-cranes",
+    "canfd-forwarder",
+    "canfd-sensor",
+    "js6000-forwarder",
+    "pvedcc-forwarder",
+    "moog-forwarder",
+    "cia402-forwarder",
+    "remote-forwarder",
 )
 
 

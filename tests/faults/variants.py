@@ -141,6 +141,7 @@ VARIANTS = {
             "BO_ 273 20;\n": 'BO_ 273 20;\nBA_ "GenMsgCycleTime" BO_ 256 50;\n',
         },
     ),
+    "switches": Variant("ecu-forwarder"),
 }
 NAMES = list(VARIANTS)
 
@@ -159,6 +160,7 @@ def machine(name: str) -> tuple[Machine, Deployment]:
     dbc = "forwarder-joints" if variant.file == "forwarder-joints" else "forwarder"
     network = (ROOT / "dbc" / f"{dbc}.dbc").read_text(encoding="cp1252")
     text = _replaced(text, {**variant.yaml, f"../dbc/{dbc}.dbc": f"{name}.dbc"})
+    text = text.replace("../dbc/", f"{ROOT}/dbc/")
     path.write_text(text, encoding="utf-8")
     network = _replaced(network, variant.dbc)
     path.with_suffix(".dbc").write_text(network, encoding="cp1252")

@@ -6,16 +6,20 @@ It runs on a clock of the test's. Every frame has the time at which it is on its
 import heapq
 import itertools
 import random
+from collections import Counter
 from collections.abc import Callable, Iterator
 
 from canshaper.codec.frame import Frame
 from tests.faults import inject
+from tests.faults.fault import Fault
 from tests.faults.hand import path
-from tests.faults.inject import Fault
 from tests.faults.inputs import Joystick
+from tests.faults.joystick_faults import joystick_frames
 from tests.faults.machine import Machine
 from tests.faults.nodes import CanopenNode, Claimant
 from tests.faults.senders import Sender, radius_frames
+from tests.faults.sensor import SensorMessage, sensor_frame
+from tests.faults.swing import Swing
 
 RADIUS_CYCLE_NS = 100_000_000
 MS = 1_000_000
@@ -34,6 +38,7 @@ class World:
     Attributes:
         now_ns: the time.
         healthy: enable, reset and deflection (-1 to 1) of every joystick once the faults are over.
+        sensed: status frames by what they say of a sway sensor.
     """
 
     def __init__(
@@ -47,6 +52,7 @@ class World:
         self.machine, self.rng, self.ticks, self.faults = machine, rng, ticks, faults
         self.now_ns = 0
         self.healthy = (1, 0, 0.0)
+        self.sensed: Counter[str] = Counter()
         self._put = put
         self._events: list[tuple[int, int, Callable[[], None]]] = []
         self._number = itertools.count()
@@ -73,8 +79,21 @@ class World:
                 rng.randrange(cycle_ns),
                 lambda joystick=joystick: self._joystick(joystick),
             )
+        for switches in machine.switches:
+            cycle_ns = switches.cycle_ms * MS
+            sender = Sender(switches, machine.tick_ms, rng)
+            self.every(cycle_ns, rng.randrange(cycle_ns), lambda one=sender: self._switches(one))
+        if machine.stop:
+            cycle_ns = machine.stop.cycle_ms * MS
+            stop = Sender(machine.stop, machine.tick_ms, rng)
+            self.every(cycle_ns, rng.randrange(cycle_ns), lambda: self._stop(stop))
         if machine.radius:
             self.every(RADIUS_CYCLE_NS, rng.randrange(RADIUS_CYCLE_NS), self._radius_now)
+        self._swings = {n: Swing(a, rng) for n, a in machine.axes.items() if a.period_s}
+        self._by_valve = {one.axis.valve_key: one for one in self._swings.values()}
+        for sensor in machine.sensors.values():
+            cycle_ns = sensor.cycle_ms * MS
+            self.every(cycle_ns, rng.randrange(cycle_ns), lambda one=sensor: self._sensor(one))
         self.every(machine.tick_ns, rng.randrange(machine.tick_ns), self._others)
 
     # -- time -------------------------------------------------------------------------------------
@@ -127,30 +146,35 @@ class World:
         if node and not self.nodes[node.number].operational:
             return
         sender = self._joysticks[joystick.name]
-        mine = [f for f in self.active() if f.joystick is joystick]
         raw = sender.counted(self._hand(joystick))
-        for fault in mine:
-            if act := inject.RAW.get(fault.kind):
-                act(fault, raw)
-        sent = [joystick.data(raw)]
-        for fault in mine:
-            if spoil := inject.WIRE.get(fault.kind):
-                sent = spoil(fault, sent)
-        for data in sender.passed(sent):
+        for data in sender.passed(joystick_frames(joystick, [raw], self.active())):
             self.put(Frame(*joystick.key, data))
+
+    def _switches(self, sender: Sender) -> None:
+        switches = sender.source
+        raw = sender.counted(dict(switches.codes))
+        sent = inject.input_frames(switches, raw, self.active(), inject.SWITCHES)
+        for data in sender.passed(sent):
+            self.put(Frame(*switches.key, data))
+
+    def _stop(self, sender: Sender) -> None:
+        raw = sender.counted({self.machine.stop_field.name: 0})
+        sent = inject.input_frames(sender.source, raw, self.active(), inject.STOP)
+        for data in sender.passed(sent):
+            self.put(Frame(*sender.source.key, data))
 
     def _hand(self, joystick: Joystick) -> dict[str, int]:
         """Raw values of joysticks and switches as the operator has them now."""
         tick = self.tick
         if tick >= self.ticks:
             enable, reset, deflection = self.healthy
-            raw = {joystick.enable.name: enable}
+            raw = joystick.pressed(enable)
             if joystick.reset:
                 raw[joystick.reset.name] = reset
             for axis in joystick.axes:
                 raw |= axis.raw(round(deflection * axis.signal.full))
             return raw
-        raw = {joystick.enable.name: 1}
+        raw = joystick.pressed()
         first, second = self._toggles[joystick.name]
         if self._toggled and joystick.off and first <= tick < second:
             raw[joystick.off.name] = 1
@@ -161,6 +185,15 @@ class World:
     def _radius_now(self) -> None:
         for frame in radius_frames(self.machine, self._radius, self.active()):
             self.put(frame)
+
+    def _sensor(self, sensor: SensorMessage) -> None:
+        if sensor.node is not None and not self.nodes[sensor.node].operational:
+            return
+        for swing in self._swings.values():
+            swing.advance(self.now_ns, self.active())
+        values = sensor.values(self._swings, self.rng)
+        if (data := sensor_frame(sensor, values, self.active())) is not None:
+            self.put(Frame(*sensor.key, data))
 
     def _others(self) -> None:
         """What somebody else sends in each tick of a fault."""
@@ -173,6 +206,11 @@ class World:
 
     def sent(self, frame: Frame) -> None:
         """A frame of the daemon is on its bus."""
+        if swing := self._by_valve.get(frame[:3]):
+            swing.asked(frame.data)
+        status = self.machine.statuses.get(frame[:3])
+        if status and status.period_s:
+            self.sensed[status.sensor_state(frame.data)] += 1
         for node in self.nodes.values():
             node.command(frame)
         for claimant in self.claimants:

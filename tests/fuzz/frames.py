@@ -2,7 +2,7 @@
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from tests.faults.inputs import Input
+from tests.faults.inputs import Input, Switches
 from tests.faults.judge import Judge
 from tests.faults.variants import NAMES, machine
 
@@ -28,7 +28,7 @@ class Script:
 
     def receive(self, frame: Frame) -> None:
         now_ns = self.now_ns + 1  # frames come after the last tick
-        self.judge.hear(frame, now_ns)
+        self.judge.receive(frame, now_ns)
         self.controller.receive(frame, now_ns)
 
     def joystick(self, number: int, word: int) -> None:
@@ -49,9 +49,11 @@ class Script:
                 if (source.counter)
                 else {}
             )
+            if isinstance(source, Switches):
+                raw |= source.codes
             for joystick in self.machine.joysticks.values():
                 if joystick is source:
-                    raw[joystick.enable.name] = 1
+                    raw |= joystick.pressed()
                     for axis in joystick.axes:
                         raw |= axis.raw(deflected * axis.signal.full // 100)
             self.receive(Frame(*source.key, source.data(raw)))

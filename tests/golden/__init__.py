@@ -4,7 +4,7 @@
 ``forwarder.log`` and ``forwarder-robust.log`` are what the controller sends at every tick of it.
 Both are lines of text, so a change of behaviour is read in a diff.
 
-The filters reckon with floats, and another mathematical library may round the last bit of ``exp``
+The filters compute with floats, and another mathematical library may round the last bit of ``exp``
 or ``sin`` otherwise. What is sent is rounded to the grid of its frame, so that shows only where a
 value lies next to a rounding edge, half-way between two steps. The nearest comes to 0.0005 steps of
 it with forwarder.yaml, 0.0011 with forwarder-robust.yaml. Six and three lie exactly on it: the rate

@@ -4,7 +4,7 @@ import pytest
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from canshaper.machine.bus_load import longest_frame_bits
+from canshaper.machine.bus_load import longest_fd_bits, longest_frame_bits
 from tests.rigs.files import Machine
 
 
@@ -30,6 +30,34 @@ def test_stuff_bits_are_as_many_as_a_worst_frame_has(
         if run == 5:
             stuff, run, last = stuff + 1, 1, 1 - bit
     assert longest_frame_bits(extended, length) == stuffed + 8 * length + stuff + other
+
+
+# CRC of 17 bits up to 16 bytes, else of 21; six or seven fixed stuff bits among it and its count.
+@pytest.mark.parametrize(
+    ("extended", "length", "slow", "fast"),
+    [
+        (False, 8, 17 + 4 + 13, 69 + 17 + 27),
+        (False, 16, 17 + 4 + 13, 133 + 33 + 27),
+        (False, 20, 17 + 4 + 13, 165 + 41 + 32),
+        (True, 64, 36 + 8 + 13, 517 + 130 + 32),
+    ],
+)
+def test_longest_frames_of_can_fd(extended: bool, length: int, slow: int, fast: int) -> None:
+    assert longest_fd_bits(extended, length) == (slow, fast)
+
+
+def test_the_data_of_can_fd_have_a_rate_of_their_own(machine: Machine) -> None:
+    machine.in_dbc("SlewCommand: 2", "SlewCommand: 64")
+    machine.in_yaml("bitrate: 250000", "bitrate: 250000, fd: true")
+    slow = machine.load().load("crane")
+    machine.in_yaml("fd: true", "fd: true, data_bitrate: 1000000")
+    fast = machine.load().load("crane")
+    assert slow is not None
+    assert fast is not None
+    data = longest_fd_bits(False, 64)[1] * 50
+    assert slow.share - fast.share == pytest.approx(data / 250_000 - data / 1_000_000)
+    check = ["check", str(machine.directory / "machine.yaml")]
+    assert "% of 250 kbit/s, data 1000 kbit/s" in CliRunner().invoke(app, check).output
 
 
 def test_every_message_of_the_deployment_counts_and_no_other(machine: Machine) -> None:

@@ -94,12 +94,17 @@ def test_overlapping_signals_are_told_at_their_message(machine: Machine) -> None
     ]
 
 
-def test_a_table_without_its_signal_is_told_at_the_table(machine: Machine) -> None:
-    machine.in_dbc("SG_ Enable :", "SG_ Enabel :")
-    line = machine.in_dbc("VAL_ 272 Enable", "VAL_ 272 Enable")
-    (problem,) = machine.problems()
-    assert problem.startswith(f"machine.dbc:{line}: not a DBC file that can be used: unused VAL_")
-    assert "\n" not in problem
+def test_a_table_without_its_signal_is_a_warning_and_named_by_none(machine: Machine) -> None:
+    """It gives names only, and no signal has them."""
+    machine.in_dbc("VAL_ 272 Enable", 'VAL_ 272 Enabel 1 "Leftover" ;\nVAL_ 272 Enable')
+    line = machine.in_dbc("VAL_ 272 Enabel", "VAL_ 272 Enabel")
+    deployment = machine.load()
+    count, (warning,) = deployment.messages.warnings()
+    assert count == 1
+    path = machine.directory / "machine.dbc"
+    assert str(warning) == f"{path}:{line}: VAL_ 272 Enabel is of a signal that there is not"
+    enable = deployment.joysticks["left"].message.get_signal_by_name("Enable")
+    assert "Leftover" not in {str(name) for name in (enable.choices or {}).values()}
 
 
 def test_a_type_without_its_signal_is_told_at_the_type(machine: Machine) -> None:
@@ -161,19 +166,23 @@ def test_messages_of_several_files_come_together(machine: Machine) -> None:
     [
         (
             [("JoystickLeft: 8", "JoystickLeft: 9")],
-            "joysticks.left.message: JoystickLeft: expected 8 bytes at most, got 9",
+            "joysticks.left.message: JoystickLeft: expected a message of classical CAN, 8 bytes at"
+            " most, got 9 bytes: bus crane has no fd: true",
         ),
         (
             [("SlewCommand: 2", "SlewCommand: 12")],
-            "axes.slew.valve.message: SlewCommand: expected 8 bytes at most, got 12",
+            "axes.slew.valve.message: SlewCommand: expected a message of classical CAN, 8 bytes at"
+            " most, got 12 bytes: bus crane has no fd: true",
         ),
         (
             [("Slew : 0|16", "Slew m0 : 0|16"), ("Enable : 32", "Enable M : 32")],
-            "joysticks.left.message: JoystickLeft is multiplexed; nothing can be taken from it",
+            "joysticks.left.message: JoystickLeft is multiplexed; without multiplexor"
+            " nothing can be taken from it",
         ),
         (
             [("Velocity : 0|8", "Velocity m0 : 0|8"), ("Counter : 8|8", "Counter M : 8|8")],
-            "axes.slew.valve.message: SlewCommand is multiplexed; nothing can be sent in it",
+            "axes.slew.valve.message: SlewCommand is multiplexed; without multiplexor"
+            " nothing can be sent in it",
         ),
     ],
 )

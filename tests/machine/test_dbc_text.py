@@ -183,6 +183,7 @@ OTHER = 'BO_ 5 Other: 2 A\n SG_ One : 0|8@1+ (1,0) [0|0] "" A\n SG_ Two : 8|8@1+
         ("8|8@1+", "-1|8@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
         ("8|8@1+", "8|1.5@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
         ("8|8@1+", "7|8@1+", 1, "Other: has overlapping signals, One and Two"),
+        ("Two : 8|8", "One : 8|8", 1, "Other: has two signals of the name One"),
         ("8|8@1+", "7|8@0+", 1, "Other: has overlapping signals, One and Two"),
         ("8|8@1+", "8|999999999@1+", 1, "the signal Two is not within them"),
         ("BO_ 5", "BO_ 2048", 1, "Other: has the id 0x800 of more than 11 bits; an id of 29"),
@@ -277,13 +278,13 @@ def test_check_shows_the_first_of_them(machine: Machine) -> None:
     shown = CliRunner().invoke(app, command)
     assert shown.exit_code == 0
     path = machine.directory / "machine.dbc"
-    assert "  1 WARNING in messages that are not used:" in shown.output
+    assert "  1 WARNING in messages and tables that are not used:" in shown.output
     assert f"    {path}:{line}: VAL_ 2000 None is of a signal that there is not\n" in shown.output
     assert "more" not in shown.output.split("not used:")[1].split("  bus")[0]
     machine.in_dbc("CM_ ", 'VAL_ 2000 None 1 "on" ;\n' * 10 + "CM_ ")
     machine.load()
     shown = CliRunner().invoke(app, command)
-    assert "  11 WARNINGS in messages that are not used:" in shown.output
+    assert "  11 WARNINGS in messages and tables that are not used:" in shown.output
     assert shown.output.count("that there is not") == 10
     assert "    and 1 more\n" in shown.output
 
@@ -355,7 +356,6 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     )
     for row in (
         OTHER,  # two of one id
-        'VAL_ 5 None 1 "on" ;\n',
         "SIG_VALTYPE_ 5 One : 1;\n",  # a float of 8 bits
         'BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","J1939PG";\n'
         'BA_DEF_DEF_ "VFrameFormat" "StandardCAN";\nBA_ "VFrameFormat" BO_ 5 1;\n',
@@ -369,6 +369,10 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     loaded, _ = load_dbc(file, ())
     assert loaded
     assert loaded.messages == []
+    file.write_text(f'{OTHER}VAL_ 5 None 1 "on" ;\n', "cp1252")
+    loaded, _ = load_dbc(file)
+    assert loaded
+    assert ([m.name for m in loaded.messages], loaded.count) == (["Other"], 1)
 
 
 # -- written as nobody expects, and too large -----------------------------------------------------

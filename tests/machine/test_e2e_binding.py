@@ -5,13 +5,14 @@ from pathlib import Path
 import pytest
 
 from canshaper.checksums import Checksum
-from canshaper.codec.e2e import Profile1, Profile2
+from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile5
 from canshaper.codec.protection import Protection
 from tests.machine.protected_machine import (
     IDS,
     JOYSTICK,
     RADIUS,
     STATUS,
+    STOP,
     VALVES,
     line_of,
     load,
@@ -44,6 +45,24 @@ def test_every_message_has_its_protection(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("section", "kind", "counts"),
+    [
+        ("{ profile: p11, data_id: 0x123, data_id_mode: nibble }", Profile1, 15),
+        (f"{{ profile: p22, data_ids: {IDS} }}", Profile2, 16),
+        ("{ profile: p05, data_id: 0x1234 }", Profile5, 256),
+    ],
+)
+def test_other_profiles(tmp_path: Path, section: str, kind: type[E2e], counts: int) -> None:
+    found = problems(tmp_path, (STOP, section))
+    # The stop lies in byte 2, where profile 5 has its counter.
+    assert len(found) == (kind is Profile5)
+    if not found:
+        stop = load(tmp_path, (STOP, section)).emergency_stop
+        assert stop
+        assert (type(stop.protection.check), stop.protection.counts) == (kind, counts)
+
+
 def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
     """The upper half of byte 1 is State in the status, and Low in the valve message."""
     assert not problems(tmp_path)
@@ -56,14 +75,30 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
         # the section itself
         (
             JOYSTICK,
-            "{ profile: p05, data_id: 1 }",
-            ".profile: expected 'p01' or 'p02', got 'p05'",
+            "{ profile: p03, data_id: 1 }",
+            ".profile: expected 'p01', 'p02', 'p04', 'p05', 'p06', 'p07', 'p11' or 'p22', got"
+            " 'p03'",
+        ),
+        (
+            JOYSTICK,
+            "{ profile: p05, data_id: 0x10000 }",
+            ": data_id: expected up to 0xffff with profile p05, got 0x10000",
         ),
         (JOYSTICK, "{ data_id: 1 }", ".profile: missing: profile of AUTOSAR E2E"),
         (
             JOYSTICK,
             "{ profile: p01, data_id: 1 }",
             ": expected data_id and data_id_mode with profile p01, got data_id",
+        ),
+        (
+            JOYSTICK,
+            "{ profile: p05, data_id: 1, data_id_mode: low }",
+            ": expected data_id with profile p05, got data_id and data_id_mode",
+        ),
+        (
+            JOYSTICK,
+            "{ profile: p11, data_id: 1, data_id_mode: low }",
+            ": data_id_mode: expected both or nibble with profile p11, got low",
         ),
         (
             JOYSTICK,
@@ -101,9 +136,13 @@ def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
         (
             "data_id: 0x123",
             "data_id: 0x10000",
-            ".data_id: expected a whole number, 0 to 65535, got 65536",
+            ": data_id: expected up to 0xffff with profile p01, got 0x10000",
         ),
-        ("data_id: 0x123", "data_id: -1", ".data_id: expected a whole number, 0 to 65535, got -1"),
+        (
+            "data_id: 0x123",
+            "data_id: -1",
+            ".data_id: expected a whole number, 0 to 4294967295, got -1",
+        ),
         (
             "data_id_mode: both",
             "data_id_mode: high",

@@ -75,6 +75,10 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
         (SLEW, SLEW.replace("200", "100"), "expected more than the 100 ms of joystick left, whose"),
         (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
          "direction: expected none in the message of joystick left, which"),
+        (SLEW, f"{SLEW} multiplexor: 3,",  # frames with another value would not pass
+         "multiplexor: expected none in the message of joystick left, which"),
+        (SLEW, f"{SLEW} cycle_ms: 40,",
+         "cycle_ms: expected the same as joystick left, got another"),
         (f"{SLEW} {COUNTER}",
          "bus: machine, message: SlewCommand, signal: Velocity, timeout_ms: 200",
          "leave with this command in them, got 'SlewCommand'"),
@@ -122,7 +126,7 @@ def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -
     dbc = ("\nBO_ 273", ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273')
     (found,) = problems(tmp_path, *changes, dbc=dbc)
     assert (
-        "gateway.fallback: expected stop or pass, got neutral: can-gw of the kernel reckons"
+        "gateway.fallback: expected stop or pass, got neutral: can-gw of the kernel computes"
         " crc8_autosar in" in found
     )
     assert load(tmp_path, *changes, ("fallback: neutral", "fallback: stop"), dbc=dbc)

@@ -182,7 +182,28 @@ def test_an_algorithm_that_fails_is_a_problem_of_the_file(
             "joysticks.left.checksum.kind: expected one of"
             f" {', '.join(map(repr, [*CHECKSUMS][:-1]))} or {[*CHECKSUMS][-1]!r}, got 'crc8'",
         ),
-        ("checksum: { signal: Check }", "joysticks.left.checksum.kind: "),
+        (
+            "checksum: { signal: Check }",
+            "joysticks.left.checksum: expected one of kind and polynomial, got neither",
+        ),
+        (
+            "checksum: { signal: Check, kind: xor, polynomial: 7 }",
+            "joysticks.left.checksum: expected one of kind and polynomial, got both",
+        ),
+        (
+            "checksum: { signal: Check, kind: xor, start: 1 }",
+            "joysticks.left.checksum: start, end and reflected: expected with polynomial, got kind",
+        ),
+        (
+            "checksum: { signal: Check, polynomial: 0x107 }",
+            "joysticks.left.checksum.signal: Check: expected 8 or 16 bits, as many as the"
+            " polynomial has, got 8",
+        ),
+        (
+            "checksum: { signal: Half, polynomial: 3 }",
+            "joysticks.left.checksum.signal: Half: expected 8 or 16 bits, as many as the"
+            " polynomial has, got 4",
+        ),
         ("checksum: { kind: xor }", "joysticks.left.checksum.signal: "),
         ("checksum: { signal: Check, kind: xor, byte: 6 }", "joysticks.left.checksum.byte: "),
         (
@@ -411,7 +432,9 @@ def test_an_emergency_stop_without_a_cycle_is_a_problem_of_the_dbc(stoppable: Ma
     stoppable.in_dbc('BA_ "GenMsgCycleTime" BO_ 64 20;\n', "")
     line = stoppable.in_dbc("BO_ 64 Stop", "BO_ 64 Stop")
     stop(stoppable, STOP + " }")
-    assert stoppable.problems() == [f"machine.dbc:{line}: Stop: has no GenMsgCycleTime"]
+    assert stoppable.problems() == [
+        f"machine.dbc:{line}: Stop: has no GenMsgCycleTime; cycle_ms may say it"
+    ]
 
 
 def test_problems_of_joysticks_and_stop_are_told_together(stoppable: Machine) -> None:

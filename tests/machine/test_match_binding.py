@@ -93,7 +93,7 @@ def test_two_channels_that_nothing_tells_apart(tmp_path: Path, first: str, secon
         (
             "{ bitrate: 9999 }",
             "match.bitrate",
-            "expected a whole number, 10000 to 1e+06 bit/s, got 9999",
+            "expected a whole number, 10000 to 1000000 bit/s, got 9999",
         ),
         ("{ name: can0 }", "match.name", "expected one of the keys serial, path, port, driver"),
         (

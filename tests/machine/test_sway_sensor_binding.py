@@ -4,12 +4,13 @@ import math
 
 import pytest
 
-from canshaper.shaping.observer import Measured
+from canshaper.shaping.sway_sensor import Measured
 from tests.rigs.files import Machine
 
 ALONG = "bus: crane, message: GrappleSway, signal: SwayParallel, kind: angle, timeout_ms: 80"
 ACROSS = ALONG.replace("SwayParallel", "SwayPerpendicular")
 UNIT = 'SwayParallel : 16|16@1- (0.01,0) [-180|180] "deg"'
+INCLINED = ALONG.replace("kind: angle", "kind: inclination")
 SLEW, NEAR_FAR = "    sway: { period_s: 2.356", "    sway: { length_m: 1.2"
 
 
@@ -34,6 +35,40 @@ def test_a_sensor_binds_to_its_message(machine: Machine) -> None:
     assert timing.measured is Measured.ANGLE
     assert (timing.period_s, timing.delay_s, timing.lag_s, timing.lost_s) == (0.04, 0.04, 0.1, 0.08)
     assert (bound.config.noise, bound.config.offset_max_deg) == (0.1, 3.0)
+
+
+MERIT = """ SG_ Merit : 62|2@1+ (1,0) [0|3] "" SHAPER
+ SG_ Float : 32|32@1- (1,0) [0|3] "" SHAPER
+"""
+
+
+def with_merits(machine: Machine, merit: str = MERIT) -> None:
+    machine.in_dbc("GrappleSway: 4 PLANT\n", f"GrappleSway: 8 PLANT\n{merit}")
+
+
+def test_axes_may_share_a_figure_of_merit(machine: Machine) -> None:
+    with_merits(machine, MERIT.splitlines()[0] + "\n")
+    sensing(machine, f"{ALONG}, merit: Merit")
+    sensing(machine, f"{ACROSS}, merit: Merit", SLEW)
+    bound = machine.load().axes["near_far"].sway_sensor
+    assert bound is not None
+    assert bound.message.merits == {"SwayPerpendicular": "Merit", "SwayParallel": "Merit"}
+
+
+@pytest.mark.parametrize(
+    ("merit", "fault"),
+    [
+        ("Merits", "expected a signal of GrappleSway, got 'Merits'"),
+        ("SwayParallel", "expected a free signal, got 'SwayParallel', which is"),
+        ("Float", "expected a signal of whole numbers, got 'Float'"),
+    ],
+)
+def test_a_figure_of_merit_that_is_none(machine: Machine, merit: str, fault: str) -> None:
+    with_merits(machine, MERIT.splitlines()[1] + "\n")
+    machine.dbc += "SIG_VALTYPE_ 1024 Float : 1;\n"
+    line = sensing(machine, f"{ALONG}, merit: {merit}")
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway_sensor.merit: {fault}")
 
 
 def test_axes_may_read_the_same_message(machine: Machine) -> None:
@@ -62,6 +97,23 @@ def test_the_unit_is_that_of_the_dbc(machine: Machine, unit: str, kind: str, fac
     assert bound.factor == pytest.approx(factor)
 
 
+def test_an_inclination_is_an_angle(machine: Machine) -> None:
+    sensing(machine, f"{INCLINED}, fusion_s: 3.4")
+    bound = machine.load().axes["near_far"].sway_sensor
+    assert bound is not None
+    assert bound.timing(0.02).measured is Measured.ANGLE
+    assert bound.config.noise == 0.1
+
+
+def test_a_second_swing(machine: Machine) -> None:
+    sensing(machine, f"{ALONG}, second_period_s: 0.7")
+    bound = machine.load().axes["near_far"].sway_sensor
+    assert bound is not None
+    second = bound.limits.second
+    assert second is not None
+    assert (second.period_s, second.damping_ratio) == (pytest.approx(0.7), 0.04)
+
+
 SAYS = [
     (changed("bus: crane", "bus: rear"), ".bus: expected a bus, got 'rear'"),
     (changed("GrappleSway", "GrappleSwing"), ".message: "),
@@ -69,7 +121,15 @@ SAYS = [
     (changed("kind: angle", "kind: force"), ".kind: "),
     (f"{ALONG}, delay_ms: 501", ".delay_ms: expected 0 to 500 ms, got 501"),
     (f"{ALONG}, noise_deg: 9", ".noise_deg: expected 0.01 to 5 deg, deg/s, got 9"),
+    (f"{ALONG}, offset_max_deg: 21", ".offset_max_deg: expected 0.1 to 20 deg, deg/s, got 21"),
+    (f"{ALONG}, node: tool", ".node: expected a node of bus crane, got 'tool'; there are none"),
+    (f"{ALONG}, fusion_s: 5", ".fusion_s: expected it with the kind inclination only, got it with"),
+    (f"{INCLINED}", ".fusion_s: expected 3.3 s or more, 1.5 swings, got none"),
+    (f"{INCLINED}, fusion_s: 2", ".fusion_s: expected 3.3 s or more, 1.5 swings, got 2 s"),
+    (f"{INCLINED}, fusion_s: 0", ".fusion_s: expected 3.3 s or more, 1.5 swings, got 0: without"),
     (changed("timeout_ms: 80", "timeout_ms: 30"), ".timeout_ms: "),
+    (f"{ALONG}, second_period_s: 3.1", ".second_period_s: expected 0.15 to 3 s, got 3.1"),
+    (f"{ALONG}, second_period_s: 1.2", ".second_period_s: expected up to 1.10 s, half of the"),
 ]
 
 
@@ -82,15 +142,16 @@ def test_what_is_wrong_is_told_at_its_line(machine: Machine, text: str, says: st
 
 def test_a_unit_that_is_no_angle(machine: Machine) -> None:
     machine.in_dbc(UNIT, UNIT.replace('"deg"', '"m"'))
-    sensing(machine, ALONG)
+    line = sensing(machine, ALONG)
     (problem,) = machine.problems()
-    assert "SwayParallel has the unit 'm'; expected one of deg, °, rad, mrad" in problem
+    expected = "expected one in deg, °, rad, mrad for the kind angle, got 'SwayParallel' in 'm'"
+    assert problem == f"machine.yaml:{line}: axes.near_far.sway_sensor.signal: {expected}"
 
 
 def test_a_rate_is_no_angle(machine: Machine) -> None:
     sensing(machine, changed("kind: angle", "kind: rate"))
     (problem,) = machine.problems()
-    assert "SwayParallel has the unit 'deg'; expected one of deg/s, °/s, rad/s, mrad/s" in problem
+    assert ".signal: expected one in deg/s, °/s, rad/s, mrad/s for the kind rate, got" in problem
 
 
 def test_an_axis_without_sway(machine: Machine) -> None:
@@ -116,6 +177,13 @@ def test_too_few_messages_in_a_swing(machine: Machine) -> None:
     sensing(machine, changed("timeout_ms: 80", "timeout_ms: 900, delay_ms: 500"))
     (problem,) = machine.problems()
     assert "expected 6 messages or more in a swing of 2200 ms, got one in 400 ms" in problem
+
+
+def test_too_few_messages_in_a_second_swing(machine: Machine) -> None:
+    machine.in_dbc('"GenMsgCycleTime" BO_ 1024 20;', '"GenMsgCycleTime" BO_ 1024 200;')
+    sensing(machine, changed("timeout_ms: 80", "timeout_ms: 900, second_period_s: 0.7"))
+    (problem,) = machine.problems()
+    assert "expected 6 messages or more in a swing of 700 ms, got one in 200 ms" in problem
 
 
 def test_a_delay_of_more_than_a_quarter_of_a_swing(machine: Machine) -> None:

@@ -17,7 +17,7 @@ from packaging.utils import canonicalize_name
 
 ROOT = Path(__file__).parents[2]
 VENDOR = ROOT / "canshaper" / "studio" / "static" / "vendor"
-LOCKS = ("requirements.txt", "build-requirements.txt")
+LOCKS = ("deb/requirements.txt", "deb/build-requirements.txt", "image/requirements.txt")
 PIN = re.compile(r"^([a-z0-9-]+)(?:\[[a-z,-]+\])?==(\S+) \\$")
 HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}( \\)?$")
 
@@ -26,7 +26,7 @@ def pins(name: str) -> dict[str, str]:
     """Version of every package of a lock; each line is a pin, a hash or a comment."""
     found: dict[str, str] = {}
     hashes = 1
-    for line in (ROOT / "tools" / "deb" / name).read_text(encoding="utf-8").splitlines():
+    for line in (ROOT / "tools" / name).read_text(encoding="utf-8").splitlines():
         if pin := PIN.match(line):
             assert hashes, f"{list(found)[-1]} has no hash"
             found[pin[1]], hashes = pin[2], 0
@@ -43,10 +43,15 @@ def test_every_package_of_a_lock_has_a_version_and_hashes(name: str) -> None:
     assert pins(name)
 
 
-def test_the_lock_fits_the_dependencies() -> None:
-    locked = pins("requirements.txt")
+@pytest.mark.parametrize(
+    ("name", "extras"),
+    [("deb/requirements.txt", ()), ("image/requirements.txt", ("tools", "studio"))],
+)
+def test_the_lock_fits_the_dependencies(name: str, extras: tuple[str, ...]) -> None:
+    locked = pins(name)
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
-    for text in project["dependencies"]:
+    optional = [text for extra in extras for text in project["optional-dependencies"][extra]]
+    for text in (*project["dependencies"], *optional):
         wanted = Requirement(text)
         assert wanted.specifier.contains(locked[canonicalize_name(wanted.name)]), text
 
@@ -54,17 +59,34 @@ def test_the_lock_fits_the_dependencies() -> None:
 def test_the_package_is_built_from_the_locks_only() -> None:
     lines = (ROOT / "tools" / "deb.sh").read_text(encoding="utf-8").splitlines()
     installs = [line for line in lines if line.startswith("pip_install ")]
-    assert len(installs) == len(LOCKS) + 1
+    assert len(installs) == 3
     for line in installs:
         assert "--require-hashes" in line or "--no-deps --no-build-isolation" in line
 
 
-def test_vendored_files_are_those_that_were_packed() -> None:
+def test_image_and_package_have_the_same_versions() -> None:
+    package, image = pins("deb/requirements.txt"), pins("image/requirements.txt")
+    assert package.items() <= image.items()
+
+
+def test_other_packages_and_the_image_are_built_from_the_locks_only() -> None:
+    for name in ("debs.sh", "image.sh"):
+        text = (ROOT / "tools" / name).read_text(encoding="utf-8").replace("\\\n", "")
+        pip = [
+            one for one in text.splitlines() if re.match(r'[^#\[]*/pip"? .*(install|load) ', one)
+        ]
+        assert pip
+        for line in pip:
+            assert "--require-hashes" in line or "--no-index" in line, line
+
+
+@pytest.mark.parametrize("vendor", [VENDOR, ROOT / "tools" / "site" / "vendor"])
+def test_vendored_files_are_those_that_were_packed(vendor: Path) -> None:
     listed = {}
-    for line in (VENDOR / "SHA256SUMS").read_text(encoding="utf-8").splitlines():
+    for line in (vendor / "SHA256SUMS").read_text(encoding="utf-8").splitlines():
         value, name = line.split()
         listed[name] = value
-    there = {p.name: sha256(p.read_bytes()).hexdigest() for p in VENDOR.iterdir()}
+    there = {p.name: sha256(p.read_bytes()).hexdigest() for p in vendor.iterdir()}
     del there["SHA256SUMS"]
     assert there == listed
 
@@ -80,6 +102,10 @@ def test_the_bill_is_valid_and_names_everything(tmp_path: Path) -> None:
     """Of a directory that is laid out as that of a package."""
     vendor = tmp_path / "canshaper" / "studio" / "static" / "vendor"
     shutil.copytree(VENDOR, vendor)
+    site = tmp_path / "canshaper" / "data" / "site"
+    (site / "assets").mkdir(parents=True)
+    (site / "assets" / "mkdocs-material-9.8.1.LICENSE").write_text("")
+    shutil.copytree(ROOT / "tools" / "site" / "vendor", site / "site")
     about = tmp_path / "some_package-2.0.dist-info" / "METADATA"
     about.parent.mkdir()
     about.write_text("Metadata-Version: 2.1\nName: some-package\nVersion: 2.0\nLicense: MIT\n")
@@ -90,7 +116,10 @@ def test_the_bill_is_valid_and_names_everything(tmp_path: Path) -> None:
     bill = json.loads(done.stdout)
     assert bill["metadata"]["component"]["version"] == "1.2.3"
     parts = {one["name"]: one for one in bill["components"]}
-    assert parts.keys() == {"some-package", "three", "uplot"}
+    assert parts.keys() == {
+        *("some-package", "three", "uplot"),
+        *("iframe-worker", "mkdocs-material"),
+    }
     packed = sha256((VENDOR / "three.js").read_bytes()).hexdigest()
     assert parts["three"]["hashes"] == [{"alg": "SHA-256", "content": packed}]
     assert parts["some-package"]["licenses"] == [{"license": {"id": "MIT"}}]

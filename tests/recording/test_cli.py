@@ -1,13 +1,18 @@
 """The commands as a user calls them."""
 
 import json
+from array import array
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from matplotlib.text import Text
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
+from canshaper.cli.verbs.replay import _run
 from canshaper.recording.log import read_log
+from canshaper.recording.plot import figure
 
 DRIVE = Path(__file__).parents[1] / "golden" / "drive.log"
 
@@ -70,7 +75,7 @@ def test_part_of_a_drive(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("rows", "text"),
     [
-        ("", "got no data frame"),
+        ("", "got no frame"),
         ("(1.0) vcan0 7FF#00\n(2.0) vcan0 7FF#00\n", "none of its joystick messages (JoystickLeft"),
         (
             "(1.0) can3 110#00\n(2.0) can4 110#00\n",
@@ -104,3 +109,35 @@ def test_options_that_cannot_be(tmp_path: Path) -> None:
         DRIVE, *file, "--channel", "joy=can0", code=2
     )
     assert "No such file" in called(tmp_path / "none.log", *file, code=2)
+
+
+def test_the_picture_has_both_deployments_states_and_reasons_and_leaves_out_what_is_idle(
+    tmp_path: Path,
+) -> None:
+    files = ["forwarder-robust.yaml", "forwarder.yaml"]
+    replays = _run(DRIVE, files, {}, (0.0, None), tmp_path, None)
+    for one in replays:
+        one.measure()
+    drawn = figure(replays)
+    titles = [panel.get_title(loc="left") for panel in drawn.axes]
+    assert "Slew: largest sway" in " ".join(titles)
+    words = [text.get_text() for text in drawn.texts]
+    assert any("lanes: grey ready" in text for text in words)
+    command = drawn.axes[0]
+    assert [line.get_linestyle() for line in command.lines][:2] == ["-", "--"]
+    reasons = {text.get_text() for panel in drawn.axes for text in panel.texts}
+    assert {"enable released in motion", "no joystick message"} <= reasons
+    for one in replays:  # all numbers that a title can have
+        for metrics in (one.measures, one.straight):
+            for name in metrics:
+                full = {"peak_deg": 12.3, "residual_deg": 12.3, "run_on_s": 1.2}
+                metrics[name] = replace(metrics[name], **full)
+    drawn = figure(replays)
+    boxes = [text.get_window_extent() for text in drawn.findobj(Text) if text.get_text()]
+    assert max(box.x1 for box in boxes) <= drawn.bbox.x1
+    for one in replays:  # the lift rests
+        for column in one.trace._rows["lift"]:
+            column[:] = array("d", [0.0] * len(column))
+    drawn = figure(replays)
+    assert not any("Lift" in panel.get_title(loc="left") for panel in drawn.axes)
+    assert any("idle, left out: lift" in text.get_text() for text in drawn.texts)

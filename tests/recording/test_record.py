@@ -135,7 +135,7 @@ def test_a_silent_bus_gives_a_file_without_frames(tmp_path: Path, name: str) -> 
         app, ["record", "forwarder.yaml", *BUS, "--seconds", "0.2", "--out", str(out)]
     )
     assert result.exit_code == 0, result.output
-    assert f"nothing was heard, {out} is without frames: is the bus up" in result.output
+    assert f"nothing was received, {out} is without frames: is the bus up" in result.output
     assert ", 0 frames" in result.output
     assert list(tmp_path.iterdir()) == [out]
     log = out

@@ -60,13 +60,15 @@ def test_residual_and_run_on_after_both_joysticks(hand_made: HandMade) -> None:
     def sway(t: float) -> float:
         return 3.0 if t >= NEAR_FAR[1] + 2.5 else 9.0 if t >= SLEW[1] else 4.0
 
-    found = measured(both(hand_made, sway))
-    assert found.peak_deg == 9.0
-    assert found.residual_deg == 3.0
+    measures = measured(both(hand_made, sway))
+    assert measures.peak_deg == 9.0
+    assert measures.residual_deg == 3.0
     # From the release of the last joystick; 0.01 s of the sample before it stands.
-    assert found.run_on_s == pytest.approx(0.5, abs=0.021)
-    assert found.run_on_m == pytest.approx(0.5, abs=0.021)
-    assert found.rms_deg == pytest.approx(math.sqrt((16 * 3 + 81 * 3.5 + 9 * 5.5) / 12), rel=0.01)
+    assert measures.run_on_s == pytest.approx(0.5, abs=0.021)
+    assert measures.run_on_m == pytest.approx(0.5, abs=0.021)
+    assert measures.rms_deg == pytest.approx(
+        math.sqrt((16 * 3 + 81 * 3.5 + 9 * 5.5) / 12), rel=0.01
+    )
 
 
 def test_run_on_is_the_farthest_from_where_the_tip_was_at_the_release(
@@ -85,8 +87,8 @@ def test_a_drive_that_is_never_let_go_has_no_residual_and_no_run_on(hand_made: H
     recording = hand_made(END_S, slew=(joystick, joystick, joystick, still))
     here = [(3.0, 0.0)] * len(recording.t_s)
     crane = CraneTrace(here, here, [5.0] * len(here))
-    found = crane_metrics(recording, crane)
-    assert found == CraneMetrics(5.0, pytest.approx(5.0), None, None, None)
+    measures = crane_metrics(recording, crane)
+    assert measures == CraneMetrics(5.0, pytest.approx(5.0), None, None, None)
 
 
 def test_report_has_the_crane_where_the_drives_know_the_tip(hand_made: HandMade) -> None:

@@ -14,8 +14,8 @@ from matplotlib.figure import Figure
 from matplotlib.text import Text
 
 from canshaper.report.metrics import report_dict
-from canshaper.report.plot import draw, figure, gain_and_price
-from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR
+from canshaper.report.plot import figure, gain_and_price
+from canshaper.report.style import RAW_COLOUR, SHAPED_COLOUR, save, stamp
 from canshaper_sim.recording import CraneTrace, Recording
 
 Pair = tuple[Recording, Recording]
@@ -48,12 +48,22 @@ def test_picture_is_a_png_of_the_right_size(
     pair: Pair, report: dict[str, Any], tmp_path: Path
 ) -> None:
     path = tmp_path / "demo.png"
-    draw(*pair, report, path)
+    save(figure(*pair, report), path)
     data = path.read_bytes()
     assert data[:8] == b"\x89PNG\r\n\x1a\n"
-    assert struct.unpack(">II", data[16:24]) == (1600, 1560)
+    assert struct.unpack(">II", data[16:24]) == (1600, 1594)
     assert data.endswith(b"IEND\xaeB`\x82")
     assert len(data) > 30_000
+
+
+def test_the_stamp_stands_below_all_else(pair: Pair, report: dict[str, Any]) -> None:
+    drawn = figure(*pair, report)
+    stamp(drawn, "a-deployment-with-a-long-name.yaml, canshaper 0.1.0, 2026-11-23")
+    drawn.draw_without_rendering()
+    *texts, last = drawn.texts
+    top = last.get_window_extent().y1
+    assert all(text.get_window_extent().y0 > top for text in texts)
+    assert all(legend.get_window_extent().y0 > top for legend in drawn.legends)
 
 
 def test_titles_state_the_finding_with_its_numbers(pair: Pair, report: dict[str, Any]) -> None:
@@ -171,19 +181,18 @@ def test_without_a_residual_window_the_peak_is_told(
     fig = figure(raw, shaped, report)
     assert titles(fig) == ["Slew: largest swing 8.0° → 2.0° (\N{MINUS SIGN}75 %)"]
     assert not fig.texts, "no shade, no word of it"
-    draw(raw, shaped, report, tmp_path / "slew.png")
 
 
 def test_a_still_crane_can_be_drawn_and_one_without_sway_cannot(
-    hand_made: Callable[..., Recording], tmp_path: Path
+    hand_made: Callable[..., Recording],
 ) -> None:
     def zero(_t: float) -> float:
         return 0.0
 
     still = hand_made(1.0, slew=(zero, zero, zero, zero))
     report = report_dict(still, still, transport="vcan0", missed_deadlines=0)
-    draw(still, still, report, tmp_path / "still.png")
+    assert titles(figure(still, still, report))
     lift = hand_made(1.0, lift=(zero, zero, zero, None))
     report = report_dict(lift, lift, transport="vcan0", missed_deadlines=0)
     with pytest.raises(ValueError, match="no axis of the drives has sway"):
-        draw(lift, lift, report, tmp_path / "lift.png")
+        figure(lift, lift, report)

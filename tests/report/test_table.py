@@ -1,4 +1,5 @@
 import io
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -6,7 +7,7 @@ from rich.console import Console
 
 from canshaper.report.metrics import report_dict
 from canshaper.report.table import print_report
-from canshaper_sim.recording import Recording
+from canshaper_sim.recording import CraneTrace, Recording
 
 
 def printed(report: dict[str, Any], *, encoding: str = "utf-8") -> str:
@@ -61,6 +62,24 @@ def test_swing_in_the_other_plane_is_told_where_there_is_some(report: dict[str, 
     text = printed(report)
     assert "After slew, residual sway in the other plane" in text
     assert "After near-far" not in text
+
+
+@pytest.mark.parametrize(
+    ("raw_deg", "shaped_deg", "with_filters"),
+    [(91.0, 20.0, "off"), (91.0, 95.0, "off and filters on"), (89.0, 20.0, "")],
+)
+def test_a_grapple_above_the_horizontal_is_told(
+    pair: tuple[Recording, Recording], raw_deg: float, shaped_deg: float, with_filters: str
+) -> None:
+    drives = []
+    for drive, sway_deg in zip(pair, (raw_deg, shaped_deg), strict=True):
+        count = len(drive.t_s)
+        way = [(3.0, 0.0)] * count
+        drives.append(replace(drive, crane=CraneTrace(way, way, [sway_deg] * count)))
+    report = report_dict(*drives, transport="udp_multicast", missed_deadlines=0)
+    text = " ".join(printed(report).split())
+    line = f"above the horizontal with filters {with_filters}: these figures say nothing"
+    assert (line in text) == bool(with_filters)
 
 
 def test_missed_deadlines_and_transport(report: dict[str, Any]) -> None:

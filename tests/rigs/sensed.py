@@ -5,19 +5,23 @@ import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
+from canshaper.config.sway_sensor import Kind
+from canshaper.machine.sway_sensor import SECOND_DAMPING
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.observer import Measured, SensorTiming
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.fir import zv_taps
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.trust import SensorLimits, Trust
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.trust import Trust
 from canshaper_sim.crane import Crane, CraneParameters, CraneState
 from canshaper_sim.grapple import Sway
 from canshaper_sim.strokes import Script, Stroke
 from canshaper_sim.sway_sensor import SwaySensor, SwaySensorParameters
+from tests.rigs import double_pendulum
+from tests.rigs.double_pendulum import DoublePendulum
 
 TICK_S = 0.02
 LENGTH_M, FULL_SPEED_M_S = 1.2, 1.0
@@ -76,6 +80,11 @@ class Drive:
         return moving[-1] - self.script.strokes[-1].end_s
 
     @property
+    def path(self) -> float:
+        """How far what was sent has gone to and fro, full speeds."""
+        return sum(abs(new - old) for old, new in itertools.pairwise(self.sent))
+
+    @property
     def travel_m(self) -> float:
         """How far the tip has gone."""
         return self.radius_m[-1] - self.radius_m[0]
@@ -101,6 +110,8 @@ class Setup:
         taps: of the filter.
         contact: what holds the grapple.
         delay_s: as the observer has it.
+        long_log: natural frequencies of a double pendulum that hangs there instead, rad/s.
+        second_s: period of a second swing, as the observer has it.
     """
 
     measured: Measured | None = Measured.ANGLE
@@ -114,6 +125,8 @@ class Setup:
     contact: Contact = lambda _state: None
     delay_s: float = 0.02
     lag_s: float = 0.1
+    long_log: tuple[float, float] | None = None
+    second_s: float | None = None
 
     def timing(self, measured: Measured) -> SensorTiming:
         """As the observer has it."""
@@ -129,15 +142,19 @@ class Setup:
         sensor, sensed = None, None
         if self.measured:
             noise = math.radians(NOISE_DEG[self.measured])
-            limits = SensorLimits(noise, math.radians(3.0))
+            second = self.second_s and SwayMode.from_period(self.second_s, SECOND_DAMPING)
+            limits = SensorLimits(noise, math.radians(3.0), second=second or None)
             sensed = SensedSway(sway, self.timing(self.measured), limits, damps=self.damps)
             noisy = replace(self.sensor, noise_deg=NOISE_DEG[self.measured])
-            rate = self.measured is Measured.RATE
-            sensor = SwaySensor(noisy, "near_far", across=False, rate=rate)
+            kind: Kind = "rate" if self.measured is Measured.RATE else "angle"
+            sensor = SwaySensor(noisy, "near_far", across=False, kind=kind)
         axis.sensed = sensed
         crane = self._crane()
+        log = DoublePendulum(*self.long_log) if self.long_log else None
         for tick in range(round(drive.script.duration_s / TICK_S)):
             state = self._held(crane)
+            if log:
+                state = state._replace(theta6_rad=log.angle, theta6_rate_rad_s=log.rate)
             if sensor and sensed:
                 value = self._measured(sensor, state, tick)
                 sensed.measure(value, SCALE, commanded=axis.commanded)
@@ -149,7 +166,10 @@ class Setup:
             drive.speed.append(state.radius_rate_m_s)
             drive.radius_m.append(state.radius_m)
             drive.trust.append(sensed.state if sensed else Trust.NO_DATA)
-            crane.step(TICK_S, {"near_far": axis.raw / STEPS})
+            if log:
+                swing_on(log, crane, axis.raw / STEPS)
+            else:
+                crane.step(TICK_S, {"near_far": axis.raw / STEPS})
         return drive
 
     def _crane(self) -> Crane:
@@ -173,3 +193,12 @@ class Setup:
         value = math.radians(sensor.value(state.time_s))
         gone = state.time_s >= self.sensor.lost_s or tick % self.every
         return None if gone else value
+
+
+def swing_on(log: DoublePendulum, crane: Crane, command: float) -> None:
+    """Drive the crane on for a tick, and let the log swing below its tip."""
+    step_s = TICK_S / double_pendulum.STEPS
+    for _ in range(double_pendulum.STEPS):
+        before = crane.state.radius_rate_m_s
+        crane.step(step_s, {"near_far": command})
+        log.step((crane.state.radius_rate_m_s - before) / step_s, step_s)

@@ -5,12 +5,11 @@ from typing import Any
 import pytest
 
 from canshaper.shaping.axis import Axis
-from canshaper.shaping.observer import Measured, SensorTiming
 from canshaper.shaping.sensed import SensedSway
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode
-from canshaper.shaping.trust import SensorLimits
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
 from tests.shaping.test_sensed import Rig
 from tests.shaping.test_small_strokes import axis_with, tapped
 

@@ -267,3 +267,49 @@ def test_a_radius_of_nothing_is_no_reason_to_stop(tip_m: float) -> None:
         now = drive.near_far.moving.added
         assert abs(now - last) <= MOST_STEP + 1e-12
         last = now
+
+
+def slewing(path_m: float = 0.3) -> tuple[TwoAxisMotion, MovingAxis, MovingAxis]:
+    """Slew commanded, near-far left alone."""
+    slew = MovingAxis(TURN_RAD_S, TICK_S, SwayModel(SLEW, TICK_S), commanded=True, able=True)
+    near_far = MovingAxis(OUT_M_S, TICK_S, SwayModel(NEAR_FAR, TICK_S), able=True)
+    return TwoAxisMotion(slew, near_far, path_m), slew, near_far
+
+
+def test_near_far_may_damp_what_slewing_makes_it_swing() -> None:
+    motion, slew, near_far = slewing()
+    motion.step(TICK_S, 3.0)
+    assert near_far.damps
+    assert not slew.damps
+    near_far.commanded = True
+    motion.step(TICK_S, 3.0)
+    assert not near_far.damps
+    near_far.commanded, near_far.able = False, False
+    motion.step(TICK_S, 3.0)
+    assert not near_far.damps
+    near_far.able = True
+    for _ in range(20):
+        motion.step(TICK_S, 3.0)
+    assert near_far.damps
+    slew.commanded = False
+    motion.step(TICK_S, 3.0)
+    assert not near_far.damps
+
+
+def test_no_farther_than_it_may_be_moved() -> None:
+    motion, _, near_far = slewing(path_m=0.1)
+    near_far.applied = -0.25
+    for _ in range(19):
+        motion.step(TICK_S, 3.0)
+        assert near_far.damps
+    motion.step(2 * TICK_S, 3.0)
+    assert near_far.damped == pytest.approx(-0.105)
+    assert not near_far.damps
+    near_far.commanded = True
+    motion.step(TICK_S, 3.0)
+    assert near_far.damped == 0.0
+    near_far.commanded = False
+    motion.step(TICK_S, 3.0)
+    assert near_far.damps
+    motion.stop()
+    assert (near_far.damps, near_far.damped) == (False, 0.0)

@@ -6,12 +6,12 @@ import pytest
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.observer import Measured, SensorTiming
 from canshaper.shaping.sensed import FADE_S, SensedSway
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.sway import SwayMode, SwayModel
-from canshaper.shaping.trust import SensorLimits, Trust
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from canshaper.shaping.trust import Trust
 
 TICK_S = 0.02
 MODE = SwayMode(2.86, 0.05)
@@ -30,20 +30,28 @@ class Rig:
         limits = SensorLimits(math.radians(0.1), math.radians(3.0))
         self.sensed = self.axis.sensed = SensedSway(self.model, timing, limits, damps=damps)
         self.offset_rad = offset_rad
+        self.most = 1.0 if damps else 0.0
         self.command = 0.0
+        self.push = 0.0  # on the grapple, normalised
 
     @property
     def angle(self) -> float:
         """Of the grapple, rad."""
         return SCALE * self.real.angle + self.offset_rad
 
-    def run(self, seconds: float, value: float | None = math.inf) -> "Rig":
-        """Run on; by default the sensor shows the grapple, otherwise this value."""
+    def run(self, seconds: float, value: float | None = math.inf, *, damps: bool = False) -> "Rig":
+        """Run on; by default the sensor shows the grapple, otherwise this value.
+
+        With ``damps`` as while another axis makes the grapple swing.
+        """
         for _ in range(round(seconds / TICK_S)):
             shown = self.angle if value == math.inf else value
-            self.sensed.measure(shown, SCALE, commanded=self.axis.commanded)
-            self.axis.tick(CommandInput(command=self.command, enabled=True))
+            self.sensed.measure(shown, SCALE, commanded=self.axis.commanded, damps=damps)
+            joystick = CommandInput(command=self.command, enabled=True)
+            self.axis.act(joystick, 0.0, damps=damps)
+            self.axis.advance()
             self.real.step(self.axis.sent)
+            self.real.rate += TICK_S * self.push
         return self
 
     def trusted(self) -> "Rig":
@@ -52,7 +60,7 @@ class Rig:
         self.command = 0.8
         self.run(1.2)
         assert self.sensed.state is Trust.TRUSTED
-        assert self.sensed.weight == (1.0 if self.sensed._damps else 0.0)
+        assert self.sensed.weight == self.most
         return self
 
     def fed_back(self) -> bool:
@@ -70,7 +78,7 @@ def test_without_motion_nothing_is_proved() -> None:
 
 def test_motion_proves_it_and_its_weight_comes_in() -> None:
     rig = Rig().run(1.0)
-    rig.real.angle += 0.05
+    rig.real.angle += 0.03
     rig.command = 0.8
     rig.run(0.6)
     assert rig.sensed.state is Trust.TRUSTED
@@ -89,7 +97,7 @@ def test_watched_only_nothing_is_fed_back() -> None:
 
 def test_silence_is_a_loss_and_the_swing_fades() -> None:
     rig = Rig().trusted()
-    rig.real.angle += 0.05
+    rig.real.angle += 0.03
     rig.run(0.3)
     rig.run(0.06, None)
     assert rig.sensed.state is Trust.TRUSTED
@@ -177,7 +185,7 @@ def test_a_command_that_goes_to_and_fro_is_restless() -> None:
 
 def test_after_an_invalid_output_nothing_is_fed_back() -> None:
     rig = Rig().trusted()
-    rig.real.angle += 0.05
+    rig.real.angle += 0.03
     rig.run(0.3)
     assert rig.fed_back()
     rig.axis.tick(CommandInput(command=math.nan, enabled=True))
@@ -188,7 +196,7 @@ def test_after_an_invalid_output_nothing_is_fed_back() -> None:
 
 def test_a_retune_takes_the_free_swing_over() -> None:
     rig = Rig().trusted()
-    rig.real.angle += 0.05
+    rig.real.angle += 0.03
     rig.run(0.3)
     before = rig.model.free_angle * MODE.angle_per_speed_rad
     other = SwayMode(2.4, 0.05)

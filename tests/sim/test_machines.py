@@ -136,7 +136,7 @@ def test_parameters_by_name() -> None:
     assert isinstance(boom, JointBoom)
     assert changed.joints.boom.tip(*boom.joints[1:]) == pytest.approx((3.0, 4.0), abs=1e-12)
     for change in ("joints.boom_m=1", "joints=1", "joints.knuckle=1", "joints.knuckle.lag_s.x=1"):
-        with pytest.raises(ValueError, match=f"no parameter '{change[:-2]}'"):
+        with pytest.raises(ValueError, match=f"expected a parameter, got '{change[:-2]}'"):
             changed_parameters([change])
     with pytest.raises(ValueError, match=r"joints: main_boom_m: expected .*, got 99.0"):
         changed_parameters(["joints.main_boom_m=99"])

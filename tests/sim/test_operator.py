@@ -5,9 +5,11 @@ from itertools import pairwise
 
 import pytest
 
+from canshaper.errors import DesignError
 from canshaper_sim.axes import JOINT_AXES
 from canshaper_sim.crane import AXES, Crane
 from canshaper_sim.operator import SCRIPTS, Script, Stroke, random_script, script_named
+from canshaper_sim.parameters import changed_parameters
 
 TICK_S = 0.02
 
@@ -225,3 +227,10 @@ def test_scripts_by_name() -> None:
     for name in ("demos", "random", "random-", "random-x", "random--1"):
         with pytest.raises(ValueError, match=r"pulse-near_far, .*loading.*, random-<seed>"):
             script_named(name)
+
+
+def test_a_name_that_looks_like_another_is_answered_with_it() -> None:
+    with pytest.raises(DesignError, match=r"got 'puls-slew'; did you mean pulse-slew\?$"):
+        script_named("puls-slew")
+    with pytest.raises(DesignError, match=r"'grapple.l2m'; did you mean grapple.l2_m\?$"):
+        changed_parameters(["grapple.l2m=1.5"])

@@ -5,6 +5,7 @@ import statistics
 
 import pytest
 
+from canshaper.config.sway_sensor import Kind
 from canshaper.errors import DesignError
 from canshaper_sim.grapple import Sway
 from canshaper_sim.parameters import changed_parameters
@@ -15,10 +16,10 @@ QUIET = {"noise_deg": 0.0, "delay_s": 0.0}
 
 
 def shown(
-    seconds: float, *, across: bool = True, rate: bool = False, **parameters: float
+    seconds: float, *, across: bool = True, kind: Kind = "angle", **parameters: float
 ) -> list[float]:
     """What it shows of a swing that grows by ten degrees per second, each tick."""
-    sensor = SwaySensor(SwaySensorParameters(**parameters), "slew", across=across, rate=rate)
+    sensor = SwaySensor(SwaySensorParameters(**parameters), "slew", across=across, kind=kind)
     values = []
     for tick in range(round(seconds / TICK_S)):
         time_s = tick * TICK_S
@@ -31,7 +32,17 @@ def shown(
 def test_it_shows_the_angle_or_the_rate_of_its_plane() -> None:
     assert shown(1.0, **QUIET)[-1] == pytest.approx(9.8)
     assert shown(1.0, across=False, **QUIET)[-1] == pytest.approx(-9.8)
-    assert shown(1.0, rate=True, **QUIET)[-1] == pytest.approx(10.0)
+    assert shown(1.0, kind="rate", **QUIET)[-1] == pytest.approx(10.0)
+
+
+def test_an_inclination_is_led_back_to_zero() -> None:
+    """A ramp of 10 degrees per second behind a high-pass of so many seconds, and without a gyro."""
+    one = shown(10.0, kind="inclination", fusion_s=1.0, **QUIET)
+    assert one[-1] == pytest.approx(10.0, rel=0.02)
+    assert shown(0.2, kind="inclination", fusion_s=100.0, **QUIET)[-1] == pytest.approx(
+        1.8, abs=0.01
+    )
+    assert max(map(abs, shown(1.0, kind="inclination", fusion_s=0.0, **QUIET))) == 0.0
 
 
 def test_a_delay_shows_what_was() -> None:

@@ -84,11 +84,11 @@ def test_rate_limit_comes_after_the_flow_limit() -> None:
     parameters = ValveParameters(deadband=0.0, flow_limit=0.5, lag_s=0.01)
     valve = Valve(parameters)
     valve.set_command(1.0)
-    valve.advance(0.1)
-    assert valve.speed + 0.01 * valve.speed_rate == pytest.approx(0.5, abs=1e-12)
+    _, _, speed, rate = valve.advance(0.1)
+    assert speed + 0.01 * rate == pytest.approx(0.5, abs=1e-12)
     valve.set_command(0.0)
-    valve.advance(0.05)
-    assert valve.speed + 0.01 * valve.speed_rate == pytest.approx(0.25, abs=1e-12)
+    _, _, speed, rate = valve.advance(0.05)
+    assert speed + 0.01 * rate == pytest.approx(0.25, abs=1e-12)
 
 
 @pytest.mark.parametrize("dead_time_s", [0.0, 0.02, 0.033, 0.2])
@@ -127,15 +127,34 @@ def test_a_tap_shorter_than_the_dead_time_is_not_lost() -> None:
     assert late[5:] == pytest.approx(prompt[:-5], abs=1e-12)
 
 
-def test_speed_rate_is_the_derivative() -> None:
+def test_the_rates_of_a_step_are_the_derivatives_at_its_ends() -> None:
     valve = Valve(ValveParameters())
     source = random.Random(3)
     for _ in range(300):
         valve.set_command(source.uniform(-1.0, 1.0))
-        rate, before = valve.speed_rate, valve.speed
-        valve.advance(1e-6)
-        assert (valve.speed - before) / 1e-6 == pytest.approx(rate, abs=1e-4)
-        valve.advance(0.015)
+        before = valve.speed
+        rate, _, after, _ = valve.advance(1e-6)
+        assert (after - before) / 1e-6 == pytest.approx(rate, abs=1e-4)
+        before, rate = valve.advance(0.015)[2:]
+        assert valve.speed == before
+        assert (valve.advance(1e-6)[2] - before) / 1e-6 == pytest.approx(rate, abs=1e-4)
+
+
+@given(
+    st.lists(st.floats(-1.0, 1.0), min_size=1, max_size=10),
+    st.sampled_from([ValveParameters(), replace(IDEAL, dead_time_s=0.013), IDEAL]),
+)
+def test_the_middle_of_a_step_is_the_end_of_half_of_it(
+    commands: list[float], parameters: ValveParameters
+) -> None:
+    whole, halves = Valve(parameters), Valve(parameters)
+    for command in commands:
+        whole.set_command(command)
+        halves.set_command(command)
+        start_rate, middle, end, end_rate = whole.advance(0.02)
+        first, last = halves.advance(0.01), halves.advance(0.01)
+        assert (start_rate, end_rate) == pytest.approx((first[0], last[3]), abs=1e-9)
+        assert (middle, end) == pytest.approx((first[2], last[2]), abs=1e-12)
 
 
 @given(
@@ -177,3 +196,11 @@ def test_parameters_out_of_range_are_refused(name: str, value: float, expected: 
 def test_a_command_that_is_no_number_is_refused(command: float) -> None:
     with pytest.raises(ValueError, match="valve: command"):
         Valve().set_command(command)
+
+
+def test_hysteresis_is_a_play_between_command_and_spool() -> None:
+    parameters = ValveParameters(deadband=0.0, hysteresis=0.04, rate_limit_1_s=math.inf)
+    commands = [0.5, 0.49, 0.47, 0.45, 0.46, 0.48, 0.5, 0.0]
+    found = speeds(parameters, commands, 3.0)
+    assert found == pytest.approx([0.48, 0.48, 0.48, 0.47, 0.47, 0.47, 0.48, 0.02], abs=1e-9)
+    assert speeds(replace(parameters, hysteresis=0.0), commands, 3.0) == pytest.approx(commands)

@@ -1,12 +1,13 @@
 """Chromium for the tests and pictures of the page: Debian's, installed where that is possible."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from playwright.sync_api import Browser, Page, expect, sync_playwright
+import pytest
+from playwright.sync_api import Browser, Locator, Page, expect, sync_playwright
 
 from tests.lane.outcome import NoLane
 from tests.lane.packages import install, missing
@@ -22,6 +23,13 @@ FLAGS = [
 ]
 # Only to end a test that hangs.
 WAIT_MS = 60_000
+expect.set_options(timeout=WAIT_MS)
+NO_GAMEPAD = "() => { navigator.getGamepads = () => []; }"
+TRIES = 8
+SOON_MS = 10_000
+DISTURBED = re.compile(
+    "is silent|no joystick message|joystick messages are not|too late|stood still"
+)
 
 
 class NoBrowserError(Exception):
@@ -69,5 +77,47 @@ def opened(one: Browser, url: str, faults: list[str], **options: Any) -> Page:
     page.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url}"))
     page.on("response", lambda a: faults.append(f"{a.status} {a.url}") if a.status > 399 else None)
     page.goto(url)
-    expect(page.locator("#link")).to_have_text("connected", timeout=WAIT_MS)
+    heard = re.compile("^(connected|opened|daemon silent: machine)$")
+    expect(page.locator("#link")).to_have_text(heard, timeout=WAIT_MS)
     return page
+
+
+def enabled(page: Page) -> None:
+    """Drive, with the axes ready. Enable of the driver before is released first."""
+    expect(page.locator("#seat")).to_have_text("you drive: press enable")
+    page.keyboard.press("e")
+    expect(page.locator("#seat")).to_have_text("you drive")
+    expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+
+
+def swing(page: Page, crane: str) -> float:
+    return float(page.inner_text(f"#swing-{crane}").strip("±°"))
+
+
+def undisturbed(page: Page, drive: Callable[[], None]) -> None:
+    """Drive; where a busy machine held up page or joysticks too long, let go and drive again."""
+    disturbed = page.locator("#events li", has_text=DISTURBED)
+    for _ in range(TRIES):
+        if page.inner_text("#seat") != "you drive":
+            enabled(page)
+        expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+        before = disturbed.count()
+        try:
+            drive()
+        except AssertionError:
+            if disturbed.count() == before:
+                raise
+        if disturbed.count() == before:
+            return
+        print("the machine was busy; driven again")
+        page.mouse.up()
+        for key in ("a", "ArrowUp"):
+            page.keyboard.up(key)
+        page.evaluate(NO_GAMEPAD)
+        page.wait_for_timeout(4000)  # by then enable is released, or kept
+    pytest.fail(f"the machine was too busy in each of {TRIES} drives")
+
+
+def state(page: Page, crane: int, axis: str = "slew") -> Locator:
+    """The words of an axis: crane 1 is the shaped one, 2 the raw one."""
+    return page.locator(f"#axes tr:has(td:text-is('{axis}')) td").nth(crane).locator(".state")

@@ -11,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import pytest
 from websockets.sync.client import ClientConnection, connect
@@ -19,6 +19,10 @@ from websockets.sync.client import ClientConnection, connect
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+    from playwright.sync_api import Page as Tab
 
 # Only to end a test that hangs.
 WAIT_S = 60.0
@@ -38,15 +42,18 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
         return
     skip = pytest.mark.skip(reason="takes minutes in a real browser: run make test-studio")
     for item in items:
-        if item.path == HERE / "test_browser.py":  # this hook sees the items of all directories
+        # This hook sees the items of all directories.
+        if item.path.parent == HERE and item.path.name.startswith("test_browser"):
             item.add_marker(skip)
 
 
 class Studio:
     """``canshaper studio`` as a process."""
 
-    def __init__(self, *options: str, file: str = "forwarder.yaml") -> None:
-        self.groups = free_groups()
+    def __init__(
+        self, *options: str, file: str = "forwarder.yaml", groups: tuple[str, str] | None = None
+    ) -> None:
+        self.groups = groups or free_groups()
         self._command = [sys.executable, "-m", "canshaper", "studio", file, "--port", "0"]
         self._command += ["--interface", "udp_multicast", *options]
         if "--shadow" not in options:
@@ -57,7 +64,8 @@ class Studio:
 
     def start(self, port: int = 0) -> None:
         """Start it, at a port."""
-        command = [str(port) if w == "0" else w for w in self._command]
+        at = self._command.index("--port") + 1
+        command = [*self._command[:at], str(port), *self._command[at + 1 :]]
         self.process = subprocess.Popen(
             command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
         )
@@ -92,6 +100,14 @@ class Studio:
         assert self.process.returncode == 0, out
         assert not any(Path(f"/proc/{pid}").exists() for pid in children)
         return str(out)
+
+
+class Opened(Studio):
+    """``canshaper studio`` of drives that are over, as a process."""
+
+    def __init__(self, *arguments: str) -> None:
+        self._command = [sys.executable, "-m", "canshaper", "studio", "--port", "0", *arguments]
+        self.start()
 
 
 def command_of(pid: int) -> list[str]:
@@ -220,3 +236,33 @@ def listen() -> Iterator[Callable[[str], Listener]]:
     yield open_one
     for one in opened:
         one.port.close()
+
+
+@pytest.fixture(scope="session")
+def chromium() -> Iterator["Browser"]:
+    """A browser; without one the tests are skipped."""
+    from tests.studio.browser import NoBrowserError, browser
+
+    try:
+        with browser() as one:
+            yield one
+    except NoBrowserError as error:
+        pytest.skip(f"no browser: {error}")
+
+
+@pytest.fixture
+def tab(chromium: "Browser") -> Iterator[Callable[..., "Tab"]]:
+    """Opens tabs; at the end nothing may have gone wrong in any of them."""
+    from tests.studio.browser import opened
+
+    faults: list[str] = []
+    tabs: list[Tab] = []
+
+    def open_one(studio: Studio, **options: object) -> "Tab":
+        tabs.append(opened(chromium, studio.url, faults, **options))
+        return tabs[-1]
+
+    yield open_one
+    for one in tabs:
+        one.context.close()
+    assert faults == []

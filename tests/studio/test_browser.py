@@ -4,88 +4,23 @@ import os
 import re
 import signal
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 
 import pytest
-from playwright.sync_api import Browser, Locator, Page, expect
+from playwright.sync_api import Browser, Page, expect
 
-from tests.studio.browser import WAIT_MS, NoBrowserError, browser, opened
+from tests.studio.browser import (
+    NO_GAMEPAD,
+    SOON_MS,
+    enabled,
+    opened,
+    state,
+    swing,
+    undisturbed,
+)
 from tests.studio.conftest import WAIT_S, Studio, command_of
 
-expect.set_options(timeout=WAIT_MS)
-NO_GAMEPAD = "() => { navigator.getGamepads = () => []; }"
-TRIES = 8
-SOON_MS = 10_000
-DISTURBED = re.compile(
-    "is silent|no joystick message|joystick messages are not|too late|stood still"
-)
 DAEMON_SILENT = re.compile("daemon silent: shaped")
-
-
-@pytest.fixture(scope="session")
-def chromium() -> Iterator[Browser]:
-    try:
-        with browser() as one:
-            yield one
-    except NoBrowserError as error:
-        pytest.skip(f"no browser: {error}")
-
-
-@pytest.fixture
-def tab(chromium: Browser) -> Iterator[Callable[..., Page]]:
-    """Opens tabs; at the end nothing may have gone wrong in any of them."""
-    faults: list[str] = []
-    tabs: list[Page] = []
-
-    def open_one(studio: Studio, **options: object) -> Page:
-        tabs.append(opened(chromium, studio.url, faults, **options))
-        return tabs[-1]
-
-    yield open_one
-    for one in tabs:
-        one.context.close()
-    assert faults == []
-
-
-def enabled(page: Page) -> None:
-    """Drive, with the axes ready. Enable of the driver before is released first."""
-    expect(page.locator("#seat")).to_have_text("you drive: press enable")
-    page.keyboard.press("e")
-    expect(page.locator("#seat")).to_have_text("you drive")
-    expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
-
-
-def swing(page: Page, crane: str) -> float:
-    return float(page.inner_text(f"#swing-{crane}").strip("±°"))
-
-
-def undisturbed(page: Page, drive: Callable[[], None]) -> None:
-    """Drive; where a busy machine held up page or joysticks too long, let go and drive again."""
-    disturbed = page.locator("#events li", has_text=DISTURBED)
-    for _ in range(TRIES):
-        if page.inner_text("#seat") != "you drive":
-            enabled(page)
-        expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
-        before = disturbed.count()
-        try:
-            drive()
-        except AssertionError:
-            if disturbed.count() == before:
-                raise
-        if disturbed.count() == before:
-            return
-        print("the machine was busy; driven again")
-        page.mouse.up()
-        for key in ("a", "ArrowUp"):
-            page.keyboard.up(key)
-        page.evaluate(NO_GAMEPAD)
-        page.wait_for_timeout(4000)  # by then enable is released, or kept
-    pytest.fail(f"the machine was too busy in each of {TRIES} drives")
-
-
-def state(page: Page, crane: int, axis: str = "slew") -> Locator:
-    """The words of an axis: crane 1 is the shaped one, 2 the raw one."""
-    return page.locator(f"#axes tr:has(td:text-is('{axis}')) td").nth(crane).locator(".state")
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
@@ -162,6 +97,45 @@ def test_a_gamepad_drives(own: Callable[..., Studio], tab: Callable[..., Page]) 
     undisturbed(page, drive)
 
 
+GAMEPAD = """(down) => { navigator.getGamepads = () => [{
+    connected: true, id: "pad", mapping: "standard", axes: [0, 0, 0, 0],
+    buttons: [0, 1, 2, 3].map((n) => ({ pressed: n === down })) }]; }"""
+
+
+def test_buttons_of_a_gamepad_enable_stop_and_switch_anti_sway(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    seat, none = page.locator("#seat"), -1
+    expect(seat).to_have_text("you drive: press enable")
+    expect(page.locator("#gamepad")).to_be_hidden()
+
+    def press(button: int) -> None:
+        page.evaluate(GAMEPAD, button)
+        page.wait_for_timeout(100)
+        page.evaluate(GAMEPAD, none)
+        page.wait_for_timeout(100)
+
+    page.evaluate(GAMEPAD, 0)  # one that is held while the gamepad is found does nothing
+    expect(page.locator("#gamepad")).to_contain_text("enable")
+    page.wait_for_timeout(500)
+    expect(seat).to_have_text("you drive: press enable")
+    page.evaluate(GAMEPAD, none)
+    page.wait_for_timeout(100)
+    press(0)
+    expect(seat).to_have_text("you drive")
+    press(0)  # it is no toggle
+    expect(seat).to_have_text("you drive")
+    press(2)
+    expect(page.locator("#antisway")).to_have_attribute("aria-pressed", "false")
+    press(2)
+    expect(page.locator("#antisway")).to_have_attribute("aria-pressed", "true")
+    press(1)
+    expect(seat).to_have_text("you drive: press enable")
+    page.evaluate(NO_GAMEPAD)
+    expect(page.locator("#gamepad")).to_be_hidden()
+
+
 def test_anti_sway_is_switched_in_motion(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
@@ -217,6 +191,11 @@ def test_a_slider_is_felt_by_the_daemon(
     expect(page.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.48")
     page.wait_for_timeout(1500)  # by then it shows what the daemon has
     assert slider.input_value() == "1"
+    back = page.locator(".slider .back").first
+    back.click()
+    expect(page.locator("#events li").last).to_contain_text("axes.slew.filter.a2 = 0.12")
+    expect(back).to_be_disabled()
+    assert slider.input_value() == "0"
 
 
 def test_a_second_tab_takes_the_joysticks(
@@ -225,12 +204,18 @@ def test_a_second_tab_takes_the_joysticks(
     studio = own()
     first = tab(studio)
     enabled(first)
+    first.locator("#slider-calm").focus()
+    first.keyboard.press("End")
+    expect(first.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.48")
     second = tab(studio)
     expect(second.locator("#seat")).to_have_text("another page drives")
     expect(second.locator("#enable")).to_be_disabled()
     second.click("#take")
     expect(first.locator("#seat")).to_have_text("another page drives")
     enabled(second)
+    # What the driver before has changed is put back.
+    expect(second.locator("#events")).to_contain_text("axes.slew.filter.a2 = 0.12")
+    expect(second.locator(".slider b").first).to_contain_text("1.00")
 
 
 def test_the_page_is_back_when_the_daemon_is_back_and_when_the_studio_is(

@@ -216,3 +216,34 @@ def test_the_set_in_force_says_which_profile(number: int, name: str | None) -> N
     axes = watched.take([codec.frame(one)])["axes"]
     assert axes["slew"]["profile"] == name
     assert axes["near_far"]["profile"] is axes["lift"]["profile"] is None
+
+
+def test_frames_a_second_and_age_of_each_source(watched: Watched) -> None:
+    shown = watched.view.values(0.0)["sources"]
+    assert shown["joystick left"] == {"per_s": 0, "age_s": None}
+    for tick in range(100):  # two seconds, the joystick at 50 and the valve at 25 frames a second
+        watched.take(Hand(watched.deployment).frames(0, Held()), 0.02 * tick)
+        if tick % 2:
+            watched.take([watched.valve("slew", 10)], 0.02 * tick)
+    shown = watched.view.values(1.99)["sources"]
+    name = watched.deployment.axes["slew"].valve_message.name
+    assert shown["joystick left"] == {"per_s": 50, "age_s": pytest.approx(0.01)}
+    assert shown[name] == {"per_s": 25, "age_s": pytest.approx(0.01)}
+    assert shown["TipPosition"]["age_s"] is None
+    gone = watched.view.values(9.0)["sources"]
+    assert gone[name] == {"per_s": 0, "age_s": pytest.approx(7.02)}
+
+
+def test_a_frame_that_is_too_short_is_not_counted(watched: Watched) -> None:
+    frame = watched.valve("slew", 10)
+    watched.take([frame._replace(data=frame.data[:1])])
+    name = watched.deployment.axes["slew"].valve_message.name
+    assert watched.view.values(0.0)["sources"][name]["age_s"] is None
+
+
+def test_a_joystick_position_that_is_old_is_shown_no_more(watched: Watched) -> None:
+    watched.take(Hand(watched.deployment).frames(0, Held({"slew": 0.5})), 1.0)
+    for age_s, position in ((SILENT_S - 0.01, 0.5), (SILENT_S, None)):
+        watched.view.check(1.0 + age_s)
+        axis = watched.view.values(1.0 + age_s)["axes"]["slew"]
+        assert axis["joystick"] == (position and pytest.approx(position, abs=0.005))

@@ -10,8 +10,9 @@ def licence(package: Distribution) -> str:
     """Name of the licence, from the newest of the fields that packages have used for it."""
     classifiers = package.metadata.get_all("Classifier") or []
     named = [c.rpartition(" :: ")[2] for c in classifiers if c.startswith("License ::")]
-    fields = [package.metadata["License-Expression"], package.metadata["License"], *named]
-    for field in fields:
+    names = ("License-Expression", "License")
+    fields = [field for name in names for field in package.metadata.get_all(name) or []]
+    for field in (*fields, *named):
         if field and len(field) < LONGEST_NAME and field != "UNKNOWN":
             return str(field)
     raise SystemExit(f"{package.name} does not say its licence")

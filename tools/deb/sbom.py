@@ -1,7 +1,7 @@
 """Bill of materials of an installed canshaper, CycloneDX 1.6: ``sbom.py DIRECTORY VERSION``.
 
-Python packages as they lie in the directory, and the JavaScript libraries of the live page. The
-same content gives the same bytes; SOURCE_DATE_EPOCH is its time.
+Python packages as they lie in the directory, and the JavaScript libraries of the live page and of
+the site. The same content gives the same bytes; SOURCE_DATE_EPOCH is its time.
 """
 
 import json
@@ -23,7 +23,8 @@ from cyclonedx.model.component import Component, ComponentType
 from cyclonedx.output.json import JsonV1Dot6
 from packageurl import PackageURL
 
-BANNER = re.compile(r"/\* (\w+) (\S+), (\w+) licence")
+BANNER = re.compile(r"/\* ([\w-]+) (\S+), (\w+) licence")
+THEME = re.compile(r"([\w-]+)-([\d.]+)\.LICENSE")
 LICENCES = LicenseFactory()
 
 
@@ -60,6 +61,19 @@ def scripts(vendor: Path) -> Iterator[Component]:
         )
 
 
+def theme(site: Path) -> Iterator[Component]:
+    """The theme of the site, by the name of the file with its licence."""
+    for path in sorted((site / "assets").glob("*.LICENSE")):
+        if named := THEME.fullmatch(path.name):
+            yield Component(
+                name=named[1],
+                version=named[2],
+                type=ComponentType.LIBRARY,
+                licenses=[LICENCES.make_from_string("MIT")],
+                purl=PackageURL("pypi", name=named[1], version=named[2]),
+            )
+
+
 def bill(library: Path, version: str) -> str:
     """The whole bill, as JSON."""
     root = Component(
@@ -69,7 +83,9 @@ def bill(library: Path, version: str) -> str:
         licenses=[LICENCES.make_from_string("Apache-2.0")],
         purl=PackageURL("pypi", name="canshaper", version=version),
     )
-    parts = [*packages(library), *scripts(library / "canshaper" / "studio" / "static" / "vendor")]
+    program, site = library / "canshaper", library / "canshaper" / "data" / "site"
+    vendored = scripts(program / "studio" / "static" / "vendor")
+    parts = [*packages(library), *vendored, *scripts(site / "site"), *theme(site)]
     for one in (root, *parts):
         one.bom_ref.value = str(one.purl)  # a random one would be another in every build
     bom = Bom(components=parts)

@@ -1,5 +1,6 @@
 """``canshaper calibrate``: dead band, gain and asymmetry of a valve, measured and written."""
 
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
@@ -9,27 +10,17 @@ from canshaper.cli.common import (
     FILE,
     INTERFACE,
     NETWORK,
+    PICTURE,
+    REPORT,
     SET,
-    echo,
     loader,
     refuse_shipped,
 )
-from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
-    from canshaper.commissioning.calibration.drive import CalibrationDrive
-    from canshaper.commissioning.calibration.fit import Calibration
-    from canshaper.machine.deployment import Deployment
+    from matplotlib.figure import Figure
 
-# Speed of each axis as `canshaper sim` tells it.
-SIMULATED = {
-    "slew": "TipVelocity.SlewRate",
-    "near_far": "TipVelocity.RadialSpeed",
-    "lift": "TipVelocity.VerticalSpeed",
-    "lift_cylinder": "JointVelocity.LiftRate",
-    "knuckle": "JointVelocity.KnuckleRate",
-    "extension": "JointVelocity.ExtensionSpeed",
-}
+    from canshaper.commissioning.calibration.drive import CalibrationDrive
 
 
 def calibrate(
@@ -47,6 +38,8 @@ def calibrate(
     channel: list[str] | None = CHANNEL,
     network: bool = NETWORK,
     changes: list[str] | None = SET,
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:
     """Measure at which command a valve opens, and what it gives, in each direction.
 
@@ -64,18 +57,23 @@ def calibrate(
 
       canshaper calibrate config/forwarder-robust.yaml --axis slew --set slew.deadband=0.08
 
+      canshaper calibrate config/forwarder-robust.yaml --axis slew --report slew.html
+
       canshaper calibrate machine.yaml --axis slew --speed TipVelocity.SlewRate --live --write
     """
+    from canshaper.cli.results import Results
     from canshaper.commissioning.calibration.drive import CalibrationDrive
     from canshaper.commissioning.calibration.ramp import Ramp
     from canshaper.commissioning.calibration.run import run_live
+    from canshaper.commissioning.calibration.write import curve_lines, speed_signal, write_curve
     from canshaper.report.console import progress_bar
 
     deployment = loader(file, interface, channel, network=network)()
     if write:
         refuse_shipped(file)
+    results = Results(f"Valve of {axis}, calibrated", deployment, report, picture)
     ramp = Ramp(rate_pct_s / 100.0, top_pct / 100.0)
-    drive = CalibrationDrive(deployment, axis, _speed(deployment, axis, speed), ramp)
+    drive = CalibrationDrive(deployment, axis, speed_signal(deployment, axis, speed), ramp)
     if live and not yes:
         typer.confirm(
             f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
@@ -85,74 +83,30 @@ def calibrate(
         )
     with progress_bar(axis) as on_progress:
 
-        def report(now: "CalibrationDrive") -> None:
+        def show(now: "CalibrationDrive") -> None:
             waits = f" waits for {now.waiting_for}" if now.waiting_for else ""
             on_progress(now.progress, f"{axis}{waits}")
 
         if live:
-            run_live(drive, deployment, report)
+            run_live(drive, deployment, show)
         else:
             from canshaper.commissioning.calibration.simulated import run_simulated
             from canshaper_sim.parameters import changed_parameters
 
-            run_simulated(drive, deployment, changed_parameters(changes or []), report)
+            run_simulated(drive, deployment, changed_parameters(changes or []), show)
     result = drive.result()
     if write:  # first: what reads the output may end before its last line
-        _write(deployment, axis, result)
-    _print_curve(deployment, axis, result, top_pct)
+        bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
+        write_curve(deployment, axis, result, simulated=not live or bus.is_virtual)
+    results.print("\n".join(curve_lines(deployment, axis, result, top_pct)), soft_wrap=True)
+
+    def figure() -> "Figure":
+        from canshaper.commissioning.calibration.plot import figure as of_valve
+
+        return of_valve(axis, deployment.axes[axis].config.limits.output_limits(), result, top_pct)
+
+    if path := results.picture(None, figure):
+        results.picture_line(path)
     if write:
-        echo(f"written: {deployment.path}")
-
-
-def _speed(deployment: "Deployment", axis: str, speed: str | None) -> tuple[str, str]:
-    """Message and signal with the speed of the axis.
-
-    Raises:
-        ValueError: no such axis; or none was named, and none is known.
-    """
-    bound = deployment.axes.get(axis)
-    if bound is None:
-        names = ", ".join(deployment.axes)
-        raise UsageError(f"--axis: expected an axis, got {axis!r}; there are {names}")
-    if speed is None and bound.config.feedback:
-        return bound.config.feedback.message, bound.config.feedback.signal
-    message, dot, signal = (speed or SIMULATED.get(axis, "")).partition(".")
-    if not (message and dot and signal):
-        raise UsageError(f"--speed: expected MESSAGE.SIGNAL, got {speed or 'none'}")
-    return message, signal
-
-
-def _print_curve(
-    deployment: "Deployment", axis: str, result: "Calibration", top_pct: float
-) -> None:
-    """The result for people, after what the file has."""
-    limits = deployment.axes[axis].config.limits
-    now = f"deadband_pct {limits.deadband_pct:g}"
-    if limits.curve_command_pct and limits.curve_speed_pct:
-        pairs = zip(limits.curve_command_pct, limits.curve_speed_pct, strict=True)
-        ends = [f"{command:g}" for command, speed in pairs if speed == 0.0]
-        now = f"a curve with the dead band at {' to '.join(ends)} %"
-    echo(f"axis {axis}: the file has {now}")
-    full = max(result.positive.full, result.negative.full)
-    for name, one in (("positive", result.positive), ("negative", result.negative)):
-        echo(
-            f"  {name}: opens at {100 * one.opens:.1f} % of the command, full speed"
-            f" {one.full:.4g} ({100 * one.full / full:.0f} %), delay of the valve worth"
-            f" {100 * one.delay:.1f} %"
-        )
-    commands, speeds = result.curve()
-    echo(f"  curve_command_pct: {commands}\n  curve_speed_pct: {speeds}")
-    if top_pct < 100:
-        echo(f"  above {top_pct:g} % of the command this is a straight line, not measured")
-
-
-def _write(deployment: "Deployment", axis: str, result: "Calibration") -> None:
-    from canshaper.config.edit import set_values
-
-    commands, speeds = result.curve()
-    values = {
-        "deadband_pct": None,
-        "curve_command_pct": commands,
-        "curve_speed_pct": speeds,
-    }
-    set_values(deployment.path, ("axes", axis, "limits"), values)
+        results.print(f"written: {deployment.path}", soft_wrap=True)
+    results.write()

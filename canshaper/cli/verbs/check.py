@@ -1,6 +1,8 @@
 """``canshaper check``: is a deployment fit to start?"""
 
-from typing import TYPE_CHECKING
+import json
+from dataclasses import asdict
+from typing import TYPE_CHECKING, Any
 
 import typer
 
@@ -20,7 +22,10 @@ FALLBACKS = {
 }
 
 
-def check(file: str = FILE) -> None:
+def check(
+    file: str = FILE,
+    as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
+) -> None:
     """Load a deployment against its DBC files and report every problem at once.
 
     Shows how far each axis still travels after release, reversal, lost joystick and lost enable,
@@ -32,26 +37,78 @@ def check(file: str = FILE) -> None:
     is a warning; so is an interface of this machine that is not the device of its bus, and an axis
     that may travel on for more than 2 m without a stop_distance_m in the file, with which run does
     not start; and a filter that was designed for another swing, valve or tail than the file has
-    now.
+    now; and what was measured on a simulated crane.
 
     Examples:
 
       canshaper check config/forwarder-robust.yaml
+
+      canshaper check config/forwarder-robust.yaml --json
     """
-
-    from canshaper.commissioning.stopping import print_stopping
-    from canshaper.config.source import Source
-    from canshaper.machine.filters import unfit
-    from canshaper.machine.stopping import unstated
-    from canshaper.report.console import SafeConsole
-
     try:
         deployment = loader(file)()
     except ConfigError as error:
-        echo(str(error), err=True)
-        count = len(error.problems)
-        echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
+        if as_json:
+            problems = [asdict(problem) for problem in error.problems]
+            echo(json.dumps({"file": file, "good": False, "problems": problems}, indent=2))
+        else:
+            echo(str(error), err=True)
+            count = len(error.problems)
+            echo(f"{count} problem{'s' if count > 1 else ''}", err=True)
         raise typer.Exit(EXIT_WRONG) from None
+    if as_json:
+        echo(json.dumps(_as_dict(deployment), indent=2))
+    else:
+        _print(deployment)
+
+
+def _as_dict(deployment: "Deployment") -> dict[str, Any]:
+    """Everything as plain data; travel in seconds of full speed."""
+    from canshaper.commissioning.doubts import doubts
+    from canshaper.commissioning.stopping import stopping
+
+    config, loads = (
+        deployment.config,
+        {bus: deployment.load(bus) for bus in deployment.config.buses},
+    )
+    return {
+        "file": str(deployment.path),
+        "good": True,
+        "problems": [],
+        "warnings": [asdict(warning) for warning in doubts(deployment)],
+        "not_used": [asdict(warning) for warning in deployment.messages.warnings()[1]],
+        "digest": f"{deployment.identity.digest:#06x}",
+        "identity": deployment.identity.lines()[1:],
+        "buses": {
+            name: {
+                "interface": bus.interface,
+                "channel": bus.channel,
+                "bitrate": bus.bitrate,
+                "load": load.share if (load := loads[name]) else None,
+                "match": _match(bus) if bus.match else None,
+            }
+            for name, bus in config.buses.items()
+        },
+        "axes": {
+            one.name: {
+                "filter": config.axes[one.name].filter.kind,
+                "valve": config.axes[one.name].valve.message,
+                "full_speed_m_s": one.speed.m_s,
+                "travel_s": asdict(one.travel),
+                "allowed_s": one.allowed_s,
+                "stop_distance_m": one.stated_m,
+            }
+            for one in stopping(deployment)
+        },
+    }
+
+
+def _print(deployment: "Deployment") -> None:
+    """Everything for people."""
+    from canshaper.commissioning.doubts import doubts
+    from canshaper.commissioning.stopping import print_stopping
+    from canshaper.report.console import SafeConsole
+
     config = deployment.config
     echo(f"{deployment.path}: good")
     print_warnings(*deployment.messages.warnings(), "not used")
@@ -84,8 +141,8 @@ def check(file: str = FILE) -> None:
     for line in identity.lines()[1:]:
         echo(f"    {line}")
     print_stopping(deployment, SafeConsole())
-    for place, text in (*unfit(deployment.config), *unstated(deployment)):
-        echo(f"WARNING: {Source(deployment.path).problem(place, text)}")
+    for warning in doubts(deployment):
+        echo(f"WARNING: {warning}")
 
 
 def _match(bus: "Bus") -> str:
@@ -119,6 +176,9 @@ def _load(deployment: "Deployment", bus: str) -> str:
     load = deployment.load(bus)
     if load is None:
         return ", no bitrate given, so its load is not known"
-    rate = (deployment.config.buses[bus].bitrate or 0) / 1000
+    config = deployment.config.buses[bus]
+    rate = f"{(config.bitrate or 0) / 1000:g} kbit/s"
+    if config.data_bitrate:
+        rate += f", data {config.data_bitrate / 1000:g} kbit/s"
     warning = " - WARNING: above 50 %, frames will wait for others" if load.share > BUSY else ""
-    return f", its {load.messages} messages load {load.share:.0%} of {rate:g} kbit/s{warning}"
+    return f", its {load.messages} messages load {load.share:.0%} of {rate}{warning}"

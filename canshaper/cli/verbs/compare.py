@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import echo, loader, picture, picture_line
+from canshaper.cli.common import PICTURE, REPORT, echo, loader
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
     from rich.table import Table
 
     from canshaper.design.comparison.limits import Least
@@ -38,6 +39,8 @@ def compare(
     processes: int | None = typer.Option(
         None, "--processes", min=1, help="Processes; by default one a processor."
     ),
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:
     """Drive every filter through the same manoeuvres and say which to take.
 
@@ -46,67 +49,66 @@ def compare(
     axis, strokes of both, random joysticks, a loading cycle, a load picked up on the way, a slow
     valve, a start with swing; at -30 to +30 % pendulum length. The tables have the largest swing
     that is left, what the operator feels, the worst case of each filter, which of ours stops as
-    soon and leaves less, and what no shaper can beat. Writes compare.png and compare.json. Takes
-    one to two minutes.
+    soon and leaves less, and what no shaper can beat. A file whose sway sensors damp has rows with
+    them. Writes compare.png and compare.json. Takes one to two minutes.
 
     Examples:
 
       canshaper compare
 
+      canshaper compare config/forwarder-sensor.yaml
+
       canshaper compare config/forwarder.yaml
 
       canshaper compare --json --processes 1
     """
+    from canshaper.cli.results import Results
     from canshaper.design.comparison.candidates import candidates
     from canshaper.design.comparison.limits import AXIS, least, limits_for
     from canshaper.design.comparison.manoeuvres import manoeuvres
     from canshaper.design.comparison.measure import measure_all
     from canshaper.design.comparison.summary import recommendations, rows
     from canshaper.design.swinging import swinging_axis
-    from canshaper.report.console import SafeConsole, progress_bar
+    from canshaper.report.console import progress_bar
 
-    console = SafeConsole(stderr=as_json)
     deployment = loader(file)()
+    results = Results("Comparison of filters", deployment, report, picture, quiet=as_json)
+    out.mkdir(parents=True, exist_ok=True)  # reported before minutes of driving
     tasks = manoeuvres()
-    try:
-        found = candidates(deployment)
-        with progress_bar(f"{len(found)} filters, {len(tasks)} manoeuvres") as on_progress:
-            outcomes = measure_all(
-                deployment.path, found, tasks, on_progress=on_progress, processes=processes
-            )
-            limits = least(deployment)
-    except KeyboardInterrupt:
-        echo("interrupted", err=True)
-        raise typer.Exit(130) from None
-    table = rows(found, outcomes)
+    filters = candidates(deployment)
+    with progress_bar(f"{len(filters)} filters, {len(tasks)} manoeuvres") as on_progress:
+        outcomes = measure_all(
+            deployment.path, filters, tasks, on_progress=on_progress, processes=processes
+        )
+        limits = least(deployment)
+    table = rows(filters, outcomes)
     advice = recommendations(table, swinging_axis(deployment, AXIS)[1].mode().period_s)
     data = {
         "rows": [asdict(row) for row in table],
         "recommendations": {k: {"filter": r.name, "why": why} for k, (r, why) in advice.items()},
         "limits": [asdict(limit) for limit in limits],
     }
-    out.mkdir(parents=True, exist_ok=True)
     text = json.dumps({**data, "outcomes": [asdict(o) for o in outcomes]}, indent=2)
     (out / "compare.json").write_text(text + "\n", encoding="utf-8")
     if as_json:
         echo(json.dumps(data, indent=2))
-    else:
-        for drawn in (_residuals(table), _felt(table), _worst(table), _limits(limits)):
-            console.print(drawn)
-        for _, why in advice.values():
-            console.print(f"- {why}.")
+    for shown in (_residuals(table), _felt(table), _worst(table), _limits(limits)):
+        results.print(shown)
+    for _, why in advice.values():
+        results.print(f"- {why}.")
 
-    def draw(path: Path) -> None:
+    def figure() -> "Figure":
         from canshaper.report.pareto import Point
-        from canshaper.report.pareto import draw as draw_points
+        from canshaper.report.pareto import figure as of_points
 
         points = [Point(r.name, r.ours, r.stop_s, r.rise_s, r.worst_30_deg) for r in table]
-        draw_points(points, limits_for(deployment, outcomes), title, path)
+        return of_points(points, limits_for(deployment, outcomes), title)
 
     off = next(row for row in table if row.name == "off")
     calm = advice["calm"][0]
     title = f"{calm.name} leaves {calm.worst_30_deg:.1f}° of {off.worst_30_deg:.1f}° at worst"
-    console.print(picture_line(picture(out / "compare.png", draw)))
+    results.picture_line(results.picture(out / "compare.png", figure))
+    results.write()
 
 
 def _residuals(table: "list[Row]") -> "Table":

@@ -3,28 +3,44 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CRANE, SET, echo, fail, loader, picture, picture_line
-from canshaper.errors import DriveError
+from canshaper.cli.common import (
+    CRANE,
+    EXIT_INTERRUPTED,
+    PICTURE,
+    REPORT,
+    SENSOR,
+    SET,
+    echo,
+    fail,
+    loader,
+    sensed,
+)
+from canshaper.errors import DriveError, UsageError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from canshaper.campaign.draw import Setting
+    from canshaper.design.lockstep import DriveOptions
     from canshaper.design.processes import Transport
     from canshaper.machine.deployment import Deployment
+    from canshaper_sim.crane import CraneParameters
     from canshaper_sim.recording import Recording
     from canshaper_sim.strokes import Script
 
 # What `report.json` says of a drive without a bus.
 EXIT_NOT_DRIVEN = 1
+DEFAULT = "forwarder-robust.yaml"
 LOCKSTEP = "lock-step, no bus"
 
 
 def demo(
-    file: str = typer.Argument(
-        "forwarder-robust.yaml", help="Deployment file; by default a shipped one."
-    ),
+    file: str = typer.Argument(DEFAULT, help="Deployment file; by default a shipped one."),
+    sensor: bool = SENSOR,
     script: str = typer.Option("demo", "--script", help="What the operator does."),
     out: Path = typer.Option(Path("out/demo"), "--out", help="Directory for picture and report."),
     lockstep: bool = typer.Option(
@@ -35,8 +51,19 @@ def demo(
     transport: str = typer.Option(
         "auto", "--transport", help="auto, vcan0 (or another SocketCAN channel), udp_multicast."
     ),
+    seed: int | None = typer.Option(
+        None, "--seed", min=0, help="This drive of `canshaper campaign FILE`, in lock-step."
+    ),
+    ranges: str | None = typer.Option(
+        None,
+        "--ranges",
+        metavar="FILE",
+        help="Draw it from this file's ranges, as `campaign FILE --against` does.",
+    ),
     crane: str | None = CRANE,
     changes: list[str] | None = SET,
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:
     """Drive the simulated crane twice, anti-sway off and on, and show the difference.
 
@@ -53,12 +80,18 @@ def demo(
 
       canshaper demo --lockstep --script loading
 
-      canshaper demo forwarder.yaml --lockstep     (the paper's filter)
+      canshaper demo forwarder.yaml --lockstep  # the paper's filter
 
       canshaper demo --set grapple.l2_m=1.5
+
+      canshaper demo --sensor --set grapple.l2_m=1.5
+
+      canshaper demo --seed 34
+
+      canshaper demo new.yaml --seed 34 --ranges old.yaml
     """
+    from canshaper.cli.results import Results
     from canshaper.design.processes import choose_transport
-    from canshaper.report.console import SafeConsole
     from canshaper.report.metrics import report_dict
     from canshaper.report.table import print_report
     from canshaper_sim.axes import ALL_AXES
@@ -66,29 +99,37 @@ def demo(
     from canshaper_sim.operator import script_named
     from canshaper_sim.parameters import changed_parameters
 
-    console = SafeConsole()
-    changed_parameters(changes or [])  # wrong ones are named before anything begins
-    deployment = loader(file)()
+    nominal = changed_parameters(changes or [])  # wrong ones are named before anything begins
+    if (ranges is not None and seed is None) or (crane is not None and seed is not None):
+        raise UsageError("--seed: expected with --ranges, and without --crane: it is the first one")
+    deployment = loader(sensed(file, DEFAULT, sensor))()
+    results = Results("Drive without and with filters", deployment, report, picture)
+    lockstep = lockstep or seed is not None
     # A drive on a bus needs Linux' scheduler and sockets.
     way = None if lockstep or sys.platform != "linux" else choose_transport(transport, deployment)
     several = cranes(deployment)
     crane = crane or next(iter(several), None)
     axes = (one_crane(deployment, crane) if crane else deployment).axes
-    played = script_named(script, [axis for axis in ALL_AXES if axis in axes])
-    console.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
+    options: DriveOptions = {"parameters": nominal, "crane": crane}
+    if seed is None:
+        played = script_named(script, [axis for axis in ALL_AXES if axis in axes])
+    else:
+        drawn = _drawn(deployment, seed, ranges, nominal)
+        played, options = drawn.script, drawn.options
+    results.print(f"Operator script {played.name}, {played.duration_s:g} s, driven twice.")
     if crane:
-        console.print(f"Crane: {crane} (of {', '.join(several)})")
-    console.print(f"Transport: {way.description if way else LOCKSTEP}")
+        results.print(f"Crane: {crane} (of {', '.join(several)})")
+    results.print(f"Transport: {way.description if way else LOCKSTEP}")
 
     try:
-        (raw, shaped), missed = _drive_twice(deployment, way, played, crane, changes or [])
+        (raw, shaped), missed = _drive_twice(deployment, way, played, options, changes or [])
     except DriveError as error:
         raise fail(error, EXIT_NOT_DRIVEN) from None
     except KeyboardInterrupt:
         echo("interrupted; every process was stopped, valves neutral", err=True)
-        raise typer.Exit(130) from None
+        raise typer.Exit(EXIT_INTERRUPTED) from None
 
-    report = report_dict(
+    measures = report_dict(
         raw,
         shaped,
         transport=way.description if way else LOCKSTEP,
@@ -96,23 +137,35 @@ def demo(
         facts={"script": played.name, "deployment": str(deployment.path.name)},
     )
     out.mkdir(parents=True, exist_ok=True)
-    print_report(report, console)
-    (out / "report.json").write_text(json.dumps(report, indent=2) + "\n", encoding="utf-8")
+    print_report(measures, results)
+    (out / "report.json").write_text(json.dumps(measures, indent=2) + "\n", encoding="utf-8")
 
-    def draw(path: Path) -> None:
-        from canshaper.report.plot import draw as draw_drives
+    def figure() -> "Figure":
+        from canshaper.report.plot import figure as of_drives
 
-        draw_drives(raw, shaped, report, path)
+        return of_drives(raw, shaped, measures)
 
-    console.print(picture_line(picture(out / "demo.png", draw)))
-    console.print(f"Report: {out / 'report.json'}")
+    results.picture_line(results.picture(out / "demo.png", figure))
+    results.print(f"Numbers: {out / 'report.json'}")
+    results.write()
+
+
+def _drawn(
+    deployment: "Deployment", seed: int, ranges: str | None, nominal: "CraneParameters"
+) -> "Setting":
+    """A drive of a campaign; with the ranges of another file, one of its second file."""
+    from canshaper.campaign.draw import check_same_axes, draw_drive
+
+    first = loader(ranges)() if ranges else deployment
+    check_same_axes(first, deployment)
+    return draw_drive(deployment, seed, first.config.uncertainty, nominal)
 
 
 def _drive_twice(
     deployment: "Deployment",
     way: "Transport | None",
     played: "Script",
-    crane: str | None,
+    options: "DriveOptions",
     changes: list[str],
 ) -> tuple[list["Recording"], int]:
     """Drives with anti-sway off and on, and the deadlines that the daemon missed in both.
@@ -121,23 +174,23 @@ def _drive_twice(
         deployment: the machine.
         way: the bus to drive on; None for lock-step.
         played: what the operator does.
-        crane: which one, where there are several.
-        changes: parameters of the crane, NAME=VALUE.
+        options: of a drive in lock-step.
+        changes: parameters of the crane on a bus, NAME=VALUE.
     """
     from canshaper.design.lockstep import drive
     from canshaper.design.processes import drive_on_bus
     from canshaper.report.console import progress_bar
-    from canshaper_sim.parameters import changed_parameters
 
     recordings, missed = [], 0
     for name, bypass in (("anti-sway off", True), ("anti-sway on", False)):
         with progress_bar(name, played.duration_s) as on_progress:
-            options: Any = {"bypass": bypass, "on_progress": on_progress}
             if way is None:
-                options |= {"parameters": changed_parameters(changes), "crane": crane}
-                recordings.append(drive(deployment, played, **options))
+                options["bypass"] = bypass
+                recordings.append(drive(deployment, played, on_progress, **options))
             else:
-                run = drive_on_bus(deployment, way, played, changes, **options)
+                run = drive_on_bus(
+                    deployment, way, played, changes, bypass=bypass, on_progress=on_progress
+                )
                 recordings.append(run.recording)
                 missed += run.missed_deadlines
     return recordings, missed

@@ -6,10 +6,12 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, echo, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, PICTURE, REPORT, loader
 from canshaper.errors import UsageError, WrongDeviceError
 
 if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
     from canshaper.commissioning.doctor.finding import Finding
     from canshaper.machine.deployment import Deployment
 
@@ -35,6 +37,8 @@ def doctor(
     as_json: Path | None = typer.Option(
         None, "--json", metavar="FILE", help="Write all numbers to this file."
     ),
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:
     """Is this PC fit to run a deployment? Nothing is sent on its buses, nothing moves.
 
@@ -55,18 +59,20 @@ def doctor(
 
       canshaper doctor config/forwarder-robust.yaml --no-load --listen 10
     """
+    from canshaper.cli.results import Results
     from canshaper.commissioning.doctor.finding import fit
     from canshaper.commissioning.doctor.interfaces import bus_findings
     from canshaper.commissioning.doctor.machine import machine_findings
     from canshaper.commissioning.doctor.measure import measure
     from canshaper.commissioning.doctor.report import as_dict, print_report
     from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings
-    from canshaper.report.console import SafeConsole, progress_bar
+    from canshaper.report.console import progress_bar
 
     try:
         deployment = loader(file, interface, channel)()
+        results = Results("Is this PC fit for the machine?", deployment, report, picture)
         findings = machine_findings(deployment.config.tick_ms)
-        findings += bus_findings(deployment.config.buses)
+        findings += bus_findings(deployment.config.buses, deployment.config.tick_ms)
         if listen_s is not None:
             findings += _listened(deployment, listen_s)
         runs = {}
@@ -79,10 +85,16 @@ def doctor(
             as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         raise UsageError(str(error)) from None
-    except KeyboardInterrupt:
-        echo("interrupted", err=True)
-        raise typer.Exit(130) from None
-    print_report(deployment, seconds, runs, findings, SafeConsole())
+    print_report(deployment, seconds, runs, findings, results)
+
+    def figure() -> "Figure":
+        from canshaper.commissioning.doctor.plot import figure as of_runs
+
+        return of_runs(runs, deployment.config.tick_ms)
+
+    if path := results.picture(None, figure):
+        results.picture_line(path)
+    results.write()
     if not fit(findings):
         raise typer.Exit(EXIT_NOT_FIT)
 
@@ -94,9 +106,9 @@ def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
 
     try:
         with progress_bar(f"listening, {seconds:g} s", seconds, refresh_hz=REFRESH_HZ) as passed:
-            heard = listen(deployment, seconds, passed)
+            listened = listen(deployment, seconds, passed)
     except (OSError, WrongDeviceError) as error:
         remedy = "fix the interface first"
         why = error.strerror if isinstance(error, OSError) else error
         return [Finding("joysticks", Level.BAD, f"cannot listen: {why}", remedy)]
-    return heard_findings(deployment, heard)
+    return heard_findings(deployment, listened)

@@ -2,7 +2,17 @@
 
 import typer
 
-from canshaper.cli.common import CHANNEL, CRANE, FILE, INTERFACE, NETWORK, echo, loader
+from canshaper.cli.common import (
+    CHANNEL,
+    CRANE,
+    EXIT_INTERRUPTED,
+    FILE,
+    INTERFACE,
+    NETWORK,
+    buses_line,
+    echo,
+    loader,
+)
 
 
 def operator(
@@ -16,6 +26,8 @@ def operator(
     show: bool = typer.Option(False, "--list", help="List the scripts and exit."),
 ) -> None:
     """Play a scripted operator: joystick frames with the enable switch held.
+
+    Says what is played on which buses; ends with the script, or on SIGTERM or Ctrl-C.
 
     Examples:
 
@@ -41,4 +53,12 @@ def operator(
     if crane:
         deployment = one_crane(deployment, crane)
     axes = [axis for axis in ALL_AXES if axis in deployment.axes]
-    run_operator(deployment, script_named(script, axes), bypass=bypass)
+    played = script_named(script, axes)
+    filters = "off" if bypass else "on"
+    echo(
+        f"script {played.name}, {played.duration_s:g} s, moves {', '.join(played.axes)} with"
+        f" anti-sway {filters} on {buses_line(deployment)}"
+    )
+    if not run_operator(deployment, played, bypass=bypass):
+        echo("interrupted", err=True)
+        raise typer.Exit(EXIT_INTERRUPTED)

@@ -32,15 +32,15 @@ def profiles(
 
     deployment = loader(file)()
     try:
-        found = list(figures(deployment))
+        results = list(figures(deployment))
     except DesignError as error:
         raise UsageError(f"{deployment.path}: {error}") from None
     if as_json:
-        echo(json.dumps([asdict(one) for one in found], indent=2))
+        echo(json.dumps([asdict(one) for one in results], indent=2))
         return
     heads = ("run-on, s", "travel, s", "swing, deg", "left, deg", "±15 %, deg")
     table = new_table("axis, profile", *heads)
-    for one in found:
+    for one in results:
         table.add_row(
             f"{one.axis}, {one.profile}",
             f"{one.run_on_s:.2f}",

@@ -1,20 +1,20 @@
 """``canshaper record``: a log of the buses, and a bundle to attach to a report."""
 
-import signal
 import tempfile
 import time
 from datetime import datetime
 from pathlib import Path
-from types import FrameType
 from typing import TYPE_CHECKING
 
 import typer
 
 from canshaper.cli.common import (
     CHANNEL,
+    EXIT_INTERRUPTED,
     FILE,
     INTERFACE,
     NETWORK,
+    Stop,
     control_socket,
     echo,
     fail,
@@ -86,7 +86,7 @@ def record(
     recording = Recording(deployment)
     failure: CanshaperError | None = None
     code: int | None = None
-    stop = _Stop()
+    stop = Stop()
     log = out
     try:
         log = out if out.suffix == ".log" else _beside(out)
@@ -109,7 +109,7 @@ def record(
     if failure is not None:
         raise fail(failure, code)
     if not recording.frames:
-        text = f"nothing was heard, {out} is without frames: is the bus up, and the machine on?"
+        text = f"nothing was received, {out} is without frames: is the bus up, and the machine on?"
         echo(text, err=True)
     echo(f"{out}: {_text(recording)}")
 
@@ -123,7 +123,7 @@ def _last(file: str, control: Path | None) -> None:
         folder = write_black_box(path, lambda: time.sleep(ASK_AGAIN_S))
     except KeyboardInterrupt:
         echo("the daemon writes it when every axis is neutral", err=True)
-        raise typer.Exit(130) from None
+        raise typer.Exit(EXIT_INTERRUPTED) from None
     echo(f"written in {folder}")
 
 
@@ -160,19 +160,6 @@ def _bundle(
     except OSError as error:
         text = f"{error.filename or out}: {error.strerror or error}; the log is {log}"
         raise fail(UsageError(text), EXIT_NOT_WRITTEN) from None
-
-
-class _Stop:
-    """Asked for by SIGTERM or SIGINT; a second time it ends at once."""
-
-    def __init__(self) -> None:
-        self.asked = False
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._on_signal)
-
-    def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        self.asked = True
-        signal.signal(number, signal.SIG_DFL)
 
 
 def _line(recording: "Recording", out: Path) -> str:

@@ -5,24 +5,32 @@ import json
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from canshaper.cli.common import (
+    EXIT_INTERRUPTED,
+    PICTURE,
+    PROCESSES,
+    REPORT,
+    SCHEDULER,
+    channels_of,
     echo,
+    engine,
     loader,
+    names_of,
     os_errors,
-    picture,
-    picture_line,
 )
 from canshaper.errors import UsageError
 from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from matplotlib.figure import Figure
 
+    from canshaper.cli.results import Results
     from canshaper.machine.deployment import Deployment
     from canshaper.recording.replay import Drive
     from canshaper.recording.report import Replayed
@@ -34,7 +42,7 @@ MOST_EVENTS = 12
 
 def replay(
     log: Path = typer.Argument(..., help="A black box or another bundle (.zip);"
-    " candump .log, .asc, .blf, .mf4, .csv, each also .gz."),
+    " .log, .asc, .blf, .trc, .csv, .db, .mf4, see docs/replay.md."),
     configs: list[str] | None = typer.Option(
         None, "--config", metavar="FILE", help="Deployment; twice for two side by side. Of a bundle"
         " its own by default."
@@ -48,6 +56,10 @@ def replay(
     ),
     begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Table and picture from here."),
     end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
+    processes: int | None = PROCESSES,
+    scheduler: str | None = SCHEDULER,
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:  # fmt: skip
     """Drive the controller with a black box or a log, at full speed.
 
@@ -58,7 +70,11 @@ def replay(
     is compared with the one that was sent then. With other files (--config), and with any other
     log, the joystick frames drive the controller at the ticks of a clock.
 
-    Exit code 0, with --verify 1 when anything is different, 2 when log or deployment are wrong.
+    Of a folder every log in it and below is driven, and one table says it of all; a folder in it
+    is a machine.
+
+    Exit code 0; 1 when a log of a folder cannot be read, or with --verify when anything is
+    different; 2 when log or deployment are wrong.
 
     Examples:
 
@@ -69,11 +85,19 @@ def replay(
       canshaper replay drive.asc --config machine.yaml --config robust.yaml --out out/compare
 
       canshaper replay recording.zip --verify
-    """
-    from canshaper.recording.bundle import unpack
-    from canshaper.report.console import SafeConsole
 
-    console = SafeConsole()
+      canshaper replay logs/ --config old.yaml --config new.yaml
+    """
+    from canshaper.cli.fleet import check_only_folders
+    from canshaper.cli.results import Results
+    from canshaper.recording.bundle import unpack
+
+    results = Results(f"Replay of {log.name}", None, report, picture)
+    if log.is_dir():
+        of_one = {"--verify": verify, "--from": begin_s, "--to": end_s, "--picture": picture}
+        check_only_folders([log], of_one)
+        _fleet(log, tuple(configs or ()), channel or [], out, (processes, scheduler), results)
+        return
     with os_errors(out), tempfile.TemporaryDirectory() as folder:
         try:
             inside = None
@@ -83,18 +107,51 @@ def replay(
                     configs, inside = [str(own)], Path(folder)
             if not configs:
                 raise typer.BadParameter("--config is missing: which deployment?")
-            replays = _run(log, configs, _channels(channel or []), (begin_s, end_s), out, inside)
+            replays = _run(log, configs, channels_of(channel or []), (begin_s, end_s), out, inside)
             for one in replays:
                 one.measure()
         except KeyboardInterrupt:
             echo("interrupted; what was written so far stays", err=True)
-            raise typer.Exit(130) from None
+            raise typer.Exit(EXIT_INTERRUPTED) from None
+    if not all(one.trace.rows for one in replays):
+        lasts_s = (replays[0].trace.end_ns - (replays[0].trace.start_ns or 0)) / 1e9
+        raise UsageError(f"--from, --to: expected a part of {lasts_s:.1f} s of log, got none of it")
     if verify and not all(one.replay.exact for one in replays):
         text = f"--verify: expected a black box of these files, without --config, got {log}"
         raise UsageError(text)
-    different = _show(replays, out, console)
+    results.deployment = replays[0].deployment
+    different = _show(replays, out, results)
+    results.write()
     if verify and different:
         raise typer.Exit(EXIT_DIFFERENT)
+
+
+def _fleet(
+    folder: Path,
+    configs: tuple[str, ...],
+    channel: list[str],
+    out: Path,
+    workers: tuple[int | None, str | None],
+    results: "Results",
+) -> None:
+    """Replay every log of a folder; one table of all."""
+    from canshaper.cli.fleet import finish, replayed, run_fleet, show_replays
+    from canshaper.report.console import progress_bar
+
+    if not configs:
+        raise typer.BadParameter("--config is missing: which deployment?")
+    channels = channels_of(channel)
+    deployments = [loader(config)() for config in configs]  # a wrong one is reported once
+    _check_buses(deployments, channels)
+    results.deployment = deployments[0]
+    work = partial(replayed, configs, channels)
+    with progress_bar(folder.name) as on_progress, os_errors(out):
+        logs = run_fleet(engine(*workers), work, [folder], on_progress)
+    show_replays(logs, results)
+    code = finish(logs, out, results)
+    results.write()
+    if code:
+        raise typer.Exit(code)
 
 
 def _run(
@@ -110,13 +167,9 @@ def _run(
     from canshaper.recording.report import Replayed
     from canshaper.report.console import progress_bar
 
-    names = _names([deployment_path(config) for config in configs])
+    names = names_of([deployment_path(config) for config in configs])
     deployments = [loader(config, inside=inside)() for config in configs]
-    for deployment in deployments:
-        if unknown := channels.keys() - deployment.config.buses.keys():
-            buses = ", ".join(deployment.config.buses)
-            text = f"--channel: expected a bus, got {', '.join(unknown)}; there are {buses}"
-            raise UsageError(text)
+    _check_buses(deployments, channels)
     drives = [look(one, log, channels, own=inside is not None) for one in deployments]
     out.mkdir(parents=True, exist_ok=True)
     replays: list[Replayed] = []
@@ -148,7 +201,7 @@ def _one(
         (out / f"{name}.log").open("w", encoding="ascii") as log,
         (out / f"{name}.events.txt").open("w", encoding="utf-8") as events,
     ):
-        writer = LogWriter(log, channel_of)
+        writer = LogWriter(log, channel_of, deployment.fd)
         for tick, result in replay.run(on_progress):
             done.ticks += 1
             if number is not None and tick.number > number:
@@ -163,65 +216,54 @@ def _one(
     return done
 
 
-def _show(replays: "list[Replayed]", out: Path, console: "Console") -> bool:
+def _show(replays: "list[Replayed]", out: Path, results: "Results") -> bool:
     """Print and write everything; whether anything was not the same as in the log."""
     from canshaper.recording.report import print_replays, verdict_lines
 
     first = replays[0]
     seconds = (first.trace.end_ns - (first.trace.start_ns or 0)) / 1e9
-    console.print(f"{seconds:.1f} s of driving.")
+    results.print(f"{seconds:.1f} s of driving.")
     for one in replays:
-        console.print(f"{one.name}: {one.replay.ticks_of()}", soft_wrap=True)
+        results.print(f"{one.name}: {one.replay.ticks_of()}", soft_wrap=True)
         for warning in one.replay.warnings():
-            console.print(f"WARNING: {one.name}: {warning}", style="yellow")
+            results.print(f"WARNING: {one.name}: {warning}", style="yellow")
         if one.trace.full:
-            console.print(f"{one.name}: table and picture are of the first {one.trace.rows} ticks.")
-    print_replays(replays, console)
+            results.print(f"{one.name}: table and picture are of the first {one.trace.rows} ticks.")
+    print_replays(replays, results)
     for one in replays:
         for time_ns, text in one.events[:MOST_EVENTS]:
             after_s = (time_ns - (one.trace.start_ns or 0)) / 1e9
-            console.print(f"{after_s:9.3f} s {one.name} {text}", soft_wrap=True)
+            results.print(f"{after_s:9.3f} s {one.name} {text}", soft_wrap=True)
         if len(one.events) > MOST_EVENTS:
             more = len(one.events) - MOST_EVENTS
-            console.print(f"  and {more} more in {out / one.name}.events.txt")
+            results.print(f"  and {more} more in {out / one.name}.events.txt")
         for line in verdict_lines(one, examples=len(replays) == 1):
-            console.print(line, soft_wrap=True)
+            results.print(line, soft_wrap=True)
     data = {one.name: one.as_dict() for one in replays}
     (out / "replay.json").write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     made = [f"{one.name}.log" for one in replays] + ["replay.json"]
     if all(one.trace.rows > 1 for one in replays):
 
-        def draw(path: Path) -> None:
-            from canshaper.recording.plot import draw as draw_replays
+        def figure() -> "Figure":
+            from canshaper.recording.plot import figure as of_replays
 
-            draw_replays(replays, path)
+            return of_replays(replays)
 
-        if picture(out / "replay.png", draw):
-            made.append("replay.png")
+        path = results.picture(out / "replay.png", figure)
+        if path and path.parent == out:
+            made.append(path.name)
         else:
-            console.print(picture_line(None))
-    console.print(f"Written to {out}: {', '.join(made)}", soft_wrap=True)
+            results.picture_line(path)
+    results.print(f"Written to {out}: {', '.join(made)}", soft_wrap=True)
     return any(one.replay.verdict.different for one in replays)
 
 
-def _names(paths: list[Path]) -> list[str]:
-    """A name for each deployment, different ones for different files."""
-    stems = [path.stem for path in paths]
-    return [
-        stem if stems.count(stem) == 1 else f"{stem}-{stems[: i + 1].count(stem)}"
-        for i, stem in enumerate(stems)
-    ]
-
-
-def _channels(given: list[str]) -> dict[str, str]:
-    """Channels by bus from BUS=CHANNEL."""
-    found = {}
-    for item in given:
-        bus, mark, channel = item.partition("=")
-        if not mark:
-            raise typer.BadParameter(f"expected BUS=CHANNEL, got {item!r}", param_hint="--channel")
-        found[bus] = channel
-    return found
+def _check_buses(deployments: "list[Deployment]", channels: dict[str, str]) -> None:
+    for deployment in deployments:
+        if unknown := channels.keys() - deployment.config.buses.keys():
+            buses = ", ".join(deployment.config.buses)
+            text = f"--channel: expected a bus, got {', '.join(unknown)}; there are {buses}"
+            raise UsageError(text)
 
 
 @contextmanager

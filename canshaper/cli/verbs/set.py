@@ -43,6 +43,7 @@ def set(
 
       canshaper set machine.yaml axes.slew.filter.a1=0.6 axes.slew.filter.a2=0.09 --write
     """
+    from canshaper.config.numbers import write_numbers
     from canshaper.daemon import control_client as client
     from canshaper.report.console import SafeConsole
 
@@ -56,7 +57,7 @@ def set(
         client.change(path, values)
     table = client.table(path)
     if values and write:
-        _write(deployment.path, values)
+        write_numbers(deployment.path, values)
     if as_json:
         echo(json.dumps(table, indent=2))
         return
@@ -86,16 +87,3 @@ def _table(adjustable: dict[str, dict[str, float]]) -> "Table":
         numbers = (one["now"], one["file"], one["low"], one["high"])
         table.add_row(key, *(f"{number:g}" for number in numbers))
     return table
-
-
-def _write(path: Path, values: dict[str, float]) -> None:
-    from canshaper.config.adjust import Key
-    from canshaper.config.edit import set_values
-
-    sections: dict[tuple[str, str, str], dict[str, float]] = {}
-    for text, number in values.items():
-        key = Key.parsed(text)
-        assert key is not None  # the daemon took it
-        sections.setdefault(("axes", key.axis, key.section), {})[key.name] = number
-    for place, numbers in sections.items():
-        set_values(path, place, numbers)

@@ -2,7 +2,17 @@
 
 import typer
 
-from canshaper.cli.common import CHANNEL, CRANE, FILE, INTERFACE, NETWORK, SET, echo, loader
+from canshaper.cli.common import (
+    CHANNEL,
+    CRANE,
+    FILE,
+    INTERFACE,
+    NETWORK,
+    SET,
+    buses_line,
+    echo,
+    loader,
+)
 
 
 def sim(
@@ -24,7 +34,7 @@ def sim(
     """Simulate valves, crane and swinging grapple behind the valve messages of a deployment.
 
     Reads valve frames, publishes sway, position and velocity of the tip, and of its joints where
-    the machine has them. Ends on SIGTERM or Ctrl-C.
+    the machine has them. Says on which buses, and ends on SIGTERM or Ctrl-C.
 
     Examples:
 
@@ -49,4 +59,5 @@ def sim(
         return
     deployment = loader(file, interface, channel, network=network)()
     driven = one_crane(deployment, crane) if crane else deployment
+    echo(f"the crane of {', '.join(driven.axes)} is on {buses_line(deployment)}; Ctrl-C ends it")
     run_plant(driven, parameters, machine)

@@ -4,6 +4,7 @@ import contextlib
 import secrets
 import signal
 import socket
+import sys
 import tempfile
 from pathlib import Path
 from types import FrameType
@@ -14,26 +15,59 @@ import typer
 from canshaper.cli.common import (
     CHANNEL,
     INTERFACE,
+    SENSOR,
     SET,
+    control_socket,
     echo,
     fail,
     loader,
+    refuse_shipped,
+    sensed,
 )
 from canshaper.errors import UsageError
 from canshaper.shipped import deployment_path
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from starlette.types import ASGIApp
+
     from canshaper.design.processes import Transport
+    from canshaper.studio.access import Access
+    from canshaper.studio.stage import Stage
 
 EXIT_NO_ADDRESS = 1
+DEFAULT = "forwarder.yaml"
+LINUX = sys.platform == "linux"
 LOOPBACK = ("127.0.0.1", "localhost", "::1")
 
 
 def studio(
-    file: str = typer.Argument("forwarder.yaml", help="Deployment file; by default a shipped one."),
+    file: str = typer.Argument(
+        DEFAULT,
+        help="Deployment file; by default a shipped one. Or a log, a black box, a recording.",
+    ),
+    sensor: bool = SENSOR,
     shadow: bool = typer.Option(
         False, "--shadow", help="Show a real machine: listen to the file's buses, never send."
     ),
+    adjust: bool = typer.Option(
+        False, "--adjust", help="With --shadow: let the page change what `canshaper set` may."
+    ),
+    control: Path | None = typer.Option(
+        None, "--control", metavar="PATH", help="Control socket for that, instead of the file's."
+    ),
+    others: list[str] | None = typer.Option(
+        None, "--with", metavar="FILE", help="Replay the log, or the drive, with this one too."
+    ),
+    seeds: list[int] | None = typer.Option(
+        None, "--seed", min=0, help="This drive of `canshaper campaign FILE`; several to choose."
+    ),
+    folder: Path | None = typer.Option(
+        None, "--campaign", metavar="FOLDER", help="The worst drives of the campaign in it."
+    ),
+    begin_s: float = typer.Option(0.0, "--from", metavar="S", help="Show a log from here."),
+    end_s: float | None = typer.Option(None, "--to", metavar="S", help="And up to here."),
     host: str = typer.Option(
         "127.0.0.1", "--host", help="Address to serve at; others than loopback need a token."
     ),
@@ -47,7 +81,14 @@ def studio(
     Starts the daemon and the simulated crane twice, each pair on a bus of its own, and sends
     nothing but joystick frames; everything shown is read from the buses. Without --channel the
     buses are python-can's udp_multicast; with two of them (vcan0 and vcan1) SocketCAN, the first
-    for the shaped crane. With --shadow nothing is started and nothing is sent.
+    for the shaped crane. With --shadow nothing is started and nothing is sent. On other systems
+    than Linux there are no buses: both cranes and their controllers run in this process.
+
+    With --adjust too the page changes numbers of the running daemon, on its PC, within the limits
+    of the file's section "control".
+
+    A log, a black box or a recording is replayed, and a drive of a campaign driven; the page then
+    has a time bar. Of a log --channel is BUS=CHANNEL.
 
     Examples:
 
@@ -55,53 +96,140 @@ def studio(
 
       canshaper studio forwarder-robust.yaml --set grapple.l2_m=1.5
 
+      canshaper studio --sensor --set log.grip_s=20
+
       canshaper studio --channel vcan0 --channel vcan1
 
       canshaper studio machine.yaml --shadow --host 0.0.0.0
+
+      canshaper studio machine.yaml --shadow --adjust
+
+      canshaper studio harvester-0007.zip --with new.yaml
+
+      canshaper studio drive.log --with machine.yaml --with new.yaml
+
+      canshaper studio forwarder.yaml --seed 34
     """
-    from canshaper.studio.access import Access
-    from canshaper.studio.crane import copied
-    from canshaper.studio.events import Events
-    from canshaper.studio.server import address, build_app, listening, server
-    from canshaper.studio.stage import Stage, before_the_rest
+    from canshaper.cli.playback import is_drive, opened_drives
     from canshaper_sim.parameters import changed_parameters
 
     # As a service manager ends it; uvicorn raises the signal again when it is done.
     signal.signal(signal.SIGTERM, _interrupt)
     with contextlib.suppress(KeyboardInterrupt), contextlib.ExitStack() as stack:
         parameters = changed_parameters(changes or [])
+        file = sensed(file, DEFAULT, sensor)
+        drawn = [] if seeds is None else seeds
+        if is_drive(file) or drawn or folder:
+            choices = opened_drives(
+                file, others or [], drawn, folder,
+                channels=channel or [], window=(begin_s, end_s), changes=changes or [],
+            )  # fmt: skip
+            from canshaper.studio.playback_app import playback_app
+
+            _serve(stack, host, port, lambda access: playback_app(Path(file).name, choices, access))
+            return
+        if others:
+            raise UsageError("--with: expected with a log, a black box, --seed or --campaign")
+        if (adjust or control) and not (adjust and shadow):
+            raise UsageError("--adjust, --control: expected with --shadow --adjust")
+        if not LINUX and (shadow or interface or channel):
+            raise UsageError(f"studio with a bus: expected Linux, got {sys.platform}")
+        from canshaper.studio.commission import Commission
+        from canshaper.studio.server import build_app
+
         if shadow:
-            stage = Stage(loader(file, interface, channel)(), Events())
-            stage.watch()
+            stage = _machine(file, interface, channel, (control,) if adjust else None)
         else:
-            directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
-            transports = _transports(interface, channel or [])
-            _, deployment = copied(deployment_path(file), directory)
-            if len(deployment.config.buses) > 1:
-                raise UsageError("this deployment has several buses; only --shadow shows it")
-            stage = Stage(deployment, Events())
-            stage.drive(transports, directory, changes or [])
-        try:
-            one = stack.enter_context(listening(host, port))
-        except OSError as error:
-            text = f"cannot serve at {host} port {port}: {error.strerror or error}; try --port 0"
-            raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
-        port = one.getsockname()[1]
-        token = None if host in LOOPBACK else secrets.token_urlsafe(16)
-        names = (host, socket.gethostname()) if token else ()
-        web = server(build_app(stage, Access(port, names, token), parameters))
+            stage = _cranes(stack, file, interface, channel or [], changes or [])
+        own = deployment_path(file) == Path(file)
+        commission = Commission(Path(file) if own else None, changes or [], machine=shadow)
+        stack.callback(commission.close)
 
-        def end() -> None:
-            web.should_exit = True
+        def page(access: "Access") -> "ASGIApp":
+            return build_app(stage, access, parameters, commission)
 
+        _serve(stack, host, port, page, stage)
+
+
+def _machine(
+    file: str, interface: str | None, channel: list[str] | None, adjust: tuple[Path | None] | None
+) -> "Stage":
+    """A machine to listen to; with ``adjust``, a control socket or the file's, to change."""
+    from canshaper.studio.events import Events
+    from canshaper.studio.stage import Stage
+
+    deployment = loader(file, interface, channel)()
+    if adjust:
+        refuse_shipped(file, "--adjust")
+    stage = Stage(deployment, Events())
+    stage.watch((adjust[0] or control_socket(deployment)) if adjust else None)
+    return stage
+
+
+def _cranes(
+    stack: contextlib.ExitStack,
+    file: str,
+    interface: str | None,
+    channel: list[str],
+    changes: list[str],
+) -> "Stage":
+    """Simulated cranes to drive."""
+    from canshaper.studio.crane import copied
+    from canshaper.studio.events import Events
+    from canshaper.studio.stage import Stage
+
+    directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
+    transports = _transports(interface, channel) if LINUX else []
+    _, deployment = copied(deployment_path(file), directory)
+    if len(deployment.config.buses) > 1:
+        raise UsageError("this deployment has several buses; only --shadow shows it")
+    stage = Stage(deployment, Events())
+    if LINUX:
+        stage.drive(transports, directory, changes)
+    else:
+        stage.drive_here(changes)
+    return stage
+
+
+def _serve(
+    stack: contextlib.ExitStack,
+    host: str,
+    port: int,
+    make: "Callable[[Access], ASGIApp]",
+    stage: "Stage | None" = None,
+) -> None:
+    """Serve a page until Ctrl-C; ``make`` gets who may see it."""
+    from canshaper.cli.reach import qr_code, reachable
+    from canshaper.studio.access import Access
+    from canshaper.studio.priority import before_the_rest
+    from canshaper.studio.server import address, listening, server
+
+    try:
+        one = stack.enter_context(listening(host, port))
+    except OSError as error:
+        text = f"cannot serve at {host} port {port}: {error.strerror or error}; try --port 0"
+        raise fail(UsageError(text), EXIT_NO_ADDRESS) from None
+    port = one.getsockname()[1]
+    token = None if host in LOOPBACK else secrets.token_urlsafe(16)
+    names = (host, socket.gethostname()) if token else ()
+    web = server(make(Access(port, names, token)))
+
+    def end() -> None:
+        web.should_exit = True
+
+    if stage:
         stack.callback(stage.stop)
         stage.start(end)
-        echo(f"open {address(host, port, token)} in a browser; Ctrl-C ends")
-        if token:
-            echo("anybody on the network path can read the token: plain HTTP")
+    url = address(reachable(host), port, token)
+    echo(f"open {url} in a browser; Ctrl-C ends")
+    if token:
+        echo("anybody on the network path can read the token: plain HTTP")
+    if token and sys.stdout.isatty():
+        typer.echo(qr_code(url) or "with the package segno it stands here as a QR code, too")
+    if stage:
         # The threads hold each other up: one that waits for the processor has Python's lock.
         before_the_rest()
-        web.run(sockets=[one])
+    web.run(sockets=[one])
 
 
 def _transports(interface: str | None, channels: list[str]) -> list["Transport"]:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import typer
 
-from canshaper.cli.common import FILE, echo, loader, picture, picture_line, refuse_shipped
-from canshaper.cli.filter_file import write_filter, written_line
+from canshaper.cli.common import FILE, PICTURE, REPORT, echo, loader, refuse_shipped
 from canshaper.errors import UsageError
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from matplotlib.figure import Figure
 
+    from canshaper.cli.results import Results
     from canshaper.config.sway import Sway
     from canshaper.design.tuning.deploy import Setting
     from canshaper.design.tuning.evaluate import Machine
@@ -66,6 +66,8 @@ def tune(
     out: Path = typer.Option(Path("out/tune"), "--out", help="Directory for the picture."),
     write: bool = typer.Option(False, "--write", help="Write filter and tail into the file."),
     as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
+    picture: Path | None = PICTURE,
+    report: Path | None = REPORT,
 ) -> None:
     """Find the best poles of an axis' G_FF, show what they do, write them on request.
 
@@ -85,11 +87,12 @@ def tune(
 
       canshaper tune config/forwarder.yaml --axis slew --method manual
     """
+    from canshaper.cli.results import Results
     from canshaper.design.swinging import swinging_axis
-    from canshaper.report.console import SafeConsole, progress_bar
+    from canshaper.report.console import progress_bar
 
-    console = SafeConsole()
     deployment = loader(file)()
+    results = Results(f"Filter for {axis}", deployment, report, picture, quiet=as_json)
     if write:
         refuse_shipped(file)
     bound, sway = swinging_axis(deployment, axis)
@@ -114,12 +117,12 @@ def tune(
         )
         with progress_bar(axis) as on_progress:
 
-            def report(done: float, what: str) -> None:
+            def show(done: float, what: str) -> None:
                 on_progress(done, f"{axis}: {what}")
 
-            tuning = _solve(task, method, starts, report, beyond=beyond)
-        _report(deployment, bound, task, tuning, out, console, write=write, as_json=as_json)
-    except (OSError, ValueError) as error:
+            tuning = _solve(task, method, starts, show, beyond=beyond)
+        _report(deployment, bound, task, tuning, out, results, write=write, as_json=as_json)
+    except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
 
 
@@ -179,7 +182,7 @@ def _report(
     task: "Task",
     tuning: "Tuning",
     out: Path,
-    console: "Console",
+    results: "Results",
     *,
     write: bool,
     as_json: bool,
@@ -191,20 +194,20 @@ def _report(
     from canshaper.design.tuning.table import table
 
     machine = Machine.of(bound)
-    found = deploy.deployed(tuning, task.mode, task.tick_s, machine)
+    setting = deploy.deployed(tuning, task.mode, task.tick_s, machine)
     before = None
     if bound.config.filter.kind == "gff":
         parameters = bound.config.filter.parameters()
         before = deploy.from_parameters(parameters, task.mode, task.tick_s, machine)
-    best_tail = deploy.tail_for(found, task.mode, task.tick_s, machine)
+    best_tail = deploy.tail_for(setting, task.mode, task.tick_s, machine)
     tail = best_tail if best_tail and best_tail[0] > bound.config.limits.tail_s else None
-    sentence = deploy.recommendation(bound.name, found, tail)
-    drawn = picture(
-        out / f"{bound.name}.png", lambda path: _draw(path, bound, task, found, before, machine)
+    sentence = deploy.recommendation(bound.name, setting, tail)
+    drawn = results.picture(
+        out / f"{bound.name}.png", lambda: _figure(bound, task, setting, before, machine)
     )
-    changed = _write(deployment, bound, task, found, best_tail) if write else []
+    changed = _write(deployment, bound, task, setting, best_tail) if write else []
     if as_json:
-        result = deploy.as_dict(tuning, found) | {
+        result = deploy.as_dict(tuning, setting) | {
             "axis": bound.name,
             "in_file": deploy.measures_dict(before.measures) if before else None,
             "recommendation": sentence,
@@ -214,34 +217,34 @@ def _report(
             "changed": changed,
         }
         echo(json.dumps(result, indent=2))
-        return
-    console.print(table(found, before, tuning.method))
+    results.print(table(setting, before, tuning.method))
     if tuning.method == "optimal":
-        console.print("\n".join(deploy.optimum_lines(tuning)))
-    stop = consequences(deployment, bound.name, found.filter, tail[0] if tail else None)
-    console.print(f"\n{sentence}", style="bold")
-    console.print(stop)
-    console.print(picture_line(drawn))
-    if write:
+        results.print("\n".join(deploy.optimum_lines(tuning)))
+    stop = consequences(deployment, bound.name, setting.filter, tail[0] if tail else None)
+    results.print(f"\n{sentence}", style="bold")
+    results.print(stop)
+    results.picture_line(drawn)
+    if write and not as_json:
+        from canshaper.commissioning.filter_file import written_line
+
         echo("\n".join([*changed, written_line(deployment.path)]))
+    results.write()
 
 
-def _draw(
-    path: Path,
+def _figure(
     bound: "BoundAxis",
     task: "Task",
-    found: "Setting",
+    setting: "Setting",
     before: "Setting | None",
     machine: "Machine",
-) -> None:
-    from canshaper.design.tuning.plot import draw
+) -> "Figure":
+    from canshaper.design.tuning.plot import figure
 
     assert bound.config.sway is not None
     speed = bound.config.sway.full_speed_m_s
-    draw(
-        path,
+    return figure(
         axis=bound.name,
-        found=found,
+        setting=setting,
         mode=task.mode,
         tick_s=task.tick_s,
         machine=machine,
@@ -254,11 +257,12 @@ def _write(
     deployment: "Deployment",
     bound: "BoundAxis",
     task: "Task",
-    found: "Setting",
+    setting: "Setting",
     tail: tuple[float, float] | None,
 ) -> list[str]:
-    from canshaper.config.edit import Value
+    from canshaper.commissioning.filter_file import write_filter
     from canshaper.config.filters import designed
+    from canshaper.config.flow import Value
 
     designed_for = designed(task.mode)
     if task.length_range_pct is not None:
@@ -268,8 +272,12 @@ def _write(
         designed_for["duration_s"] = tail_s
     if task.require.max_rate_per_s is not None:
         designed_for["valve_rate_per_s"] = task.require.max_rate_per_s
-    values: dict[str, Value] = {**found.values(), "designed_for": designed_for}
-    if bound.config.filter.kind != "gff":
-        gone = bound.config.filter.model_dump(exclude_none=True).keys()
-        values = {"kind": "gff", **dict.fromkeys(gone - {"kind"}), **values}
-    return write_filter(deployment, bound.name, values, tail_s)
+    values: dict[str, Value] = {
+        "kind": "gff",
+        **setting.values(),
+        "designed_for": designed_for,
+    }
+    gone = bound.config.filter.model_dump(exclude_none=True).keys() - values.keys()
+    return write_filter(
+        deployment, bound.name, dict.fromkeys(sorted(gone)) | values, tail_s, "tune"
+    )

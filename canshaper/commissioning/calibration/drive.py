@@ -48,14 +48,14 @@ class _RampJoystick:
         self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
     ) -> CommandInput:
         """What the axis may use now."""
-        found = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
-        usable = found.fault is None and found.enabled
-        self.moved = usable and abs(found.command) > neutral_band
+        given = self._joystick.command(signal, now_ns, releases, trip, neutral_band)
+        usable = given.fault is None and given.enabled
+        self.moved = usable and abs(given.command) > neutral_band
         if not usable:
-            return found
+            return given
         if self.moved:  # contradicts the ramp: a fault that stops the axis through its filter
-            return CommandInput(fault=Reason.JOYSTICK_CONTRADICTORY, trip=found.trip)
-        return found._replace(command=self.deflection, bypass=False)
+            return CommandInput(fault=Reason.JOYSTICK_CONTRADICTORY, trip=given.trip)
+        return given._replace(command=self.deflection, bypass=False)
 
 
 class CalibrationDrive:
@@ -135,8 +135,8 @@ class CalibrationDrive:
         """One tick: the frames to send."""
         axis = self._runner.axis
         state = axis.state
-        heard = self._speed.heard(now_ns)
-        if self._begun_ns is None and state is State.READY and heard and not self._moved:
+        valid = self._speed.valid(now_ns)
+        if self._begun_ns is None and state is State.READY and valid and not self._moved:
             self._begun_ns = now_ns
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
@@ -149,8 +149,8 @@ class CalibrationDrive:
                 self.ended = f"stopped: {axis.reason.name}"
             elif self._moved:
                 self.ended = f"stopped: the joystick of {self._moved} was moved"
-            elif not heard:
-                self.ended = "stopped: the feedback fell silent, or tells an error"
+            elif not valid:
+                self.ended = "stopped: the feedback fell silent, or reports an error"
             if self.ended:
                 self._joystick.deflection = 0.0
         yield from self._controller.tick(now_ns, missed)
@@ -189,7 +189,7 @@ class CalibrationDrive:
         if len(rest) < 2:
             raise CalibrationError("no feedback came while the axis was at rest")
         noise, zero = statistics.pstdev(rest), statistics.fmean(rest)
-        found = []
+        ways = []
         for sign, mark in ((1.0, "+"), (-1.0, "-")):
             # The feedback may count the other way round than the command.
             parts = [self._samples.get(f"{way}{mark}", []) for way in ("up", "held", "down")]
@@ -198,10 +198,10 @@ class CalibrationDrive:
                 [Sample(abs(s.command), way * (s.speed - zero)) for s in part] for part in parts
             )
             try:
-                found.append((sign * way, fit(up, held, down, noise)))
+                ways.append((sign * way, fit(up, held, down, noise)))
             except CalibrationError as error:
                 direction = "positive" if sign > 0 else "negative"
                 raise CalibrationError(f"{direction} commands: {error}") from None
-        if found[0][0] != found[1][0]:
+        if ways[0][0] != ways[1][0]:
             raise CalibrationError("both directions moved the same way; is the feedback signed?")
-        return Calibration(found[0][1], found[1][1])
+        return Calibration(ways[0][1], ways[1][1])

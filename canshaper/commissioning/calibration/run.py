@@ -5,6 +5,7 @@ import time
 from collections.abc import Callable
 from contextlib import ExitStack
 from types import FrameType
+from typing import Any
 
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
@@ -17,7 +18,8 @@ from canshaper.machine.deployment import Deployment
 # How often neutral is sent to every valve at the end: a frame may be lost.
 LAST_FRAMES = 3
 # All that can end or hold a program from its terminal: a valve must not stay open behind it.
-STOPS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP, signal.SIGQUIT, signal.SIGTSTP)
+_STOPS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
+STOPS = [getattr(signal, name) for name in _STOPS if hasattr(signal, name)]
 
 
 def run_live(
@@ -45,8 +47,7 @@ def run_live(
         nonlocal stopped
         stopped = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
 
-    for number in STOPS:
-        signal.signal(number, stop)
+    before = {number: signal.signal(number, stop) for number in STOPS}
     told_ns = 0
     standstill = Standstill(deployment)
 
@@ -61,8 +62,9 @@ def run_live(
         return not drive.ended
 
     with ExitStack() as open_ports:
+        open_ports.callback(_restore, before)
         for name, bus in deployment.config.buses.items():
-            ports[name] = open_port(name, bus, ignore)
+            ports[name] = open_port(name, bus, ignore, fd=deployment.routing.buses[name].fd)
             open_ports.callback(ports[name].close)
         try:
             run_at_deadlines(deployment.config.tick_ms * 1_000_000, body)
@@ -72,3 +74,9 @@ def run_live(
                     ports[frame.bus].send(frame)
                 time.sleep(deployment.config.tick_ms / 1000.0)
     on_progress(drive)
+
+
+def _restore(handlers: dict[signal.Signals, Any]) -> None:
+    """What signals did before the measurement."""
+    for number, handler in handlers.items():
+        signal.signal(number, handler)

@@ -1,10 +1,11 @@
-"""The speed of an axis as its machine tells it: from one bus and one sender, or it is silence."""
+"""The speed of an axis as its machine reports it: from one bus and one sender, or it is silence."""
 
 from cantools.database.can import Message, Signal
 
 from canshaper.codec.codecs import JoystickCodec
 from canshaper.codec.frame import Frame
 from canshaper.codec.identifier import NULL, group_of
+from canshaper.codec.layout import CLASSICAL_BYTES, FD_LENGTHS
 from canshaper.codec.protection import UNPROTECTED
 from canshaper.codec.signals import find_signal
 from canshaper.config.input import Input
@@ -15,7 +16,6 @@ from canshaper.machine.inputs import BoundInput
 
 # Feedback older than that says nothing of the axis, which must not go on unseen.
 SILENT_MS = 500
-MOST_BYTES = 8
 
 
 class SpeedFeedback:
@@ -35,9 +35,10 @@ class SpeedFeedback:
     """
 
     def __init__(self, deployment: Deployment, axis: str, message: str, signal: str) -> None:
-        found = _find(deployment, message, signal)
-        self._bound = bound = _bound(deployment, axis, message, found[0], signal)
-        self._input = ValueInput(bound, found[1].name, *measurable(found[1]))
+        bus = deployment.config.buses[deployment.axes[axis].config.valve.bus]
+        feedback = _find(deployment, message, signal, fd=bus.fd)
+        self._bound = bound = _bound(deployment, axis, message, feedback[0], signal)
+        self._input = ValueInput(bound, feedback[1].name, *measurable(feedback[1]))
         self._keys = frozenset(bound.keys)
         _, can_id, _ = bound.key
         self._source = None if can_id & 0xFF == NULL else can_id & 0xFF
@@ -47,8 +48,8 @@ class SpeedFeedback:
         """The last speed that counted, in the unit of the DBC."""
         return self._input.value
 
-    def heard(self, now_ns: int) -> bool:
-        """Whether it tells the speed now: neither silence nor an error nor what is no number."""
+    def valid(self, now_ns: int) -> bool:
+        """Whether there is a speed now: neither silence nor an error nor what is no number."""
         measured_ns = self._input.measured_ns
         return measured_ns is not None and now_ns - measured_ns <= SILENT_MS * 1_000_000
 
@@ -69,22 +70,24 @@ class SpeedFeedback:
         return source == self._source
 
 
-def _find(deployment: Deployment, message: str, signal: str) -> tuple[Message, Signal]:
-    found = deployment.messages.find(message)
-    if isinstance(found, str):
-        raise ConfigError([Problem("command line", None, "--speed", found)])
-    definition = find_signal(found[1], signal)
+def _find(deployment: Deployment, message: str, signal: str, *, fd: bool) -> tuple[Message, Signal]:
+    match = deployment.messages.find(message)
+    if isinstance(match, str):
+        raise ConfigError([Problem("command line", None, "--speed", match)])
+    definition = find_signal(match[1], signal)
     if definition is None:
-        names = ", ".join(s.name for s in found[1].signals)
+        names = ", ".join(s.name for s in match[1].signals)
         raise _problem(
             deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
         )
-    if found[1].is_multiplexed():
+    if match[1].is_multiplexed():
         raise _problem(deployment, f"{message} is multiplexed; nothing can be taken from it")
-    if found[1].length > MOST_BYTES:
-        text = f"{message}: expected {MOST_BYTES} bytes at most, got {found[1].length}"
+    lengths = FD_LENGTHS if fd else range(CLASSICAL_BYTES + 1)
+    if match[1].length not in lengths:
+        text = f"{message}: expected the length of a frame, {lengths[-1]} bytes at most"
+        text += f", got {match[1].length}"
         raise _problem(deployment, text)
-    return found[1], definition
+    return match[1], definition
 
 
 def _bound(

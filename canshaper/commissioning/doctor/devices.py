@@ -10,7 +10,7 @@ from canshaper.bus.device import (
     Ask,
     Device,
     device_fault,
-    kind_and_bitrate,
+    kind_and_bitrates,
     read_device,
     whereabouts,
 )
@@ -23,7 +23,7 @@ _REPLACED = re.compile(r"[^0-9A-Za-z#+\-.:=@_]")
 
 
 def device_findings(
-    name: str, bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate
+    name: str, bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates
 ) -> list[Finding]:
     """Whether the interface of a bus is its device; none where there is no such interface.
 
@@ -31,7 +31,7 @@ def device_findings(
         name: of the bus in the deployment file.
         bus: its section.
         root: of the file system.
-        ask_kernel: for kind and bit rate of the interface with an index.
+        ask_kernel: for kind and bit rates of the interface with an index.
     """
     subject = f"{bus.channel} device"
     try:

@@ -10,6 +10,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from canshaper.bus.device import FD_MTU
+from canshaper.commissioning.doctor.adapters import adapter_findings
 from canshaper.commissioning.doctor.devices import device_findings
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.config.bus import Bus
@@ -21,6 +23,8 @@ SHORTEST_QUEUE, LONGEST_QUEUE = 10, 20
 SBIN = ":/usr/sbin:/sbin"
 ARPHRD_CAN = 280  # linux/if_arp.h
 IFF_UP = 0x1  # linux/if.h
+SYS_FILES = ("type", "flags", "tx_queue_len", "mtu")
+WRONG_RATE = "one of both is wrong: a wrong bit rate disturbs the whole bus"
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,7 @@ class Link:
         kind: of its driver: can (a controller), vcan, vxcan; None where it is not known.
         up: whether it is set up.
         queue: length of its transmit queue, frames.
+        mtu: bytes of the kernel's frames that it carries: 16 of classical CAN, 72 of CAN FD.
         data: details of a controller, in the words of ``ip``; empty where there are none.
         counts: its errors since it was set up first.
     """
@@ -42,25 +47,33 @@ class Link:
     kind: str | None
     up: bool
     queue: int
+    mtu: int
     data: dict[str, Any]
     counts: dict[str, int]
 
     @property
     def bitrate(self) -> int | None:
         """Bit rate, bit/s."""
-        timing = self.data.get("bittiming", {})
-        found = timing.get("bitrate", self.data.get("bittiming_bitrate"))
-        return int(found) if found else None
+        return self._rate("bittiming")
+
+    @property
+    def data_bitrate(self) -> int | None:
+        """Bit rate of the data of CAN FD, bit/s."""
+        return self._rate("data_bittiming")
+
+    def _rate(self, timing: str) -> int | None:
+        """Of a timing; of an adapter without timings, what it says itself."""
+        rate = self.data.get(timing, {}).get("bitrate", self.data.get(f"{timing}_bitrate"))
+        return int(rate) if rate else None
 
 
-def bus_findings(buses: dict[str, Bus]) -> list[Finding]:
+def bus_findings(buses: dict[str, Bus], tick_ms: int) -> list[Finding]:
     """Checks of all buses of a deployment."""
-    findings = []
+    findings: list[Finding] = []
     kernel: str | None = None
     for name, bus in buses.items():
         if bus.interface != "socketcan":
-            found = f"python-can interface {bus.interface} {bus.channel}: cannot be checked"
-            findings.append(Finding(f"bus {name}", Level.NOTE, found))
+            findings += adapter_findings(name, bus, tick_ms)
             continue
         kernel = kernel or kernel_fault()
         if kernel:
@@ -111,6 +124,7 @@ def parse_ip(text: str) -> Link | None:
         kind=info.get("info_kind"),
         up="UP" in entry["flags"],
         queue=entry.get("txqlen", 0),
+        mtu=entry.get("mtu", 0),
         data=info.get("info_data", {}),
         counts=info.get("info_xstats", {}),
     )
@@ -120,7 +134,7 @@ def read_sys(name: str, root: Path) -> Link | None:
     """An interface from /sys/class/net, which has no details of controllers."""
     directory = root / "sys/class/net" / name
     try:
-        texts = {f: (directory / f).read_text().strip() for f in ("type", "flags", "tx_queue_len")}
+        texts = {f: (directory / f).read_text().strip() for f in SYS_FILES}
     except OSError:
         return None
     return Link(
@@ -129,6 +143,7 @@ def read_sys(name: str, root: Path) -> Link | None:
         kind=None,
         up=bool(int(texts["flags"], 0) & IFF_UP),
         queue=int(texts["tx_queue_len"]),
+        mtu=int(texts["mtu"]),
         data={},
         counts={},
     )
@@ -149,14 +164,15 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
     if link.kind in ("vcan", "vxcan"):
         if link.up:
             found = "up; a virtual bus, nothing else to check"
-            return [Finding(name, Level.NOTE, found)]
-        return [Finding(name, Level.BAD, "is down", f"sudo ip link set {name} up")]
+            return [Finding(name, Level.NOTE, found), *fd(link, bus)]
+        return [Finding(name, Level.BAD, "is down", f"sudo ip link set {name} up"), *fd(link, bus)]
     if not link.data:
-        found = "no tool that tells bit rate, state and restart: not checked"
-        tool = Finding(name, Level.WARNING, found, "install iproute2")
-        return [up(link, bus), queue(link), tool]
+        text = "no tool that shows bit rate, state and restart: not checked"
+        tool = Finding(name, Level.WARNING, text, "install iproute2")
+        return [up(link, bus), *fd(link, bus), queue(link), tool]
     checks: list[Callable[[Link], Finding | None]] = [queue, state, errors, restart, modes]
-    findings = [up(link, bus), bitrate(link, bus), *(check(link) for check in checks)]
+    findings = [up(link, bus), bitrate(link, bus), *fd(link, bus)]
+    findings += [check(link) for check in checks]
     return [finding for finding in findings if finding]
 
 
@@ -165,7 +181,8 @@ def up(link: Link, bus: Bus) -> Finding:
     if link.up:
         return Finding(link.name, Level.OK, "up")
     rate = link.bitrate or bus.bitrate or 250_000
-    remedy = f"sudo ip link set {link.name} up type can bitrate {rate} restart-ms 100"
+    options = f"bitrate {rate} {fd_options(bus)}restart-ms 100"
+    remedy = f"sudo ip link set {link.name} up type can {options}"
     return Finding(link.name, Level.BAD, "is down", remedy)
 
 
@@ -177,8 +194,31 @@ def bitrate(link: Link, bus: Bus) -> Finding | None:
     found = f"{link.bitrate} bit/s"
     if bus.bitrate is None or bus.bitrate == link.bitrate:
         return Finding(subject, Level.OK, found)
-    remedy = "one of both is wrong: a wrong bit rate disturbs the whole bus"
-    return Finding(subject, Level.BAD, f"{found}, in the file {bus.bitrate} bit/s", remedy)
+    return Finding(subject, Level.BAD, f"{found}, in the file {bus.bitrate} bit/s", WRONG_RATE)
+
+
+def fd(link: Link, bus: Bus) -> list[Finding]:
+    """It carries CAN FD at the bit rates of the file, where the bus is one of CAN FD."""
+    if not bus.fd:
+        return []
+    subject = f"{link.name} CAN FD"
+    if link.mtu < FD_MTU:
+        what = "mtu 72" if link.kind in ("vcan", "vxcan") else f"type can {fd_options(bus)}".strip()
+        remedy = f"with {link.name} down: sudo ip link set {link.name} {what}"
+        return [Finding(subject, Level.BAD, f"off, the MTU is {link.mtu}", remedy)]
+    rate = link.data_bitrate
+    if rate is None or rate == bus.data_bitrate:
+        return [Finding(subject, Level.OK, f"on, data {rate} bit/s" if rate else "on")]
+    wanted = f"{bus.data_bitrate} bit/s" if bus.data_bitrate else "none"
+    text = f"data {rate} bit/s, in the file data_bitrate {wanted}"
+    return [Finding(subject, Level.BAD if bus.data_bitrate else Level.WARNING, text, WRONG_RATE)]
+
+
+def fd_options(bus: Bus) -> str:
+    """What ``ip link set ... type can`` needs for CAN FD, with a blank behind it."""
+    if not bus.fd:
+        return ""
+    return f"dbitrate {bus.data_bitrate or bus.bitrate or 2_000_000} fd on "
 
 
 def queue(link: Link) -> Finding:

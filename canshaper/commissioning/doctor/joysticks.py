@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.bus.clock import boottime_ns
-from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.packet import FD_SIZE, FDF, Packet
 from canshaper.codec.can_id import EFF_FLAG
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, real_time, say_ready
 from canshaper.daemon.loop import run_at_deadlines
@@ -53,6 +53,7 @@ class Joysticks:
     def __init__(self, deployment: Deployment, sockets: dict[str, socket.socket]) -> None:
         self._node = JoystickNode(deployment, Waving("waving", (), math.inf))
         self._sockets = sockets
+        self._fd = deployment.fd
         joysticks = list(deployment.joysticks.values())
         inputs = [*joysticks, *([deployment.emergency_stop] if deployment.emergency_stop else [])]
         self._numbers = {joystick.key: number for number, joystick in enumerate(joysticks)}
@@ -67,7 +68,7 @@ class Joysticks:
     def _body(self, _now_ns: int, missed: int, _late_ns: int) -> bool:
         for one in self._sockets.values():  # what valves and displays hear
             with suppress(BlockingIOError, ConnectionError):
-                while one.recv(CAN_FRAME.size):
+                while one.recv(FD_SIZE):
                     pass
         try:
             for late in range(missed, -1, -1):
@@ -79,7 +80,8 @@ class Joysticks:
     def _send(self, now: bool) -> None:
         for frame in self._node.frames(self._time_ms) if now else ():
             word = frame.can_id | EFF_FLAG if frame.extended else frame.can_id
-            data = CAN_FRAME.pack(word, len(frame.data), frame.data)
+            flags = FDF if frame[:3] in self._fd else None
+            data = Packet(word, frame.data, flags).pack()
             at_ns = boottime_ns()
             try:
                 self._sockets[frame.bus].send(data)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from itertools import pairwise
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.packet import FD_SIZE, Packet
 from canshaper.bus.socketcan import open_sockets
 from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG
 from canshaper.codec.frame import Frame
@@ -67,12 +67,12 @@ def listen(
 
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
     """The next data frame of a socket and when the kernel received it, ns; None for another one."""
-    packet, ancillary, _, _ = one.recvmsg(CAN_FRAME.size, ANCILLARY_BYTES)
-    word, length, data = CAN_FRAME.unpack(packet)
+    packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
+    word, data, _ = Packet.unpack(packet)
     if word & (ERR_FLAG | RTR_FLAG):
         return None
     extended = bool(word & EFF_FLAG)
-    frame = Frame(bus, word & EFF_MASK, extended, data[:length])
+    frame = Frame(bus, word & EFF_MASK, extended, data)
     time_ns = stamp_ns(ancillary)
     return None if time_ns is None else (frame, time_ns)
 

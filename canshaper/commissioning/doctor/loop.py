@@ -4,7 +4,7 @@ import json
 import select
 import socket
 from array import array
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -31,6 +31,7 @@ class WatchedPort(RawPort):
         one: the end.
         on_fault: called with every fault of the bus.
         on_sent: called with every frame as soon as it was sent.
+        fd: what is sent in frames of CAN FD; None on a bus of classical CAN.
 
     Attributes:
         taken: frames so far.
@@ -42,10 +43,11 @@ class WatchedPort(RawPort):
         one: socket.socket,
         on_fault: Callable[[FrameFault], None],
         on_sent: Callable[[Frame], None],
+        fd: Iterable[tuple[int, bool]] | None = None,
     ) -> None:
         self.taken = 0
         self._on_sent = on_sent
-        super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False)
+        super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False, fd=fd)
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits."""
@@ -76,8 +78,12 @@ class Loop:
         self._controller = Controller(deployment)
         self._guarded = Guarded(self._controller)
         faults = self._controller.counters.add
+        buses, routes = deployment.config.buses, deployment.routing.buses
         self._ports = {
-            name: WatchedPort(name, one, faults, self._note) for name, one in sockets.items()
+            name: WatchedPort(
+                name, one, faults, self._note, routes[name].fd if buses[name].fd else None
+            )
+            for name, one in sockets.items()
         }
         self._valves: dict[tuple[str, int, bool], list[int]] = {}
         for i, axis in enumerate(deployment.axes.values()):

@@ -9,7 +9,7 @@ from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from typing import Any
 
-from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.packet import CAN_FRAME
 from canshaper.commissioning.doctor.load import load_kinds
 from canshaper.commissioning.doctor.processes import Children, output, ready
 from canshaper.errors import MeasurementError

@@ -7,7 +7,9 @@ from canshaper.commissioning.doctor.figures import quantile, summary
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.processes import LOOP_PRIORITY
+from canshaper.daemon.follow import AFTER_NS
 from canshaper.machine.deployment import Deployment
+from canshaper.machine.following import follow_fault
 
 # Names of the runs.
 IDLE, LOADED = "idle", "under load"
@@ -36,7 +38,22 @@ def measured_findings(deployment: Deployment, runs: dict[str, Run]) -> list[Find
         findings += [check(name, run, tick_ns) for check in checks]
         findings.append(joystick(name, run, deployment))
         findings.append(motion(name, run, list(deployment.axes)))
-    return findings
+    return [*findings, *waiting(deployment)]
+
+
+def waiting(deployment: Deployment) -> list[Finding]:
+    """That joystick frames wait for the tick where they need not; measured is without that."""
+    config = deployment.config
+    subject = "wait for the tick"
+    if config.tick:
+        text = f"ticks follow {config.tick.follow}, but not in what is measured here"
+        return [Finding(subject, Level.NOTE, text)]
+    joysticks = deployment.joysticks.items()
+    names = [name for name, one in joysticks if follow_fault(config, one) is None]
+    if not names:
+        return []
+    text = f"up to {config.tick_ms} ms, half of that on average; it could be {AFTER_NS / 1e6:g} ms"
+    return [Finding(subject, Level.NOTE, text, f"tick: {{ follow: {names[0]} }}")]
 
 
 def _share_finding(
@@ -46,12 +63,14 @@ def _share_finding(
     at_ns = quantile(sorted(times_ns), 0.999)
     good, worst = shares
     part = at_ns / tick_ns
-    found = f"p99.9 {at_ns / 1000:.0f} us, {100 * part:.1f} % of the tick"
+    measured = f"p99.9 {at_ns / 1000:.0f} us, {100 * part:.1f} % of the tick"
     if part <= good:
-        return Finding(subject, Level.OK, found)
+        return Finding(subject, Level.OK, measured)
     if part <= worst:
-        return Finding(subject, Level.WARNING, f"{found}; good is up to {100 * good:g} %", remedy)
-    return Finding(subject, Level.BAD, f"{found}; expected is up to {100 * worst:g} %", remedy)
+        return Finding(
+            subject, Level.WARNING, f"{measured}; good is up to {100 * good:g} %", remedy
+        )
+    return Finding(subject, Level.BAD, f"{measured}; expected is up to {100 * worst:g} %", remedy)
 
 
 def _held_up(run: Run) -> str:
@@ -76,29 +95,31 @@ def deadlines(name: str, run: Run, tick_ns: int) -> Finding:
     """Deadlines at which nothing was computed; the valves held their last command."""
     subject = f"deadlines {name}"
     of = len(run.late_ns) + run.missed
-    found = f"{run.missed} of {of} missed"
+    measured = f"{run.missed} of {of} missed"
     if run.missed == 0:
-        return Finding(subject, Level.OK, found)
+        return Finding(subject, Level.OK, measured)
     seldom = run.missed * MISSED_ONE_IN <= of
     level = Level.WARNING if seldom and name == LOADED else Level.BAD
     longest_ms = max(run.late_ns) / 1e6
     return Finding(
-        subject, level, f"{found}, the latest tick {longest_ms:.1f} ms late", _held_up(run)
+        subject, level, f"{measured}, the latest tick {longest_ms:.1f} ms late", _held_up(run)
     )
 
 
 def joystick(name: str, run: Run, deployment: Deployment) -> Finding:
     """Joystick to valve: the wait for the next valve frame, and what comes on top."""
     subject = f"joystick to valve {name}"
-    found = summary(run.joystick_ns)
-    if found is None:
+    quantiles = summary(run.joystick_ns)
+    if quantiles is None:
         return Finding(
             subject, Level.BAD, "no valve frame answered a joystick", "measure longer: --seconds"
         )
     tick_ms = deployment.config.tick_ms
     longest_ms = tick_ms * max(axis.period_ticks for axis in deployment.axes.values())
-    text = f"p99.9 {found.p99_9 / 1000:.1f} ms, of which up to {longest_ms} ms wait for the cycle"
-    if found.p99_9 <= 1000.0 * (longest_ms + LATE_SHARES[1] * tick_ms):
+    text = (
+        f"p99.9 {quantiles.p99_9 / 1000:.1f} ms, of which up to {longest_ms} ms wait for the cycle"
+    )
+    if quantiles.p99_9 <= 1000.0 * (longest_ms + LATE_SHARES[1] * tick_ms):
         return Finding(subject, Level.OK, text)
     return Finding(subject, Level.WARNING, f"{text}: more than that explains", _held_up(run))
 
@@ -117,8 +138,8 @@ def motion(name: str, run: Run, axes: list[str]) -> Finding:
         return Finding(subject, Level.WARNING, f"stopped: {text}", remedy)
     still = [axis for axis in axes if axis not in run.moved]
     if still:
-        found = f"not in motion: {', '.join(still)}; measured with a neutral output"
-        return Finding(subject, Level.WARNING, found, "measure longer: --seconds")
+        observed = f"not in motion: {', '.join(still)}; measured with a neutral output"
+        return Finding(subject, Level.WARNING, observed, "measure longer: --seconds")
     return Finding(subject, Level.OK, "all in motion, none stopped")
 
 
@@ -127,8 +148,8 @@ def policy(run: Run) -> Finding:
     subject = "scheduling"
     if run.policy is None:
         return Finding(subject, Level.OK, f"SCHED_FIFO with priority {LOOP_PRIORITY}")
-    found = f"measured without SCHED_FIFO: {run.policy} (RLIMIT_RTPRIO)"
-    return Finding(subject, Level.WARNING, found, f"measure as root; {SERVICE}")
+    observed = f"measured without SCHED_FIFO: {run.policy} (RLIMIT_RTPRIO)"
+    return Finding(subject, Level.WARNING, observed, f"measure as root; {SERVICE}")
 
 
 def memory(run: Run) -> Finding:
@@ -136,5 +157,5 @@ def memory(run: Run) -> Finding:
     subject = "memory"
     if run.memory is None:
         return Finding(subject, Level.OK, "locked")
-    found = f"measured without locked memory: {run.memory}"
-    return Finding(subject, Level.WARNING, found, f"measure as root; {SERVICE}")
+    observed = f"measured without locked memory: {run.memory}"
+    return Finding(subject, Level.WARNING, observed, f"measure as root; {SERVICE}")

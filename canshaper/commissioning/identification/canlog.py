@@ -28,6 +28,7 @@ class _Reader:
     message: Message
     signal: Signal
     unit: Unit
+    source: int | None = None
     samples: Samples = field(default_factory=Samples)
     senders: set[tuple[str, int]] = field(default_factory=set)
     wrong_length: int = 0
@@ -48,7 +49,7 @@ class _Reader:
         own = self.message.frame_id
         if not is_j1939(self.message):
             return can_id == own
-        sender = own & 0xFF
+        sender = own & 0xFF if self.source is None else self.source
         return group_of(can_id) == group_of(own) and sender in (NULL, can_id & 0xFF)
 
     def take(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
@@ -99,6 +100,7 @@ def read_can(
     *,
     deployment: Deployment | None = None,
     channel: str | None = None,
+    sources: Mapping[str, int | None] | None = None,
     on_progress: Callable[[float], None] | None = None,
 ) -> dict[str, Series]:
     """Signals of a log by axis.
@@ -110,13 +112,17 @@ def read_can(
         messages: of the DBC files.
         deployment: names the commands of the axes and the signal of the grapple, where known.
         channel: bus of the log that is read; by default all of them.
+        sources: address of the sender of each axis, in J1939; by default that of the DBC.
         on_progress: called with the part that is read, 0 to 1.
 
     Raises:
         IdentificationError: a signal is not in the log, or from two senders.
         LogError: the log cannot be read.
     """
-    readers = {axis: _Reader(name, *bind(name, messages)) for axis, name in wanted.items()}
+    readers = {
+        axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis))
+        for axis, name in wanted.items()
+    }
     grapple = deployment.load_state if deployment else None
     weight = None
     if grapple and (signal := find_signal(grapple.message, grapple.config.signal)):
@@ -133,7 +139,16 @@ def read_can(
         source = f"{path.name}: {reader.name}"
         command = commands.of(axis)
         result[axis] = Series(
-            source, label, reader.unit, time, value, command, idle, at, [*notes, *faults]
+            source,
+            label,
+            reader.unit,
+            time,
+            value,
+            command,
+            idle,
+            commands.others(axis),
+            at,
+            [*notes, *faults],
         )
     return result
 

@@ -1,10 +1,12 @@
 """Commands of the axes in a CAN log: when each was commanded to move, and how fast."""
 
 from array import array
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from canshaper.codec.frame import Frame
 from canshaper.codec.layout import Layout
@@ -35,6 +37,26 @@ class Samples:
     def arrays(self) -> tuple[Array, Array]:
         """Times and values."""
         return np.array(self.time_s), np.array(self.value)
+
+
+def joystick_commands(
+    joystick: BoundJoystick, axes: Mapping[str, BoundAxis], data: bytes
+) -> tuple[dict[str, Any], dict[str, float]]:
+    """Raw values of a joystick's frame, and the command of each axis that it has one of.
+
+    Both are empty for a frame of another length; a command that is no value is left out.
+    """
+    try:
+        raw, commands = joystick.codec.decode(data)
+    except WrongLengthError:
+        return {}, {}
+    values = {}
+    for name, axis in axes.items():
+        config = axis.config.command
+        value = commands.get(config.signal) if config.joystick == joystick.name else None
+        if type(value) is float:
+            values[name] = value
+    return raw, values
 
 
 class Commands:
@@ -72,16 +94,10 @@ class Commands:
                 self._take_joystick(joystick, time_s, data)
 
     def _take_joystick(self, joystick: BoundJoystick, time_s: float, data: bytes) -> None:
-        try:
-            _, commands = joystick.codec.decode(data)
-        except WrongLengthError:
-            return
-        for name, bound in self._axes.items():
-            config = bound.config.command
-            value = commands.get(config.signal) if config.joystick == joystick.name else None
-            if type(value) is float:
-                moved = abs(value) > config.neutral_pct / 100.0
-                self._joysticks[name].add(time_s, value if moved else 0.0)
+        _, commands = joystick_commands(joystick, self._axes, data)
+        for name, value in commands.items():
+            moved = abs(value) > self._axes[name].config.command.neutral_pct / 100.0
+            self._joysticks[name].add(time_s, value if moved else 0.0)
 
     def _speed(self, bound: BoundAxis, command: float) -> float:
         """Speed that the valve gives by the limits of its axis, part of full."""
@@ -93,11 +109,24 @@ class Commands:
 
     def of(self, axis: str) -> Command | None:
         """Commands of an axis; None where the log has none."""
-        for samples in (self._valves.get(axis), self._joysticks.get(axis)):
-            if samples and samples.value:
+        return self._of(axis, (self._valves, self._joysticks))
+
+    @staticmethod
+    def _of(axis: str, kinds: Sequence[Mapping[str, Samples]]) -> Command | None:
+        """Of the first kind that the log has."""
+        for kind in kinds:
+            if (samples := kind.get(axis)) and samples.value:
                 time, speed = samples.arrays()
                 return Command(time, speed)
         return None
+
+    def others(self, axis: str) -> list[tuple[float, float]]:
+        """Stretches in which other axes are asked to move.
+
+        By their joysticks where these are in the log: what a two-axis motion adds makes no swing.
+        """
+        asked = [self._of(n, (self._joysticks, self._valves)) for n in self._axes if n != axis]
+        return [part for command in asked if command for part in _moving(command)]
 
     def idle(self) -> list[tuple[float, float]] | None:
         """Stretches in which every axis stands; None where no command is in the log."""
@@ -112,9 +141,19 @@ class Commands:
 
 def _standing(command: Command) -> list[tuple[float, float]]:
     """Stretches in which a command is known to be zero."""
+    return _while(command, np.abs(command.speed[:-1]) < STANDS)
+
+
+def _moving(command: Command) -> list[tuple[float, float]]:
+    """Stretches in which it is known not to be zero."""
+    return _while(command, np.abs(command.speed[:-1]) >= STANDS)
+
+
+def _while(command: Command, is_so: NDArray[np.bool_]) -> list[tuple[float, float]]:
+    """Stretches in which something is so of a command, and the next one comes soon."""
     time = command.time_s
-    stands = (np.abs(command.speed[:-1]) < STANDS) & (np.diff(time) < _SILENT_S)
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], stands.astype(int), [0]])))
+    known = is_so & (np.diff(time) < _SILENT_S)
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], known.astype(int), [0]])))
     pairs = zip(edges[::2], edges[1::2], strict=True)
     return [(float(time[a]), float(time[b])) for a, b in pairs]
 

@@ -60,7 +60,9 @@ def _response(one: Driven, coefficients: tuple[Array, Array], delay: float) -> t
     return np.interp(time, grid, swing), np.interp(time, grid, speed)
 
 
-def swing_filter(omega: float, sigma: float, lag: float, kind: Kind) -> tuple[Array, Array]:
+def swing_filter(
+    omega: float, sigma: float, lag: float, kind: Kind, step_s: float = BIN_S
+) -> tuple[Array, Array]:
     """Swing by the speed that is commanded, sampled with a zero-order hold: b and a of z^-1.
 
     By partial fractions of the step response, as a matrix exponential for every try of the solver
@@ -72,7 +74,7 @@ def swing_filter(omega: float, sigma: float, lag: float, kind: Kind) -> tuple[Ar
     residues = square / (GRAVITY_M_S2 * lag * apart)
     if kind is Kind.RATE:
         residues = residues * poles
-    decays = np.exp(poles * BIN_S)
+    decays = np.exp(poles * step_s)
     parts = [residue * np.poly(np.delete(decays, i)) for i, residue in enumerate(residues)]
     b = np.convolve([1.0, -1.0], np.sum(parts, axis=0)).real
     return b, np.asarray(np.poly(decays).real, dtype=np.float64)

@@ -6,11 +6,11 @@ Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
 import math
 import textwrap
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 from scipy.signal import find_peaks
 
 from canshaper.commissioning.identification.decay import DecayFit, SegmentFit
@@ -20,56 +20,58 @@ from canshaper.commissioning.identification.series import Kind, binned
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.report.style import (
     JOYSTICK_COLOUR,
+    PRINT_DPI,
     RAW_COLOUR,
     SHAPED_COLOUR,
     TEXT_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
     new_figure,
     plain,
-    save,
 )
 
-WIDTH_PX, ROW_PX, TITLE_PX = 1500, 380, 24
-TITLE_CHARACTERS = 130
+ROW_PX, TITLE_PX, FOOT_PX = 640, 38, 150
+TITLE_CHARACTERS = 88
 MOST_ROWS = 6
-_LABEL: dict[str, Any] = {"fontsize": 11, "color": TEXT_COLOUR}
+_LABEL: dict[str, Any] = {"fontsize": TEXT_PT, "color": TEXT_COLOUR}
 _DATA = "#8A8A8A"
 
 
-def draw(path: Path, findings: Sequence[Finding], titles: Sequence[str]) -> None:
-    """Draw findings and write the picture (PNG) to ``path``.
+def figure(findings: Sequence[Finding], titles: Sequence[str]) -> Figure:
+    """The picture.
 
     Args:
-        path: file to write.
         findings: those in which something was found, at most ``MOST_ROWS`` are drawn.
         titles: the recommendations, a line each.
     """
     rows = list(findings)[:MOST_ROWS]
     wrapped = [line for title in titles for line in textwrap.wrap(title, TITLE_CHARACTERS)]
-    top = TITLE_PX * len(wrapped) + 70
-    height = top + ROW_PX * len(rows)
-    fig = new_figure(WIDTH_PX, height)
+    top = TITLE_PX * len(wrapped) + 110
+    height = top + ROW_PX * len(rows) + FOOT_PX
+    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
     for i, line in enumerate(wrapped):
-        at = 1.0 - (32 + TITLE_PX * i) / height
-        fig.text(0.052, at, line, fontsize=13, weight="bold", color=TEXT_COLOUR)
+        at = 1.0 - (40 + TITLE_PX * i) / height
+        fig.text(0.012, at, line, fontsize=TITLE_PT, weight="bold", color=TEXT_COLOUR)
     grid = fig.add_gridspec(
         len(rows),
         2,
-        left=0.052,
+        left=0.085,
         right=0.985,
         top=1.0 - top / height,
-        bottom=52 / height,
-        width_ratios=[2.4, 1],
-        wspace=0.16,
-        hspace=0.42,
+        bottom=FOOT_PX / height,
+        width_ratios=[2.0, 1],
+        wspace=0.28,
+        hspace=0.5,
     )
     for i, finding in enumerate(rows):
         swing, decay = fig.add_subplot(grid[i, 0]), fig.add_subplot(grid[i, 1])
-        plain(swing)
-        plain(decay)
+        plain(swing, size=TEXT_PT)
+        plain(decay, size=TEXT_PT)
         swing.set_title(
-            heading(finding),
+            "\n".join(textwrap.wrap(heading(finding), TITLE_CHARACTERS)),
             loc="left",
-            fontsize=12,
+            fontsize=TITLE_PT,
             weight="bold",
             color=TEXT_COLOUR if finding.usable else RAW_COLOUR,
         )
@@ -79,7 +81,7 @@ def draw(path: Path, findings: Sequence[Finding], titles: Sequence[str]) -> None
         elif finding.driven is not None:
             _draw_driven(swing, finding.driven)
             decay.set_axis_off()
-    save(fig, path)
+    return fig
 
 
 def _to_shown(kind: Kind) -> tuple[float, str]:
@@ -117,7 +119,7 @@ def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
     text = f" free swing, {len(fit.segments)} found, {fit.swings:.0f} swings"
     top = 1.05 * factor * float(longest.base[0] + longest.envelope[0])
     begin = longest.segment.start_s
-    panel.text(begin, top, text, color=SHAPED_COLOUR, fontsize=11, weight="bold")
+    panel.text(begin, top, text, color=SHAPED_COLOUR, fontsize=TEXT_PT, weight="bold")
     around = factor * (longest.base[0])
     reach = factor * float(longest.envelope[0])
     low = min(float(factor * value[seen].min()), around - reach)
@@ -150,7 +152,7 @@ def _draw_decay(panel: Axes, fit: DecayFit) -> None:
         va="top",
         transform=panel.transAxes,
         color=SHAPED_COLOUR,
-        fontsize=11,
+        fontsize=TEXT_PT,
         weight="bold",
     )
     panel.set_yscale("log")

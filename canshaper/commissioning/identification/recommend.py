@@ -47,7 +47,8 @@ def advise(
     """
     usable = [f for f in findings if f.usable]
     if not usable:
-        return Advice(axis, {}, 0.0, 0, [], f"{axis}: nothing that can be used; see above.")
+        reasons = " ".join(dict.fromkeys(text for f in findings for text in f.poor[:1]))
+        return Advice(axis, {}, 0.0, 0, [], f"{axis}: nothing that can be used. {reasons}".strip())
     values = [_values(f, speed_m_s) for f in usable]
     if len(usable) == 1:
         text = f"Use sway: {flow(values[0])} for {axis}."

@@ -48,6 +48,8 @@ _RADIANS = math.pi / 180.0
 _UNITS = {
     r"(deg(rees?)?|°)\s*(/|per\s*)\s*s(ec)?|°\s*s-1|dps": (Kind.RATE, _RADIANS),
     r"rad(ians?)?\s*(/|per\s*)\s*s(ec)?|rad\s*s-1": (Kind.RATE, 1.0),
+    r"mrad\s*/\s*s": (Kind.RATE, 1e-3),
+    r"mrad": (Kind.ANGLE, 1e-3),
     r"deg(rees?)?|°": (Kind.ANGLE, _RADIANS),
     r"rad(ians?)?": (Kind.ANGLE, 1.0),
 }
@@ -97,6 +99,7 @@ class Series:
         value: in rad, rad/s or its own unit.
         command: commands of the axis, where the log has them.
         idle: stretches in which no axis was commanded to move, s; None where that is not known.
+        others: stretches in which other axes were asked to move, s.
         at: value of the deployment's grapple signal, where the log has it.
         notes: what was left out while reading.
     """
@@ -108,6 +111,7 @@ class Series:
     value: Array
     command: Command | None = None
     idle: list[tuple[float, float]] | None = None
+    others: list[tuple[float, float]] = field(default_factory=list)
     at: float | None = None
     notes: list[str] = field(default_factory=list)
 

@@ -26,12 +26,14 @@ class Candidate:
         filters: by axis, as they would stand in a deployment file.
         ours: limit-aware, as G_FF and the robust shaper are.
         motion: with the two-axis motion, where the deployment has one.
+        sensor: with its sway sensors.
     """
 
     name: str
     filters: Mapping[str, Filter]
     ours: bool = False
     motion: bool = True
+    sensor: bool = False
 
 
 def candidates(deployment: Deployment) -> list[Candidate]:
@@ -46,7 +48,7 @@ def candidates(deployment: Deployment) -> list[Candidate]:
         (kind, {axis: kind.settings(modes[axis], ticks_s[axis]) for axis in AXES})
         for kind in sorted(KINDS.values(), key=lambda kind: kind.limit_aware)
     ]
-    found = [
+    every = [
         Candidate(
             label,
             {axis: filter_of(kind.name, **by_axis[axis][label]) for axis in AXES},
@@ -64,11 +66,28 @@ def candidates(deployment: Deployment) -> list[Candidate]:
         }
         name = f"robust {duration_s:.1f} s ±{range_pct:g} %"
         designs.append(Candidate(name, filters, ours=True))
-    found += designs
+    every += designs
     if deployment.motions:
-        name = designs[1].name.partition(" ±")[0] + " apart"
-        found.append(replace(designs[1], name=name, motion=False))
-    return found
+        name = _short(designs[1].name) + " apart"
+        every.append(replace(designs[1], name=name, motion=False))
+    if all(_damped(deployment, axis) for axis in AXES):
+        every += [
+            replace(one, name=_short(one.name) + " +sensor", sensor=True)
+            for one in every
+            if one.motion and one.filters["slew"].kind == "robust"
+        ]
+    return every
+
+
+def _short(name: str) -> str:
+    """Without what it covers: tables have 80 columns."""
+    return name.removeprefix("limit-aware ").partition(" ±")[0]
+
+
+def _damped(deployment: Deployment, axis: str) -> bool:
+    """Whether the axis feeds back what a sway sensor measures."""
+    sensor = deployment.axes[axis].sway_sensor
+    return sensor is not None and sensor.config.use == "damp"
 
 
 def tick_s(deployment: Deployment, axis: str) -> float:
@@ -93,12 +112,13 @@ def _robust(
 
 
 def with_candidate(deployment: Deployment, candidate: Candidate) -> Deployment:
-    """The deployment with these filters, and with time enough to run on."""
+    """The deployment with these filters, with its sensors or without, and time to run on."""
     axes = dict(deployment.axes)
     for axis, its_filter in candidate.filters.items():
         config = axes[axis].config
         limits = config.limits.model_copy(update={"tail_s": TAIL_S})
         config = config.model_copy(update={"filter": its_filter, "limits": limits})
-        axes[axis] = replace(axes[axis], config=config)
+        sensor = axes[axis].sway_sensor if candidate.sensor else None
+        axes[axis] = replace(axes[axis], config=config, sway_sensor=sensor)
     motions = deployment.motions if candidate.motion else {}
     return replace(deployment, axes=axes, motions=motions)

@@ -69,7 +69,7 @@ def measure(
         task.script,
         parameters=replace(task.crane, grapple=grapple),
         sway=Sway(theta6_rad=math.radians(task.initial_deg)),
-        load=None if task.load_s is None else (task.load_s, _loaded(grapple)),
+        loads=() if task.load_s is None else ((task.load_s, _loaded(grapple)),),
     )
     assert recording.crane is not None  # of a tip with both planes
     tilt_deg = recording.crane.sway_deg

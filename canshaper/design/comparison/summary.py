@@ -56,10 +56,10 @@ class Row:
     path_part: float
 
 
-def rows(found: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
+def rows(compared: list[Candidate], outcomes: list[Outcome]) -> list[Row]:
     """Summaries in the order of the candidates."""
     raw = [o for o in outcomes if o.candidate == "off"]
-    return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in found]
+    return [_row(c, [o for o in outcomes if o.candidate == c.name], raw) for c in compared]
 
 
 def _row(candidate: Candidate, outcomes: list[Outcome], raw: list[Outcome]) -> Row:

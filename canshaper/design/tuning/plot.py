@@ -4,10 +4,10 @@ Drawn through the object API of matplotlib, like ``canshaper.report.plot``.
 """
 
 import math
-from pathlib import Path
 from typing import Any
 
 from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from canshaper.design.tuning.deploy import Setting
 from canshaper.design.tuning.evaluate import Evaluation, Machine, Traces, gff, press
@@ -19,7 +19,6 @@ from canshaper.report.style import (
     TEXT_COLOUR,
     new_figure,
     plain,
-    save,
 )
 from canshaper.report.table import axis_title
 from canshaper.shaping.sway import SwayMode
@@ -28,35 +27,33 @@ SIZE_PX = (1500, 720)
 _LABEL: dict[str, Any] = {"fontsize": 11, "color": TEXT_COLOUR}
 
 
-def draw(
-    path: Path,
+def figure(
     *,
     axis: str,
-    found: Setting,
+    setting: Setting,
     mode: SwayMode,
     tick_s: float,
     machine: Machine,
     full_speed_m_s: float,
     before: Setting | None = None,
-) -> None:
-    """Draw a setting and write the picture (PNG of ``SIZE_PX``) to ``path``.
+) -> Figure:
+    """The picture of a setting.
 
     Args:
-        path: file to write.
         axis: name of the axis.
-        found: the setting.
+        setting: the setting.
         mode: sway mode of the axis.
         tick_s: period of the axis.
         machine: what stands behind the filter.
         full_speed_m_s: speed of the tip at full command, for the swing in degrees.
         before: the setting in the file, to compare with.
     """
-    duration_s = max(3.0, 1.5 * found.measures.run_on_s, 1.5 * mode.period_s)
-    shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
+    duration_s = max(3.0, 1.5 * setting.measures.run_on_s, 1.5 * mode.period_s)
+    shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
     traces = press(mode, tick_s, shaper, machine, duration_s)
     fig = new_figure(*SIZE_PX)
-    fig.text(0.052, 0.955, finding(axis, found), fontsize=17, weight="bold", color=TEXT_COLOUR)
-    fig.text(0.052, 0.912, _poles(found), fontsize=12, color=TEXT_COLOUR)
+    fig.text(0.052, 0.955, finding(axis, setting), fontsize=17, weight="bold", color=TEXT_COLOUR)
+    fig.text(0.052, 0.912, _poles(setting), fontsize=12, color=TEXT_COLOUR)
     halves = fig.add_gridspec(
         1, 2, left=0.052, right=0.985, top=0.865, bottom=0.085, wspace=0.13, width_ratios=[1.25, 1]
     )
@@ -66,19 +63,19 @@ def draw(
     length = fig.add_subplot(halves[1])
     for panel in (command, swing, length):
         plain(panel)
-    _draw_command(command, traces, found.measures)
+    _draw_command(command, traces, setting.measures)
     to_deg = math.degrees(mode.angle_per_speed_rad * full_speed_m_s)
     _draw_swing(swing, traces, to_deg)
-    _draw_length(length, found.measures, before.measures if before else None)
-    save(fig, path)
+    _draw_length(length, setting.measures, before.measures if before else None)
+    return fig
 
 
-def finding(axis: str, found: Setting) -> str:
+def finding(axis: str, setting: Setting) -> str:
     """Say what the setting does: "Slew: 4 % of the swing is left, ...".
 
     Shares are of what the same movement of the joystick leaves without the filter.
     """
-    m = found.measures
+    m = setting.measures
     return (
         f"{axis_title(axis)}: {100 * m.worst(0.0):.0f} % of the swing is left,"
         f" at most {100 * m.worst(10.0):.0f} % within ±10 % length;"
@@ -86,10 +83,13 @@ def finding(axis: str, found: Setting) -> str:
     )
 
 
-def _poles(found: Setting) -> str:
-    poles = [*found.poles_rad_s, *([found.third_pole_rad_s] if found.third_pole_rad_s else [])]
+def _poles(setting: Setting) -> str:
+    poles = [
+        *setting.poles_rad_s,
+        *([setting.third_pole_rad_s] if setting.third_pole_rad_s else []),
+    ]
     text = ", ".join(f"{p:.2f}".replace("-", MINUS) for p in poles)
-    return f"G_FF with poles {text} rad/s (a1 = {found.a1:g} s, a2 = {found.a2:g} s²)"
+    return f"G_FF with poles {text} rad/s (a1 = {setting.a1:g} s, a2 = {setting.a2:g} s²)"
 
 
 def _draw_command(panel: Axes, traces: Traces, measures: Evaluation) -> None:

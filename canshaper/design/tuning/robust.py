@@ -167,8 +167,8 @@ def shortest(
             second=second,
         )
 
-    def left_pct(found: RobustShaper) -> float:
-        return 100.0 * max(found.residual, found.second_residual)
+    def left_pct(candidate: RobustShaper) -> float:
+        return 100.0 * max(candidate.residual, candidate.second_residual)
 
     best = design(high)
     if left_pct(best) > residual_pct:
@@ -178,9 +178,9 @@ def shortest(
         )
     while low < high:
         middle = (low + high) // 2
-        found = design(middle)
-        if left_pct(found) <= residual_pct:
-            high, best = middle, found
+        candidate = design(middle)
+        if left_pct(candidate) <= residual_pct:
+            high, best = middle, candidate
         else:
             low = middle + 1
     return best

@@ -19,7 +19,8 @@ class CanopenNetwork(BusProtocol):
 
     Args:
         deployment: the machine.
-        axes: its axes, whose interlocks are the nodes of joystick and valve, and the valve itself.
+        axes: its axes, whose interlocks are the nodes of joystick and valve, and the valve itself;
+            their sway sensors measure while their nodes work.
 
     Attributes:
         nodes: our node on each bus of CANopen.
@@ -61,6 +62,8 @@ class CanopenNetwork(BusProtocol):
             runner.add_interlock(NodeGate(node, Reason.NODE_FAULT))
         if control is not None:
             runner.add_interlock(control.gate)
+        if (sensor := runner.bound.sway_sensor) and sensor.config.node:
+            runner.measured_by(self.nodes[sensor.config.bus].nodes[sensor.config.node])
 
     def usual(self, frame: Frame) -> bool:
         """Others use services there that no DBC file knows."""

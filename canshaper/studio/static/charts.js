@@ -1,10 +1,16 @@
-// The last twenty seconds of an axis: command and sway.
+// Command, sway and states of an axis: the last ten minutes, of which a part is shown.
+import { Lanes, spans } from "/static/lanes.js";
 import uPlot from "/static/vendor/uplot.js";
 
-const SECONDS = 20;
-const MOST = SECONDS * 40;
+const KEPT_S = 600;
+const WINDOWS_S = [5, 10, 20, 60, 180, KEPT_S];
+const MOST_POINTS = 1200; // of a line: there are no more dots across
+const MOST_EVENTS = 500; // as many as the studio keeps
 const DRAW_MS = 100;
 
+const set = (element, text) => {
+  if (element.textContent !== text) element.textContent = text;
+};
 const css = (name) => getComputedStyle(document.documentElement).getPropertyValue(name).trim();
 
 export class Charts {
@@ -13,19 +19,24 @@ export class Charts {
     this.hello = hello;
     this.axis = hello.axes[0];
     this.drawn = 0;
-    this.rows = []; // [t, {axis: {joystick, [crane]: {valve, sway, predicted}}}]
+    this.rows = []; // [t, {axis: {joystick, [crane]: {valve, sway, predicted, state, level, reason}}}]
+    this.events = []; // {t, source, text, level}
+    this.lanes = new Lanes(hello.cranes, hello.colors, css);
     this.main = hello.cranes[0];
+    this.seconds = 20;
+    this.stoppedAt = null; // the time up to which is shown, while paused
+    this.at = null; // the time that is looked at, of a drive that is over
+    this.onseek = null; // called with a time that was clicked at
     this.build();
   }
 
   build() {
-    this.command?.destroy();
-    this.sway?.destroy();
+    this.destroy();
     const { cranes } = this.hello;
-    const color = (name) => css({ raw: "--raw" }[name] ?? "--shaped");
+    const color = (name) => css(this.hello.colors[name]);
     const lines = [{ label: "joystick", stroke: css("--joystick"), get: (v) => v.joystick, dash: [5, 4] },
-      ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), get: (v) => v[c]?.valve, width: 2 })).reverse()];
-    const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), get: (v) => v[c]?.sway, width: 2 })).reverse(),
+      ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), get: (v) => v[c]?.valve, width: 2 }))];
+    const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), get: (v) => v[c]?.sway, width: 2 })),
       { label: "model", stroke: css("--predicted"), get: (v) => v[this.main]?.predicted, dash: [3, 3] }];
     this.command = this.plot("chart-command", "legend-command", lines, 100, { range: [-105, 105] });
     this.sway = this.plot("chart-sway", "legend-sway", sways, 1, {
@@ -34,17 +45,26 @@ export class Charts {
         return [-most, most];
       },
     });
+    this.states = this.plot("chart-states", "legend-states",
+      cranes.map((c) => ({ label: c, stroke: color(c), get: () => null })), 1, { range: [0, 1] }, (u) => this.lanes.draw(u));
   }
 
-  plot(id, legendId, series, scale, y) {
+  destroy() {
+    for (const plot of [this.command, this.sway, this.states]) plot?.destroy();
+  }
+
+  /** @param paint draws into a plot that has no lines. */
+  plot(id, legendId, series, scale, y, paint) {
     const host = document.getElementById(id);
     const grid = { stroke: css("--line"), width: 1 };
     const axis = { stroke: css("--quiet"), grid, ticks: { show: false }, font: "11px system-ui, sans-serif" };
     const plot = new uPlot({
-      width: host.clientWidth, height: host.clientHeight, cursor: { show: false }, legend: { show: false },
+      width: host.clientWidth, height: host.clientHeight, cursor: { sync: { key: "charts" }, drag: { setScale: false, x: false }, points: { show: false } }, legend: { show: false },
       padding: [6, 16, 0, 0],
-      scales: { x: { time: false, range: [-SECONDS, 0] }, y },
-      axes: [{ ...axis, size: 22, values: (_, v) => v.map((s) => (s ? `${s} s` : "now")) }, { ...axis, size: 38 }],
+      scales: { x: { time: false, range: () => this.range() }, y },
+      hooks: { setCursor: [(u) => this.showCursor(u)], ready: [(u) => this.listen(u)], draw: [...(paint ? [paint] : []), (u) => this.line(u)] },
+      axes: paint ? [{ show: false }, { ...axis, size: 38, values: (_, v) => v.map(() => ""), grid: { show: false } }]
+        : [{ ...axis, size: 22, values: (_, v) => v.map((s) => (s || this.stoppedAt || this.at !== null ? `${s} s` : "now")) }, { ...axis, size: 38 }],
       series: [{}, ...series.map((s) => ({ stroke: s.stroke, width: s.width ?? 1.5, dash: s.dash, points: { show: false } }))],
     }, [[], ...series.map(() => [])], host);
     plot.lines = series;
@@ -54,10 +74,66 @@ export class Charts {
       const item = document.createElement("span");
       const line = document.createElement("i");
       line.style.setProperty("--color", s.stroke);
-      item.append(line, s.label);
+      const value = document.createElement("b");
+      item.append(line, s.label, value);
       return item;
     }));
+    plot.values = legend.querySelectorAll("b");
     return plot;
+  }
+
+  /** Up to when is shown, and where zero is: now, or the begin of a drive that is over. */
+  window() {
+    const last = this.rows.at(-1)?.[0] ?? 0;
+    if (this.at === null) return [this.stoppedAt ?? last, this.stoppedAt ?? last];
+    const first = this.rows[0]?.[0] ?? 0;
+    return [Math.max(first + this.seconds, Math.min(last, this.at + this.seconds / 2)), 0];
+  }
+
+  range() {
+    const [end, zero] = this.window();
+    return [end - this.seconds - zero, end - zero];
+  }
+
+  /** Look at a time of a drive that is over. */
+  seek(t) {
+    this.at = t;
+  }
+
+  listen(plot) {
+    plot.over.addEventListener("click", () => {
+      if (this.at !== null && plot.cursor.left >= 0) this.onseek?.(plot.posToVal(plot.cursor.left, "x"));
+    });
+  }
+
+  /** The time that is looked at, as a line. */
+  line(plot) {
+    if (this.at === null) return;
+    const { top, height } = plot.bbox;
+    plot.ctx.fillStyle = css("--text");
+    plot.ctx.fillRect(plot.valToPos(this.at, "x", true), top, devicePixelRatio, height);
+  }
+
+  /** Write what is under the cursor into the legend. */
+  showCursor(plot) {
+    const at = plot.cursor.idx;
+    const t = at == null ? null : plot.data[0][at];
+    const states = plot === this.states;
+    const words = states && t !== null ? this.lanes.words(t) : [];
+    plot.values?.forEach((element, i) => {
+      const value = t === null || states ? null : plot.data[i + 1][at];
+      set(element, words[i] ? ` ${words[i]}` : value == null ? "" : ` ${value.toFixed(1)}`);
+    });
+    if (!states) return;
+    const mark = t === null ? null : this.lanes.near(plot);
+    set(document.getElementById("mark"), mark ?? "");
+    document.getElementById("legend-states").hidden = mark !== null;
+  }
+
+  /** Mark an event on the time axis. */
+  mark(t, source, text, level) {
+    this.events.push({ t, source, text, level });
+    if (this.events.length > MOST_EVENTS) this.events.shift();
   }
 
   /** Keep one picture of the machine. */
@@ -69,29 +145,89 @@ export class Charts {
         const way = this.hello.sway_of[axis];
         row[axis][name] = {
           valve: crane.axes[axis].valve,
-          sway: way && crane.measured ? crane.sway?.[way === "across" ? 0 : 1] : null,
+          sway: way && (crane.measured || crane.simulated) ? crane.sway?.[way === "across" ? 0 : 1] : null,
           predicted: crane.axes[axis].predicted,
+          state: crane.axes[axis].state,
+          level: crane.axes[axis].level,
+          reason: crane.axes[axis].reason,
         };
       }
     }
     const last = this.rows.at(-1);
-    if (last && shown.t < last[0]) this.rows = []; // another studio
+    if (last && shown.t < last[0]) [this.rows, this.events] = [[], []]; // another studio
     this.rows.push([shown.t, row]);
-    if (this.rows.length > MOST) this.rows.splice(0, this.rows.length - MOST);
+    // Not one by one: an array of that length is moved.
+    if (shown.t - this.rows[0][0] > 1.1 * KEPT_S) {
+      this.rows.splice(0, this.rows.findIndex(([t]) => shown.t - t <= KEPT_S));
+    }
+  }
+
+  /** Stop the picture, or let it go on; nothing is lost meanwhile. */
+  pause(on) {
+    this.stoppedAt = on ? this.rows.at(-1)?.[0] ?? null : null;
+    this.drawn = 0;
+  }
+
+  /** Show more seconds, or fewer. */
+  zoom(steps) {
+    const at = WINDOWS_S.indexOf(this.seconds) + steps;
+    this.seconds = WINDOWS_S[Math.max(0, Math.min(WINDOWS_S.length - 1, at))];
+    this.drawn = 0;
+  }
+
+  /** Everything that is kept, as lines of comma-separated values. */
+  csv() {
+    const plots = [["command", this.command], ["sway", this.sway]];
+    const columns = this.hello.axes.flatMap((axis) => plots.flatMap(([what, plot]) =>
+      plot.lines.map((line) => [`${axis} ${what} ${line.label}`, (row) => line.get(row[axis]), plot.factor])));
+    const states = this.hello.axes.flatMap((axis) => this.hello.cranes.map((c) => [axis, c]));
+    const titles = [...columns.map(([name]) => name), ...states.map(([axis, c]) => `${axis} state ${c}`)];
+    const lines = [["seconds", ...titles].join(",")];
+    for (const [t, row] of this.rows) {
+      const cells = columns.map(([, get, factor]) => {
+        const value = get(row);
+        return value == null ? "" : String(Math.round(1000 * value * factor) / 1000);
+      });
+      const words = states.map(([axis, c]) => `"${row[axis][c]?.state ?? ""}"`);
+      lines.push([(t - this.rows[0][0]).toFixed(3), ...cells, ...words].join(","));
+    }
+    return `${lines.join("\n")}\n`;
+  }
+
+  /** The charts as they are, one above the other, as a canvas. */
+  picture() {
+    const parts = [this.command, this.sway, this.states].map((plot) => plot.ctx.canvas);
+    const whole = document.createElement("canvas");
+    whole.width = Math.max(...parts.map((part) => part.width));
+    whole.height = parts.reduce((sum, part) => sum + part.height, 0);
+    const pen = whole.getContext("2d");
+    pen.fillStyle = css("--panel");
+    pen.fillRect(0, 0, whole.width, whole.height);
+    parts.reduce((top, part) => {
+      pen.drawImage(part, 0, top);
+      return top + part.height;
+    }, 0);
+    return whole;
   }
 
   draw(now) {
     if (now - this.drawn < DRAW_MS || !this.rows.length) return;
     this.drawn = now;
-    const end = this.rows.at(-1)[0];
-    const rows = this.rows.filter(([t]) => end - t <= SECONDS);
-    const x = rows.map(([t]) => t - end);
+    const [end, zero] = this.window();
+    const inside = this.rows.filter(([t]) => t <= end && end - t <= this.seconds);
+    const every = Math.ceil(inside.length / MOST_POINTS);
+    const rows = every > 1 ? inside.filter((_, i) => i % every === 0) : inside;
+    const x = rows.map(([t]) => t - zero);
     for (const plot of [this.command, this.sway]) {
       plot.setData([x, ...plot.lines.map((s) => rows.map(([, row]) => {
         const value = s.get(row[this.axis]);
         return value == null ? null : value * plot.factor;
       }))]);
     }
+    const own = inside.map(([t, row]) => [t - zero, row[this.axis]]); // not one state may be left out
+    for (const name of this.hello.cranes) this.lanes.spans[name] = spans(own, (row) => row[name]);
+    this.lanes.marks = this.events.filter(({ t }) => t <= end && end - t <= this.seconds).map((one) => ({ ...one, t: one.t - zero }));
+    this.states.setData([x, ...this.hello.cranes.map(() => x.map(() => null))]);
   }
 
   show(axis) {
@@ -102,7 +238,7 @@ export class Charts {
   }
 
   resize() {
-    for (const [plot, id] of [[this.command, "chart-command"], [this.sway, "chart-sway"]]) {
+    for (const [plot, id] of [[this.command, "chart-command"], [this.sway, "chart-sway"], [this.states, "chart-states"]]) {
       const host = document.getElementById(id);
       plot.setSize({ width: host.clientWidth, height: host.clientHeight });
     }

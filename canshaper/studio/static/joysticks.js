@@ -1,19 +1,22 @@
 // Where the joysticks are: mouse on two pads, keyboard, gamepad. The largest deflection counts.
+import { Gamepad } from "/static/gamepad.js";
 
 const RAMP_S = 0.12; // a hand moves a joystick from neutral to full in that time
 const FINE = 0.4; // with Shift
-const GAMEPAD_DEAD = 0.1;
 const SVG = "http://www.w3.org/2000/svg";
 
 // Four ways of two pads: axis of the deployment by its number, sign of right or up, keys, gamepad.
 const WAYS = [
-  { pad: 0, way: "x", keys: ["d", "a"], gamepad: 0 },
-  { pad: 0, way: "y", keys: ["w", "s"], gamepad: 1 },
-  { pad: 1, way: "y", keys: ["arrowup", "arrowdown"], gamepad: 3 },
-  { pad: 1, way: "x", keys: ["arrowright", "arrowleft"], gamepad: 2 },
+  { pad: 0, way: "x", keys: ["KeyD", "KeyA"], gamepad: 0 },
+  { pad: 0, way: "y", keys: ["KeyW", "KeyS"], gamepad: 1 },
+  { pad: 1, way: "y", keys: ["ArrowUp", "ArrowDown"], gamepad: 3 },
+  { pad: 1, way: "x", keys: ["ArrowRight", "ArrowLeft"], gamepad: 2 },
 ];
 const NAMES = { slew: ["right", "left"], near_far: ["out", "in"], lift: ["up", "down"],
   lift_cylinder: ["up", "down"], knuckle: ["out", "in"], extension: ["out", "in"] };
+
+const ARROWS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
+const SHIFTS = ["ShiftLeft", "ShiftRight"];
 
 export class Joysticks {
   /** @param axes names of the axes, in the order of the deployment. */
@@ -31,14 +34,21 @@ export class Joysticks {
       const ways = this.ways.filter((w) => w.pad === number);
       if (ways.length) pads.append(this.buildPad(number, ways));
     }
-    const keyName = (k) => k.replace("arrow", "").replace(/^(up|down|left|right)$/,
-      (n) => ({ up: "↑", down: "↓", left: "←", right: "→" })[n]).toUpperCase();
-    keys.innerHTML = "";
+    this.gamepad = new Gamepad(document.getElementById("gamepad"), this.ways);
+    this.keys = keys;
+    this.nameKeys();
+    // What is printed on the keys of this keyboard; not every browser tells.
+    navigator.keyboard?.getLayoutMap?.().then((names) => this.nameKeys(names), () => {});
+  }
+
+  nameKeys(names) {
+    const keyName = (code) => ARROWS[code] ?? (names?.get(code) ?? code.replace("Key", "")).toUpperCase();
+    this.keys.replaceChildren();
     const rows = this.ways.map((w) => [w.keys.map(keyName), `${w.axis.replace("_", "-")} ${(NAMES[w.axis] ?? ["+", "−"]).join(" / ")}`]);
     for (const [names, text] of [...rows, [["⇧"], "gently"], [["Space"], "release enable: stop"]]) {
       const left = document.createElement("span");
       for (const name of names) left.append(Object.assign(document.createElement("kbd"), { textContent: name }), " ");
-      keys.append(left, Object.assign(document.createElement("span"), { textContent: text }));
+      this.keys.append(left, Object.assign(document.createElement("span"), { textContent: text }));
     }
   }
 
@@ -86,10 +96,10 @@ export class Joysticks {
     return box;
   }
 
-  /** Take a key; whether it moves a joystick. */
+  /** Take a key by its code; whether it moves a joystick. */
   press(key, isDown) {
     const known = this.ways.some((w) => w.keys.includes(key));
-    if (isDown && (known || key === "shift")) this.down.add(key);
+    if (isDown && (known || SHIFTS.includes(key))) this.down.add(key);
     else this.down.delete(key);
     return known;
   }
@@ -105,15 +115,13 @@ export class Joysticks {
     const now = performance.now();
     const step = Math.min(0.1, (now - this.at) / 1000) / RAMP_S;
     this.at = now;
-    const gamepad = [...(navigator.getGamepads?.() ?? [])].find((g) => g?.connected);
+    const sticks = this.gamepad.read();
     const found = {};
+    const fine = SHIFTS.some((key) => this.down.has(key)) ? FINE : 1;
     for (const w of this.ways) {
-      const aim = (this.down.has(w.keys[0]) - this.down.has(w.keys[1])) * (this.down.has("shift") ? FINE : 1);
+      const aim = (this.down.has(w.keys[0]) - this.down.has(w.keys[1])) * fine;
       w.key += limited(aim - w.key, step);
-      let pad = gamepad?.axes[w.gamepad] ?? 0;
-      if (w.way === "y") pad = -pad;
-      pad = Math.abs(pad) < GAMEPAD_DEAD ? 0 : (pad - Math.sign(pad) * GAMEPAD_DEAD) / (1 - GAMEPAD_DEAD);
-      const all = [w.key, w.mouse, limited(pad)];
+      const all = [w.key, w.mouse, sticks?.[w.gamepad] ?? 0];
       w.now = all.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
       found[w.axis] = Math.round(w.now * w.sign * 1000) / 1000;
     }

@@ -1,52 +1,49 @@
-// The connection to the studio: one JSON object a message, made again when it is lost.
+// The connection to the studio, which a worker keeps, and how old what it brought is.
 
-const FIRST_WAIT_MS = 300;
-const LONGEST_WAIT_MS = 3000;
-// A studio that is there sends thirty times a second.
-const SILENT_MS = 3000;
+// Two clocks differ by that much at most: a part of the time that has passed.
+const DRIFT = 1e-4;
 
 export class Link {
   /** @param on {hello, shown, lost}: called with what was received, and why a connection ended. */
   constructor(on) {
-    this.on = on;
-    this.wait = FIRST_WAIT_MS;
-    this.open();
-    setInterval(() => {
-      if (this.up && performance.now() - this.heard > SILENT_MS) this.socket.close();
-    }, 1000);
-  }
-
-  get up() {
-    return this.socket.readyState === WebSocket.OPEN;
-  }
-
-  open() {
-    this.socket = new WebSocket(`ws://${location.host}/ws`);
-    this.heard = performance.now();
-    this.socket.onmessage = (event) => {
-      this.heard = performance.now();
-      const message = JSON.parse(event.data);
+    this.offset = Infinity; // from the studio's clock to ours, by the quickest message; ms
+    this.last = -Infinity; // the studio's clock at the last message, ms
+    this.worker = new Worker("/static/wire.js");
+    this.worker.onmessage = ({ data }) => {
+      if (data.lost !== undefined) {
+        on.lost(data.lost);
+        return;
+      }
+      const message = JSON.parse(data.text);
       if (message.hello) {
-        this.wait = FIRST_WAIT_MS;
-        this.on.hello(message.hello);
+        this.offset = Infinity;
+        this.last = -Infinity;
+        on.hello(message.hello);
       } else {
-        this.on.shown(message);
+        this.take(message.t * 1000);
+        on.shown(message);
       }
     };
-    this.socket.onclose = (event) => {
-      this.on.lost(event.reason);
-      setTimeout(() => this.open(), this.wait);
-      this.wait = Math.min(LONGEST_WAIT_MS, this.wait * 1.6);
-    };
+  }
+
+  take(sent) {
+    const drift = Math.max(0, sent - this.last) * DRIFT;
+    this.offset = Math.min(performance.now() - sent, this.offset + (Number.isFinite(drift) ? drift : 0));
+    this.last = sent;
+  }
+
+  /** Age of what is shown, ms: also what waited on its way is old. */
+  age() {
+    return performance.now() - this.last - (Number.isFinite(this.offset) ? this.offset : 0);
   }
 
   /** Send what a hand did once. */
   send(message) {
-    if (this.up) this.socket.send(JSON.stringify(message));
+    this.worker.postMessage(message);
   }
 
-  /** Send where the joysticks are; what cannot go out now is out of date later. */
-  sendNow(message) {
-    if (this.up && this.socket.bufferedAmount === 0) this.socket.send(JSON.stringify(message));
+  /** Positions of the joysticks now, or null where this page does not drive. */
+  joysticks(positions) {
+    this.worker.postMessage({ joysticks: positions });
   }
 }

@@ -1,62 +1,56 @@
 // The page: it sends where the joysticks are and shows what is on the buses, nothing else.
-import { Charts } from "/static/charts.js";
 import { Link } from "/static/link.js";
+import { Numbers } from "/static/numbers.js";
 import { Panel } from "/static/panel.js";
-import { Scene } from "/static/scene.js";
+import { Shell } from "/static/shell.js";
 import { Joysticks } from "/static/joysticks.js";
 
-const SEND_MS = 20;
+const READ_MS = 20;
 const SLIDE_MS = 100;
+const STALE_MS = 500; // what is older is no news
+const HICCUP_MS = 300;
+const TOLD_MS = 4000; // so long a hiccup is shown
 const byId = (id) => document.getElementById(id);
 
-let hello, panel, charts, scene, joysticks, shown, link;
+const shell = new Shell();
+let hello, panel, numbers, joysticks, shown, link;
+let inForce = null; // numbers of a machine that may be changed
 let taken = false; // whether this page has asked for the joysticks on this connection
+let before = null; // its number on the connection before, where it drove
+let stale = false;
+let drawn = false; // whether there were pictures for a second: at the start shaders are built
+let closedFor = ""; // why the studio closed the connection
 const slides = {};
 
 function begin(found) {
   const first = !hello;
+  before = shown && shown.driver === hello?.page ? hello.page : null;
+  shown = undefined;
+  closedFor = "";
   const same = hello && JSON.stringify({ ...found, page: 0 }) === JSON.stringify({ ...hello, page: 0 });
   hello = found;
   byId("file").textContent = hello.machine ? `${hello.file} — listening only` : hello.file;
   byId("controls").hidden = !hello.drives;
   byId("hands").hidden = !hello.drives;
   byId("profile").hidden = !hello.profiles;
-  byId("view").hidden = hello.cranes.length < 2;
-  pill("link", "connected", "ok");
-  byId("banner").hidden = true;
   taken = false;
   if (same) {
-    byId("events").replaceChildren();
+    byId("events").replaceChildren(); // all of them come again
+    shell.charts.events = [];
     return;
   }
   panel = new Panel(hello, (name, factor) => { slides[name] = factor; });
   joysticks = new Joysticks(hello.drives ? hello.axes : [], byId("pads"), byId("keys"));
-  charts?.command.destroy();
-  charts?.sway.destroy();
-  charts = new Charts(hello);
-  if (first) {
-    try {
-      scene = new Scene(byId("scene"), hello);
-    } catch (error) {
-      byId("note").textContent = `No 3-D picture: ${error.message}`;
-    }
-  } else {
-    location.reload(); // another machine: other cranes
-  }
-  byId("tabs").replaceChildren(...hello.axes.map((axis) => {
-    const tab = document.createElement("button");
-    tab.textContent = axis.replace("_", "-");
-    tab.setAttribute("role", "tab");
-    tab.dataset.axis = axis;
-    tab.onclick = () => choose(axis);
-    return tab;
-  }));
-  choose(hello.axes[0]);
-}
-
-function choose(axis) {
-  charts.show(axis);
-  for (const tab of byId("tabs").children) tab.setAttribute("aria-selected", tab.dataset.axis === axis);
+  joysticks.gamepad.on = {
+    enable: () => link.send({ do: "enable" }),
+    release: actions.Space,
+    antisway: actions.KeyN,
+    reset: actions.KeyX,
+    ...(hello.profiles ? { profile: actions.KeyP } : {}),
+  };
+  if (hello.numbers) numbers = new Numbers(byId("numbers"), (message) => link.send(message));
+  if (first) shell.begin(hello);
+  else location.reload(); // another machine: other cranes
 }
 
 function show(message) {
@@ -64,17 +58,24 @@ function show(message) {
   const mine = message.driver === hello.page;
   if (!taken && hello.drives) {
     taken = true;
-    if (message.driver === null) link.send({ do: "take" });
+    // A connection that was lost is not gone for the studio: its driver is this page.
+    if (message.driver === null || message.driver === before) link.send({ do: "take" });
   }
-  charts.add(message);
-  scene?.add(message);
+  shell.charts.add(message);
+  shell.show(message);
   panel.show(message, mine);
-  for (const [, time, source, text, level] of message.events ?? []) panel.event(time, source, text, level);
+  for (const [, time, source, text, level, clock] of message.events ?? []) {
+    panel.event(time, source, text, level);
+    shell.charts.mark(clock, source, text, level);
+  }
   for (const text of message.refused ?? []) panel.event(Date.now() / 1000, "page", `refused: ${text}`, "warn");
+  inForce = message.numbers?.table ?? inForce;
+  shell.residual.follow([message.sliders, inForce]);
+  if (message.numbers) numbers.show(message.numbers);
+  if (message.difference) numbers.ask(message.difference);
+  fresh();
+  byId("hint").hidden = !mine || message.enable;
   if (!hello.drives) return;
-  const silent = Object.entries(message.cranes).filter(([, crane]) => !crane.daemon).map(([name]) => name);
-  if (silent.length) pill("link", `daemon silent: ${silent.join(", ")}`, "bad");
-  else pill("link", "connected", "ok");
   byId("seat").hidden = false;
   if (mine) pill("seat", message.enable ? "you drive" : "you drive: press enable", message.enable ? "ok" : "warn");
   else pill("seat", message.driver === null ? "nobody drives" : "another page drives", "warn");
@@ -87,12 +88,29 @@ function show(message) {
 }
 
 function lost(reason) {
-  pill("link", "no connection", "bad");
-  byId("banner").textContent = reason
-    ? `The studio has closed the connection: ${reason}. Trying again.`
-    : "No connection to the studio; joysticks are in neutral there. Trying again.";
-  byId("banner").hidden = false;
+  closedFor = reason || closedFor;
   byId("seat").hidden = true;
+}
+
+/** Whether what is shown is news; what is not is grey. */
+function fresh() {
+  const age = link.age();
+  const old = !(age < STALE_MS);
+  if (old !== stale) document.body.classList.toggle("stale", old);
+  stale = old;
+  byId("banner").hidden = !old || !hello;
+  if (!old) {
+    const silent = Object.entries(shown?.cranes ?? {}).filter(([, crane]) => !crane.daemon).map(([name]) => name);
+    if (silent.length) pill("link", `daemon silent: ${silent.join(", ")}`, "bad");
+    else pill("link", "connected", "ok");
+  } else if (hello) {
+    pill("link", "no connection", "bad");
+    const since = Number.isFinite(age) ? ` for ${(age / 1000).toFixed(1)} s` : "";
+    const hand = hello.drives ? "; joysticks are in neutral there" : "";
+    byId("banner").textContent = closedFor
+      ? `The studio has closed the connection: ${closedFor}. Trying again.`
+      : `No connection to the studio${since}: all that is shown is old${hand}. Trying again.`;
+  }
 }
 
 function pill(id, text, level) {
@@ -103,56 +121,66 @@ function pill(id, text, level) {
 
 // -- what a hand does --------------------------------------------------------------------------
 
+const enable = () => link.send({ do: shown?.enable ? "release" : "enable" });
+// By their place on the keyboard, whatever letter is on them.
 const actions = {
-  e: () => link.send({ do: shown?.enable ? "release" : "enable" }),
-  " ": () => link.send({ do: "release" }),
-  n: () => link.send({ antisway: !shown?.antisway }),
-  x: () => link.send({ do: "reset" }),
-  p: () => hello?.profiles && link.send({ do: "profile" }),
-  v: () => overlay(!scene?.overlay),
+  KeyE: enable,
+  Space: () => link.send({ do: "release" }),
+  KeyN: () => link.send({ antisway: !shown?.antisway }),
+  KeyX: () => link.send({ do: "reset" }),
+  KeyP: () => hello?.profiles && link.send({ do: "profile" }),
+  KeyV: () => shell.overlay(!shell.scene?.overlay),
+  KeyB: () => shell.look("plan"),
+  KeyL: () => shell.look("residual"),
 };
-
-function overlay(on) {
-  scene?.setOverlay(on);
-  byId("view").setAttribute("aria-pressed", on);
-}
 
 addEventListener("keydown", (event) => {
   if (event.ctrlKey || event.altKey || event.metaKey || !joysticks) return;
-  const key = event.key.toLowerCase();
-  const onSlider = event.target.type === "range" && key.startsWith("arrow");
+  if (event.target.matches?.("input:not([type=range]), dialog *")) return; // it is written in
+  const onSlider = event.target.type === "range" && event.code.startsWith("Arrow");
   if (onSlider) return;
-  if (joysticks.press(key, true)) event.preventDefault();
-  else if (actions[key] && !event.repeat) {
+  if (joysticks.press(event.code, true)) event.preventDefault();
+  else if (actions[event.code] && !event.repeat) {
     event.preventDefault();
-    actions[key]();
+    actions[event.code]();
   }
 });
-addEventListener("keyup", (event) => joysticks?.press(event.key.toLowerCase(), false));
+addEventListener("keyup", (event) => joysticks?.press(event.code, false));
 addEventListener("blur", () => joysticks?.release());
-document.addEventListener("visibilitychange", () => joysticks?.release());
+document.addEventListener("visibilitychange", () => {
+  joysticks?.release();
+  readAt = null; // a page that is hidden is called seldom
+});
 
 byId("take").onclick = () => link.send({ do: "take" });
-byId("enable").onclick = actions.e;
-byId("antisway").onclick = actions.n;
-byId("reset").onclick = actions.x;
-byId("profile").onclick = actions.p;
-byId("view").onclick = actions.v;
-byId("theme").onclick = () => theme(document.documentElement.dataset.theme === "light" ? "dark" : "light");
+byId("enable").onclick = byId("hint").onclick = enable;
+byId("antisway").onclick = actions.KeyN;
+byId("reset").onclick = actions.KeyX;
+byId("profile").onclick = actions.KeyP;
 
-function theme(name) {
-  document.documentElement.dataset.theme = name;
-  localStorage.setItem("theme", name);
-  scene?.paint();
-  charts?.build();
-}
-theme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark"));
-
+let readAt = null;
+let hiccupUntil = 0;
 setInterval(() => {
+  const now = performance.now();
+  if (readAt !== null && drawn && !document.hidden && now - readAt > HICCUP_MS) hiccup(now - readAt, now);
+  readAt = now;
+  if (now > hiccupUntil) byId("hiccup").hidden = true;
+  if (link) fresh();
   if (!joysticks || !hello?.drives) return;
   const read = joysticks.read();
-  if (shown?.driver === hello.page) link.sendNow({ joysticks: read });
-}, SEND_MS);
+  link.joysticks(shown?.driver === hello.page ? read : null);
+}, READ_MS);
+
+/** Say in large words that the page stood still. */
+function hiccup(ms, now) {
+  const drove = shown?.driver === hello.page && shown.enable;
+  byId("hiccup").querySelector("b").textContent = `The page stood still for ${(ms / 1000).toFixed(1)} s`;
+  byId("hiccup").querySelector("span").textContent = drove ? "The joysticks went to neutral: let go of them, then drive on." : "";
+  byId("hiccup").hidden = false;
+  panel?.event(Date.now() / 1000, "page", `the page stood still for ${(ms / 1000).toFixed(1)} s`, "warn");
+  hiccupUntil = now + TOLD_MS;
+}
+
 setInterval(() => {
   for (const [name, to] of Object.entries(slides)) {
     link.send({ slide: name, to });
@@ -168,16 +196,15 @@ let counted = performance.now();
 function draw(now) {
   requestAnimationFrame(draw);
   if (!hello) return;
-  scene?.draw(now);
-  charts.draw(now);
+  shell.draw(now);
   joysticks.draw(shown && Object.values(shown.cranes)[0]?.axes);
   pictures += 1;
   if (now - counted >= 1000) {
     byId("fps").textContent = Math.round((1000 * pictures) / (now - counted));
     pictures = 0;
+    drawn = true;
     counted = now;
   }
 }
-addEventListener("resize", () => charts?.resize());
 link = new Link({ hello: begin, shown: show, lost });
 requestAnimationFrame(draw);

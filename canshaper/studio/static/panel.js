@@ -1,8 +1,8 @@
 // States, events, sliders and the large numbers.
 
 const MOST_EVENTS = 300;
-const SHOW_MS = 150; // nobody reads faster
-const CRANE = { shaped: "shaped", raw: "raw", machine: "machine" };
+const OLD_S = 0.5;
+const SHOW_MS = 150; // no one reads faster
 const WORDS = {
   calm: ["Filter", "fast", "calm"],
   length: ["Pendulum length that the filter believes", "shorter", "longer"],
@@ -17,6 +17,10 @@ const make = (tag, attributes = {}, ...children) => {
   element.append(...children);
   return element;
 };
+const coloured = (element, color) => {
+  if (color) element.style.color = `var(${color})`;
+  return element;
+};
 const set = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
@@ -27,7 +31,7 @@ export class Panel {
     this.shownAt = -SHOW_MS;
     this.cells = {};
     const body = document.querySelector("#axes tbody");
-    body.replaceChildren(make("tr", {}, make("th"), ...hello.cranes.map((c) => make("th", { className: `from-${c}` }, CRANE[c]))));
+    body.replaceChildren(make("tr", {}, make("th", {}, "axis"), ...hello.cranes.map((c) => coloured(make("th", {}, c), hello.colors[c]))));
     for (const axis of hello.axes) {
       const row = make("tr", {}, make("td", {}, axis.replace("_", "-")));
       for (const crane of hello.cranes) {
@@ -39,12 +43,18 @@ export class Panel {
       body.append(row);
     }
     const swings = document.getElementById("swings");
-    this.swings = Object.fromEntries([...hello.cranes].reverse().map((crane) => [crane, make("b", { id: `swing-${crane}` }, "–")]));
-    swings.replaceChildren(...Object.entries(this.swings).map(([crane, number]) => {
-      const box = make("div", { className: "swing" }, `${CRANE[crane]}: swing now`, number);
-      box.style.setProperty("--color", `var(--${crane === "raw" ? "raw" : "shaped"})`);
+    this.swings = Object.fromEntries(hello.cranes.map((crane) => [crane,
+      { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }) }]));
+    // In the order in which the cranes stand in the picture.
+    swings.replaceChildren(...Object.entries(this.swings).map(([crane, { number, from }]) => {
+      const box = make("div", { className: "swing" }, make("b", {}, crane), number, from);
+      box.style.setProperty("--color", `var(${hello.colors[crane]})`);
       return box;
     }));
+    const sources = document.getElementById("sources");
+    sources.hidden = !hello.machine; // of our own cranes there is nothing to find out
+    sources.querySelector("ul").replaceChildren();
+    this.sources = {};
     this.buildSliders(slide);
     document.getElementById("events").replaceChildren();
   }
@@ -60,8 +70,8 @@ export class Panel {
       const value = make("b");
       const found = make("span", { className: "numbers" });
       const factor = () => Math.min(range[1], Math.max(range[0], 2 ** input.value));
-      const tell = (f) => {
-        set(value, `× ${f.toFixed(2)}`);
+      const showFactor = (f) => {
+        set(value, `×\u00a0${f.toFixed(2)}`);
         const byAxis = {};
         for (const [key, v, p] of numbers) {
           const [, axis, , number] = key.split(".");
@@ -71,40 +81,52 @@ export class Panel {
       };
       input.addEventListener("input", () => {
         this.touched = performance.now();
-        tell(factor());
+        showFactor(factor());
         slide(name, factor());
       });
+      const back = make("button", { className: "back", title: "Back to what the file says", onclick: () => {
+        input.value = 0;
+        input.dispatchEvent(new Event("input"));
+      } }, "× 1.00");
+      back.setAttribute("aria-label", `${title}: back to × 1.00`);
       const label = make("label", { htmlFor: input.id }, `${title} `, value);
-      host.append(make("div", { className: "slider" }, label, input,
+      host.append(make("div", { className: "slider" }, back, label, input,
         make("div", { className: "ends" }, make("span", {}, low), found, make("span", {}, high))));
-      this.sliders[name] = { input, tell };
-      tell(1);
+      this.sliders[name] = { input, showFactor, back };
+      showFactor(1);
     }
     if (!host.children.length && this.hello.drives) {
       host.append(make("p", { className: "quiet" }, "No filter of this deployment has numbers for sliders."));
     }
   }
 
-  show(shown, mine) {
+  show(shown, mine, soon = false) {
     const now = performance.now();
-    if (now - this.shownAt < SHOW_MS && mine === this.mine) return;
+    if (now - this.shownAt < SHOW_MS && mine === this.mine && !soon) return;
     this.shownAt = now;
     this.mine = mine;
     for (const [name, crane] of Object.entries(shown.cranes)) {
-      set(this.swings[name], crane.swing == null || !crane.sway ? "–" : `±${crane.swing.toFixed(1)}°`);
+      const { number, from } = this.swings[name];
+      const known = crane.swing != null && crane.sway;
+      set(number, known ? `±${crane.swing.toFixed(1)}°` : "–");
+      if (!known) set(from, "swing not known");
+      else set(from, crane.measured ? "swing, measured" : crane.simulated ? "swing, simulated" : "swing, by the model");
+      from.parentElement.classList.toggle("modelled", Boolean(known && !crane.measured));
+      if (this.hello.machine) this.showSources(crane.sources);
       for (const [axis, values] of Object.entries(crane.axes)) {
         const { state, reason } = this.cells[`${name} ${axis}`];
-        set(state, values.state ?? (crane.daemon ? "not told" : "daemon silent"));
+        set(state, values.state ?? (crane.daemon ? "not known" : "daemon silent"));
         state.dataset.level = values.level;
         set(reason, values.reason ?? "");
       }
     }
-    for (const [name, { input, tell }] of Object.entries(this.sliders)) {
+    for (const [name, { input, showFactor, back }] of Object.entries(this.sliders)) {
       input.disabled = !mine;
+      back.disabled = !mine || shown.sliders[name] === 1;
       // While a hand is on it, it shows what is wanted; then what the daemon has.
       if (performance.now() - (this.touched ?? -1e9) > 1000) {
         input.value = Math.log2(shown.sliders[name]);
-        tell(shown.sliders[name]);
+        showFactor(shown.sliders[name]);
       }
     }
     const first = Object.values(shown.cranes)[0];
@@ -112,7 +134,7 @@ export class Panel {
     set(document.getElementById("late"), late);
     const silent = Object.entries(shown.cranes).filter(([, crane]) => !crane.crane).map(([name]) => name);
     let note = "";
-    if (silent.length) {
+    if (silent.length && !this.hello.playback) {
       note = this.hello.drives
         ? `Not heard: the crane (${silent.join(", ")}); its pose is not measured, its sway that of the model`
         : "Position and sway are not on the bus: pose not measured, sway that of the model";
@@ -120,11 +142,25 @@ export class Panel {
     set(document.getElementById("note"), note);
   }
 
+  showSources(sources) {
+    const list = document.querySelector("#sources ul");
+    for (const [name, { per_s: rate, age_s: age }] of Object.entries(sources)) {
+      if (!this.sources[name]) {
+        this.sources[name] = { rate: make("b"), age: make("span") };
+        list.append(make("li", {}, make("span", {}, name), this.sources[name].rate, this.sources[name].age));
+      }
+      const one = this.sources[name];
+      set(one.rate, `${rate}/s`);
+      set(one.age, age === null ? "never" : `${age.toFixed(age < 10 ? 2 : 0)} s`);
+      one.age.parentElement.classList.toggle("old", age === null || age > OLD_S);
+    }
+  }
+
   event(time, source, text, level) {
     const list = document.getElementById("events");
-    const stamp = new Date(time * 1000).toTimeString().slice(0, 8);
+    const stamp = this.hello.playback ? `${time.toFixed(2)} s` : new Date(time * 1000).toTimeString().slice(0, 8);
     const down = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
-    list.append(make("li", {}, make("time", {}, stamp), make("span", { className: `source from-${source}` }, source),
+    list.append(make("li", {}, make("time", {}, stamp), coloured(make("span", { className: "source" }, source), this.hello.colors[source]),
       make("span", { className: level }, text)));
     while (list.children.length > MOST_EVENTS) list.firstChild.remove();
     if (down) list.scrollTop = list.scrollHeight;

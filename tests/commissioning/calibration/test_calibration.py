@@ -11,6 +11,7 @@ from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.config.origin import Origin, written_by
 from canshaper.errors import CalibrationError, ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -102,6 +103,7 @@ def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
     curve = limits.curve()
     assert curve is not None
     assert limits.deadband_pct == 0.0
+    assert limits.curve_origin == Origin(**written_by("calibrate", simulated=True))
     assert curve.velocity(0.04) == 0.0 == curve.velocity(-0.09)
     assert curve.velocity(0.06) > 0.0 > curve.velocity(-0.115)
 
@@ -137,7 +139,7 @@ def run(
     [
         ("silent", {}, "stopped: STOP_DONE"),
         ("enable", {}, "stopped: ENABLE_LOST"),
-        ("unseen", {}, "stopped: the feedback fell silent, or tells an error"),
+        ("unseen", {}, "stopped: the feedback fell silent, or reports an error"),
         ("", {"hand": 0.3}, "stopped: STOP_DONE"),
     ],
 )

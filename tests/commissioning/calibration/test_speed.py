@@ -36,14 +36,16 @@ BO_ 1003 Ranged: 8 PLANT
 """
 
 
-def with_messages(folder: Path) -> Deployment:
+def with_messages(folder: Path, long: int = 20, fd: str = "") -> Deployment:
     dbc = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
     at = dbc.index("BO_ ")
-    changed = dbc[:at] + MESSAGES.lstrip() + dbc[at:] + "\nSIG_VALTYPE_ 1000 Speed : 1;\n"
+    messages = MESSAGES.lstrip().replace("Long: 20", f"Long: {long}")
+    changed = dbc[:at] + messages + dbc[at:] + "\nSIG_VALTYPE_ 1000 Speed : 1;\n"
     (folder / "machine.dbc").write_text(changed, "cp1252")
     file = folder / "machine.yaml"
     text = (ROOT / "config" / "forwarder.yaml").read_text()
-    file.write_text(text.replace("../dbc/forwarder.dbc", "machine.dbc"))
+    text = text.replace("../dbc/forwarder.dbc", "machine.dbc")
+    file.write_text(text.replace("bitrate: 250000", f"bitrate: 250000{fd}"))
     return load_deployment(file)
 
 
@@ -78,7 +80,7 @@ def test_another_valve_that_speaks_does_not_stand_for_one_that_fell_silent() -> 
     )
     heard = [own] * 200 + [other]
     drive = drive_on(deployment, "slew", ("AVEF0", "ExtendFlow"), heard)
-    assert drive.ended == "stopped: the feedback fell silent, or tells an error"
+    assert drive.ended == "stopped: the feedback fell silent, or reports an error"
     assert 0.0 < drive.progress < 1.0
 
 
@@ -97,12 +99,15 @@ def test_what_is_no_speed_counts_as_silence(tmp_path: Path, message: str, data: 
     drive = drive_on(deployment, "slew", (message, "Speed"), [bad])
     assert drive.waiting_for == "feedback"
     drive = drive_on(deployment, "slew", (message, "Speed"), [good] * 200 + [bad])
-    assert drive.ended == "stopped: the feedback fell silent, or tells an error"
+    assert drive.ended == "stopped: the feedback fell silent, or reports an error"
 
 
 @pytest.mark.parametrize(
     ("message", "why"),
-    [("Chosen", " is multiplexed"), ("Long", ": expected 8 bytes at most, got 20")],
+    [
+        ("Chosen", " is multiplexed"),
+        ("Long", ": expected the length of a frame, 8 bytes at most, got 20"),
+    ],
 )
 def test_messages_that_cannot_be_measured_with(tmp_path: Path, message: str, why: str) -> None:
     with pytest.raises(ConfigError, match=f"--speed: {message}{why}"):
@@ -165,3 +170,20 @@ def test_a_shipped_deployment_is_not_written(
     assert told.exit_code == 2, told.output
     assert "shipped with the package; copy it, then write to the copy" in told.output
     assert (ROOT / "config" / "forwarder.yaml").read_text() == before
+
+
+@pytest.mark.parametrize(("length", "good"), [(20, True), (21, False)])
+def test_a_speed_may_be_in_a_frame_of_can_fd(tmp_path: Path, length: int, good: bool) -> None:
+    """There is none of 21 bytes."""
+    deployment = with_messages(tmp_path, length, fd=", fd: true")
+    if good:
+        data = struct.pack("<h", 50).ljust(length, b"\0")
+        can_id = deployment.messages.find("Long")[1].frame_id  # type: ignore[union-attr]
+        drive = drive_on(
+            deployment, "slew", ("Long", "Speed"), [Frame("crane", can_id, False, data)]
+        )
+        assert drive.waiting_for == ""
+        return
+    text = "expected the length of a frame, 64 bytes at most, got 21"
+    with pytest.raises(ConfigError, match=f"--speed: Long: {text}"):
+        CalibrationDrive(deployment, "slew", ("Long", "Speed"), RAMP)

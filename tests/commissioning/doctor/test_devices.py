@@ -152,5 +152,5 @@ def test_the_device_is_looked_at_with_the_interface(
     monkeypatch.setattr(interfaces, "kernel_fault", lambda: None)
     monkeypatch.setattr(device_findings, "__defaults__", (here.root, here.ask))
     buses = {"crane": Bus(interface="socketcan", channel="can3")}
-    subjects = [one.subject for one in interfaces.bus_findings(buses)]
+    subjects = [one.subject for one in interfaces.bus_findings(buses, 20)]
     assert subjects == ["can3", "can3 device"]

@@ -5,8 +5,10 @@ the lane of the tests on SocketCAN: SJA1000 controllers set up in several ways, 
 behind a serial line on which an adapter reported warning, passive and bus-off.
 """
 
+import json
 import socket
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -166,7 +168,7 @@ def test_output_that_is_not_json() -> None:
 def test_without_ip_the_kernel_tells_less(tmp_path: Path, flags: str, level: Level) -> None:
     directory = tmp_path / "sys/class/net/can0"
     directory.mkdir(parents=True)
-    for name, text in (("type", "280"), ("flags", flags), ("tx_queue_len", "10")):
+    for name, text in (("type", "280"), ("flags", flags), ("tx_queue_len", "10"), ("mtu", "16")):
         (directory / name).write_text(text + "\n")  # as they stand for can0 in the lane
     link = read_sys("can0", tmp_path)
     assert link is not None
@@ -180,11 +182,24 @@ def test_without_ip_the_kernel_tells_less(tmp_path: Path, flags: str, level: Lev
     assert read_sys("can1", tmp_path) is None
 
 
-def test_other_interfaces_cannot_be_checked() -> None:
-    other = Bus(interface="udp_multicast", channel="239.1.2.3")
-    (found,) = bus_findings({"crane": other})
-    assert found.level is NOTE
-    assert "udp_multicast 239.1.2.3: cannot be checked" in found.found
+@pytest.mark.parametrize(
+    ("interface", "older_ms", "error_frames"),
+    [("udp_multicast", 20, NOTE), ("slcan", 5, NOTE), ("socketcand", 5, OK)],
+)
+def test_what_an_adapter_is_silent_about(
+    interface: str, older_ms: int, error_frames: Level
+) -> None:
+    results = bus_findings({"crane": Bus(interface=interface, channel="somewhere")}, tick_ms=20)
+    start = f"bus crane {interface}"
+    assert [(f.subject, f.level) for f in results] == [
+        (start, NOTE),
+        (f"{start} time stamps", NOTE),
+        (f"{start} error frames", error_frames),
+        (f"{start} send confirmation", WARNING),
+    ]
+    assert "python-can on somewhere: cannot be checked" in results[0].found
+    assert f"up to {older_ms} ms older" in results[1].found
+    assert f"timeout_ms of inputs {older_ms} ms more" in results[1].remedy
 
 
 def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -192,7 +207,66 @@ def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
         raise OSError(97, "Address family not supported by protocol")
 
     monkeypatch.setattr(socket, "socket", refuse)
-    (found,) = bus_findings({"crane": bus("can0")})
-    assert found.level is BAD
-    assert found.found.startswith("no SocketCAN in this kernel")
-    assert "modprobe can_raw" in found.remedy
+    (finding,) = bus_findings({"crane": bus("can0")}, 20)
+    assert finding.level is BAD
+    assert finding.found.startswith("no SocketCAN in this kernel")
+    assert "modprobe can_raw" in finding.remedy
+
+
+def fd_findings(file: str, channel: str, **asked: Any) -> dict[str, Finding]:
+    link = parse_ip((IP / f"{file}.json").read_text())
+    assert link is not None
+    config = Bus(interface="socketcan", channel=channel, fd=True, **asked)
+    return {f.subject: f for f in link_findings(link, config)}
+
+
+def test_a_controller_without_can_fd() -> None:
+    found = fd_findings("can1-good", "can1", bitrate=250_000, data_bitrate=1_000_000)["can1 CAN FD"]
+    assert (found.level, found.found) == (BAD, "off, the MTU is 16")
+    options = "type can dbitrate 1000000 fd on"
+    assert found.remedy == f"with can1 down: sudo ip link set can1 {options}"
+
+
+@pytest.mark.parametrize(
+    ("mtu", "level", "remedy"),
+    [(16, BAD, "with vcan0 down: sudo ip link set vcan0 mtu 72"), (72, OK, "")],
+)
+def test_a_virtual_bus_with_and_without_can_fd(mtu: int, level: Level, remedy: str) -> None:
+    text = f'[{{"ifname": "vcan0", "link_type": "can", "flags": ["UP"], "mtu": {mtu}, "linkinfo":'
+    link = parse_ip(text + ' {"info_kind": "vcan"}}]')
+    assert link is not None
+    assert [f.subject for f in link_findings(link, bus("vcan0"))] == ["vcan0"]
+    _, found = link_findings(link, Bus(interface="socketcan", channel="vcan0", fd=True))
+    assert (found.subject, found.level, found.remedy) == ("vcan0 CAN FD", level, remedy)
+
+
+@pytest.mark.parametrize(
+    ("data_bitrate", "level", "text"),
+    [
+        (2_000_000, OK, "on, data 2000000 bit/s"),
+        (4_000_000, BAD, "data 2000000 bit/s, in the file data_bitrate 4000000 bit/s"),
+        (None, WARNING, "data 2000000 bit/s, in the file data_bitrate none"),
+    ],
+)
+def test_the_bit_rate_of_the_data_is_that_of_the_file(
+    data_bitrate: int | None, level: Level, text: str
+) -> None:
+    """As ``ip`` of iproute2 6.1 prints a controller of CAN FD; the lane has none."""
+    entry = json.loads((IP / "can1-good.json").read_text())
+    (one,) = (e for e in entry if e.get("ifname"))
+    one["mtu"] = 72
+    one["linkinfo"]["info_data"]["data_bittiming"] = {"bitrate": 2_000_000}
+    link = parse_ip(json.dumps(entry))
+    assert link is not None
+    config = Bus(interface="socketcan", channel="can1", fd=True, data_bitrate=data_bitrate)
+    found = {f.subject: f for f in link_findings(link, config)}["can1 CAN FD"]
+    assert (found.level, found.found) == (level, text)
+
+
+def test_a_controller_of_can_fd_that_is_down_is_set_up_with_its_rates() -> None:
+    link = parse_ip((IP / "can1-down.json").read_text())
+    assert link is not None
+    asked = {"bitrate": 500_000, "data_bitrate": 2_000_000}
+    config = Bus(interface="socketcan", channel=link.name, fd=True, **asked)
+    found = link_findings(link, config)[0]
+    assert "dbitrate 2000000 fd on restart-ms 100" in found.remedy

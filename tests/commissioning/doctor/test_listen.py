@@ -12,7 +12,7 @@ from typing import Any
 import pytest
 
 from canshaper.bus.arrival import SO_TIMESTAMPNS
-from canshaper.bus.raw import CAN_FRAME
+from canshaper.bus.packet import CAN_FRAME
 from canshaper.cli.verbs.doctor import _listened
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening

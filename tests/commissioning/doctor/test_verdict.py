@@ -1,13 +1,15 @@
 """What was measured against the tick: every limit from both sides."""
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import pytest
 
 from canshaper.commissioning.doctor.finding import Finding, Level, fit
 from canshaper.commissioning.doctor.measure import Run
-from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings
+from canshaper.commissioning.doctor.verdict import IDLE, LOADED, measured_findings, waiting
+from canshaper.config.schema import Tick
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import SHIPPED, TICK_NS
 
@@ -25,10 +27,14 @@ def tail(part: float, rare: int = 2) -> list[int]:
 
 
 def test_a_good_pc(run: Make) -> None:
-    found = judged({IDLE: run(), LOADED: run()})
-    assert {f.level for f in found.values()} == {Level.OK}
+    by_subject = judged({IDLE: run(), LOADED: run()})
+    note = by_subject.pop("wait for the tick")
+    assert {f.level for f in by_subject.values()} == {Level.OK}
+    assert (note.level, note.remedy) == (Level.NOTE, "tick: { follow: left }")
+    assert note.found == "up to 20 ms, half of that on average; it could be 1.2 ms"
+
     subjects = ["lateness", "deadlines", "whole tick", "joystick to valve", "axes"]
-    assert list(found) == ["scheduling", "memory"] + [
+    assert list(by_subject) == ["scheduling", "memory"] + [
         f"{subject} {name}" for name in (IDLE, LOADED) for subject in subjects
     ]
 
@@ -123,3 +129,15 @@ def test_the_verdict_is_that_of_the_worst() -> None:
     good = [Finding("x", level, "found") for level in levels]
     assert fit(good)
     assert not fit([*good, Finding("y", Level.BAD, "found")])
+
+
+@pytest.mark.parametrize(
+    ("change", "expected"),
+    [
+        ({"tick": Tick(follow="right")}, ["ticks follow right, but not in what is measured here"]),
+        ({"tick_ms": 19}, []),
+    ],
+)
+def test_ticks_that_follow_already_or_cannot(change: dict[str, Any], expected: list[str]) -> None:
+    changed = replace(DEPLOYMENT, config=DEPLOYMENT.config.model_copy(update=change))
+    assert [one.found for one in waiting(changed)] == expected

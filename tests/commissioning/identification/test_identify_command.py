@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
+from canshaper.config.origin import Origin, written_by
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.grapple import Sway
 from tests.commissioning.identification.machine import (
@@ -70,7 +71,8 @@ def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) 
     assert "Near-far: period 2.20" in result.output
     assert "Use sway: { period_s: 2.35" in said(result)
     assert f"Written to {file}" in result.output
-    assert f"canshaper tune {file} --axis slew" in result.output
+    assert f"canshaper robust {file} --axis slew" in result.output
+    assert f"replaces the filter gff, which canshaper tune {file} --axis slew keeps" in said(result)
     axes = load_deployment(file).axes
     for name, mode in (("slew", EMPTY.mode5), ("near_far", EMPTY.mode6)):
         sway = axes[name].config.sway
@@ -79,9 +81,13 @@ def test_both_axes_of_a_log_are_written(tmp_path: Path, file: Path, logs: Path) 
         assert sway.period_s == pytest.approx(period_of(mode), rel=0.005)
         assert sway.damping_ratio == pytest.approx(mode.zeta, rel=0.1)
     assert axes["slew"].config.sway.full_speed_m_s == pytest.approx(1.5, rel=0.15)  # type: ignore[union-attr]
-    # Two lines are others, and every comment is there.
+    # Two lines are others, and the comment above each.
     after = file.read_text().splitlines()
-    assert sum(a != b for a, b in zip(before, after, strict=True)) == 2
+    changed = [b for a, b in zip(before, after, strict=True) if a != b]
+    assert changed[::2] == ["    # Written by canshaper identify."] * 2
+    origin = axes["slew"].config.sway.origin  # type: ignore[union-attr]
+    assert origin == Origin(**written_by("identify", simulated=True, log="empty.log"))
+    assert len(changed) == 4
     check = CliRunner().invoke(app, ["check", str(file)])
     assert check.exit_code == 0, check.output
     picture = tmp_path / "out" / "identify.png"

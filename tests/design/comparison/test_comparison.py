@@ -7,9 +7,11 @@ import subprocess
 import sys
 from contextlib import suppress
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import pytest
+from matplotlib.text import Annotation, Text
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
@@ -23,7 +25,7 @@ from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.console import SafeConsole
-from canshaper.report.pareto import Limits, Point, draw, figure
+from canshaper.report.pareto import Limits, Point, figure
 from canshaper.shaping.registry import KINDS
 from canshaper_sim.operator import SCRIPTS
 
@@ -47,14 +49,14 @@ def task(name: str) -> Manoeuvre:
 
 
 def test_every_filter_of_the_registry_takes_part_on_both_axes(deployment: Deployment) -> None:
-    found = candidates(deployment)
+    every = candidates(deployment)
     for axis in ("slew", "near_far"):
-        assert {c.filters[axis].kind for c in found} == set(KINDS)
-    assert len({c.name for c in found}) == len(found)
-    assert [c.name for c in found if c.ours and not c.motion] == ["robust 1.8 s apart"]
-    assert not next(c for c in found if c.name == "off").motion
+        assert {c.filters[axis].kind for c in every} == set(KINDS)
+    assert len({c.name for c in every}) == len(every)
+    assert [c.name for c in every if c.ours and not c.motion] == ["robust 1.8 s apart"]
+    assert not next(c for c in every if c.name == "off").motion
     without = candidates(replace(deployment, motions={}))
-    assert [c.name for c in without] == [c.name for c in found][:-1]
+    assert [c.name for c in without] == [c.name for c in every][:-1]
 
 
 def test_manoeuvres_end_in_rest_and_cover_what_they_should() -> None:
@@ -155,11 +157,11 @@ def test_initial_sway_hangs_along_the_boom(
 def test_processes_give_what_one_gives(
     deployment: Deployment, by_name: dict[str, Candidate]
 ) -> None:
-    found = [by_name["off"], by_name[ROBUST]]
+    every = [by_name["off"], by_name[ROBUST]]
     tap = task("tap 0.6 s 20 % slew")
     seen: list[float] = []
-    outcomes = measure_all(FILE, found, [tap], on_progress=seen.append, processes=2)
-    assert outcomes == [measure(deployment, c, tap, 0) for c in found]
+    outcomes = measure_all(FILE, every, [tap], on_progress=seen.append, processes=2)
+    assert outcomes == [measure(deployment, c, tap, 0) for c in every]
     assert seen == [0.5, 1.0]
 
 
@@ -235,8 +237,8 @@ def test_limits_lie_below_what_was_measured(
     deployment: Deployment, by_name: dict[str, Candidate]
 ) -> None:
     pulse = task("pulse near-far")
-    found = [by_name["off"], by_name["ZV"]]
-    outcomes = [measure(deployment, c, pulse, p) for c in found for p in pulse.lengths_pct]
+    every = [by_name["off"], by_name["ZV"]]
+    outcomes = [measure(deployment, c, pulse, p) for c in every for p in pulse.lengths_pct]
     limits = limits_for(deployment, outcomes)
     durations, left = zip(*limits.curve, strict=True)
     assert list(durations) == sorted(durations)
@@ -269,7 +271,7 @@ def test_the_table_of_limits(deployment: Deployment) -> None:
     assert limits[3].no_dip_30 == pytest.approx(0.124, abs=0.003)
 
 
-def test_picture_has_every_name_once_in_each_panel(tmp_path: Path) -> None:
+def test_picture_has_every_name_once_in_each_panel() -> None:
     points = [
         Point(f"filter {i}", i % 2 == 0, 1.0 + 0.01 * i, 1.1 + 0.01 * i, 5.0 + 0.1 * i)
         for i in range(12)
@@ -278,8 +280,30 @@ def test_picture_has_every_name_once_in_each_panel(tmp_path: Path) -> None:
     for panel in drawn.axes:
         texts = [t.get_text() for t in panel.texts]
         assert all(texts.count(p.name) == 1 for p in points)
-    draw(points, Limits([], 0.9), "title", tmp_path / "p.png")
-    assert (tmp_path / "p.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_no_line_to_a_name_goes_through_another_name() -> None:
+    """Names and dots of the shipped deployment: run-on in s, swing left in degrees."""
+    spots = {
+        "ZV": (1.28, 11.8), "limit-aware ZV": (1.28, 11.4), "G_FF slew poles": (1.41, 12.4),
+        "G_FF third pole -5": (1.57, 11.0), "robust 1.5 s": (1.6, 10.4), "two-mode": (1.64, 9.4),
+        "robust 1.8 s apart": (1.87, 11.2), "G_FF third pole -4": (1.85, 8.9),
+        "robust 1.8 s": (1.87, 8.3), "G_FF no jump": (1.94, 7.7), "G_FF near-far": (1.97, 8.1),
+        "off": (0.32, 53.6), "robust 2.4 s": (2.44, 2.7),
+    }  # fmt: skip
+    points = [Point(name, True, x, x + 0.1, y) for name, (x, y) in spots.items()]
+    drawn = figure(points, Limits([], 0.9), "title")
+    for panel in drawn.axes:
+        texts = [t for t in panel.texts if isinstance(t, Annotation) and t.get_text() in spots]
+        boxes = [
+            t.get_tightbbox() if not t.arrow_patch else Text.get_window_extent(t) for t in texts
+        ]
+        assert all(not a.overlaps(b) for a, b in combinations(boxes, 2))
+        lines = [(i, t.arrow_patch.get_path()) for i, t in enumerate(texts) if t.arrow_patch]
+        assert lines
+        for i, path in lines:
+            others = [box for j, box in enumerate(boxes) if j != i]
+            assert not any(path.intersects_bbox(box, filled=False) for box in others)
 
 
 def test_a_candidate_gets_time_to_run_on(
@@ -292,6 +316,18 @@ def test_a_candidate_gets_time_to_run_on(
     assert changed.axes["lift"] is deployment.axes["lift"]
     assert changed.motions == deployment.motions
     assert with_candidate(deployment, by_name["off"]).motions == {}
+
+
+def test_an_out_that_is_a_file_is_told_before_anything_is_driven(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def drives(*_arguments: object, **_options: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("canshaper.design.comparison.measure.measure_all", drives)
+    (tmp_path / "out").touch()
+    done = CliRunner().invoke(app, ["compare", "--out", str(tmp_path / "out")])
+    assert (done.exit_code, done.output) == (2, f"{tmp_path / 'out'}: File exists\n")
 
 
 def test_a_machine_without_slew_and_near_far_is_not_compared(tmp_path: Path) -> None:

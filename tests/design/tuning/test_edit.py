@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 import yaml
 
-from canshaper.config.edit import Value, edited, set_values
+from canshaper.config.edit import edited, set_values
+from canshaper.config.flow import Value
 from canshaper.config.load import load_config
 from canshaper.errors import ConfigError
 
@@ -243,9 +244,70 @@ def test_a_file_that_is_not_there(tmp_path: Path) -> None:
         set_values(tmp_path / "none.yaml", SLEW, NEW)
 
 
-def test_only_words_and_numbers_are_written() -> None:
-    with pytest.raises(ValueError, match="expected a word, got 'a: b'"):
-        edited("filter: { kind: gff }", ("filter",), {"kind": "a: b"})
+@pytest.mark.parametrize(
+    ("text", "written"),
+    [
+        ("a: b", '"a: b"'),
+        ("a.log, b.log", '"a.log, b.log"'),
+        ("Häiriö 2.log", "Häiriö 2.log"),
+        ("drive #2.log", '"drive #2.log"'),
+        ('a"b', '"a\\"b"'),
+        ("true", '"true"'),
+        ("12", '"12"'),
+        ("", '""'),
+        ("2026-11-23", "2026-11-23"),
+        ("canshaper identify 0.1.0", "canshaper identify 0.1.0"),
+    ],
+)
+def test_text_is_quoted_where_it_would_be_read_otherwise(text: str, written: str) -> None:
+    section = edited("sway: { kind: gff }", ("sway",), {"kind": text, "origin": {"log": text}})
+    assert section == f"sway: {{ kind: {written}, origin: {{ log: {written} }} }}"
+
+
+NOTE = "Written by canshaper identify."
+SWAY: dict[str, Value] = {"period_s": 2.5, "full_speed_m_s": 1.0}
+
+
+@pytest.mark.parametrize("newline", ["\n", "\r\n"])
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        (
+            "# the crane\n\n  # Stopwatch: ten swings\n  # took 23 s.\n"
+            "  sway: { period_s: 2.3 } # by hand\n",
+            f"# the crane\n\n  # {NOTE}\n  sway: {{ period_s: 2.5, full_speed_m_s: 1.0 }}\n",
+        ),
+        (
+            "    # of another\n# of all\n  sway: { period_s: 2.3 } # by hand\n  # below\n",
+            "    # of another\n# of all\n  sway: { period_s: 2.5, full_speed_m_s: 1.0 }"
+            f" # {NOTE}\n  # below\n",
+        ),
+        (
+            "  sway: { period_s: 2.3 }\n",
+            "  sway: { period_s: 2.5, full_speed_m_s: 1.0 }\n",
+        ),
+        (
+            "  # tool and load\n  sway: { mass_kg: 3, period_s: 2.3 } # heavy\n",
+            "  # tool and load\n"
+            "  sway: { mass_kg: 3, period_s: 2.5, full_speed_m_s: 1.0 } # heavy\n",
+        ),
+        (
+            "  # some\n  sway: # of all\n    # weighed\n    mass_kg: 3 # by hand\n\n"
+            "    # timed\n    period_s: 2.3 # twice\n",
+            "  # some\n  sway: # of all\n    # weighed\n    mass_kg: 3 # by hand\n\n"
+            f"    # {NOTE}\n    period_s: 2.5\n    full_speed_m_s: 1.0\n",
+        ),
+        (
+            "  sway: # of all\n\n    # timed\n    # twice\n    period_s: 2.3 # by hand\n"
+            "    # seen\n    # by eye\n    full_speed_m_s: 2\n",
+            f"  sway: # {NOTE}\n\n    period_s: 2.5\n    full_speed_m_s: 1.0\n",
+        ),
+    ],
+)
+def test_a_note_replaces_comments_on_what_is_written(before: str, after: str, newline: str) -> None:
+    text = ("axis:\n" + before + "  next: 1\n").replace("\n", newline)
+    expected = ("axis:\n" + after + "  next: 1\n").replace("\n", newline)
+    assert edited(text, ("axis", "sway"), SWAY, "", NOTE) == expected
 
 
 @pytest.mark.parametrize("newline", ["\n", "\r\n"])

@@ -5,6 +5,7 @@ from typer.testing import CliRunner
 
 from canshaper.cli.app import app
 from canshaper.config.filters import DesignedFor
+from canshaper.config.origin import Origin, written_by
 from canshaper.machine.binding import load_deployment
 
 ROOT = Path(__file__).parents[3]
@@ -51,8 +52,11 @@ def test_write_changes_the_filter_and_nothing_else(file: Path) -> None:
         length_range_pct=30.0,
         duration_s=1.82,
         valve_rate_per_s=5.0,
+        origin=Origin(**written_by("robust", simulated=None)),
     )
-    assert len(after[changed[0]]) < 280  # nobody reads a line of a hundred taps
+    assert "NOTE: axes.slew.filter.kind: robust replaces gff" in output
+    line = after[changed[0]].partition(", origin")[0]
+    assert len(line) < 280  # no one reads a line of a hundred taps
 
 
 def test_write_lengthens_a_tail_that_is_too_short(file: Path) -> None:

@@ -95,8 +95,8 @@ class DoublePendulum:
             return np.array([*self.rates(x[:4], tip), tip])
 
         end_s = len(sent) * TICK_S
-        found = solve_ivp(rates, (0.0, end_s), np.zeros(5), max_step=0.01, rtol=1e-7, atol=1e-9)
-        state: Vector = found.y[:4, -1]
+        solution = solve_ivp(rates, (0.0, end_s), np.zeros(5), max_step=0.01, rtol=1e-7, atol=1e-9)
+        state: Vector = solution.y[:4, -1]
         return state
 
 
@@ -196,19 +196,19 @@ def test_no_allowed_second_mode_spoils_the_first() -> None:
     for period_s in (0.3, 0.6, 0.96):
         for damping_ratio in (0.0, 0.1, 0.4):
             second = second_mode(first, period_s, damping_ratio, 20.0, **VALVE)
-            found = least_residual(first, second=second, **asked)
-            assert found.residual < alone.residual + 0.02
-            assert found.second_residual <= 0.51 * found.residual
-            assert found.mean_delay_s < alone.mean_delay_s + 0.01
+            covering = least_residual(first, second=second, **asked)
+            assert covering.residual < alone.residual + 0.02
+            assert covering.second_residual <= 0.51 * covering.residual
+            assert covering.mean_delay_s < alone.mean_delay_s + 0.01
 
 
 def test_the_shortest_keeps_both_modes_below_the_residual() -> None:
     first = LOGS.modes()[0]
     second = second_mode(first, 0.645, 0.09, 20.0, **VALVE)
-    found = shortest(first, residual_pct=5.0, range_pct=15.0, second=second, **VALVE)
+    covering = shortest(first, residual_pct=5.0, range_pct=15.0, second=second, **VALVE)
     alone = shortest(first, residual_pct=5.0, range_pct=15.0, **VALVE)
-    assert max(found.residual, found.second_residual) <= 0.05
-    assert alone.duration_s <= found.duration_s < alone.duration_s + 0.2
+    assert max(covering.residual, covering.second_residual) <= 0.05
+    assert alone.duration_s <= covering.duration_s < alone.duration_s + 0.2
 
 
 def test_it_prints_what_the_second_mode_costs_and_gains(file: Path) -> None:

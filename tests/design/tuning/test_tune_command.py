@@ -11,7 +11,9 @@ import pytest
 from typer.testing import CliRunner, Result
 
 from canshaper.cli.app import app
+from canshaper.config.flow import flow
 from canshaper.config.load import load_config
+from canshaper.config.origin import written_by
 from canshaper.design.tuning.deploy import deployed, setting
 from canshaper.design.tuning.evaluate import Machine
 from canshaper.design.tuning.manual import manual
@@ -88,11 +90,13 @@ def test_write_and_write_back(file: Path) -> None:
     assert len(changed) == 1
     result = run(file, "--axis", "slew", "--write", "--json", "--starts", "1")
     assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
+    printed = json.loads(result.stdout)
     after = load_config(file)[0].axes["slew"].filter.parameters()
-    assert after == {"a1": found["a1"], "a2": found["a2"]}
+    assert after == {"a1": printed["a1"], "a2": printed["a2"]}
+    origin = f"origin: {flow(written_by('tune', simulated=None))}"
+    designed_for = f"{DESIGNED.removesuffix(' }')}, {origin} }}"
     expected = before.replace(
-        "a1: 0.708, a2: 0.12 }\n", f"a1: {found['a1']}, a2: {found['a2']}, {DESIGNED} }}\n"
+        "a1: 0.708, a2: 0.12 }\n", f"a1: {printed['a1']}, a2: {printed['a2']}, {designed_for} }}\n"
     )
     assert file.read_text() == expected
 
@@ -231,6 +235,12 @@ def test_errors_leave_the_file_alone(file: Path, name: str) -> None:
     assert text in result.output.replace("\n", " ")
     assert f"axis {options[1]}" in result.output
     assert file.read_bytes() == before
+
+
+def test_an_out_that_is_a_file_is_told(file: Path, tmp_path: Path) -> None:
+    (tmp_path / "here").touch()
+    result = run(file, "--axis", "slew", "--method", "manual", "--out", str(tmp_path / "here"))
+    assert (result.exit_code, result.output) == (2, f"{tmp_path / 'here'}: File exists\n")
 
 
 def test_a_shipped_file_is_not_written_to(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -1,0 +1,174 @@
+"""A bus of python-can: whatever its interface raises or waits for, the loop goes on."""
+
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import suppress
+from importlib import import_module
+from typing import Any
+
+import can
+
+from canshaper.bus.arrival import Arrivals
+from canshaper.bus.multicast import LocalMulticastBus, receive_one_group
+from canshaper.bus.raw import MOST_FRAMES
+from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.config.bus import Bus
+from canshaper.machine.interface_options import ALWAYS_FD
+from canshaper.machine.routing import BusRoutes
+
+# Frames sent and not yet seen again: a few ticks of a machine with many axes.
+MOST_ECHOES = 256
+# Failures of an interface in one tick: a garbled line of an adapter costs that line, and what waits
+# behind it must not grow old; a bus that is gone fails at every call.
+MOST_FAILURES = 20
+
+
+# Their calls return at once: datagrams, and a queue in memory. Of other interfaces it is not known.
+NEVER_BLOCK = frozenset(("udp_multicast", "virtual"))
+# What an interface is opened with unless the file says otherwise: a read of a serial line waits
+# so long in the middle of a frame, and TCP sends before it has an answer to what it sent last.
+DEFAULTS: Mapping[str, Mapping[str, Any]] = {
+    "serial": {"timeout": 0.01},
+    "socketcand": {"tcp_tune": True},
+}
+
+
+class PythonCanPort:
+    """One open bus of python-can, without its Notifier: one exception ends that thread for good."""
+
+    def __init__(
+        self,
+        name: str,
+        config: Bus,
+        on_fault: Callable[[FrameFault], None],
+        fd: Iterable[tuple[int, bool]] = (),
+    ) -> None:
+        self.name = name
+        self._fd, self._fd_bus = frozenset(fd), config.fd
+        self._brs = config.data_bitrate is not None
+        self.state = BusState.UP
+        self.arrived_ns = 0
+        self._arrivals = Arrivals()  # before a frame can arrive
+        self._on_fault = on_fault
+        self._bus: Any = open_python_can(config)
+        self._apart = config.interface not in NEVER_BLOCK
+        if self._apart:
+            # Not before it is needed: only POSIX has what it asks of a line.
+            self._bus = import_module("canshaper.bus.apart").BusApart(self._bus)
+        # Multicast brings back what this process sent; the others do not.
+        multicast = config.interface == "udp_multicast"
+        self._echoes: deque[Frame] | None = deque(maxlen=MOST_ECHOES) if multicast else None
+        self._lost = 0
+
+    def frames(self) -> Iterator[Frame]:
+        """Every frame that waits, in order; ends when there is none or the bus fails."""
+        receive, failures = self._bus.recv, 0
+        # python-can's own times are those of whatever clock an interface has.
+        self.arrived_ns = self._arrivals.begin()
+        if self._apart and (lost := self._bus.lost) != self._lost:
+            self._lost = lost
+            self._on_fault(FrameFault.FRAMES_LOST)
+        for _ in range(MOST_FRAMES):
+            try:
+                message = receive(0)
+            except Exception:  # each interface raises its own kinds
+                self.state = BusState.FAILED
+                self._on_fault(FrameFault.BUS_ERROR)
+                failures += 1
+                if failures == MOST_FAILURES:
+                    return
+                continue
+            if message is None:
+                self._arrivals.emptied()
+                return
+            if self._apart:
+                self.arrived_ns = self._bus.since_ns
+            if self.state is not BusState.NOT_CONFIRMED:
+                self.state = BusState.UP
+            if message.is_error_frame:  # first: its id is an error class, and could match
+                self._on_fault(FrameFault.ERROR_FRAME)
+            elif message.is_remote_frame or (message.is_fd and not self._fd_bus):
+                self._on_fault(FrameFault.WRONG_LENGTH)
+            else:
+                frame = Frame(
+                    self.name, message.arbitration_id, message.is_extended_id, bytes(message.data)
+                )
+                if self._echoes and frame in self._echoes:
+                    self._echoes.remove(frame)
+                else:
+                    yield frame
+
+    def background(self) -> Iterator[Frame]:
+        """Nothing: ``frames`` hands out everything."""
+        return iter(())
+
+    def send(self, frame: Frame) -> bool:
+        """Send now or not at all; False when the frame did not go out."""
+        fd = frame[1:3] in self._fd
+        message = can.Message(
+            arbitration_id=frame.can_id,
+            is_extended_id=frame.extended,
+            data=frame.data,
+            is_fd=fd,
+            bitrate_switch=fd and self._brs,
+        )
+        try:
+            self._bus.send(message)
+        except Exception as error:  # as above
+            blocked = self._apart and isinstance(error, can.CanTimeoutError)
+            before = self.state
+            self.state = BusState.NOT_CONFIRMED if blocked else BusState.FAILED
+            if blocked and before is not self.state:
+                self._on_fault(FrameFault.NOT_CONFIRMED)
+            return False
+        if self.state is BusState.NOT_CONFIRMED and self._bus.took:
+            self.state = BusState.UP
+        if self._echoes is not None:
+            self._echoes.append(frame)
+        return True
+
+    def watch(self, name: str, ids: BusRoutes) -> None:
+        """Serve another deployment: its name of the bus, its messages of CAN FD."""
+        self.name, self._fd = name, ids.fd
+
+    def fileno(self) -> int:
+        """File descriptor to wait on; -1 where the interface has none."""
+        try:
+            return int(self._bus.fileno())
+        except Exception:  # most have none and say so in their own way
+            return -1
+
+    def close(self) -> None:
+        """Close the bus; errors of a bus that is gone do not matter any more."""
+        with suppress(Exception):
+            self._bus.shutdown()
+
+
+def open_python_can(config: Bus) -> can.BusABC:
+    """Open a bus of python-can; ``udp_multicast`` stays on this machine but with ``network``.
+
+    Raises:
+        Exception: each interface raises its own kinds.
+    """
+    if config.interface == "udp_multicast" and not config.network:
+        return LocalMulticastBus(config.channel)
+    options = {**DEFAULTS.get(config.interface, {}), **config.options}
+    if config.bitrate is not None:
+        options["bitrate"] = config.bitrate
+    if config.fd and config.interface not in ALWAYS_FD:
+        options["fd"] = True
+        if config.data_bitrate is not None:
+            options["data_bitrate"] = config.data_bitrate
+    # ignore_config: files and variables of the environment must not change the bus
+    bus = can.Bus(
+        interface=config.interface,
+        channel=config.channel,
+        ignore_config=True,
+        receive_own_messages=False,
+        **options,
+    )
+    if config.interface == "udp_multicast":
+        receive_one_group(bus.fileno())
+        while bus.recv(0) is not None:  # of other groups, until now
+            pass
+    return bus

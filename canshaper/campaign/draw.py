@@ -1,0 +1,178 @@
+"""What is drawn for one drive of a campaign: crane, load, valves, operator, faults.
+
+Everything comes from the drive's seed by NumPy's SeedSequence, in a fixed order: a drive is the
+same in whatever process and order it is driven, and two files that are driven with the same ranges
+meet the same crane and the same operator.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from canshaper.campaign.faults import Fault, bus_fault, sensor_fault
+from canshaper.campaign.operators import OPERATORS, Draw
+from canshaper.config.uncertainty import Uncertainty
+from canshaper.design.lockstep import DriveOptions, driven_part
+from canshaper.errors import CampaignError
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.axes import ALL_AXES, JOINT_AXES, SLEW
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.cranes import cranes
+from canshaper_sim.grapple import Grapple, Sway
+from canshaper_sim.strokes import Script
+
+# Parts of the drive in which a load is picked up, and put down.
+_PICK_UP, _PUT_DOWN = (0.1, 0.5), (0.5, 0.9)
+_FULL_SPEEDS = {
+    "slew": "slew_full_speed_rad_s",
+    "near_far": "near_far_full_speed_m_s",
+    "lift": "lift_full_speed_m_s",
+    "lift_cylinder": "lift_cylinder_full_speed_rad_s",
+    "knuckle": "knuckle_full_speed_rad_s",
+    "extension": "extension_full_speed_m_s",
+}
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One drive.
+
+    Attributes:
+        operator: kind of operator.
+        fault: kind of fault, empty without one.
+        factors: numbers that were drawn, by name.
+        script: what the operator does.
+        options: the crane and all else, see ``DriveOptions``.
+    """
+
+    operator: str
+    fault: str
+    factors: dict[str, float]
+    script: Script
+    options: DriveOptions
+
+
+def driven_axes(deployment: Deployment) -> tuple[str | None, list[str]]:
+    """Name of the crane that is driven, of several the first one, and the axes it has."""
+    crane = next(iter(cranes(deployment)), None)
+    driven = driven_part(deployment, crane)
+    return crane, [axis for axis in ALL_AXES if axis in driven.axes]
+
+
+def check_same_axes(first: Deployment, second: Deployment) -> None:
+    """Look whether a seed means the same crane and operator with both deployments.
+
+    Raises:
+        CampaignError: they have other axes: the same numbers would be drawn for other things.
+    """
+    (_, ones), (_, others) = driven_axes(first), driven_axes(second)
+    if ones != others:
+        text = f"expected the axes of {first.path.name}, {', '.join(ones)}, got {', '.join(others)}"
+        raise CampaignError(f"{second.path}: {text}")
+
+
+def draw_drive(
+    deployment: Deployment, seed: int, ranges: Uncertainty, nominal: CraneParameters | None = None
+) -> Setting:
+    """Draw one drive.
+
+    Args:
+        deployment: the machine.
+        seed: of the drive, 0 or more.
+        ranges: from which the crane is drawn.
+        nominal: the crane that the ranges are about.
+    """
+    of_crane, of_operator, of_load, of_fault = (
+        Draw(one) for one in np.random.SeedSequence(seed).spawn(4)
+    )
+    crane, axes = driven_axes(deployment)
+    parameters, factors = _crane(of_crane, axes, ranges, nominal or CraneParameters())
+    swing = [of_crane.between(*ranges.sway_deg) * of_crane.one_of((-1, 1)) for _ in range(2)]
+    operator = of_operator.one_of([*OPERATORS])
+    script = OPERATORS[operator](of_operator, axes, f"campaign-{seed}")
+    loads, of_loads = _loads(of_load, ranges, script.duration_s, parameters.grapple)
+    sensors = any(axis.sway_sensor for axis in deployment.axes.values())
+    fault = _fault(of_fault, ranges, script.duration_s, sensors=sensors)
+    sensor = replace(parameters.sway_sensor, seed=seed % 1_000_000, **fault.sensor)
+    options: DriveOptions = {
+        "parameters": replace(parameters, sway_sensor=sensor),
+        "sway": Sway(*map(math.radians, swing)),
+        "loads": loads,
+        "crane": crane,
+    }
+    if fault.disturb is not None:
+        options["disturb"] = fault.disturb
+    factors |= {"sway_across_deg": swing[0], "sway_along_deg": swing[1], **of_loads}
+    return Setting(operator, fault.name, factors, script, options)
+
+
+def _crane(
+    draw: Draw, axes: Sequence[str], ranges: Uncertainty, nominal: CraneParameters
+) -> tuple[CraneParameters, dict[str, float]]:
+    """Tool, pose and valves; what was drawn of them."""
+    factors = {
+        "length_pct": draw.between(*ranges.length_pct),
+        "damping_pct": draw.between(*ranges.damping_pct),
+        "radius_m": draw.between(*ranges.radius_m),
+    }
+    damped = 1.0 + factors["damping_pct"] / 100.0
+    grapple = nominal.grapple
+    grapple = replace(
+        grapple.longer(factors["length_pct"]),
+        c5_n_m_s_rad=damped * grapple.c5_n_m_s_rad,
+        c6_n_m_s_rad=damped * grapple.c6_n_m_s_rad,
+    )
+    crane, joints = replace(nominal, grapple=grapple), nominal.joints
+    by_joints = bool({*axes} & {*JOINT_AXES} - {SLEW})
+    if by_joints:  # they reach the start that they were given, not any
+        del factors["radius_m"]
+    else:
+        radius_m = min(max(factors["radius_m"], nominal.radius_min_m), nominal.radius_max_m)
+        crane = replace(crane, start_radius_m=radius_m)
+    for axis in axes:
+        drawn = {
+            "dead_time_s": draw.between(*ranges.valve_dead_time_s),
+            "lag_s": draw.between(*ranges.valve_lag_s),
+            "rate_limit_1_s": draw.between(*ranges.valve_rate_per_s),
+            "deadband": draw.between(*ranges.valve_deadband_pct) / 100.0,
+            "hysteresis": draw.between(*ranges.valve_hysteresis_pct) / 100.0,
+        }
+        gain_pct = draw.between(*ranges.valve_gain_pct)
+        factors |= {f"{axis}_{name}": value for name, value in drawn.items()}
+        factors[f"{axis}_gain_pct"] = gain_pct
+        owner = joints if by_joints and axis != SLEW else crane
+        full = _FULL_SPEEDS[axis]
+        changed = {
+            axis: replace(getattr(owner, axis), **drawn),
+            full: (1.0 + gain_pct / 100.0) * getattr(owner, full),
+        }
+        if owner is joints:
+            joints = replace(joints, **changed)
+        else:
+            crane = replace(crane, **changed)
+    return replace(crane, joints=joints), factors
+
+
+def _loads(
+    draw: Draw, ranges: Uncertainty, duration_s: float, empty: Grapple
+) -> tuple[list[tuple[float, Grapple]], dict[str, float]]:
+    """When something else hangs from the tip, and what was drawn of it."""
+    loaded = draw.between(0.0, 100.0) < ranges.load_change_pct
+    mass, lower_m = draw.between(*ranges.load_mass), draw.between(*ranges.load_m)
+    times_s = [duration_s * draw.between(*part) for part in (_PICK_UP, _PUT_DOWN)]
+    if not loaded:
+        return [], {"load_mass": 1.0, "load_m": 0.0}
+    full = replace(empty, m2_kg=mass * empty.m2_kg, l2_m=empty.l2_m + lower_m)
+    return [*zip(times_s, (full, empty), strict=True)], {"load_mass": mass, "load_m": lower_m}
+
+
+def _fault(draw: Draw, ranges: Uncertainty, duration_s: float, *, sensors: bool) -> Fault:
+    """What goes wrong, one thing at most."""
+    of_bus, of_sensor = draw.between(0.0, 100.0), draw.between(0.0, 100.0)
+    if of_bus < ranges.bus_fault_pct:
+        return bus_fault(draw, duration_s)
+    if sensors and of_sensor < ranges.sensor_fault_pct:
+        return sensor_fault(draw, duration_s)
+    return Fault("")

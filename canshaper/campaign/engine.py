@@ -1,0 +1,249 @@
+"""Many pieces of work on the processes of this machine, or on a Dask cluster: the same results.
+
+Every piece is done once, and its result handed out once, whatever becomes of the process that had
+it: one that dies costs time, no result.
+"""
+
+import multiprocessing
+import signal
+import subprocess
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any, Generic, Protocol, TypeVar
+
+from canshaper.errors import CampaignError, WorkerError
+from canshaper.machine.identity import program_sha256
+
+# A piece whose process dies so often is what kills it.
+MOST_DEATHS = 3
+# A scheduler answers at once, or is not there; workers of a batch system may start later.
+CONNECT_S, WORKERS_S = 10.0, 60.0
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+
+class Engine(Protocol):
+    """Where work is done."""
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; each with its result, in any order.
+
+        Args:
+            work: what to do; a function of a module, or ``functools.partial`` of one.
+            jobs: taken one by one, a few more than are being done.
+
+        Raises:
+            CampaignError: the processes die of it, or the cluster is gone.
+        """
+
+
+class _Queue(Generic[J]):
+    """Jobs that are still to do, each with how often its process died."""
+
+    def __init__(self, jobs: Iterable[J]) -> None:
+        self._jobs = iter(jobs)
+        self._again: deque[tuple[J, int]] = deque()
+
+    def take(self) -> tuple[J, int] | None:
+        """The next one; None where there is none."""
+        if self._again:
+            return self._again.popleft()
+        return next(((job, 0) for job in self._jobs), None)
+
+    def put_back(self, job: J, deaths: int) -> None:
+        """The process of a job died."""
+        if deaths + 1 >= MOST_DEATHS:
+            raise CampaignError(f"the process died {MOST_DEATHS} times of {job}")
+        self._again.append((job, deaths + 1))
+
+
+@dataclass
+class Processes:
+    """Processes of this machine.
+
+    Attributes:
+        count: how many; by default one a processor. With 1 the work is done in this one.
+    """
+
+    count: int | None = None
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; see ``Engine``."""
+        if self.count == 1:
+            yield from ((job, work(job)) for job in jobs)
+            return
+        queue, ends = _Queue(jobs), False
+        while not ends:
+            with ProcessPoolExecutor(self.count, initializer=_ignore_interrupts) as pool:
+                try:
+                    ends = yield from self._drain(pool, work, queue)
+                except BaseException:
+                    pool.shutdown(wait=False, cancel_futures=True)
+                    for process in multiprocessing.active_children():
+                        process.terminate()
+                    raise
+
+    def _drain(
+        self, pool: ProcessPoolExecutor, work: Callable[[J], R], queue: _Queue[J]
+    ) -> Generator[tuple[J, R], None, bool]:
+        """Do all; whether it is done. It is not where a process died, which takes all down."""
+        doing: dict[Future[R], tuple[J, int]] = {}
+        ahead, dead = 2 * (self.count or multiprocessing.cpu_count()), False
+        while True:
+            while not dead and len(doing) < ahead and (item := queue.take()):
+                try:
+                    doing[pool.submit(work, item[0])] = item
+                except BrokenProcessPool:
+                    queue.put_back(item[0], item[1] - 1)  # it never began
+                    dead = True
+            if not doing:
+                return not dead
+            for future in wait(doing, return_when=FIRST_COMPLETED).done:
+                job, deaths = doing.pop(future)
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    queue.put_back(job, deaths)
+                    dead = True
+                else:
+                    yield job, result
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
+
+
+@dataclass
+class Cluster:
+    """Workers of a Dask scheduler.
+
+    Attributes:
+        scheduler: its address, such as tcp://10.0.0.1:8786.
+        on_refusal: called with what is wrong with a worker that is given nothing more.
+        workers_s: how long to wait for the first worker; None for ever.
+    """
+
+    scheduler: str
+    on_refusal: Callable[[str], object] = field(default=lambda _text: None)
+    workers_s: float | None = WORKERS_S
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; see ``Engine``."""
+        from distributed import Client, KilledWorker, as_completed  # noqa: PLC0415  (an extra)
+        from distributed.comm import get_address_host_port  # noqa: PLC0415
+
+        try:
+            get_address_host_port(self.scheduler, strict=True)
+        except ValueError:  # a client that has begun with one would take half a minute to end
+            expected = "expected the address of a scheduler, such as tcp://10.0.0.1:8786"
+            raise CampaignError(f"{self.scheduler}: {expected}") from None
+        try:
+            client: Any = Client(self.scheduler, timeout=CONNECT_S, set_as_default=False)
+        except OSError as error:
+            text = str(error).splitlines()[0]
+            raise CampaignError(f"{self.scheduler}: no scheduler answers: {text}") from None
+        refused: set[str] = set()
+        with client:
+            try:
+                client.wait_for_workers(1, timeout=self.workers_s)
+            except TimeoutError:
+                text = f"{self.scheduler}: expected workers, got none within {self.workers_s:g} s"
+                raise CampaignError(text) from None
+            waiting = iter(jobs)
+            doing: dict[Any, J] = {}
+            done: Any = as_completed(loop=client.loop)
+
+            def submit(job: J) -> None:
+                future = client.submit(
+                    _checked, program_sha256(), work, job, pure=False, **_others(client, refused)
+                )
+                doing[future.key] = job
+                done.add(future)
+
+            for job in islice(waiting, 4 * sum(client.ncores().values())):
+                submit(job)
+            for future in done:
+                job = doing.pop(future.key)
+                try:
+                    result = future.result()
+                except WorkerError as error:
+                    if error.worker not in refused:
+                        self.on_refusal(str(error))
+                        refused.add(error.worker)
+                    submit(job)
+                    continue
+                except KilledWorker:
+                    raise CampaignError(f"{self.scheduler}: the workers died of {job}") from None
+                yield job, result
+                for following in islice(waiting, 1):
+                    submit(following)
+
+
+@dataclass
+class Slurm:
+    """Jobs of Slurm, each a worker of a Dask scheduler in this process.
+
+    Queue, account, cores and memory of a job are those of the user's Dask configuration; without
+    one a job has one core.
+
+    Attributes:
+        count: how many jobs.
+        on_refusal: see ``Cluster``.
+    """
+
+    count: int
+    on_refusal: Callable[[str], object] = field(default=lambda _text: None)
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job; see ``Engine``. It waits until Slurm has begun one of its own."""
+        import dask  # noqa: PLC0415  (an extra)
+        from dask_jobqueue import SLURMCluster  # noqa: PLC0415  (the same)
+
+        given = dask.config.get("jobqueue.slurm")
+        defaults = {"cores": 1, "memory": "1 GB", "log_directory": "out/slurm"}
+        options = {name: given[name.replace("_", "-")] or one for name, one in defaults.items()}
+        page = given["scheduler-options"] | {"dashboard": False}
+        with SLURMCluster(**options, scheduler_options=page) as slurm:
+            _try_job(slurm.job_script())
+            # Unlike `scale` it replaces a job that ends, at its time limit or otherwise.
+            slurm.adapt(minimum_jobs=self.count, maximum_jobs=self.count)
+            workers = Cluster(slurm.scheduler_address, self.on_refusal, None)
+            yield from workers.run(work, jobs)
+
+
+def _try_job(script: str) -> None:
+    """Let Slurm say whether it would take a job; afterwards its answer is in a log only."""
+    try:
+        done = subprocess.run(
+            ["sbatch", "--test-only"], input=script, capture_output=True, text=True, check=False
+        )
+    except OSError as error:
+        text = f"slurm: expected the command sbatch on this machine: {error}"
+        raise CampaignError(text) from None
+    if done.returncode:
+        raise CampaignError(f"slurm: {' '.join(done.stderr.split())}")
+
+
+def _others(client: Any, refused: set[str]) -> dict[str, Any]:
+    """Where a job may run: anywhere, until a worker was refused."""
+    if not refused:
+        return {}
+    workers = [address for address in client.ncores() if address not in refused]
+    if not workers:
+        raise CampaignError("every worker has another version than this program")
+    return {"workers": workers, "allow_other_workers": False}
+
+
+def _checked(program: str, work: Callable[[J], R], job: J) -> R:
+    """Do a job in a worker, if it runs the same program."""
+    if (own := program_sha256()) != program:
+        from distributed import get_worker  # noqa: PLC0415  (an extra)
+
+        text = f"expected the program sha256:{program[:12]}, got sha256:{own[:12]}"
+        raise WorkerError(get_worker().address, text)
+    return work(job)

@@ -1,0 +1,119 @@
+"""One drive of a campaign, measured while it is driven: no frame is recorded."""
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+from canshaper.campaign.draw import Setting, draw_drive, driven_axes
+from canshaper.config.uncertainty import Uncertainty
+from canshaper.controller.events import RefusalEvent
+from canshaper.design.lockstep import Simulation, driven_part
+from canshaper.machine.deployment import Deployment
+from canshaper.report.crane_metrics import crane_metrics
+from canshaper.report.stroke_metrics import dip
+from canshaper.report.strokes import find_strokes
+from canshaper_sim.axes import LIFT, SLEW
+from canshaper_sim.crane import CraneParameters, CraneState
+from canshaper_sim.plant import PlantNode
+from canshaper_sim.recorder import meant
+from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
+
+Row = dict[str, Any]
+"""Of one drive: seed, operator, fault, what was drawn, what was measured."""
+
+
+def measured_drive(
+    deployment: Deployment, seed: int, ranges: Uncertainty, nominal: CraneParameters | None = None
+) -> Row:
+    """Draw a drive, drive it and measure it; see ``draw_drive``.
+
+    A broken promise is a valve frame that the output guard had to refuse: it knows nothing of how
+    the controller makes a frame, only what was asked and what the limits are.
+    """
+    setting = draw_drive(deployment, seed, ranges, nominal)
+    simulation = Simulation(deployment, setting.script, **setting.options)
+    tracks = _Tracks(deployment, setting, nominal or CraneParameters(), simulation.plant)
+    broken, why = 0, ""
+    for time_ms in simulation.ticks():
+        tracks.add(time_ms)
+        for event in simulation.controller.events:
+            if isinstance(event, RefusalEvent):
+                broken, why = broken + 1, why or f"{time_ms / 1000.0:.2f} s: {event.text}"
+    row = {"seed": seed, "operator": setting.operator, "fault": setting.fault, **setting.factors}
+    return {
+        **row,
+        **tracks.measures(),
+        "broken": broken,
+        "why": why,
+        "swung_over": simulation.plant.crane.swung_over,
+    }
+
+
+class _Tracks:
+    """What the crane does in each tick, and what is measured of it at the end.
+
+    Speeds are parts of the nominal full speeds: what the operator expects of a deflection.
+    """
+
+    def __init__(
+        self, deployment: Deployment, setting: Setting, nominal: CraneParameters, plant: PlantNode
+    ) -> None:
+        crane, axes = driven_axes(deployment)
+        driven = driven_part(deployment, crane)
+        self._plant, self._script = plant, setting.script
+        self._tick_s = deployment.config.tick_ms / 1000.0
+        self._limits = {name: driven.axes[name].config.limits.output_limits() for name in axes}
+        self._full = nominal.full_speeds
+        self._t_s: list[float] = []
+        self._commands: dict[str, list[float]] = {name: [] for name in axes}
+        self._speeds: dict[str, list[float]] = {name: [] for name in axes}
+        self._states: list[CraneState] = []
+
+    def add(self, time_ms: int) -> None:
+        """A tick is over."""
+        plant = self._plant
+        crane, commands, speeds = plant.crane, self._commands, self._speeds
+        self._t_s.append(time_ms / 1000.0)
+        self._states.append(crane.state)
+        for name in commands:
+            commands[name].append(plant.command(name))
+            speeds[name].append(crane.speed(name))
+
+    def measures(self) -> dict[str, float | None]:
+        """Of the whole drive, by the names of ``MEASURES``; None where there is none."""
+        across = [math.degrees(state.theta5_rad) for state in self._states]
+        along = [math.degrees(state.theta6_rad) for state in self._states]
+        swing = [*map(math.hypot, across, along)]
+        tip = [
+            (at.radius_m * math.cos(at.theta1_rad), at.radius_m * math.sin(at.theta1_rad))
+            for at in self._states
+        ]
+        axes = {
+            name: AxisTrace(
+                [self._script.command(name, time_s) for time_s in self._t_s],
+                [meant(command, limits) for command in self._commands[name]],
+                [speed / self._full[name] for speed in self._speeds[name]],
+                across if name == SLEW else None if name == LIFT else along,
+            )
+            for name, limits in self._limits.items()
+        }
+        crane = CraneTrace(tip, tip, swing)
+        recording = Recording(self._t_s, axes, crane)
+        of_crane = crane_metrics(recording, crane)
+        strokes = find_strokes(recording)
+        dips = [dip(axes[name], stroke) for name, own in strokes.items() for stroke in own]
+        return {
+            "residual_deg": of_crane.residual_deg,
+            "peak_deg": of_crane.peak_deg,
+            "run_on_s": of_crane.run_on_s,
+            "run_on_m": of_crane.run_on_m,
+            "travel_error_s": max(self._travel_errors(axes), default=None),
+            "dip_pct": 100.0 * max(dips, default=0.0),
+        }
+
+    def _travel_errors(self, axes: Mapping[str, AxisTrace]) -> Iterator[float]:
+        """Of every axis: its way less what the joystick asked for, s of full speed."""
+        for name, axis in axes.items():
+            most = self._limits[name].maximum
+            asked = math.fsum(min(max(one, -most), most) for one in axis.joystick)
+            yield abs(math.fsum(axis.speed) - asked) * self._tick_s

@@ -1,0 +1,125 @@
+"""Operators of a campaign: what they do with the joysticks, drawn."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import TypeVar
+
+import numpy as np
+
+from canshaper_sim.axes import LIFT
+from canshaper_sim.operator import REACH_S, random_script
+from canshaper_sim.strokes import Script, Stroke
+
+# After the last stroke: the dwell of the residual, and more than a swing to see it in.
+REST_S = 5.0
+_START_S = 0.5
+_RAMP_S = (0.1, 0.4)
+_LEVEL = (0.25, 1.2)  # a part of them is full deflection
+_RANDOM_S = 15.0
+
+T = TypeVar("T")
+
+
+class Draw:
+    """Uniform numbers of one stream.
+
+    Args:
+        sequence: the stream.
+    """
+
+    def __init__(self, sequence: np.random.SeedSequence) -> None:
+        self._source = np.random.Generator(np.random.PCG64(sequence))
+
+    def between(self, low: float, high: float) -> float:
+        """Number from low to high."""
+        return low + (high - low) * float(self._source.random())
+
+    def one_of(self, choices: Sequence[T]) -> T:
+        """One of these, each as likely as another."""
+        return choices[int(self.between(0.0, len(choices)))]
+
+
+class _Hand:
+    """Strokes that do not carry the boom out of its reach."""
+
+    def __init__(self, draw: Draw) -> None:
+        self._draw = draw
+        self._travel_s: dict[str, float] = {}
+        self.strokes: list[Stroke] = []
+
+    def stroke(self, axis: str, start_s: float, duration_s: float, level: float) -> Stroke:
+        """One more; turned round or shorter where it would go too far."""
+        low_s, high_s = REACH_S[axis]
+        travel_s = self._travel_s.get(axis, 0.0)
+        if not low_s <= travel_s + level * duration_s <= high_s:
+            level = -level
+        room_s = high_s - travel_s if level > 0.0 else travel_s - low_s
+        ramp_s = min(self._draw.between(*_RAMP_S), duration_s)
+        duration_s = max(ramp_s, min(duration_s, room_s / abs(level)))
+        self._travel_s[axis] = travel_s + level * duration_s
+        stroke = Stroke(axis, start_s, duration_s, level, ramp_s)
+        self.strokes.append(stroke)
+        return stroke
+
+    def level(self) -> float:
+        """A deflection in any direction."""
+        return min(1.0, self._draw.between(*_LEVEL)) * self._draw.one_of((-1, 1))
+
+
+def _random(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
+    """Plateaus, reversals and pauses of all axes."""
+    return random_script(int(draw.between(0.0, 2**31)), _RANDOM_S, axes).strokes
+
+
+def _taps(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
+    """Short strokes of one axis, one after the other."""
+    hand, axis, at_s = _Hand(draw), draw.one_of(_swinging(axes)), _START_S
+    for _ in range(draw.one_of((2, 3, 4, 5))):
+        stroke = hand.stroke(axis, at_s, draw.between(0.12, 0.6), hand.level())
+        at_s = stroke.end_s + draw.between(0.2, 1.5)
+    return hand.strokes
+
+
+def _reversals(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
+    """To and fro on one axis, without a pause."""
+    hand, axis, at_s, level = _Hand(draw), draw.one_of(_swinging(axes)), _START_S, 0.0
+    for _ in range(draw.one_of((2, 3, 4))):
+        size = abs(hand.level())
+        level = -size if level > 0.0 else size
+        stroke = hand.stroke(axis, at_s, draw.between(0.5, 1.8), level)
+        at_s, level = at_s + stroke.duration_s, stroke.level
+    return hand.strokes
+
+
+def _both(draw: Draw, axes: Sequence[str]) -> Sequence[Stroke]:
+    """A stroke of each of two axes, at once or one a little later."""
+    hand, at_s = _Hand(draw), _START_S
+    for axis in _swinging(axes)[:2]:
+        hand.stroke(axis, at_s, draw.between(0.8, 3.0), hand.level())
+        at_s = _START_S + draw.between(0.0, 1.2)
+    return hand.strokes
+
+
+def _swinging(axes: Sequence[str]) -> Sequence[str]:
+    return [axis for axis in axes if axis != LIFT] or axes
+
+
+def _resting(
+    strokes: Callable[[Draw, Sequence[str]], Sequence[Stroke]],
+) -> "Callable[[Draw, Sequence[str], str], Script]":
+    """The same as a script of that name, with a rest at the end."""
+
+    def script(draw: Draw, axes: Sequence[str], name: str) -> Script:
+        drawn = tuple(strokes(draw, axes))
+        end_s = max((stroke.end_s for stroke in drawn), default=0.0)
+        return Script(name, drawn, end_s + REST_S)
+
+    return script
+
+
+OPERATORS: Mapping[str, Callable[[Draw, Sequence[str], str], Script]] = {
+    "random": _resting(_random),
+    "taps": _resting(_taps),
+    "reversals": _resting(_reversals),
+    "both": _resting(_both),
+}
+"""By their names; called with the stream, the axes of the crane and a name for the script."""

@@ -1,0 +1,138 @@
+"""A campaign: which drives there are, who drives them, and what is kept of them."""
+
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cache, partial
+from hashlib import sha256
+from itertools import islice
+from pathlib import Path
+from typing import Any
+
+from canshaper.campaign.engine import Engine
+from canshaper.campaign.measure import Row, measured_drive
+from canshaper.campaign.store import Store
+from canshaper.config.uncertainty import Uncertainty
+from canshaper.errors import CampaignError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.identity import program_sha256
+from canshaper_sim.parameters import changed_parameters
+
+# Drives in one piece of work: a second of it.
+_DRIVES = 16
+Seeds = tuple[int, ...]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A deployment as it is sent to where it is driven.
+
+    Attributes:
+        path: of the deployment file.
+        files: content of it and of its DBC files, by their absolute paths.
+        ranges: from which its cranes are drawn; of two files that are compared, those of the first.
+        changes: parameters of the nominal crane, NAME=VALUE.
+    """
+
+    path: str
+    files: tuple[tuple[str, bytes], ...]
+    ranges: Uncertainty
+    changes: tuple[str, ...] = ()
+
+    @classmethod
+    def of(
+        cls, deployment: Deployment, ranges: Uncertainty, changes: Sequence[str] = ()
+    ) -> "Source":
+        """Read the files of a deployment."""
+        path = deployment.path.resolve()
+        paths = [path, *((path.parent / name).resolve() for name in deployment.config.dbc)]
+        files = tuple((str(one), one.read_bytes()) for one in paths)
+        return cls(str(path), files, ranges, tuple(changes))
+
+    @property
+    def about(self) -> dict[str, Any]:
+        """What drives of it are of: only the same go together."""
+        content = sha256(b"".join(sha256(data).digest() for _, data in self.files)).hexdigest()
+        return {
+            "file": f"{Path(self.path).name} sha256:{content[:16]}",
+            "program": f"sha256:{program_sha256()[:16]}",
+            "ranges": self.ranges.model_dump(),
+            "crane": [*self.changes],
+        }
+
+
+@cache
+def _loaded(source_path: str, files: tuple[tuple[str, bytes], ...]) -> Deployment:
+    """The deployment, from where it lies or, in a worker elsewhere, from what was sent."""
+    try:
+        if all(Path(path).read_bytes() == data for path, data in files):
+            return load_deployment(Path(source_path))
+    except OSError:
+        pass
+    with tempfile.TemporaryDirectory() as folder:
+        root = Path(folder)
+        for path, data in files:
+            place = root / path.lstrip("/")
+            place.parent.mkdir(parents=True, exist_ok=True)
+            place.write_bytes(data)
+        return load_deployment(root / source_path.lstrip("/"))
+
+
+def drive_all(source: Source, seeds: Seeds) -> list[Row]:
+    """Draw, drive and measure each of some drives."""
+    deployment = _loaded(source.path, source.files)
+    nominal = changed_parameters([*source.changes])
+    return [measured_drive(deployment, seed, source.ranges, nominal) for seed in seeds]
+
+
+def shard_of(seeds: range, shard: str | None) -> range:
+    """One of N shares of a campaign, I/N; all of it without one.
+
+    Raises:
+        CampaignError: there is no such share, or no drive in it.
+    """
+    if shard is None:
+        return seeds
+    part, _, of = shard.partition("/")
+    if not (part.isdecimal() and of.isdecimal() and 1 <= int(part) <= int(of)):
+        raise CampaignError(f"--shard: expected I/N with I from 1 to N, got {shard}")
+    if not (share := seeds[int(part) - 1 :: int(of)]):
+        raise CampaignError(f"--shard: expected {len(seeds)} shares at most, got {shard}")
+    return share
+
+
+def run_campaign(
+    engine: Engine,
+    source: Source,
+    seeds: range,
+    store: Store,
+    on_progress: Callable[[int], object],
+) -> None:
+    """Make every drive that is not kept yet, and keep it; what is done is kept however it ends.
+
+    Args:
+        engine: who drives.
+        source: what is driven.
+        seeds: the drives.
+        store: where they are kept.
+        on_progress: called with the number of drives that are done.
+
+    Raises:
+        CampaignError: the engine cannot go on, or the disk takes no more.
+    """
+    left = (seed for seed in seeds if seed not in store.seeds)
+    done = sum(seed in store.seeds for seed in seeds)
+    on_progress(done)
+    try:
+        for _, rows in engine.run(partial(drive_all, source), _pieces(left)):
+            store.add(rows)
+            done += len(rows)
+            on_progress(done)
+    finally:
+        store.flush()
+
+
+def _pieces(seeds: Iterator[int]) -> Iterator[Seeds]:
+    while piece := tuple(islice(seeds, _DRIVES)):
+        yield piece

@@ -1,0 +1,187 @@
+"""What a campaign says: quantiles, broken promises, what drives the worst, and the verdict."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from canshaper.campaign.statistics import Influence, Quantile, influences, most_of, quantile
+from canshaper.config.uncertainty import MEASURES, QUANTILES
+
+Columns = Mapping[str, Sequence[Any]]
+# Not drawn, but measured or noted of a drive.
+_OUTCOMES = ("seed", *MEASURES, "broken", "why", "swung_over", "fault")
+WORST = 10
+# What the worst drives are sorted by, and what is looked into first.
+FIRST = "residual_deg"
+
+
+@dataclass(frozen=True)
+class Promises:
+    """Drives in which the output guard had to refuse a valve frame.
+
+    Attributes:
+        drives: all, those with faults too.
+        broken: those that broke one.
+        most: largest share of all drives that may break one.
+        why: of the first of them.
+    """
+
+    drives: int
+    broken: int
+    most: float
+    why: str
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """One limit of the file.
+
+    Attributes:
+        key: of ``accept``.
+        limit: the most that it may be.
+        quantile: that of the drives.
+        kept: its upper bound is within the limit; without one it is not shown.
+    """
+
+    key: str
+    limit: float
+    quantile: Quantile
+    kept: bool
+
+
+@dataclass(frozen=True)
+class Summary:
+    """Of all drives of a campaign.
+
+    Attributes:
+        quantiles: by measure and quantile, of the drives without a fault of bus or sensor.
+        faulty: the same, of those with one.
+        counts: of drives without and with a fault, and of those whose grapple swung over.
+        promises: see there.
+        influences: of the measures, each factor.
+        worst: the drives that leave the most swing, without a fault.
+        verdicts: of the limits of the file.
+    """
+
+    quantiles: Mapping[str, Mapping[str, Quantile]]
+    faulty: Mapping[str, Mapping[str, Quantile]]
+    counts: Mapping[str, int]
+    promises: Promises
+    influences: Mapping[str, Sequence[Influence]]
+    worst: Sequence[Mapping[str, Any]]
+    verdicts: Sequence[Verdict]
+
+    @property
+    def accepted(self) -> bool:
+        """Whether no promise was broken, and every limit is shown to be kept."""
+        return not self.promises.broken and all(one.kept for one in self.verdicts)
+
+    def as_dict(self) -> dict[str, Any]:
+        """For JSON."""
+        return {**asdict(self), "accepted": self.accepted}
+
+
+def summarise(columns: Columns, accept: Mapping[str, float]) -> Summary:
+    """Figures of all drives.
+
+    Args:
+        columns: of every drive, see ``Store``.
+        accept: limits by their keys in the file.
+    """
+    faults = columns["fault"]
+    sound = _where(columns, [not fault for fault in faults])
+    faulty = _where(columns, [bool(fault) for fault in faults])
+    quantiles = _quantiles(sound)
+    broken = [k for k, count in enumerate(columns["broken"]) if count]
+    drives = len(columns["seed"])
+    why = f"drive {columns['seed'][broken[0]]} at {columns['why'][broken[0]]}" if broken else ""
+    factors = {name: column for name, column in sound.items() if name not in _OUTCOMES}
+    return Summary(
+        quantiles,
+        _quantiles(faulty),
+        {
+            "without_fault": len(sound["seed"]),
+            "with_fault": len(faulty["seed"]),
+            "swung_over": sum(columns["swung_over"]),
+        },
+        Promises(drives, len(broken), most_of(len(broken), drives), why),
+        {measure: influences(factors, sound[measure]) for measure in MEASURES},
+        worst(sound),
+        [_verdict(key, limit, quantiles) for key, limit in accept.items()],
+    )
+
+
+def _where(columns: Columns, keep: Sequence[bool]) -> dict[str, list[Any]]:
+    return {
+        name: [value for value, kept in zip(column, keep, strict=True) if kept]
+        for name, column in columns.items()
+    }
+
+
+def _quantiles(columns: Columns) -> dict[str, dict[str, Quantile]]:
+    """By measure and quantile; no measure that no drive has."""
+    quantiles = {}
+    for measure in MEASURES:
+        values = [value for value in columns[measure] if value is not None]
+        if values:
+            quantiles[measure] = {name: quantile(values, part) for name, part in QUANTILES.items()}
+    return quantiles
+
+
+def worst(columns: Columns) -> list[dict[str, Any]]:
+    """The drives that leave the most swing, without a fault; the worst one first."""
+    faults = columns["fault"]
+    order = sorted(
+        (k for k, value in enumerate(columns[FIRST]) if value is not None and not faults[k]),
+        key=lambda k: -columns[FIRST][k],
+    )
+    names = ("seed", *MEASURES, "operator")
+    return [{name: columns[name][k] for name in names} for k in order[:WORST]]
+
+
+def _verdict(key: str, limit: float, quantiles: Mapping[str, Mapping[str, Quantile]]) -> Verdict:
+    measure, _, name = key.rpartition("_")
+    one = quantiles.get(measure, {}).get(name, Quantile(0.0, None, None))
+    return Verdict(key, limit, one, one.high is not None and one.high <= limit)
+
+
+@dataclass(frozen=True)
+class Difference:
+    """One measure of two files, over the same drives.
+
+    Attributes:
+        first: quantiles of the first file.
+        second: of the second one.
+        better: share of the drives in which the second one has less, of those that differ.
+        median: of the second less the first, drive by drive.
+    """
+
+    first: Mapping[str, Quantile]
+    second: Mapping[str, Quantile]
+    better: float
+    median: Quantile
+
+
+def differences(first: Columns, second: Columns) -> dict[str, Difference]:
+    """Measure by measure, over the drives that both have, without a fault."""
+    rows = [
+        {seed: k for k, seed in enumerate(one["seed"]) if not one["fault"][k]}
+        for one in (first, second)
+    ]
+    both = sorted(rows[0].keys() & rows[1].keys())
+    by_measure = {}
+    for measure in MEASURES:
+        pairs = [(first[measure][rows[0][s]], second[measure][rows[1][s]]) for s in both]
+        pairs = [(a, b) for a, b in pairs if a is not None and b is not None]
+        if not pairs:
+            continue
+        ones, others = zip(*pairs, strict=True)
+        differ = [b - a for a, b in pairs]
+        unequal = [one for one in differ if one]
+        by_measure[measure] = Difference(
+            {name: quantile(ones, part) for name, part in QUANTILES.items()},
+            {name: quantile(others, part) for name, part in QUANTILES.items()},
+            sum(one < 0.0 for one in unequal) / len(unequal) if unequal else 0.0,
+            quantile(differ, 0.5),
+        )
+    return by_measure

@@ -1,0 +1,291 @@
+"""Many logs at once, of machines and days: one row for each, those that cannot be read reported.
+
+Below the folder that is given, the folder of a log is its machine.
+"""
+
+import json
+import statistics
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from datetime import UTC, datetime
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from canshaper.blackbox.file import SUFFIX
+from canshaper.campaign.engine import Engine
+from canshaper.cli.common import loader
+from canshaper.errors import CanshaperError, UsageError
+from canshaper.recording.log import READERS, LogFile
+from canshaper.report.console import SafeConsole, new_table
+from canshaper.report.table import NOTHING
+
+# The clock of a log that begins before this counts from its own start.
+_FIRST_DAY_NS = 1_000_000_000 * 1_000_000_000
+EXIT_NOT_READ = 1
+_HEADS = ("min", "raw deg", "left deg", "dip %", "stops", "trips")
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Log:
+    """One log of a fleet.
+
+    Attributes:
+        path: the file.
+        machine: folder that it lies in, below the one that was given.
+        rows: what it shows, one for each axis and deployment.
+        fault: why there is nothing; empty where there is.
+    """
+
+    path: Path
+    machine: str
+    rows: list[Row] = field(default_factory=list)
+    fault: str = ""
+
+
+def logs_below(folder: Path) -> list[tuple[str, Path]]:
+    """Machine and path of every log in a folder and those in it, by name."""
+    known = {*READERS, SUFFIX}
+    logs = [
+        path
+        for path in sorted(folder.rglob("*"))
+        if path.is_file() and {*(suffix.lower() for suffix in path.suffixes[-2:])} & known
+    ]
+    return [(path.parent.relative_to(folder).as_posix(), path) for path in logs]
+
+
+def check_only_folders(paths: Sequence[Path], options: Mapping[str, object]) -> None:
+    """Refuse what says nothing of many logs.
+
+    Args:
+        paths: folders, the first is one.
+        options: of one log, by their names.
+
+    Raises:
+        UsageError: a path is no folder, or an option was given.
+    """
+    if others := [str(path) for path in paths if not path.is_dir()]:
+        raise UsageError(f"{others[0]}: expected a folder like {paths[0]}, got none")
+    if given := [name for name, value in options.items() if value]:
+        raise UsageError(f"{', '.join(given)}: expected one log, got the folder {paths[0]}")
+
+
+def run_fleet(
+    engine: Engine,
+    work: Callable[[Path], list[Row]],
+    folders: Sequence[Path],
+    on_progress: Callable[[float], object],
+) -> list[Log]:
+    """Do the same with every log; in the order of machines and logs.
+
+    Args:
+        engine: who does it.
+        work: gives the rows of a log.
+        folders: of the logs.
+        on_progress: called with the part that is done.
+    """
+    logs = [log for folder in folders for log in logs_below(folder)]
+    if not logs:
+        names = ", ".join(map(str, folders))
+        raise UsageError(f"{names}: expected a folder with logs, got one without")
+    done: list[Log] = []
+    for one in engine.run(partial(_one, work), logs):
+        done.append(one[1])
+        on_progress(len(done) / len(logs))
+    return sorted(done, key=lambda log: (log.machine, log.path))
+
+
+def _one(work: Callable[[Path], list[Row]], log: tuple[str, Path]) -> Log:
+    machine, path = log
+    try:
+        return Log(path, machine, work(path))
+    except (CanshaperError, OSError) as error:
+        return Log(path, machine, fault=str(error).splitlines()[0])
+
+
+def replayed(configs: tuple[str, ...], channels: Mapping[str, str], path: Path) -> list[Row]:
+    """Each deployment driven with a log: a row for each axis that moved."""
+    from canshaper.recording.replay import Replay, look
+    from canshaper.recording.report import Replayed
+    from canshaper.recording.trace import Trace
+
+    rows: list[Row] = []
+    for config in configs:
+        deployment = loader(config)()
+        drive = look(deployment, path, channels, own=False)
+        replay, trace = Replay(deployment, drive), Trace(deployment, 0.0, None)
+        done = Replayed(Path(config).stem, deployment, replay, trace)
+        for tick, result in done.replay.run(lambda _part: None):
+            done.trace.add(tick, result)
+            done.events += [(tick.now_ns, text) for text in result.events]
+        done.replay.check_joysticks()
+        done.measure()
+        start_ns, notes = done.trace.start_ns or 0, [*replay.warnings()]
+        for axis, measures in done.measures.items():
+            rows.append(
+                {
+                    "day": day_of(start_ns),
+                    "minutes": (done.trace.end_ns - start_ns) / 60e9,
+                    "deployment": done.name,
+                    "axis": axis,
+                    "straight_deg": done.straight[axis].residual_deg,
+                    "residual_deg": measures.residual_deg,
+                    "dip_pct": None if measures.dip is None else 100.0 * measures.dip,
+                    "stops": done.count(axis, "STOPPING"),
+                    "trips": done.count(axis, "TRIPPED"),
+                    "notes": notes,
+                }
+            )
+    return rows
+
+
+def day_of(time_ns: int) -> str:
+    """Day of a time of a log, in UTC; empty where its clock has none."""
+    if time_ns < _FIRST_DAY_NS:
+        return ""
+    return datetime.fromtimestamp(time_ns / 1e9, UTC).date().isoformat()
+
+
+def identified(
+    file: str | None,
+    signals: Sequence[str],
+    dbc: Sequence[Path],
+    options: Mapping[str, Any],
+    path: Path,
+) -> list[Row]:
+    """Period and damping that a log shows: a row for each axis."""
+    from canshaper.commissioning.identification.data import logged, messages_of, signals_named
+
+    deployment = loader(file)() if file else None
+    findings = logged(
+        [str(path)],
+        signals_named(signals, deployment),
+        deployment,
+        messages_of(dbc, deployment),
+        on_progress=lambda _done, what=None: None,
+        **options,
+    )
+    rows: list[Row] = []
+    for one in findings:
+        row: Row = {"day": day_of(_start_ns(path)), "axis": one.axis}
+        for name in ("period_s", "damping_ratio"):
+            value = getattr(one, name)
+            row[name] = value.value if value else None
+            row[f"{name}_half"] = value.half if value else None
+        rows.append(
+            {**row, "usable": one.usable, "why": "; ".join(one.poor), "notes": [*one.notes]}
+        )
+    return rows
+
+
+def _start_ns(path: Path) -> int:
+    """Time of the first frame of a log; 0 of a table of a phone."""
+    try:
+        return next((frame.time_ns for frame in LogFile(path)), 0)
+    except CanshaperError:
+        return 0
+
+
+def drifts(logs: Sequence[Log]) -> Iterator[str]:
+    """Where the period of a machine has changed by more than its intervals, from first to last."""
+    by_axis: dict[tuple[str, str], list[Row]] = {}
+    for log in logs:
+        for row in log.rows:
+            if row["usable"]:
+                by_axis.setdefault((log.machine, row["axis"]), []).append(row)
+    for (machine, axis), rows in by_axis.items():
+        rows.sort(key=lambda row: str(row["day"]))
+        first, last = rows[0], rows[-1]
+        change_s = last["period_s"] - first["period_s"]
+        if abs(change_s) > first["period_s_half"] + last["period_s_half"]:
+            begin, end = (row["day"] or "an unknown day" for row in (first, last))
+            yield (
+                f"{machine} {axis}: period {first['period_s']:.3f} s on {begin},"
+                f" {last['period_s']:.3f} s on {end}"
+            )
+
+
+_REPLAY = {
+    "minutes": "{:.1f}",
+    "straight_deg": "{:.2f}",
+    "residual_deg": "{:.2f}",
+    "dip_pct": "{:.0f}",
+    "stops": "{}",
+    "trips": "{}",
+}
+_PERIODS = {"period_s": "{:.3f}", "damping_ratio": "{:.4f}"}
+
+
+def show_replays(logs: Sequence[Log], results: SafeConsole) -> None:
+    """Of each deployment a row for each log and axis; then all logs together.
+
+    Log and axis are one column: the first one stands in every part of a table that is cut.
+    """
+    by_deployment: dict[str, list[tuple[Log, Row]]] = {}
+    for log, row in _rows(logs):
+        by_deployment.setdefault(row["deployment"], []).append((log, row))
+    whole = new_table("all logs", "logs", "median left, deg", "stops", "trips")
+    for deployment, rows in by_deployment.items():
+        table = new_table(deployment, "day", *_HEADS)
+        for log, row in rows:
+            cells = (_cell(form, row[key]) for key, form in _REPLAY.items())
+            table.add_row(f"{_name(log)} {row['axis']}", row["day"], *cells)
+        results.print(table)
+        for axis in dict.fromkeys(row["axis"] for _, row in rows):
+            of_axis = [row for _, row in rows if row["axis"] == axis]
+            left = [row["residual_deg"] for row in of_axis if row["residual_deg"] is not None]
+            median = _cell("{:.2f}", statistics.median(left) if left else None)
+            sums = (str(sum(row[key] for row in of_axis)) for key in ("stops", "trips"))
+            whole.add_row(f"{deployment} {axis}", str(len(of_axis)), median, *sums)
+    results.print(whole)
+
+
+def show_periods(logs: Sequence[Log], results: SafeConsole) -> None:
+    """A row for each log and axis, and where a period has drifted."""
+    table = new_table("machine, log", "day", "period, s", "damping ratio", "usable")
+    for log, row in _rows(logs):
+        cells = []
+        for key, form in _PERIODS.items():
+            value, half = (_cell(form, row[part]) for part in (key, f"{key}_half"))
+            cells.append(value if value == NOTHING else f"{value} ± {half}")
+        usable = "yes" if row["usable"] else "no"
+        table.add_row(f"{_name(log)} {row['axis']}", row["day"], *cells, usable)
+    results.print(table)
+    for line in drifts(logs):
+        results.print(f"DRIFT: {line}", soft_wrap=True)
+
+
+def finish(logs: Sequence[Log], out: Path, results: SafeConsole) -> int:
+    """Report what was wrong with logs, those that could not be read too, and write everything.
+
+    Returns:
+        The exit code.
+    """
+    for log in logs:
+        for note in dict.fromkeys(text for row in log.rows for text in row["notes"]):
+            results.print(f"note: {_name(log)}: {note}", soft_wrap=True)
+    faults = [log for log in logs if log.fault]
+    for log in faults:
+        results.print(f"not read: {log.fault}", soft_wrap=True)
+    path = out / "fleet.json"
+    path.parent.mkdir(parents=True, exist_ok=True)
+    data = [
+        {"machine": log.machine, "log": str(log.path), "fault": log.fault, "rows": log.rows}
+        for log in logs
+    ]
+    path.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
+    results.print(f"{len(logs) - len(faults)} of {len(logs)} logs; all numbers in {path}")
+    return EXIT_NOT_READ if faults else 0
+
+
+def _rows(logs: Sequence[Log]) -> Iterator[tuple[Log, Row]]:
+    return ((log, row) for log in logs for row in log.rows)
+
+
+def _name(log: Log) -> str:
+    return log.path.name if log.machine == "." else f"{log.machine}/{log.path.name}"
+
+
+def _cell(form: str, value: float | None) -> str:
+    return NOTHING if value is None else form.format(value)

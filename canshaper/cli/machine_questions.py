@@ -1,0 +1,306 @@
+"""Questions of ``canshaper init`` on a machine: its bus, joysticks, switches, axes and valves."""
+
+import re
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from canshaper.cli.answers import (
+    MOST_OFFERED,
+    NONE,
+    asked,
+    channel,
+    name,
+    one,
+    several,
+    whole,
+)
+from canshaper.cli.common import echo
+from canshaper.cli.node_questions import Nodes, uses_of
+from canshaper.cli.scaling_questions import command_scaling, valve_scaling
+from canshaper.cli.swing_questions import motion_of, sensor_of, slewing_of, swing_of
+from canshaper.errors import UsageError
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message, Signal
+
+    from canshaper.config.first import FirstAxis, FirstJoystick, FirstMachine
+
+FEWEST_CYCLES = 5  # of a joystick's message in its timeout
+FIRST_DATA_BITRATE = 2_000_000  # of most buses of CAN FD
+
+
+def machine_of(
+    messages: "list[Message]", dbc: Sequence[str], interface: str, nodes: Nodes
+) -> "FirstMachine":
+    """Ask for a machine.
+
+    Args:
+        messages: of all its DBC files, and of its nodes.
+        dbc: those files, as the deployment file names them.
+        interface: of python-can.
+        nodes: its nodes of CANopen.
+
+    Raises:
+        UsageError: no machine can be made of these messages, or of the answers.
+    """
+    from canshaper.config.bus import Bus
+    from canshaper.config.first import FirstMachine
+    from canshaper.config.load import limits
+    from canshaper.machine import suggest
+
+    possible = suggest.joysticks(messages)
+    if not possible:
+        raise UsageError(
+            "no message has a signal of more than two bits, which could be a joystick;"
+            " see docs/deployment.md"
+        )
+    channel_name = asked("CAN interface", channel, "can0")
+    bitrate = asked("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
+    joysticks: list[tuple[FirstJoystick, Message]] = []
+    chosen = _chosen(messages)
+    for message in (message for message in possible if message.name in chosen):
+        joysticks.append(_joystick(message, messages, [one for one, _ in joysticks], nodes))
+    taken = {*chosen, *(joystick.switch for joystick, _ in joysticks)}
+    others = [message for message in messages if message.name not in taken]
+    axes: list[FirstAxis] = []
+    for joystick, message in joysticks:
+        _add_axes(axes, joystick, message, others, nodes)
+    if not axes:
+        raise UsageError("no axis was named; nothing is written")
+    motion = motion_of(axes, others)
+    status, identity = suggest.service_status(messages), suggest.identity(messages)
+    machine = FirstMachine(
+        channel_name,
+        bitrate,
+        dbc,
+        [joystick for joystick, _ in joysticks],
+        axes,
+        status.name if status else None,
+        identity.name if identity else None,
+        motion,
+        interface,
+    )
+    uses = uses_of(machine, messages)
+    machine = replace(machine, data_bitrate=_data_bitrate(messages, uses, bitrate))
+    if not nodes.named:
+        return machine
+    return replace(machine, canopen=nodes.canopen(uses))
+
+
+def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int) -> int | None:
+    """Ask for the bit rate of the data where a message that is used is one of CAN FD."""
+    from canshaper.codec.layout import is_fd
+    from canshaper.config.bus import Bus
+    from canshaper.config.load import limits
+
+    if not any(is_fd(message) for message in messages if message.name in uses):
+        return None
+    most = limits(Bus, "data_bitrate")[1]
+    text = "CAN FD: bit rate of the data, bit/s"
+    return asked(text, whole(bitrate, most), str(FIRST_DATA_BITRATE))
+
+
+def _chosen(messages: "list[Message]") -> list[str]:
+    """Ask for the messages of the joysticks."""
+    from canshaper.machine import suggest
+
+    possible, likely = suggest.joysticks(messages), suggest.likely_joysticks(messages)
+    enabled = [m.name for m in likely if suggest.named(suggest.switches(m), suggest.ENABLE)]
+    offered = [message.name for message in likely]
+    text = f"Messages of the joysticks, such as {', '.join(offered[:MOST_OFFERED])}"
+    names = [message.name for message in possible]
+    return asked(text, several(names), " ".join(enabled or offered[:1]))
+
+
+def _page(message: "Message") -> "tuple[Message, int | None]":
+    """A message as it is with the multiplexor with which it is meant, and that."""
+    from canshaper.config.protection import Protected
+    from canshaper.machine.corrections import corrected, multiplexor
+
+    signal = multiplexor(message)
+    if signal is None:
+        return message, None
+    values = sorted({i for s in message.signals for i in s.multiplexer_ids or ()})
+    text = f"{message.name}: value of {signal.name} with which it is meant, of"
+    allowed = [str(value) for value in values]
+    answer = int(asked(f"{text} {', '.join(allowed)}", one(allowed), allowed[0]))
+    page = corrected(message, Protected(bus="", message=message.name, multiplexor=answer), {})
+    return (message if isinstance(page, str) else page), answer
+
+
+def _joystick(
+    whole_message: "Message",
+    messages: "list[Message]",
+    before: "Sequence[FirstJoystick]",
+    nodes: Nodes,
+) -> "tuple[FirstJoystick, Message]":
+    """A joystick, and its message; ``before`` are those that there are already."""
+    from canshaper.config.first import FirstJoystick
+    from canshaper.config.load import limits
+    from canshaper.config.schema import Joystick
+    from canshaper.machine import suggest
+
+    message, page = _page(whole_message)
+    left = suggest.switches(message)  # a switch has one meaning
+
+    def switch(text: str, looks: re.Pattern[str], *, needed: bool = False) -> str | None:
+        allowed = [signal.name for signal in left] + ([] if needed else [NONE])
+        default = suggest.named(left, looks) or (allowed[0] if needed else NONE)
+        answer = asked(f"{message.name}: {text}, of {', '.join(allowed)}", one(allowed), default)
+        left[:] = [signal for signal in left if signal.name != answer]
+        return None if answer == NONE else answer
+
+    cycle = message.cycle_time or _cycle(message.name)
+    enable: str | None
+    of = other = None
+    if left:
+        enable = switch("enable switch", suggest.ENABLE, needed=True)
+    else:
+        of, enable, other = _switch_elsewhere(message, messages, before)
+    least, most = limits(Joystick, "timeout_ms")
+    reset = switch("switch that resets a trip", suggest.RESET)
+    off = switch("switch for anti-sway off", suggest.ANTI_SWAY_OFF)
+    counter = suggest.counter(message)
+    joystick = FirstJoystick(
+        suggest.axis_name(nodes.name_of(message.name) or message.name),
+        message.name,
+        int(min(max(FEWEST_CYCLES * cycle, least), most)),
+        enable,
+        reset,
+        off,
+        None if counter in (enable, reset, off) else counter,
+        None if message.cycle_time else cycle,
+        of,
+        nodes.supervised(message.name),
+        other,
+        page,
+    )
+    return joystick, message
+
+
+def _switch_elsewhere(
+    message: "Message", messages: "list[Message]", before: "Sequence[FirstJoystick]"
+) -> tuple[str | None, str | None, str | None]:
+    """Of a joystick without a switch in its own message that enables it.
+
+    Returns:
+        message and signal of its enable switch, or None and None and the joystick that shares its.
+    """
+    from canshaper.machine import suggest
+
+    others = [one for one in messages if one.name != message.name]
+    joysticks = [joystick.name for joystick in before]
+    switches = [f"{m.name}.{s.name}" for m in others for s in suggest.switches(m)]
+    names = [*joysticks, *switches]
+    if not names:
+        text = "no message has a signal of one or two bits, which could be its enable switch"
+        raise UsageError(f"{message.name}: {text}")
+    enabling = (name for name in names if suggest.ENABLE.search(name))
+    likely = names[0] if joysticks else next(enabling, names[0])
+    offered = ", ".join(names[:MOST_OFFERED])
+    answer = asked(f"{message.name}: enable switch, such as {offered}", one(names), likely)
+    if answer in joysticks:
+        return None, None, answer
+    of, _, signal = answer.partition(".")
+    return of, signal, None
+
+
+def _cycle(message: str) -> int:
+    return asked(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
+
+
+def _add_axes(
+    axes: "list[FirstAxis]",
+    joystick: "FirstJoystick",
+    message: "Message",
+    others: "list[Message]",
+    nodes: Nodes,
+) -> None:
+    """Add the axes of a joystick; ``others`` are messages that are left."""
+    from canshaper.config.first import FirstAxis
+    from canshaper.machine import suggest
+
+    two_sided = suggest.velocities(message)
+    for command in two_sided or suggest.one_sided(message):
+        names = [axis.name for axis in axes]
+        likely = suggest.axis_name(command.name)
+        default = f"{joystick.name}_{likely}" if likely in names else likely
+        text = f"Axis of {message.name}.{command.name}, - for none"
+        axis = asked(text, name(names), default if two_sided else NONE)
+        valve = None if axis == NONE else _valve_of(axis, command, others)
+        if valve is None:
+            continue
+        sender, signal = valve
+        cycle = sender.cycle_time or _cycle(sender.name)
+        scaling, of_valve = command_scaling(command, message), valve_scaling(signal)
+        timeout_ms = _timeout(axis, cycle, nodes.timer_ms(sender.name))
+        cia408 = nodes.cia408(sender.name)
+        status = suggest.status_of(others, axis)
+        swing = swing_of(axis, cycle / 1000.0)
+        slewing = slewing_of(axis) if swing else None
+        sensor = sensor_of(axis, swing.period_s, others, axes) if swing else None
+        if sensor:
+            sensor = replace(sensor, node=nodes.supervised(sensor.message))
+        axes.append(
+            FirstAxis(
+                axis,
+                joystick.name,
+                command.name,
+                sender.name,
+                signal.name,
+                timeout_ms,
+                suggest.counter(sender),
+                status.name if status else None,
+                swing,
+                slewing,
+                sensor,
+                scaling,
+                of_valve,
+                None if sender.cycle_time else cycle,
+                cia408,
+            )
+        )
+
+
+def _valve_of(
+    axis: str, command: "Signal", others: "list[Message]"
+) -> "tuple[Message, Signal] | None":
+    """Message and signal of the valve of an axis; it is taken from those that are left."""
+    from canshaper.machine import suggest
+
+    candidates = suggest.valves(others, command.name)
+    possible = [m for m in candidates if _valve_timeouts(m.cycle_time or 0) is not None]
+    commands = {f"{m.name}.{s.name}": (m, s) for m in possible for s in suggest.valve_signals(m)}
+    if not commands:
+        echo("  no message is left that can command its valve; axis left out")
+        return None
+    first, *_ = commands
+    alike = suggest.likeness(possible[0].name, command.name) >= suggest.LIKELY
+    text = f"  {axis}: valve command, such as {', '.join([*commands][:MOST_OFFERED])}, - for none"
+    answer = asked(text, one([*commands, NONE]), first if alike else NONE)
+    if answer == NONE:
+        return None
+    others.remove(commands[answer][0])
+    return commands[answer]
+
+
+def _valve_timeouts(cycle_ms: int) -> tuple[int, int] | None:
+    """Shortest and longest of a valve that is commanded so often; None where there is none."""
+    from canshaper.config.load import limits
+    from canshaper.config.schema import Valve
+    from canshaper.machine.valves import FRAMES_PER_TIMEOUT
+
+    least, most = (int(ms) for ms in limits(Valve, "timeout_ms"))
+    shortest = max(least, FRAMES_PER_TIMEOUT * cycle_ms)
+    return (shortest, most) if shortest <= most else None
+
+
+def _timeout(axis: str, cycle_ms: int, set_ms: int) -> int:
+    """Ask for the timeout of a valve; ``set_ms`` is what it has by its EDS, 0 for none."""
+    timeouts = _valve_timeouts(cycle_ms)
+    if timeouts is None:
+        raise UsageError(f"{axis}: its valve has no timeout of three periods of {cycle_ms} ms")
+    shortest, most = timeouts
+    text = f"  {axis}: silence after which the valve closes by itself, ms (its manual)"
+    return asked(text, whole(shortest, most), str(min(max(set_ms or 200, shortest), most)))

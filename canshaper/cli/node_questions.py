@@ -1,0 +1,221 @@
+"""Questions of ``canshaper init`` on nodes of CANopen, of which it has the EDS files."""
+
+from collections.abc import Callable, Collection, Iterator, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from canshaper.cli.answers import NONE, asked, confirmed, several, whole
+from canshaper.cli.common import echo
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message
+
+    from canshaper.commissioning.nodes.node import Node, Pdo
+    from canshaper.commissioning.nodes.parameters import Parameter, Use
+    from canshaper.config.first import FirstCanopen, FirstCia408, FirstMachine
+
+_OURS, _FIRST, _LAST = 0x7E, 0x10, 127
+_NAME_LETTERS = 20  # of a node; its messages' names have 32
+_STATUS_CYCLES = 3  # of a status word in its timeout
+
+
+class Nodes:
+    """Nodes of CANopen by their EDS files: asks for name, id, and switches of each.
+
+    Args:
+        files: EDS or DCF files, one of a device that is there twice also twice.
+
+    Attributes:
+        named: the nodes by name.
+        messages: those of their PDOs.
+
+    Raises:
+        ConfigError: a file is none, or has no PDO that can be used.
+    """
+
+    def __init__(self, files: Sequence[Path]) -> None:
+        self.named: dict[str, Node] = {}
+        self.messages: list[Message] = []
+        self._pdos: dict[str, tuple[str, Pdo]] = {}
+        for path in files:
+            self._add(path)
+
+    def _add(self, path: Path) -> None:
+        from canshaper.commissioning.nodes import messages
+        from canshaper.commissioning.nodes.eds import Eds
+        from canshaper.commissioning.nodes.node import Node
+
+        eds = Eds(path)
+        likely = _likely_name(path.stem, self.named)
+        name = asked(f"{path.name}: name of the node", _name(self.named), likely)
+        ids = [node.id for node in self.named.values()]
+        free = next(number for number in range(_FIRST, _LAST + 1) if number not in ids)
+        node_id = asked(f"{name}: node id", _node_id(ids), str(eds.node or free))
+        node = Node(eds, node_id)
+        for pdo in node.pdos:
+            off = "" if pdo.on else ", off"
+            timer = "" if pdo.event_timer_ms is None else f", event timer {pdo.event_timer_ms} ms"
+            objects = ", ".join(messages.labels(pdo.objects))
+            echo(f"  {pdo.name} {pdo.can_id:#x}{off}{timer}: {objects}")
+        for text in (*map(str, node.faults), *(f"  {text}" for text in node.left_out)):
+            echo(text, err=True)
+        possible = messages.bytes_of(node)
+        switches: list[str] = []
+        if possible:
+            likely = " ".join(n for n, digital in possible.items() if digital) or NONE
+            text = f"  {name}: objects of which each bit is a switch, of {', '.join(possible)}"
+            switches = asked(f"{text}, - for none", several([*possible, NONE]), likely)
+        silent = [p.name for p in node.pdos if p.transmitted and p.event_timer_ms == 0]
+        cycle_ms = None
+        if silent:
+            text = f"  {name}: event timer to be set for {', '.join(silent)}, ms"
+            cycle_ms = asked(text, whole(5, 1000), "20")
+        self.named[name] = node
+        self.messages += messages.messages(node, name, switches, cycle_ms)
+        self._pdos |= {messages.message_name(name, pdo): (name, pdo) for pdo in node.pdos}
+
+    def name_of(self, message: str) -> str | None:
+        """Name of the node that a message is of."""
+        return self._pdos[message][0] if message in self._pdos else None
+
+    def supervised(self, message: str) -> str | None:
+        """The same, of a node that has a heartbeat."""
+        from canshaper.commissioning.nodes.parameters import heartbeat_ms
+
+        name = self.name_of(message)
+        return name if name and heartbeat_ms(self.named[name]) else None
+
+    def timer_ms(self, message: str) -> int:
+        """Event timer of a PDO; 0 where it has none."""
+        return self._pdos[message][1].event_timer_ms or 0 if message in self._pdos else 0
+
+    def cia408(self, valve: str) -> "FirstCia408 | None":
+        """Control and status word, where a message commands a valve of CiA 408."""
+        from canshaper.commissioning.nodes import messages
+        from canshaper.config.first import FirstCia408
+        from canshaper.config.load import limits
+        from canshaper.config.schema import StatusWord
+
+        name = self.name_of(valve)
+        if name is None or self.named[name].profile != messages.VALVE:
+            return None
+        control = _label(self._pdos[valve][1], messages.CONTROL_WORD)
+        sent = [pdo for owner, pdo in self._pdos.values() if owner == name and pdo.transmitted]
+        for pdo in sent:
+            status, message = _label(pdo, messages.STATUS_WORD), messages.message_name(name, pdo)
+            cycle = next(m.cycle_time for m in self.messages if m.name == message)
+            if control and status and cycle:
+                least, most = limits(StatusWord, "timeout_ms")
+                timeout = int(min(max(_STATUS_CYCLES * cycle, least), most))
+                return FirstCia408(control, message, status, timeout, self.supervised(valve))
+        echo(
+            f"  {name}: expected 6040h in {valve} and 6041h in a TPDO, got no such; not as CiA 408"
+        )
+        return None
+
+    def canopen(self, used: Collection[str]) -> "FirstCanopen":
+        """Our node, and the others of messages that are used."""
+        from canshaper.commissioning.nodes.parameters import heartbeat_ms
+        from canshaper.config.first import FirstCanopen
+
+        ids = [node.id for node in self.named.values()]
+        ours = asked("Node id of canshaper", _node_id(ids), str(_OURS))
+        text = "canshaper starts the nodes (NMT), as no other master does"
+        master = confirmed(text, default=True)
+        names = [name for name in self.named if any(self.name_of(m) == name for m in used)]
+        nodes = {n: (self.named[n].id, ms) for n in names if (ms := heartbeat_ms(self.named[n]))}
+        return FirstCanopen(ours, master, nodes)
+
+    def parameters(self, uses: "dict[str, Use]") -> "list[Parameter]":
+        """What has to be set in the nodes of messages that are used so."""
+        from canshaper.commissioning.nodes.parameters import parameters
+
+        return [
+            p
+            for name, node in self._used(uses)
+            for p in parameters(name, node, self._of(name, uses))
+        ]
+
+    def missing(self, uses: "dict[str, Use]") -> Iterator[str]:
+        """What they do not have."""
+        from canshaper.commissioning.nodes.parameters import missing
+
+        for name, node in self._used(uses):
+            yield from (f"{name} {text}" for text in missing(node, self._of(name, uses)))
+
+    def _used(self, uses: "dict[str, Use]") -> "list[tuple[str, Node]]":
+        return [(name, node) for name, node in self.named.items() if self._of(name, uses)]
+
+    def _of(self, name: str, uses: "dict[str, Use]") -> "list[tuple[Pdo, Use]]":
+        return [
+            (pdo, uses[message])
+            for message, (owner, pdo) in self._pdos.items()
+            if owner == name and message in uses
+        ]
+
+
+def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, Use]":
+    """How a machine uses messages: how often they come, and when they are lost."""
+    from canshaper.commissioning.nodes.parameters import Use
+
+    cycles = {message.name: message.cycle_time for message in messages}
+    uses: dict[str, Use] = {}
+
+    def add(message: str | None, timeout_ms: int, cycle_ms: int | None = None) -> None:
+        if message is not None:
+            uses[message] = Use(cycle_ms or cycles.get(message), timeout_ms)
+
+    for joystick in machine.joysticks:
+        for message in (joystick.message, joystick.switch):
+            add(message, joystick.timeout_ms, joystick.cycle_ms)
+    for axis in machine.axes:
+        add(axis.valve, axis.timeout_ms)
+        if axis.cia408:
+            add(axis.cia408.message, axis.cia408.timeout_ms)
+        if axis.sensor:
+            add(axis.sensor.message, axis.sensor.timeout_ms)
+    return uses
+
+
+def _label(pdo: "Pdo", key: tuple[int, int]) -> str | None:
+    """Signal of an object in a PDO."""
+    from canshaper.commissioning.nodes.messages import labels
+
+    named = zip(pdo.objects, labels(pdo.objects), strict=True)
+    return next((label for one, label in named if (one.index, one.subindex) == key), None)
+
+
+def _likely_name(stem: str, taken: Collection[str]) -> str:
+    word = "".join(c if c.isascii() and c.isalnum() else "_" for c in stem.lower()).strip("_")
+    word = (word if word and word[0].isalpha() else f"node_{word}")[: _NAME_LETTERS - 3]
+    return next(n for n in (word, *(f"{word}_{i}" for i in range(2, 129))) if n not in taken)
+
+
+def _name(taken: Collection[str]) -> Callable[[str], str]:
+    """Takes a word that can begin the names of messages, and is none of those taken."""
+
+    def parse(text: str) -> str:
+        if not (text.isidentifier() and text.isascii() and len(text) <= _NAME_LETTERS):
+            allowed = f"a word of letters, digits and _, {_NAME_LETTERS} at most"
+            raise ValueError(f"expected {allowed}, got {text!r}")
+        if text in taken:
+            raise ValueError(f"expected another one than {', '.join(taken)}, got {text!r}")
+        return text
+
+    return parse
+
+
+def _node_id(taken: Collection[int]) -> Callable[[str], int]:
+    """Takes a node id that no other node has, decimal or as 0x10."""
+
+    def parse(text: str) -> int:
+        try:
+            number = int(text, 0)
+        except ValueError:
+            number = 0
+        if not 1 <= number <= _LAST or number in taken:
+            others = f" other than {', '.join(map(str, taken))}" if taken else ""
+            raise ValueError(f"expected a node id, 1 to {_LAST}{others}, got {text!r}")
+        return number
+
+    return parse

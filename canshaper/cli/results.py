@@ -1,0 +1,134 @@
+"""What a verb shows: lines and tables on the terminal, pictures, and all of it as one HTML file."""
+
+import io
+import shlex
+import sys
+from collections.abc import Callable
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from rich.table import Table
+
+from canshaper import __version__
+from canshaper.cli.common import install_line
+from canshaper.errors import UsageError
+from canshaper.report import html
+from canshaper.report.console import SafeConsole
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from canshaper.machine.deployment import Deployment
+
+FORMATS = (".png", ".svg", ".pdf")
+# A drawing that takes more is a picture of dots in the report, which is to stay below 2 MB.
+MOST_SVG_BYTES = 400_000
+
+
+class Results(SafeConsole):
+    """The terminal of a verb, which keeps what it prints for the report.
+
+    Args:
+        title: of the report.
+        deployment: what it is of, where there is one.
+        report: file to write the report to; None for none.
+        picture: file for the picture instead of the verb's own.
+        options: of rich's console.
+
+    Attributes:
+        deployment: as above; it may be known later.
+
+    Raises:
+        UsageError: report or picture has another suffix than it can be written with.
+        OSError: the folder of one cannot be made.
+    """
+
+    def __init__(
+        self,
+        title: str,
+        deployment: "Deployment | None",
+        report: Path | None,
+        picture: Path | None = None,
+        **options: Any,
+    ) -> None:
+        super().__init__(**options)
+        suffixes = (("--report", report, (".html",)), ("--picture", picture, FORMATS))
+        for option, path, known in suffixes:
+            if path and path.suffix not in known:
+                got = f"got {path}"
+                raise UsageError(f"{option}: expected a file with {' or '.join(known)}, {got}")
+            if path:  # reported before anything is driven
+                path.parent.mkdir(parents=True, exist_ok=True)
+        self._title = title
+        self.deployment = deployment
+        self._report = report
+        self._picture = picture
+        self._date = datetime.now().astimezone()
+        self._parts: list[str] = []
+
+    def print(self, *objects: Any, **options: Any) -> None:
+        """Print, and keep."""
+        for one in objects:
+            self._parts.append(html.table(one) if isinstance(one, Table) else html.text(str(one)))
+        super().print(*objects, **options)
+
+    def picture(self, path: Path | None, figure: Callable[[], "Figure"]) -> Path | None:
+        """Draw, stamp and write a picture, in a folder that is made.
+
+        Args:
+            path: where, without --picture; None for only in the report.
+            figure: draws it.
+
+        Returns:
+            Where it is; None where it was not written, or matplotlib is missing.
+        """
+        path = self._picture or path
+        if not (path or self._report):
+            return None
+        try:
+            from canshaper.report.style import save, stamp
+        except ImportError:
+            self._parts.append(html.text(_no_picture()))
+            return None
+        drawn = figure()
+        name = f"{self.deployment.path.name}, " if self.deployment else ""
+        stamp(drawn, f"{name}canshaper {__version__}, {self._date:%Y-%m-%d}")
+        if path:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            save(drawn, path)
+        if self._report:
+            self._parts.append(_embedded(drawn, self._title))
+        return path
+
+    def picture_line(self, path: Path | None) -> None:
+        """Say where the picture is, or why there is none; the report has it."""
+        super().print(f"Picture: {path or _no_picture()}", soft_wrap=True)
+
+    def write(self) -> None:
+        """Write the report, where one is asked for."""
+        if not self._report:
+            return
+        command = ("command", shlex.join(["canshaper", *sys.argv[1:]]))
+        facts = [command, *html.facts(self.deployment, self._date)]
+        whole = html.document(self._title, facts, self._parts)
+        self._report.write_text(whole, encoding="utf-8")
+        super().print(f"Report: {self._report}", soft_wrap=True)
+
+
+def _no_picture() -> str:
+    return f"none, matplotlib is missing: {install_line('matplotlib')}"
+
+
+def _embedded(drawn: "Figure", name: str) -> str:
+    """A picture inside the report: a drawing, or dots where the drawing is large."""
+    data = _file(drawn, "svg")
+    if len(data) < MOST_SVG_BYTES:
+        return html.picture(data, "svg+xml", name)
+    return html.picture(_file(drawn, "png"), "png", name)
+
+
+def _file(drawn: "Figure", kind: str) -> bytes:
+    file = io.BytesIO()
+    drawn.savefig(file, dpi=drawn.dpi, format=kind)
+    return file.getvalue()

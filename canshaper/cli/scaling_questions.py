@@ -1,0 +1,96 @@
+"""Questions of ``canshaper init`` on what a signal means, where the DBC does not say it."""
+
+from collections.abc import Callable, Sequence
+from typing import TYPE_CHECKING
+
+from canshaper.cli.answers import asked, confirmed, number, one
+
+if TYPE_CHECKING:
+    from cantools.database.can import Message, Signal
+
+    from canshaper.config.first import FirstScaling
+
+_LARGEST = 1e9
+MIDDLE, FLAGS, SECOND = "middle", "flags", "second"
+
+
+def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
+    """What the signal of a joystick means: around a value, with flags, or with a second signal."""
+    from canshaper.codec.signals import magnitude_range, symmetrical_range
+    from canshaper.config.first import FirstScaling
+    from canshaper.machine import suggest
+
+    if symmetrical_range(signal) is None:
+        return FirstScaling()
+    if suggest.two_sided(signal):
+        return _around_zero(signal)
+    flags = [s.name for s in suggest.switches(message)]
+    rockers = [s.name for s in suggest.one_sided(message) if s.name != signal.name]
+    kinds = [MIDDLE, *([FLAGS] if len(flags) > 2 else []), *([SECOND] if rockers else [])]
+    guess = suggest.direction_flags(message, signal)
+    text = f"  {signal.name}: direction by a middle value, flags or a second signal, of"
+    kind = asked(f"{text} {', '.join(kinds)}", one(kinds), FLAGS if guess else MIDDLE)
+    if kind == MIDDLE:
+        return _around_middle(signal)
+    full = None if magnitude_range(signal) is None else _full(signal, 0.0)
+    if kind == SECOND:
+        text = f"  {signal.name}: the signal of the other direction, of {', '.join(rockers)}"
+        return FirstScaling(full, negative=asked(text, one(rockers), rockers[0]))
+    text = f"  {signal.name}: flags of neutral, negative and positive, of {', '.join(flags)}"
+    chosen = asked(text, _three(flags), " ".join(guess or flags[:3]))
+    return FirstScaling(full, flags=chosen)
+
+
+def valve_scaling(signal: "Signal") -> "FirstScaling":
+    """What the signal of a valve means."""
+    from canshaper.codec.signals import symmetrical_range
+    from canshaper.config.first import FirstScaling
+    from canshaper.machine import suggest
+
+    if symmetrical_range(signal) is None:
+        return FirstScaling()
+    return _around_zero(signal) if suggest.two_sided(signal) else _around_middle(signal)
+
+
+def _around_zero(signal: "Signal") -> "FirstScaling":
+    from canshaper.config.first import FirstScaling
+
+    return FirstScaling(_full(signal, 0.0), invert=_inverted(signal))
+
+
+def _around_middle(signal: "Signal") -> "FirstScaling":
+    from canshaper.config.first import FirstScaling
+    from canshaper.machine import suggest
+
+    low, high = suggest.reach(signal)
+    middle = suggest.likely_middle(signal)
+    text = f"  {signal.name}: its value in the middle, at zero command"
+    zero = asked(text, number(low, high), f"{middle:.12g}")
+    return FirstScaling(_full(signal, zero), zero, _inverted(signal))
+
+
+def _full(signal: "Signal", zero: float) -> float:
+    """From zero to full command."""
+    from canshaper.machine import suggest
+
+    likely = suggest.likely_full(signal, zero)
+    distance = f", from {zero:g}" if zero else ""
+    text = f"  {signal.name}: its value at full{distance}"
+    return asked(text, number(1e-6, _LARGEST), f"{likely:.12g}")
+
+
+def _inverted(signal: "Signal") -> bool:
+    text = f"  {signal.name}: does it count the other way round (invert)"
+    return confirmed(text, default=False)
+
+
+def _three(allowed: Sequence[str]) -> Callable[[str], tuple[str, str, str]]:
+    """Takes three different ones of these, with spaces or commas between."""
+
+    def parse(text: str) -> tuple[str, str, str]:
+        names = text.replace(",", " ").split()
+        if len({*names}) != 3 or len(names) != 3 or not {*names} <= {*allowed}:
+            raise ValueError(f"expected three of {', '.join(allowed)}, got {text!r}")
+        return names[0], names[1], names[2]
+
+    return parse

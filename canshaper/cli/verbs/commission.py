@@ -1,0 +1,202 @@
+"""``canshaper commission``: the day of commissioning, step by step."""
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import typer
+
+from canshaper.cli.answers import answered_by, asked, one
+from canshaper.cli.common import (
+    CHANNEL,
+    FILE,
+    INTERFACE,
+    NETWORK,
+    SET,
+    echo,
+    loader,
+    os_errors,
+    refuse_shipped,
+)
+from canshaper.errors import UsageError
+
+if TYPE_CHECKING:
+    from canshaper.commissioning.procedure.bench import Bench
+    from canshaper.commissioning.procedure.files import Files
+    from canshaper.commissioning.procedure.procedure import Procedure, Proposal
+    from canshaper.commissioning.procedure.step import Step
+    from canshaper.machine.deployment import Deployment
+
+EXIT_OPEN = 1
+YES, AGAIN, SKIP, STOP = "yes", "again", "skip", "stop"
+
+
+def commission(
+    file: str = FILE,
+    step: str | None = typer.Option(None, "--step", metavar="NAME", help="Do this one again."),
+    listed: bool = typer.Option(False, "--list", help="Show how far it has come, and exit."),
+    simulated: bool = typer.Option(
+        False, "--simulated", help="Rehearse at the desk, with a copy of FILE."
+    ),
+    yes: bool = typer.Option(False, "--yes", help="Accept every step that lacks nothing."),
+    answers: Path | None = typer.Option(
+        None, "--answers", metavar="FILE", help="Ask nothing: lines of QUESTION = ANSWER."
+    ),
+    interface: str | None = INTERFACE,
+    channel: list[str] | None = CHANNEL,
+    network: bool = NETWORK,
+    changes: list[str] | None = SET,
+) -> None:
+    """Lead through the commissioning of a machine, step by step, to a report that is signed.
+
+    Each step says what to do, shows its numbers and its picture, and what it would write into FILE;
+    nothing is written before yes. How far it has come stands in FILE.commission.json: the same
+    command goes on at the first open step. Logs, pictures and the report are in FILE.commission/.
+
+    With --simulated a crane is simulated, --set says which one, and no bus is opened. It works on
+    FILE.rehearsal.yaml, a copy that is made at the first time: nothing that was measured at the
+    desk gets into FILE.
+
+    Ctrl-C ends it at any time, with neutral valves; what is done stays done. Exit code 1 where a
+    step stays open, 2 where a file or an option is wrong, 3 where a bus cannot be opened.
+
+    Examples:
+
+      canshaper commission machine.yaml
+
+      canshaper commission machine.yaml --simulated --set grapple.l2_m=1.55
+
+      canshaper commission machine.yaml --step swing
+
+      canshaper commission machine.yaml --list
+    """
+    from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
+
+    refuse_shipped(file)
+    path = Path(file)
+    if changes and not simulated:
+        raise UsageError("--set: expected --simulated too, got none")
+    work = path
+    if simulated:
+        loader(file)()  # what is wrong in it is named by its own name
+        work = rehearsal_of(path) if listed else copy_for_rehearsal(path)
+    files = Files(work)
+
+    def load(one: Path) -> "Deployment":
+        return loader(str(one), interface, channel, network=network)()
+
+    if listed:
+        _list(files, load)
+        return
+    with os_errors(files.state), files.locked():
+        words = _words(interface, channel, network=network)
+        bench = _bench(files, words, changes or [], simulated=simulated)
+        with answered_by(answers, yes=yes):
+            _lead(_procedure(files, bench, load, path), step)
+
+
+def _words(interface: str | None, channels: list[str] | None, *, network: bool) -> list[str]:
+    """The bus options, as ``canshaper run`` takes them."""
+    words = ["--interface", interface] if interface else []
+    words += [word for channel in channels or [] for word in ("--channel", channel)]
+    return [*words, *(["--network"] if network else [])]
+
+
+def _bench(files: "Files", words: list[str], changes: list[str], *, simulated: bool) -> "Bench":
+    """Where it is measured; a rehearsal goes on with the crane that it was begun with."""
+    from canshaper.cli.person import Terminal
+    from canshaper.commissioning.procedure.bench import Simulated
+    from canshaper.commissioning.procedure.machine import Machine
+    from canshaper.commissioning.procedure.state import read_state
+
+    if not simulated:
+        return Machine(Terminal(), words)
+    state = read_state(files.state)
+    return Simulated(Terminal(), changes or (state.changes if state else []))
+
+
+def _procedure(
+    files: "Files", bench: "Bench", load: Callable[[Path], "Deployment"], path: Path
+) -> "Procedure":
+    """The steps, and what is to be said before the first of them."""
+    from canshaper.commissioning.procedure.procedure import Procedure
+    from canshaper.commissioning.procedure.steps import STEPS
+
+    procedure = Procedure(files, bench, load, STEPS, origin=path if bench.simulated else None)
+    if bench.simulated:
+        echo(f"REHEARSAL on a simulated crane, with {files.deployment}, a copy of {path}")
+    return procedure
+
+
+def _list(files: "Files", load: Callable[[Path], "Deployment"]) -> None:
+    """How far it has come."""
+    from canshaper.commissioning.procedure.state import State, read_state
+    from canshaper.commissioning.procedure.steps import STEPS
+    from canshaper.report.console import SafeConsole, new_table
+
+    state = read_state(files.state) or State()
+    deployment = load(files.deployment)
+    table = new_table("step", "is", "at")
+    for step in STEPS:
+        if step.applies(deployment):
+            record = state.of(step.name)
+            table.add_row(f"{step.name}: {step.title}", record.status.value, record.at or "-")
+    SafeConsole().print(table)
+
+
+def _lead(procedure: "Procedure", name: str | None) -> None:
+    """Step by step, to the end or to the first that stays open."""
+    step = procedure.step(name) if name else procedure.next_open()
+    while step:
+        _one(procedure, step)
+        step = None if name else procedure.next_open()
+    if procedure.next_open() is None:
+        echo(f"No step is open: {procedure.files.state}")
+
+
+def _one(procedure: "Procedure", step: "Step") -> None:
+    """One step, until it is done or left out.
+
+    Raises:
+        typer.Exit: it stays open.
+    """
+    number = procedure.steps.index(step) + 1
+    while True:
+        echo(f"\n[{number}/{len(procedure.steps)}] {step.name}: {step.title}")
+        proposal = procedure.run(step)
+        while procedure.news:
+            echo(f"NOTE: {procedure.news.pop(0)}")
+        _show(procedure, proposal)
+        choices = (AGAIN, SKIP, STOP) if proposal.poor else (YES, AGAIN, SKIP, STOP)
+        what = "accept" if not proposal.poor else "too poor"
+        default = STOP if proposal.poor else YES
+        answer = asked(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
+        if answer == YES:
+            procedure.accept(proposal)
+        elif answer == SKIP:
+            procedure.skip(step)
+        elif answer == AGAIN:
+            continue
+        else:
+            echo(f"{step.name} stays open; the same command goes on with it")
+            raise typer.Exit(EXIT_OPEN)
+        return
+
+
+def _show(procedure: "Procedure", proposal: "Proposal") -> None:
+    """The results of a step, and what it would write."""
+    from canshaper.commissioning.procedure.sheet import shown
+    from canshaper.report.console import SafeConsole
+
+    console = SafeConsole(soft_wrap=True)
+    for part in proposal.parts:
+        console.print(shown(part))
+    for picture in proposal.pictures:
+        if picture.suffix == ".png":
+            echo(f"Picture: {picture}")
+    for fault in proposal.poor:
+        echo(f"TOO POOR: {fault}")
+    if proposal.diff:
+        echo(f"It would write into {procedure.files.deployment}:\n{proposal.diff}")
+    elif not proposal.poor:
+        echo(f"{procedure.files.deployment} stays as it is.")

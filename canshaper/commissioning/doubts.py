@@ -1,0 +1,16 @@
+"""What may be meant otherwise than it stands in a good deployment file."""
+
+from canshaper.config.source import Source
+from canshaper.errors import Problem
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.filters import unfit
+from canshaper.machine.origin import rehearsed
+from canshaper.machine.stopping import unstated
+
+
+def doubts(deployment: Deployment) -> list[Problem]:
+    """Filters that do not fit, travel that no one has stated, numbers of a simulated crane."""
+    source = Source(deployment.path)
+    config = deployment.config
+    warnings = (*unfit(config), *unstated(deployment), *rehearsed(config))
+    return [source.problem(place, text) for place, text in warnings]

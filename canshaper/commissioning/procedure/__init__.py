@@ -1,0 +1,1 @@
+"""The commissioning of a machine as steps: what each needs, shows, finds, and would write."""

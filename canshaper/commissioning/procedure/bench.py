@@ -1,0 +1,144 @@
+"""Where a step drives and measures: on the machine, or on the simulated crane."""
+
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Protocol
+
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.simulated import run_simulated
+from canshaper.commissioning.simulated import log_simulated
+from canshaper.errors import UsageError
+from canshaper.machine.deployment import Deployment
+from canshaper.report.console import OnProgress
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.cranes import cranes
+from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.strokes import Script
+
+
+class Mode(Enum):
+    """Who moves the valves while a step listens."""
+
+    LISTEN = "listen"
+    """Whoever moves them without us."""
+    DRY = "dry"
+    """The same; the daemon computes, and sends no valve frame."""
+    RAW = "raw"
+    """We, without filters."""
+    SHAPED = "shaped"
+    """We, as the file says."""
+
+
+@dataclass(frozen=True)
+class Task:
+    """What a person does while a step listens.
+
+    Attributes:
+        words: what to do, for the person.
+        script: the same for the simulated operator, and how long it takes.
+        mode: who moves the valves.
+        released: from when to when the simulated operator does not hold the enable switch, s.
+    """
+
+    words: str
+    script: Script
+    mode: Mode = Mode.LISTEN
+    released: tuple[float, float] | None = None
+
+
+class Person(Protocol):
+    """Who is led through the steps."""
+
+    def ready(self, words: str) -> None:
+        """Say what to do, and wait until they are about to do it."""
+
+    def answer(self, question: str, default: str) -> str:
+        """Ask for a word; the default where they say nothing else."""
+
+    def progress(self, what: str) -> AbstractContextManager[OnProgress]:
+        """A bar, from 0 to 1."""
+
+
+class Bench(Protocol):
+    """Where it is measured.
+
+    Attributes:
+        simulated: whether a simulated crane stands for the machine.
+        person: who drives it.
+        changes: parameters of the simulated crane, NAME=VALUE.
+    """
+
+    simulated: bool
+    person: Person
+    changes: list[str]
+
+    def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
+        """Let the task be done, and write every frame of the buses into a log.
+
+        Raises:
+            BusError: a bus cannot be opened.
+            OSError: the log cannot be written.
+        """
+
+    def raw_mode(self, step: str) -> Mode:
+        """Who moves the valves without filters before the first motion."""
+
+    def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:
+        """Drive an axis through its ramp; its valve is neutral afterwards, however it ends.
+
+        Args:
+            deployment: the machine.
+            drive: the measurement.
+            words: what the person has to know and to hold.
+
+        Raises:
+            BusError: a bus cannot be opened.
+        """
+
+
+class Simulated:
+    """The simulated crane, in lock-step: no bus is opened.
+
+    Args:
+        person: who is shown the progress.
+        changes: parameters of the crane, NAME=VALUE, as for ``canshaper sim --set``.
+
+    Raises:
+        UsageError: no such parameter.
+    """
+
+    simulated = True
+
+    def __init__(self, person: Person, changes: list[str]) -> None:
+        self.person = person
+        self.changes = changes
+        self.parameters: CraneParameters = changed_parameters(changes)
+
+    def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
+        """See ``Bench``."""
+        if cranes(deployment):
+            raise UsageError(
+                f"{deployment.path}: expected one crane to rehearse with, got several; take a"
+                " deployment of one of them"
+            )
+        with self.person.progress("driving") as on_progress:
+            log_simulated(
+                log,
+                deployment if task.mode in (Mode.RAW, Mode.SHAPED) else deployment.listening(),
+                self.parameters,
+                task.script,
+                on_progress,
+                bypass=task.mode is Mode.RAW,
+                released=task.released,
+            )
+
+    def raw_mode(self, _step: str) -> Mode:
+        """See ``Bench``."""
+        return Mode.RAW
+
+    def calibrate(self, deployment: Deployment, drive: CalibrationDrive, _words: str) -> None:
+        """See ``Bench``."""
+        with self.person.progress("driving") as on_progress:
+            run_simulated(drive, deployment, self.parameters, lambda one: on_progress(one.progress))

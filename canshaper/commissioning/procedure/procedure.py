@@ -1,0 +1,258 @@
+"""The procedure: runs steps, keeps their state, writes what a person has accepted."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import dataclass, field
+from difflib import unified_diff
+from pathlib import Path
+
+from canshaper.commissioning.procedure.bench import Bench
+from canshaper.commissioning.procedure.files import Files
+from canshaper.commissioning.procedure.pictures import draw
+from canshaper.commissioning.procedure.sheet import Part
+from canshaper.commissioning.procedure.state import (
+    Record,
+    State,
+    Status,
+    hash_of,
+    read_state,
+    stamped,
+    write_state,
+)
+from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.errors import BusError, CanshaperError, UsageError
+from canshaper.machine.deployment import Deployment
+
+
+@dataclass
+class Proposal:
+    """What came out of a run of a step, and what it would write; nothing is written yet.
+
+    Attributes:
+        step: name of the step.
+        parts: lines and tables.
+        numbers: what was measured.
+        poor: what is missing, with what to do; then nothing can be accepted.
+        pictures: files of its picture.
+        files: its logs.
+        diff: what would be written into the deployment file; empty for nothing.
+        before: SHA-256 of the deployment file that it was computed from.
+        text: that file with what it would write.
+    """
+
+    step: str
+    before: str
+    parts: list[Part] = field(default_factory=list)
+    numbers: dict[str, object] = field(default_factory=dict)
+    poor: list[str] = field(default_factory=list)
+    pictures: list[Path] = field(default_factory=list)
+    files: list[Path] = field(default_factory=list)
+    diff: str = ""
+    text: bytes = b""
+
+
+class Procedure:
+    """The steps of one deployment, under its lock (``Files.locked``).
+
+    Args:
+        files: of the deployment.
+        bench: where it is measured.
+        load: reads the deployment of a path, with the bus options of the command.
+        steps: in order.
+        origin: the file that a rehearsal's is a copy of.
+
+    Attributes:
+        files: as above.
+        state: how far it has come.
+        news: what a person has to know before the next step.
+
+    Raises:
+        ConfigError: the deployment file is no good one.
+        UsageError: the state is not one, or of the other bench.
+    """
+
+    def __init__(
+        self,
+        files: Files,
+        bench: Bench,
+        load: Callable[[Path], Deployment],
+        steps: Sequence[Step],
+        origin: Path | None = None,
+    ) -> None:
+        self.files, self._bench, self._load = files, bench, load
+        self.news: list[str] = []
+        deployment = load(files.deployment)
+        self.steps = [step for step in steps if step.applies(deployment)]
+        self.state = read_state(files.state) or _new_state(bench, origin)
+        self._check_bench()
+        if origin and hash_of(origin) != self.state.origin:
+            remedy = f"to rehearse it as it is now, move {files.deployment} and {files.state} away"
+            self.news.append(f"{origin} was changed since the copy was made; {remedy}")
+        files.folder.mkdir(parents=True, exist_ok=True)
+        self._notice_changes()
+
+    def _check_bench(self) -> None:
+        """The state is of the same machine, or of the same simulated crane."""
+        state, bench, path = self.state, self._bench, self.files.state
+        remedy = "move it away to begin again"
+        if state.simulated != bench.simulated:
+            kinds = {True: "a rehearsal", False: "a machine"}
+            text = f"expected the state of {kinds[bench.simulated]}"
+            raise UsageError(f"{path}: {text}, got that of {kinds[state.simulated]}; {remedy}")
+        if state.changes != bench.changes:
+            was, now = (
+                " ".join(one) or "the nominal one" for one in (state.changes, bench.changes)
+            )
+            raise UsageError(f"{path}: --set: expected the crane {was}, got {now}; {remedy}")
+
+    # -- what is there -------------------------------------------------------------------------
+
+    def step(self, name: str) -> Step:
+        """A step by its name.
+
+        Raises:
+            UsageError: there is none, or this deployment has none.
+        """
+        for one in self.steps:
+            if one.name == name:
+                return one
+        names = ", ".join(one.name for one in self.steps)
+        raise UsageError(f"--step: expected one of {names}, got {name!r}")
+
+    def next_open(self) -> Step | None:
+        """The first step that is open; None where none is."""
+        return next((s for s in self.steps if self.state.of(s.name).status is Status.OPEN), None)
+
+    # -- one step ------------------------------------------------------------------------------
+
+    def run(self, step: Step) -> Proposal:
+        """Run a step: its results, and what it would write. What it lacks is no error.
+
+        Raises:
+            ConfigError: the deployment file is no good one.
+            BusError: a bus cannot be opened.
+            OSError: a file cannot be written.
+        """
+        self._notice_changes()
+        proposal = Proposal(step.name, hash_of(self.files.deployment))
+        deployment = self._load(self.files.deployment)
+        context = Context(deployment, self._bench, self.files.folder, self.state)
+        try:
+            outcome = step.run(context)
+            proposal.parts, proposal.numbers = outcome.sheet.parts, outcome.numbers
+            proposal.poor, proposal.files = outcome.poor, outcome.files
+            for part, figure in outcome.figures.items():
+                name = f"{step.name}-{part}" if part else step.name
+                proposal.pictures += draw(figure, self.files.folder / name, deployment)
+            if outcome.edit and not outcome.poor:
+                self._propose(proposal, outcome)
+        except BusError:
+            raise
+        except CanshaperError as error:
+            proposal.poor.append(str(error).replace(str(self.files.proposal), str(deployment.path)))
+        self._keep(proposal, Status.OPEN, why="; ".join(proposal.poor) or "not accepted yet")
+        return proposal
+
+    def accept(self, proposal: Proposal) -> None:
+        """Write what a step proposes; it is done, and what used its results is open again.
+
+        Raises:
+            UsageError: it lacks something, or the file was changed meanwhile: the step stays open.
+            OSError: a file cannot be written.
+        """
+        if proposal.poor:
+            raise UsageError(f"{proposal.step}: {'; '.join(proposal.poor)}")
+        path = self.files.deployment
+        if hash_of(path) != proposal.before:
+            self._notice_changes()
+            text = "was changed by someone else meanwhile; nothing was written, do the step again"
+            raise UsageError(f"{path}: {text}")
+        if proposal.diff:
+            self._replace(proposal.text)
+            self.state.left = hash_of(path)
+        self._keep(proposal, Status.DONE)
+        if proposal.diff:
+            name = proposal.step
+            self._reopen({name, FILE}, f"{name} has changed the file")
+        self._save()
+
+    def skip(self, step: Step) -> None:
+        """Leave a step out; what it has shown stays."""
+        record = stamped(self.state.of(step.name))
+        record.status, record.why = Status.SKIPPED, "left out"
+        self._save()
+
+    # -- parts ---------------------------------------------------------------------------------
+
+    def _propose(self, proposal: Proposal, outcome: Outcome) -> None:
+        """Let the step write into a copy of the file, and see what that changes."""
+        assert outcome.edit
+        path, copy = self.files.deployment, self.files.proposal
+        before = path.read_bytes()
+        copy.write_bytes(before)
+        copy.chmod(path.stat().st_mode)
+        try:
+            notes = outcome.edit(self._load(copy))
+            proposal.parts += [{"text": note} for note in notes]
+            proposal.text = copy.read_bytes()
+        finally:
+            with suppress(OSError):
+                copy.unlink()
+        names = f"{path.name} (now)", f"{path.name} (then)"
+        lines = unified_diff(
+            before.decode().splitlines(), proposal.text.decode().splitlines(), *names, lineterm=""
+        )
+        proposal.diff = "\n".join(lines)
+
+    def _replace(self, text: bytes) -> None:
+        """Put the accepted text in place of the file, in one step."""
+        path, copy = self.files.deployment.resolve(), self.files.proposal
+        copy.write_bytes(text)
+        copy.chmod(path.stat().st_mode)
+        copy.replace(path)
+
+    def _keep(self, proposal: Proposal, status: Status, why: str = "") -> None:
+        done = status is Status.DONE
+        record = Record(
+            status,
+            why=why,
+            parts=proposal.parts,
+            numbers=proposal.numbers,
+            poor=proposal.poor,
+            pictures=[path.name for path in proposal.pictures],
+            files=[path.name for path in proposal.files],
+            diff=proposal.diff if done else "",
+            deployment=hash_of(self.files.deployment),
+        )
+        self.state.steps[proposal.step] = stamped(record)
+        self._save()
+
+    def _save(self) -> None:
+        write_state(self.files.state, self.state)
+
+    def _reopen(self, changed: set[str], why: str) -> None:
+        """Open again what used something that has changed: results of steps, or the file."""
+        for step in self.steps:
+            record = self.state.of(step.name)
+            if step.name not in changed and changed & {*step.needs}:
+                changed.add(step.name)
+                if record.status is Status.DONE:
+                    record.status, record.why = Status.OPEN, why
+
+    def _notice_changes(self) -> None:
+        """Say so where someone else has changed the file: what it was checked for is open again."""
+        now = hash_of(self.files.deployment)
+        if self.state.left and self.state.left != now:
+            why = f"{self.files.deployment.name} was changed by another program"
+            self._reopen({FILE}, why)
+            self.news.append(f"{why} since the last step; it is checked again, nothing is lost")
+        self.state.left = now
+        write_state(self.files.state, self.state)
+
+
+def _new_state(bench: Bench, origin: Path | None) -> State:
+    return State(
+        simulated=bench.simulated,
+        changes=bench.changes,
+        origin=hash_of(origin) if origin else "",
+    )

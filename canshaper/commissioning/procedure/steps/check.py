@@ -1,0 +1,100 @@
+"""Is the file fit to start, and slow enough for the first motion?"""
+
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from canshaper.commissioning.doubts import doubts
+from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.commissioning.stopping import Stopping, print_stopping, stopping
+from canshaper.config.edit import set_values
+from canshaper.config.source import Source
+from canshaper.machine.deployment import Deployment
+from canshaper.machine.origin import rehearsed_valves
+from canshaper.machine.stopping import unstated
+from canshaper.report.style import (
+    HEAD_PT,
+    PRINT_DPI,
+    RAW_COLOUR,
+    SHAPED_COLOUR,
+    TEXT_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
+    new_figure,
+    plain,
+    titled,
+)
+from canshaper.report.table import axis_title
+
+FIRST_PCT = 40.0  # of full speed, for the first motion; what `canshaper init` writes too
+MOTION = "motion"  # the step of that name
+EVENTS = (
+    "joystick released",
+    "joystick reversed",
+    "joystick lost",
+    "enable lost",
+    "limits allow",
+)
+
+
+def run(context: Context) -> Outcome:
+    """Check the whole file, and propose reduced speed before the first motion."""
+    deployment = context.deployment
+    outcome = Outcome()
+    for name, bus in deployment.config.buses.items():
+        if load := deployment.load(name):
+            outcome.numbers[f"{name}_load_pct"] = round(100.0 * load.share, 1)
+            outcome.sheet.print(
+                f"bus {name}: {load.messages} messages load {load.share:.0%} of {bus.bitrate} bit/s"
+            )
+    print_stopping(deployment, outcome.sheet)
+    outcome.sheet.print(*deployment.identity.lines())
+    outcome.numbers["digest"] = f"{deployment.identity.digest:#06x}"
+    for doubt in doubts(deployment):
+        outcome.sheet.print(f"WARNING: {doubt}")
+    source = Source(deployment.path)
+    faults = [*unstated(deployment)]
+    faults += [] if context.bench.simulated else rehearsed_valves(deployment.config)
+    outcome.poor += [str(source.problem(place, text)) for place, text in faults]
+    axes = stopping(deployment)
+    outcome.figures[""] = lambda: figure(axes)
+    fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > FIRST_PCT]
+    if fast and MOTION not in context.numbers:
+        outcome.sheet.print(f"The first motion is at reduced speed: {', '.join(fast)}")
+        outcome.edit = partial(_slow_down, axes=fast)
+    return outcome
+
+
+def _slow_down(deployment: Deployment, axes: list[str]) -> list[str]:
+    for name in axes:
+        if "limits" in deployment.config.axes[name].model_fields_set:
+            set_values(deployment.path, ("axes", name, "limits"), {"max_pct": FIRST_PCT})
+        else:
+            set_values(deployment.path, ("axes", name), {"limits": {"max_pct": FIRST_PCT}})
+    return []
+
+
+def figure(axes: list[Stopping]) -> Figure:
+    """How far each axis travels on after each event, and how far its limits allow."""
+    height = 170 + 330 * len(axes)
+    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    for number, axis in enumerate(axes):
+        bottom = (height - 110 - 330 * (number + 1) + 75) / height
+        panel = fig.add_axes((0.2, bottom, 0.76, 215 / height))
+        plain(panel, size=TEXT_PT)
+        unit, scale = ("s of full speed", 1.0) if axis.speed.m_s is None else ("m", axis.speed.m_s)
+        titled(panel, f"{axis_title(axis.name)}, {unit}", TITLE_PT)
+        ways = axis.travel
+        events = (ways.release, ways.reversal, ways.lost, ways.enable, axis.allowed_s)
+        colours = [SHAPED_COLOUR] * (len(events) - 1) + [RAW_COLOUR]
+        panel.barh(EVENTS, [scale * way_s for way_s in events], color=colours, height=0.6)
+        panel.invert_yaxis()
+        if axis.stated_m is not None and axis.speed.m_s is not None:
+            panel.axvline(axis.stated_m, color=TEXT_COLOUR, linewidth=1.2)
+    title = "Travel from full speed; the line is stop_distance_m"
+    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+    return fig
+
+
+CHECK = Step("check", "Check", run, needs=(FILE,))

@@ -1,0 +1,166 @@
+"""The joystick of each axis, found by moving it."""
+
+from functools import partial
+
+from matplotlib.figure import Figure
+
+from canshaper.commissioning.procedure.bench import Task
+from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
+from canshaper.config.edit import set_values
+from canshaper.machine.deployment import Deployment
+from canshaper.report.console import new_table
+from canshaper.report.style import (
+    HEAD_PT,
+    PRINT_DPI,
+    SHAPED_COLOUR,
+    TEXT_COLOUR,
+    TEXT_PT,
+    TITLE_PT,
+    WIDTH_PX,
+    new_figure,
+    plain,
+    titled,
+    zero_line,
+)
+from canshaper.report.table import axis_title
+from canshaper_sim.strokes import Script, Stroke
+
+MOVE_S = 10.0
+LEAST = 0.9  # of full that both ends have to reach
+MOVED = 0.5  # from which on a signal was moved
+
+
+def run(context: Context) -> Outcome:
+    """Let every joystick be moved to both ends, and see which signal moves."""
+    deployment = context.deployment
+    outcome = Outcome()
+    table = new_table("axis", "moved", "least, %", "most, %", "enable held, %")
+    seen: dict[str, AxisTraffic] = {}
+    wrong: dict[str, tuple[str, str]] = {}
+    for name in deployment.axes:
+        log = context.folder / f"joystick-{name}.log"
+        words = (
+            f"Enable held, move the joystick of {name} to its end in positive direction, then to"
+            " the other end, and let go. Nothing has to move; touch no other joystick."
+        )
+        strokes = (Stroke(name, 1.0, 2.0, 1.0), Stroke(name, 4.0, 2.0, -1.0))
+        context.bench.drive(deployment, log, Task(words, Script("ends", strokes, MOVE_S)))
+        traffic = read_traffic(log, deployment)
+        outcome.files.append(log)
+        axis = seen[name] = traffic.axes[name]
+        moved = _moved(traffic)
+        least, most = _extremes(axis)
+        held = _held(axis)
+        table.add_row(
+            name,
+            ", ".join(moved) or "-",
+            f"{100 * least:.0f}",
+            f"{100 * most:.0f}",
+            "-" if held is None else f"{100 * held:.0f}",
+        )
+        outcome.numbers[name] = {
+            "signal": moved[0] if moved else None,
+            "least_pct": round(100 * least, 1),
+            "most_pct": round(100 * most, 1),
+        }
+        other = _other_signal(deployment, name, moved)
+        if other:
+            wrong[name] = other
+        elif fault := _fault(deployment, name, axis, moved):
+            outcome.poor.append(fault)
+    outcome.sheet.print(table)
+    for name, (joystick, signal) in wrong.items():
+        outcome.sheet.print(f"{name}: the file names another signal than {joystick}.{signal}")
+    outcome.figures[""] = lambda: figure(seen)
+    if wrong:
+        outcome.edit = partial(_write, wrong=wrong)
+    return outcome
+
+
+def _moved(traffic: Traffic) -> list[str]:
+    """Signals that were moved, the farthest first."""
+    far = {name: most - least for name, (least, most) in traffic.moved.items()}
+    return sorted((name for name in far if far[name] > MOVED), key=lambda name: -far[name])
+
+
+def _extremes(axis: AxisTraffic) -> tuple[float, float]:
+    values = axis.joystick.value or [0.0]
+    return min(values), max(values)
+
+
+def _held(axis: AxisTraffic) -> float | None:
+    """Part of the deflected time in which the enable switch was held; None where not known."""
+    if len(axis.enabled.value) != len(axis.joystick.value):
+        return None
+    deflected = [
+        enabled
+        for enabled, value in zip(axis.enabled.value, axis.joystick.value, strict=True)
+        if abs(value) > MOVED
+    ]
+    return sum(deflected) / len(deflected) if deflected else None
+
+
+def _other_signal(deployment: Deployment, name: str, moved: list[str]) -> tuple[str, str] | None:
+    """(joystick, signal) of the one that moved, where the file names another; None where not."""
+    command = deployment.axes[name].config.command
+    own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
+    if len(moved) != 1 or moved[0] == own:
+        return None
+    message, _, signal = moved[0].partition(".")
+    names = [n for n, one in deployment.joysticks.items() if one.message.name == message]
+    return (names[0], signal) if names else None
+
+
+def _fault(deployment: Deployment, name: str, axis: AxisTraffic, moved: list[str]) -> str | None:
+    """What is missing, and what to do; None where it is as it should be."""
+    command = deployment.axes[name].config.command
+    own = f"{deployment.joysticks[command.joystick].message.name}.{command.signal}"
+    least, most = _extremes(axis)
+    text = None
+    if max(-least, most) < MOVED and moved:
+        text = f"{moved[0]} moved, and {own} of the file did not: put its message into joysticks:"
+        text += " of the file, then again"
+    elif max(-least, most) < MOVED:
+        text = "no signal moved: was it the right joystick? Is its message in the DBC files?"
+    elif len(moved) > 1:
+        text = f"several moved ({', '.join(moved)}): move the one joystick straight, then again"
+    elif min(-least, most) < LEAST:
+        text = f"reached {100 * least:.0f} to {100 * most:.0f} %: move it to both ends; else its"
+        text += " range in the DBC is wrong"
+    elif next(value for value in axis.joystick.value if abs(value) > MOVED) < 0.0:
+        text = f"went to negative values first: swap the sign of {own} in the DBC (factor, range)"
+    elif (held := _held(axis)) is not None and held < LEAST:
+        text = "the enable switch was not seen held: hold it; else the file names another one"
+    return f"{name}: {text}" if text else None
+
+
+def _write(deployment: Deployment, wrong: dict[str, tuple[str, str]]) -> list[str]:
+    for name, (joystick, signal) in wrong.items():
+        values = {"joystick": joystick, "signal": signal}
+        set_values(deployment.path, ("axes", name, "command"), values)
+    return []
+
+
+def figure(axes: dict[str, AxisTraffic]) -> Figure:
+    """The command of each axis over time, as the file reads it."""
+    height = 150 + 260 * len(axes)
+    fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)
+    for number, (name, axis) in enumerate(axes.items()):
+        bottom = height - 90 - 260 * (number + 1) + 85
+        panel = fig.add_axes((0.11, bottom / height, 0.86, 150 / height))
+        plain(panel, size=TEXT_PT)
+        titled(panel, axis_title(name), TITLE_PT)
+        zero_line(panel)
+        values = [100.0 * value for value in axis.joystick.value]
+        panel.plot(axis.joystick.time_s, values, color=SHAPED_COLOUR, linewidth=1.4)
+        panel.set_xlim(0.0, MOVE_S)
+        panel.set_ylim(-110.0, 110.0)
+        panel.set_ylabel("joystick, %", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    panel.set_xlabel("time, s", fontsize=TEXT_PT, color=TEXT_COLOUR)
+    title = "Each joystick, moved to both of its ends"
+    fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
+    return fig
+
+
+JOYSTICKS = Step("joysticks", "Joysticks, found by moving them", run)

@@ -1,0 +1,120 @@
+"""The first motion, at reduced speed: right axis, right direction, and neutral at once."""
+
+from bisect import bisect_right
+from collections.abc import Sequence
+from itertools import pairwise
+from statistics import fmean
+
+from canshaper.commissioning.identification.commands import Samples
+from canshaper.commissioning.procedure.bench import Mode, Task
+from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.steps.check import FIRST_PCT, MOTION
+from canshaper.commissioning.procedure.steps.dry import PAUSE_S, ends, figure, show_states
+from canshaper.commissioning.procedure.traffic import AxisTraffic, read_traffic
+from canshaper.errors import UsageError
+from canshaper_sim.strokes import Script, Stroke
+
+LEVEL = 0.4  # of full deflection
+LEAST_MOVED = 0.02  # of full command
+# How long after the enable was let go a valve may still be away from neutral: its joystick's and
+# its own frame, each of which may have just been missed.
+FRAMES = 2
+GUIDE = (
+    "no one near, the crane free of everything, engine at low speed, a hand on the emergency stop."
+    " The controller that drove the valves so far sends no more to them"
+)
+
+
+def run(context: Context) -> Outcome:
+    """Let every axis be moved a little, and the enable be let go in motion."""
+    deployment = context.deployment
+    fast = [n for n, one in deployment.config.axes.items() if one.limits.max_pct > FIRST_PCT]
+    if fast:
+        text = f"expected max_pct up to {FIRST_PCT:g} for the first motion"
+        raise UsageError(f"{', '.join(fast)}: {text}; do the step check again, which proposes it")
+    log = context.folder / "motion.log"
+    axes = [*deployment.axes]
+    strokes = ends(axes, LEVEL)
+    begin_s = strokes[-1].end_s + PAUSE_S
+    last = Stroke(axes[0], begin_s, 2.0, LEVEL)
+    script = Script("motion", (*strokes, last), last.end_s + PAUSE_S)
+    released = (begin_s + 1.0, last.end_s + 0.5)
+    words = (
+        f"FIRST MOTION: {GUIDE}. Enable held: a little deflection forth and back of each of"
+        f" {', '.join(axes)}; then let go of the enable while {axes[0]} moves."
+        f" {script.duration_s:.0f} s."
+    )
+    context.bench.drive(deployment, log, Task(words, script, Mode.SHAPED, released))
+    traffic = read_traffic(log, deployment)
+    outcome = Outcome(files=[log])
+    show_states(outcome, traffic)
+    slowest_s: float | None = None
+    for name, axis in traffic.axes.items():
+        bound = deployment.axes[name]
+        cycle_ms = deployment.joysticks[bound.config.command.joystick].message.cycle_time or 0
+        period_ms = bound.period_ticks * deployment.config.tick_ms
+        allowed_s = FRAMES * (period_ms + cycle_ms) / 1000.0
+        if not _follows(axis):
+            text = "its valve did not follow its joystick in both directions"
+            outcome.poor.append(f"{name}: {text}: see the picture, then move it again")
+        for after_s in _releases(axis):
+            slowest_s = max(slowest_s or 0.0, after_s)
+            if after_s > allowed_s:
+                text = f"neutral only {after_s:.3f} s after the enable was let go"
+                outcome.poor.append(f"{name}: {text}, expected {allowed_s:.3f} s; do not go on")
+    if slowest_s is None:
+        text = "the enable was not let go while an axis moved, or is in no message of a joystick"
+        outcome.poor.append(f"{text}: let it go in motion; neutral has to follow at once")
+    else:
+        outcome.numbers["enable_to_neutral_s"] = round(slowest_s, 3)
+        outcome.sheet.print(f"enable let go in motion: neutral after {slowest_s:.3f} s")
+    if not context.bench.simulated:
+        outcome.sheet.print("Accept it only if each axis moved, and in its right direction.")
+    outcome.figures[""] = lambda: figure(traffic, "First motion, at reduced speed")
+    return outcome
+
+
+def _follows(axis: AxisTraffic) -> bool:
+    """Whether the valve goes to the side of the joystick while that is held, to both sides.
+
+    Slew moves near-far a little too, so what it does besides says nothing.
+    """
+    held = _held_at(axis)
+    farthest = max((abs(command) for command, _ in held), default=0.0)
+    for side in (1.0, -1.0):
+        sent = [side * valve for command, valve in held if side * command > 0.5 * farthest]
+        if not sent or fmean(sent) < LEAST_MOVED:
+            return False
+    return True
+
+
+def _held_at(axis: AxisTraffic) -> list[tuple[float, float]]:
+    """Joystick and valve at every frame of the joystick."""
+    times, values = axis.valve.time_s, axis.valve.value
+    pairs = []
+    for time_s, command in zip(*_columns(axis.joystick), strict=True):
+        number = bisect_right(times, time_s) - 1
+        pairs.append((command, values[number] if number >= 0 else 0.0))
+    return pairs
+
+
+def _columns(samples: Samples) -> tuple[Sequence[float], Sequence[float]]:
+    return samples.time_s, samples.value
+
+
+def _releases(axis: AxisTraffic) -> list[float]:
+    """How long the valve took to neutral each time the enable was let go while it moved."""
+    times_s = []
+    times, values = _columns(axis.valve)
+    enabled = list(zip(*_columns(axis.enabled), strict=True))
+    for (_, before), (time_s, now) in pairwise(enabled):
+        if before and not now:
+            moving = [v for t, v in zip(times, values, strict=True) if t < time_s]
+            if moving and abs(moving[-1]) > LEAST_MOVED:
+                after = (t for t, v in zip(times, values, strict=True) if t >= time_s and not v)
+                times_s.append(next(after, float("inf")) - time_s)
+    return times_s
+
+
+# Not the file: it gets faster afterwards.
+FIRST_MOTION = Step(MOTION, "First motion, at reduced speed", run, needs=("valve", "filter"))

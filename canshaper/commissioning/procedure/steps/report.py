@@ -1,0 +1,71 @@
+"""The report of the day, to sign."""
+
+from datetime import datetime
+from pathlib import Path
+
+from canshaper.commissioning.procedure.pictures import embedded
+from canshaper.commissioning.procedure.sheet import shown
+from canshaper.commissioning.procedure.state import Record, State, Status
+from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.machine.deployment import Deployment
+from canshaper.report import html
+from canshaper.report.console import new_table
+
+NAME = "report"
+
+
+def run(context: Context) -> Outcome:
+    """Write everything that was done into one file."""
+    path = context.folder / "report.html"
+    steps = {name: one for name, one in context.state.steps.items() if name != NAME}
+    path.write_text(document(context.deployment, context.state, steps, context.folder), "utf-8")
+    outcome = Outcome(files=[path])
+    undone = [name for name, one in steps.items() if one.status is not Status.DONE]
+    if undone:
+        outcome.sheet.print(f"NOTE: not done: {', '.join(undone)}; the report says so")
+    outcome.sheet.print(f"Report: {path}, to print and sign")
+    return outcome
+
+
+def document(deployment: Deployment, state: State, steps: dict[str, Record], folder: Path) -> str:
+    """The whole report.
+
+    Args:
+        deployment: as it is now.
+        state: of the procedure.
+        steps: those that it is about, in order.
+        folder: of their pictures.
+    """
+    title = f"Commissioning of {deployment.path.name}"
+    crane = []
+    if state.simulated:
+        title += ": REHEARSAL, nothing in it is of a machine"
+        crane.append(("simulated crane", " ".join(state.changes) or "the nominal one"))
+    facts = [*crane, *html.facts(deployment, datetime.now().astimezone())]
+    summary = new_table("step", "is", "at", "canshaper", title="Steps")
+    for name, one in steps.items():
+        summary.add_row(name, one.status.value, one.at, one.version)
+    parts = [html.table(summary)]
+    for name, one in steps.items():
+        parts += _step(name, one, folder)
+    return html.document(title, facts, parts)
+
+
+def _step(name: str, one: Record, folder: Path) -> list[str]:
+    """A step: what it has shown, its pictures, and what it has changed."""
+    parts = [html.heading(f"{name}: {one.status.value}{f', {one.why}' if one.why else ''}")]
+    for part in one.parts:
+        again = shown(part)
+        parts.append(html.text(again) if isinstance(again, str) else html.table(again))
+    parts += [html.text(f"TOO POOR: {fault}") for fault in one.poor]
+    paths = [folder / picture for picture in one.pictures]
+    drawings = {path.stem for path in paths if path.suffix == ".svg"}
+    for path in paths:
+        if path.suffix == ".svg" or path.stem not in drawings:
+            parts.append(embedded(path))
+    if one.diff:
+        parts += [html.text("Written:"), html.listing(one.diff)]
+    return parts
+
+
+REPORT = Step(NAME, "Report, to sign", run, needs=(FILE,))

@@ -1,0 +1,202 @@
+"""The swing of each axis, recorded and identified."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from matplotlib.figure import Figure
+
+from canshaper.commissioning.identification.data import (
+    SIMULATED,
+    logged,
+    measured_in,
+    timed_by_hand,
+)
+from canshaper.commissioning.identification.plot import figure
+from canshaper.commissioning.identification.recommend import Advice
+from canshaper.commissioning.identification.report import lines
+from canshaper.commissioning.identification.table import is_table
+from canshaper.commissioning.identification.verdict import Finding
+from canshaper.commissioning.identification.write import advice_on, write_sway
+from canshaper.commissioning.procedure.bench import Bench, Mode, Task
+from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.errors import UsageError
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.strokes import Script, Stroke
+
+# A push as in the scripts pulse-AXIS, and rest of ten swings of most grapples.
+PUSH_S, RAMP_S, QUIET_S = 3.0, 0.1, 30.0
+NONE = "-"
+
+
+@dataclass
+class _Sources:
+    """What shows the swing of each axis.
+
+    Attributes:
+        signals: MESSAGE.SIGNAL on a bus, by axis.
+        tables: file of a phone or logger, by axis.
+        timed: swings, seconds, first and last amplitude by a stopwatch, by axis.
+    """
+
+    signals: dict[str, str] = field(default_factory=dict)
+    tables: dict[str, Path] = field(default_factory=dict)
+    timed: dict[str, tuple[float, ...]] = field(default_factory=dict)
+
+
+def swinging(deployment: Deployment) -> list[str]:
+    """Axes that make the grapple swing."""
+    return [name for name, axis in deployment.axes.items() if axis.config.sway]
+
+
+def run(context: Context) -> Outcome:
+    """Record a push of each axis and its swing, and identify it."""
+    deployment, bench = context.deployment, context.bench
+    axes = swinging(deployment)
+    outcome = Outcome()
+    sources = _asked(bench, deployment, axes)
+    missing = [name for name in axes if not _has(sources, name)]
+    if missing:
+        text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
+        outcome.poor.append(f"{text} table, or a stopwatch")
+    findings: list[Finding] = []
+    logs: list[Path] = []
+    if sources.signals:
+        log = context.folder / "swing.log"
+        bench.drive(deployment, log, _task([*sources.signals], bench.raw_mode("swing")))
+        logs.append(log)
+        findings += _identified([log], sources.signals, deployment, bench)
+    for name, path in sources.tables.items():
+        logs.append(path)
+        findings += _identified([path], {}, deployment, bench, axis=name)
+    for name, values in sources.timed.items():
+        timed: dict[str, float | None] = dict(zip(_TIMED, values, strict=True))
+        findings.append(timed_by_hand(timed, [], name))
+    advice = advice_on(findings, deployment)
+    _show(outcome, findings, advice)
+    for name, signal in sources.signals.items():
+        outcome.numbers.setdefault(name, {})["signal"] = signal
+    outcome.files = [log for log in logs if log.parent == context.folder]
+    usable = [one for one in advice if one.sway]
+    if usable:
+        origin = _origin(logs, deployment, simulated=bench.simulated)
+        outcome.edit = partial(_write, findings=findings, advice=usable, origin=origin)
+    seen = [finding for finding in findings if finding.free or finding.driven]
+    if seen:
+        outcome.figures[""] = partial(_figure, seen, advice)
+    return outcome
+
+
+_TIMED = ("swings", "seconds", "first", "last")
+
+
+def _asked(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
+    """What shows the swing, by the person; of the simulated crane its own message."""
+    sources = _Sources()
+    for name in axes:
+        sensor = deployment.axes[name].sway_sensor
+        default = f"{sensor.message.message.name}.{sensor.signal.name}" if sensor else NONE
+        if name in SIMULATED and not isinstance(deployment.messages.find("GrappleSway"), str):
+            default = SIMULATED[name]
+        question = (
+            f"swing: {name}: what shows it: MESSAGE.SIGNAL of the bus, file of a phone (.csv), or"
+            " stopwatch SWINGS SECONDS FIRST LAST such as 10 23.6 20 5"
+        )
+        answer = default if bench.simulated else bench.person.answer(question, default)
+        words = answer.replace(",", " ").split()
+        if answer == NONE:
+            continue
+        if len(words) == len(_TIMED):
+            try:
+                sources.timed[name] = tuple(map(float, words))
+            except ValueError:
+                text = f"expected four numbers, got {answer!r}"
+                raise UsageError(f"swing: {name}: {text}") from None
+        elif is_table(Path(answer)):
+            sources.tables[name] = Path(answer)
+        else:
+            sources.signals[name] = answer
+    return sources
+
+
+def _has(sources: _Sources, name: str) -> bool:
+    return name in {**sources.signals, **sources.tables, **sources.timed}
+
+
+def _task(axes: Sequence[str], mode: Mode) -> Task:
+    strokes, begin_s = [], 0.5
+    for name in axes:
+        strokes.append(Stroke(name, begin_s, PUSH_S, 1.0, RAMP_S))
+        begin_s += PUSH_S + QUIET_S
+    words = (
+        f"Anti-sway off. For each of {', '.join(axes)}, one after the other: one short push of its"
+        f" joystick, let go, and touch nothing for ten swings. There are {begin_s:.0f} s."
+    )
+    return Task(words, Script("swing", tuple(strokes), begin_s), mode)
+
+
+def _identified(
+    logs: Sequence[Path],
+    signals: dict[str, str],
+    deployment: Deployment,
+    bench: Bench,
+    axis: str | None = None,
+) -> list[Finding]:
+    with bench.person.progress("identifying") as on_progress:
+        return logged(
+            [*map(str, logs)],
+            signals,
+            deployment,
+            deployment.messages,
+            axis=axis,
+            channel=None,
+            about_s=None,
+            on_progress=on_progress,
+        )
+
+
+def _origin(logs: Sequence[Path], deployment: Deployment, *, simulated: bool) -> dict[str, Any]:
+    origin = measured_in([*map(str, logs)], deployment.messages)
+    return {**origin, "source": "simulated"} if simulated else origin
+
+
+def _show(outcome: Outcome, findings: Sequence[Finding], advice: Sequence[Advice]) -> None:
+    for finding in findings:
+        outcome.sheet.print("\n".join(lines(finding)))
+        outcome.poor += [f"{finding.axis}: {fault}" for fault in finding.poor]
+        if finding.period_s and finding.damping_ratio:
+            outcome.numbers[finding.axis] = {
+                "period_s": round(finding.period_s.value, 4),
+                "period_half_s": round(finding.period_s.half, 4),
+                "damping_ratio": round(finding.damping_ratio.value, 4),
+                "damping_ratio_half": round(finding.damping_ratio.half, 4),
+            }
+            if speed := finding.full_speed_m_s:
+                outcome.numbers[finding.axis]["full_speed_m_s"] = round(speed.value, 3)
+    for one in advice:
+        outcome.sheet.print(one.text)
+
+
+def _write(
+    deployment: Deployment,
+    findings: Sequence[Finding],
+    advice: Sequence[Advice],
+    origin: dict[str, Any],
+) -> list[str]:
+    write_sway(deployment, findings, advice, origin)
+    scheduled = [one.axis for one in advice if deployment.axes[one.axis].config.gain_schedule]
+    return [f"NOTE: {name}: its gain schedule stays as it is" for name in scheduled]
+
+
+def _figure(findings: Sequence[Finding], advice: Sequence[Advice]) -> Figure:
+    return figure(findings, [one.text for one in advice])
+
+
+def swings(deployment: Deployment) -> bool:
+    """Whether any axis makes the grapple swing."""
+    return bool(swinging(deployment))
+
+
+SWING = Step("swing", "Swing, recorded and identified", run, needs=("joysticks",), applies=swings)

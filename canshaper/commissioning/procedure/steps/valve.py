@@ -1,0 +1,89 @@
+"""What each valve makes of its command, measured."""
+
+from functools import partial
+
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.fit import Calibration
+from canshaper.commissioning.calibration.plot import figure
+from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.write import (
+    SIMULATED,
+    curve_lines,
+    speed_signal,
+    write_curve,
+)
+from canshaper.commissioning.procedure.bench import Bench
+from canshaper.commissioning.procedure.step import Context, Outcome, Step
+from canshaper.commissioning.procedure.steps.swing import swinging, swings
+from canshaper.errors import CalibrationError
+from canshaper.machine.deployment import Deployment
+
+# As `canshaper calibrate` has them.
+RATE_PER_S, TOP = 0.03, 0.4
+NONE = "-"
+
+
+def run(context: Context) -> Outcome:
+    """Measure the valve of every axis that swings and whose speed is on a bus."""
+    deployment, bench = context.deployment, context.bench
+    outcome = Outcome()
+    results: dict[str, Calibration] = {}
+    left = []
+    for name in swinging(deployment):
+        speed = _speed(bench, deployment, name)
+        if speed == NONE:
+            left.append(name)
+            continue
+        ramp = Ramp(RATE_PER_S, TOP)
+        drive = CalibrationDrive(deployment, name, speed_signal(deployment, name, speed), ramp)
+        words = (
+            f"{name} moves BY ITSELF for {ramp.duration_s:.0f} s, up to {100 * TOP:.0f} % of its"
+            " command in both directions. No other controller sends to its valve. Everybody away;"
+            " hold the enable switch all the time, joystick in neutral: letting go ends it."
+        )
+        try:
+            bench.calibrate(deployment, drive, words)
+            results[name] = drive.result()
+        except CalibrationError as error:
+            outcome.poor.append(f"{name}: {error}; do it again")
+    for name, result in results.items():
+        outcome.sheet.print("\n".join(curve_lines(deployment, name, result, 100.0 * TOP)))
+        outcome.numbers[name] = {
+            "opens_pct": [
+                round(100.0 * one.opens, 1) for one in (result.negative, result.positive)
+            ],
+            "delay_pct": round(100.0 * result.positive.delay, 2),
+        }
+        limits = deployment.axes[name].config.limits.output_limits()
+        outcome.figures[name] = partial(figure, name, limits, result, 100.0 * TOP)
+    if left:
+        text = f"{', '.join(left)}: nothing on a bus shows the speed, so the valve is not measured"
+        outcome.sheet.print(f"NOTE: {text}; put deadband_pct of its data sheet into the file")
+    if left and not results:
+        outcome.poor.append("no valve can be measured; skip it, or name MESSAGE.SIGNAL of a speed")
+    if results:
+        outcome.edit = partial(_write, results=results, simulated=bench.simulated)
+    return outcome
+
+
+def _speed(bench: Bench, deployment: Deployment, name: str) -> str:
+    """MESSAGE.SIGNAL of the speed of an axis; a dash where there is none."""
+    default = SIMULATED.get(name, NONE)
+    if isinstance(deployment.messages.find(default.partition(".")[0]), str):
+        default = NONE
+    if feedback := deployment.axes[name].config.feedback:
+        default = f"{feedback.message}.{feedback.signal}"
+    if bench.simulated:
+        return default
+    question = f"valve: {name}: MESSAGE.SIGNAL of its speed, {NONE} for none"
+    return bench.person.answer(question, default)
+
+
+def _write(deployment: Deployment, results: dict[str, Calibration], simulated: bool) -> list[str]:
+    for name, result in results.items():
+        bus = deployment.config.buses[deployment.axes[name].config.valve.bus]
+        write_curve(deployment, name, result, simulated=simulated or bus.is_virtual)
+    return []
+
+
+VALVE = Step("valve", "Valves, calibrated", run, needs=("joysticks",), applies=swings)

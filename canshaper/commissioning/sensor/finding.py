@@ -1,0 +1,239 @@
+"""What a log shows of a sway sensor, whether that may be used, and what it makes of the file."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from canshaper.commissioning.identification.data_quality import clipped
+from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.identification.driven_data import Driven, driven_s, stretches
+from canshaper.commissioning.identification.series import Array, Command, Kind, Series
+from canshaper.commissioning.sensor.fit import SensorFit, fit_sensor
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.machine.sway_sensor import LEAST_SAMPLES, MOST_DELAY
+
+# Seconds in which the axis has to be driven, at least.
+LEAST_DRIVEN_S = 2.0
+# Part of the swing beyond noise that the commands have to explain.
+LEAST_EXPLAINED = 0.8
+# Widest interval of a delay that may be used, s.
+WIDEST_DELAY_S = 0.015
+# Beyond so many times what the full speed of the file makes, or so little, the unit is another one.
+MOST_GAIN = 3.0
+# What the model leaves wrong of the delay, s: large swings, and spools that need their time.
+MODEL_DELAY_S = 0.01
+# What two measurements differ by within so much time is noise, s: a swing hardly moves meanwhile.
+NOISE_S = 0.1
+# Lengths that are off by more are reported, as a part.
+SAME_LENGTH = 0.15
+# Part of the largest offset from which that one is raised, and what it is raised to.
+NEAR_OFFSET, MORE_OFFSET = 0.8, 1.5
+SIGMAS = 2.0  # of 95 %
+DRIVE_IT = (
+    "drive it alone at some 40 % for about a second, forth and back, four times, with a pause of"
+    " two swings after each, and let nothing touch the tool"
+)
+
+
+@dataclass
+class Finding:
+    """The sway sensor of one axis.
+
+    Attributes:
+        axis: its name.
+        series: what it measured, rad or rad/s, with the sign of its signal.
+        data: the stretches in which the axis was driven.
+        fit: the model that explains it best; None where there was nothing to explain.
+        noise: standard deviation of its noise, degrees or degrees per second.
+        poor: why nothing may be used, each with what to do.
+        notes: what else a person should know.
+    """
+
+    axis: str
+    series: Series
+    data: Sequence[Driven] = ()
+    fit: SensorFit | None = None
+    noise: float = 0.0
+    poor: list[str] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
+
+    @property
+    def unit(self) -> str:
+        """Unit for people."""
+        return "degrees/s" if self.series.unit.kind is Kind.RATE else "degrees"
+
+    @property
+    def invert(self) -> bool:
+        """Whether it is negative where the tip speeds up in positive direction."""
+        return self.fit is not None and self.fit.gain < 0.0
+
+    @property
+    def delay_s(self) -> Value:
+        """Age of a measurement."""
+        assert self.fit
+        return Value(self.fit.delay_s, math.hypot(SIGMAS * self.fit.deviations[0], MODEL_DELAY_S))
+
+    @property
+    def offset(self) -> Value:
+        """Degrees, or degrees per second, with the sign of its signal."""
+        assert self.fit
+        offsets = np.degrees(self.fit.offsets)
+        spread = float(offsets.std(ddof=1)) if len(offsets) > 1 else 0.0
+        swings = sum(len(one.time_s) for one in self.data) * NOISE_S
+        return Value(float(offsets.mean()), SIGMAS * max(spread, self.noise / math.sqrt(swings)))
+
+    @property
+    def period_s(self) -> Value:
+        """Period of the damped swing."""
+        assert self.fit
+        period = 2.0 * math.pi / self.fit.omega
+        return Value(period, SIGMAS * period * self.fit.deviations[1] / self.fit.omega)
+
+    @property
+    def size_m_s(self) -> Value:
+        """Full speed of the tip that makes so much swing."""
+        assert self.fit
+        size = abs(self.fit.gain)
+        return Value(size, SIGMAS * size * self.fit.deviations[3])
+
+
+def examine(axis: BoundAxis, series: Series) -> Finding:
+    """What a log shows of the sensor of an axis, which has one."""
+    assert axis.config.sway and axis.sway_sensor
+    finding = Finding(axis.name, series, notes=list(series.notes))
+    mode = axis.config.sway.mode()
+    if fault := _useless(axis.name, series, mode.period_s):
+        finding.poor.append(fault)
+        return finding
+    finding.data = [
+        one for part in _alone(series, mode.period_s) for one in stretches(part, mode.period_s)
+    ]
+    if not finding.data:
+        text = "no stretch of driving with measurements all the time"
+        finding.poor.append(f"{series.source}: {text}: {DRIVE_IT}")
+        return finding
+    config = axis.sway_sensor.config
+    finding.fit = fit_sensor(finding.data, mode, config.valve_lag_ms / 1000.0)
+    finding.noise = math.degrees(_noise(finding.data, finding.fit.fitted))
+    finding.poor += _faults(axis, finding)
+    finding.notes += _notes(axis, finding)
+    return finding
+
+
+def _useless(axis: str, series: Series, period_s: float) -> str | None:
+    """Why nothing can be made of a signal."""
+    time, value, source = series.time_s, series.value, series.source
+    if series.command is None:
+        return f"expected commands of {axis} in the log, got none: log its valve or its joystick"
+    if len(time) < 2 or float(np.median(np.diff(time))) > period_s / LEAST_SAMPLES:
+        return (
+            f"{source}: expected {LEAST_SAMPLES:g} measurements or more in a swing of"
+            f" {period_s:.2g} s, got {len(time)} in all: is it on, and its cycle right?"
+        )
+    if float(np.ptp(value)) == 0.0:
+        return f"{source}: it stands at {value[0]:g}: is it the right signal, and the sensor on?"
+    if (seconds := sum(map(driven_s, _alone(series, period_s)))) < LEAST_DRIVEN_S:
+        return (
+            f"expected {axis} driven alone for {LEAST_DRIVEN_S:g} s or more, got {seconds:.1f} s;"
+            f" what moves the tool without a command shows no sign: {DRIVE_IT}"
+        )
+    return clipped(series, None)
+
+
+def _alone(series: Series, period_s: float) -> list[Series]:
+    """Parts of a signal in which no other axis moves, nor did for a swing: it swings along."""
+    command = series.command
+    assert command
+    parts, begin = [], -math.inf
+    for first, last in [*sorted(series.others), (math.inf, math.inf)]:
+        if first > begin:
+            of_time = (series.time_s >= begin) & (series.time_s < first)
+            of_command = (command.time_s >= begin) & (command.time_s < first)
+            its = Command(command.time_s[of_command], command.speed[of_command])
+            time_s, value = series.time_s[of_time], series.value[of_time]
+            parts.append(replace(series, time_s=time_s, value=value, command=its))
+        begin = max(begin, last + period_s)
+    return parts
+
+
+def _noise(data: Sequence[Driven], fitted: Sequence[Array]) -> float:
+    """Standard deviation by what neighbours differ by beyond the model, in their unit."""
+    squares, count = 0.0, 0
+    for one, model in zip(data, fitted, strict=True):
+        apart = max(1, round(NOISE_S / float(np.median(np.diff(one.time_s)))))
+        left = one.value - model
+        step = left[apart:] - left[:-apart]
+        squares += 0.5 * float(step @ step)
+        count += len(step)
+    return math.sqrt(squares / count)
+
+
+def _faults(axis: BoundAxis, finding: Finding) -> list[str]:
+    """Why what was found cannot be used."""
+    fit, source = finding.fit, finding.series.source
+    assert fit
+    assert axis.config.sway
+    explained = fit.explained(math.radians(finding.noise))
+    if explained < LEAST_EXPLAINED:
+        return [
+            f"{source}: expected the commands of {axis.name} to explain"
+            f" {100 * LEAST_EXPLAINED:.0f} % of the swing, got {100 * max(0.0, explained):.0f} %:"
+            f" does it measure the plane of this axis? If so, {DRIVE_IT}"
+        ]
+    faults = []
+    if (half := finding.delay_s.half) > WIDEST_DELAY_S:
+        swing = math.degrees(math.sqrt(fit.square / fit.count))
+        faults.append(
+            f"{source}: expected the delay to {1000 * WIDEST_DELAY_S:.0f} ms, got it to"
+            f" {1000 * half:.0f} ms, by {swing:.2g} {finding.unit} of swing in a noise of"
+            f" {finding.noise:.2g}: drive it more often, or faster"
+        )
+    least_m_s = most_m_s = axis.config.sway.full_speed_m_s
+    if slewing := axis.config.slewing:
+        most_m_s = slewing.full_speed_rad_s * slewing.largest_radius_m
+    if not least_m_s / MOST_GAIN < finding.size_m_s.value < MOST_GAIN * most_m_s:
+        faults.append(
+            f"{source}: its swing needs a full speed of {finding.size_m_s.value:.2g} m/s, the file"
+            f" has {least_m_s:g}: is the unit in the DBC right?"
+        )
+    most_s = MOST_DELAY * axis.config.sway.mode().period_s
+    if finding.delay_s.value > most_s:
+        faults.append(
+            f"{source}: expected a delay up to {1000 * most_s:.0f} ms, a quarter of a swing, got"
+            f" {1000 * finding.delay_s.value:.0f} ms: take a quicker sensor, or cycle"
+        )
+    return faults
+
+
+def _notes(axis: BoundAxis, finding: Finding) -> list[str]:
+    """What else is worth knowing."""
+    assert finding.fit
+    assert axis.config.sway
+    notes, period_s = [], axis.config.sway.mode().period_s
+    longer = (finding.period_s.value / period_s) ** 2 - 1.0
+    if abs(longer) > SAME_LENGTH:
+        notes.append(
+            f"it swings like a pendulum {abs(100 * longer):.0f} %"
+            f" {'longer' if longer > 0 else 'shorter'} than the file says; canshaper identify finds"
+            " what it is"
+        )
+    return notes
+
+
+def changes(axis: BoundAxis, finding: Finding) -> dict[str, bool | float]:
+    """What the section of the sensor has to say, by key."""
+    assert axis.sway_sensor
+    config = axis.sway_sensor.config
+    delay_ms = round(1000.0 * finding.delay_s.value)
+    values: dict[str, bool | float] = {
+        "invert": finding.invert,
+        "delay_ms": max(0, delay_ms),
+        "noise_deg": float(f"{max(0.01, finding.noise):.2g}"),
+    }
+    if delay_ms < 0:  # the valve is quicker than the file says
+        values["valve_lag_ms"] = max(0, round(config.valve_lag_ms + delay_ms))
+    if abs(finding.offset.value) > NEAR_OFFSET * config.offset_max_deg:
+        values["offset_max_deg"] = math.ceil(MORE_OFFSET * abs(finding.offset.value))
+    return values

@@ -1,0 +1,46 @@
+"""A finding for people: a table next to what the file has."""
+
+import math
+
+from rich.table import Table
+
+from canshaper.commissioning.identification.decay import Value
+from canshaper.commissioning.sensor.finding import Finding
+from canshaper.machine.bound_axis import BoundAxis
+from canshaper.report.console import new_table
+from canshaper.report.table import axis_title
+
+
+def heading(finding: Finding) -> str:
+    """What was looked at, and whether it is good."""
+    text = f"{axis_title(finding.axis)}, {finding.series.source}"
+    if finding.fit is None:
+        return f"{text}: nothing found"
+    driven = len(finding.data)
+    explained = 100.0 * max(0.0, finding.fit.explained(math.radians(finding.noise)))
+    text += f": {driven} driven stretch{'es' * (driven != 1)}, {explained:.0f} % explained"
+    return f"{text} (too poor)" if finding.poor else text
+
+
+def table(axis: BoundAxis, finding: Finding) -> Table:
+    """What was found, next to what the file has."""
+    assert axis.sway_sensor
+    assert axis.config.sway
+    config, sway = axis.sway_sensor.config, axis.config.sway
+    rate = finding.unit == "degrees/s"
+    unit = "deg/s" if rate else "deg"
+    rows = new_table("", "file", "found")
+    inverted = {False: "as the model", True: "inverted"}
+    rows.add_row("sign", inverted[config.invert], inverted[finding.invert])
+    rows.add_row("delay, ms", f"{config.delay_ms:g}", _shown(finding.delay_s, 1000.0, 0))
+    rows.add_row(f"offset, {unit}", f"up to {config.offset_max_deg:g}", _shown(finding.offset))
+    rows.add_row(f"noise, {unit}", f"{config.noise:g}", f"{finding.noise:.2g}")
+    rows.add_row("period, s", f"{sway.mode().period_s:.2f}", _shown(finding.period_s))
+    rows.add_row("full speed, m/s", f"{sway.full_speed_m_s:g}", _shown(finding.size_m_s))
+    return rows
+
+
+def _shown(value: Value, factor: float = 1.0, digits: int = 2) -> str:
+    number, half = factor * value.value, factor * value.half
+    least = 10.0**-digits
+    return f"{number:.{digits}f} ± {max(half, least):.{digits}f}"

@@ -1,0 +1,202 @@
+"""The text of a first deployment file."""
+
+from collections.abc import Iterator
+
+from canshaper.config.first import (
+    FIRST_MAX_PCT,
+    FIRST_TAIL_S,
+    PERIOD_RANGE,
+    RADIUS_TIMEOUT_MS,
+    FirstAxis,
+    FirstCanopen,
+    FirstCia408,
+    FirstJoystick,
+    FirstMachine,
+    FirstMotion,
+    FirstScaling,
+    rounded,
+    stop_distance_m,
+)
+from canshaper.config.flow import plain
+
+
+def first_deployment(machine: FirstMachine) -> str:
+    """The deployment file, with a filter to begin with and reduced speed."""
+    return "\n".join(_lines(machine)) + "\n"
+
+
+def _lines(machine: FirstMachine) -> Iterator[str]:
+    yield "# Written by canshaper init. Every key: docs/deployment.md."
+    yield from (f"# {note}" for note in machine.notes)
+    yield ""
+    yield "version: 1 # of the file's format"
+    yield "tick_ms: 20 # period of the control loop"
+    yield ""
+    yield "buses:"
+    channel = plain(machine.channel)
+    bus = f"interface: {machine.interface}, channel: {channel}, bitrate: {machine.bitrate}"
+    if machine.data_bitrate:
+        bus += f", fd: true, data_bitrate: {machine.data_bitrate}"
+    if machine.canopen:
+        yield from _canopen(bus, machine.canopen)
+    else:
+        yield f"  crane: {{ {bus} }}"
+    yield ""
+    yield f"dbc: [{', '.join(plain(path) for path in machine.dbc)}] # relative to this file"
+    yield ""
+    yield "joysticks:"
+    for joystick in machine.joysticks:
+        yield from _joystick(joystick)
+    yield ""
+    yield from _switches(machine)
+    yield "axes:"
+    timeouts_ms = {joystick.name: joystick.timeout_ms for joystick in machine.joysticks}
+    for axis in machine.axes:
+        yield from _axis(axis, timeouts_ms[axis.joystick])
+        yield ""
+    if machine.motion:
+        yield from _motion(machine.motion)
+        yield ""
+    for key in ("status", "identity"):
+        if (message := getattr(machine, key)) is not None:
+            yield f"{key}: {{ bus: crane, message: {message} }}"
+            yield ""
+    yield "# What `canshaper set` may change while the machine works."
+    yield "control:"
+    yield "  adjustable:"
+    for axis in machine.axes:
+        yield f"    axes.{axis.name}.limits.max_pct: [20, 100]"
+        if axis.swing:
+            low, high = (rounded(share * axis.swing.period_s) for share in PERIOD_RANGE)
+            yield f"    axes.{axis.name}.sway.period_s: [{low}, {high}]"
+
+
+def _canopen(bus: str, canopen: FirstCanopen) -> Iterator[str]:
+    yield "  crane:"
+    yield from (f"    {part}" for part in bus.split(", "))
+    yield "    canopen:"
+    yield f"      node: {canopen.node} # ours"
+    yield f"      master: {str(canopen.master).lower()} # false where another one starts the nodes"
+    if canopen.nodes:
+        yield "      nodes: # heartbeat_ms: silence after which one is lost"
+    for name, (number, heartbeat_ms) in canopen.nodes.items():
+        yield f"        {name}: {{ id: {number}, heartbeat_ms: {heartbeat_ms} }}"
+
+
+def _cia408(valve: str, cia408: FirstCia408) -> Iterator[str]:
+    yield "    valve:"
+    yield from (f"      {part}" for part in ("bus: crane", *valve.split(", ")))
+    yield "      cia408:"
+    yield f"        control: {cia408.control}"
+    status = f"message: {cia408.message}, signal: {cia408.signal}, timeout_ms: {cia408.timeout_ms}"
+    yield f"        status: {{ bus: crane, {status} }}"
+    if cia408.node:
+        yield f"        node: {cia408.node}"
+
+
+def _joystick(joystick: FirstJoystick) -> Iterator[str]:
+    yield f"  {joystick.name}:"
+    yield "    bus: crane"
+    yield f"    message: {joystick.message}"
+    yield f"    timeout_ms: {joystick.timeout_ms} # five lost messages"
+    if joystick.cycle_ms:
+        yield f"    cycle_ms: {joystick.cycle_ms}"
+    if joystick.node:
+        yield f"    node: {joystick.node}"
+    if joystick.multiplexor is not None:
+        yield f"    multiplexor: {joystick.multiplexor}"
+    if joystick.enable_of:
+        yield f"    enable_of: {joystick.enable_of}"
+    else:
+        yield f"    enable: {f'{joystick.name}_enable' if joystick.switch else joystick.enable}"
+    for key in ("reset", "anti_sway_off", "alive_counter"):
+        if (signal := getattr(joystick, key)) is not None:
+            yield f"    {key}: {signal}"
+
+
+def _switches(machine: FirstMachine) -> Iterator[str]:
+    """Enable switches in messages of their own, which come as often as the joystick."""
+    having = [joystick for joystick in machine.joysticks if joystick.switch]
+    if not having:
+        return
+    yield "switches:"
+    for joystick in having:
+        yield f"  {joystick.name}_enable:"
+        yield "    bus: crane"
+        yield f"    message: {joystick.switch}"
+        yield f"    signal: {joystick.enable}"
+        yield f"    timeout_ms: {joystick.timeout_ms}"
+        if joystick.cycle_ms:
+            yield f"    cycle_ms: {joystick.cycle_ms}"
+    yield ""
+
+
+def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
+    counter = f", alive_counter: {axis.alive_counter}" if axis.alive_counter else ""
+    valve = f"message: {axis.valve}, signal: {axis.signal}, timeout_ms: {axis.timeout_ms}{counter}"
+    yield f"  {axis.name}:"
+    command = f"joystick: {axis.joystick}, signal: {axis.command_signal}"
+    command += _scaling(axis.scaling)
+    valve += _scaling(axis.valve_scaling)
+    valve += f", cycle_ms: {axis.cycle_ms}" if axis.cycle_ms else ""
+    yield f"    command: {{ {command}, neutral_pct: 2 }}"
+    if axis.cia408:
+        yield from _cia408(valve, axis.cia408)
+    else:
+        yield f"    valve: {{ bus: crane, {valve} }}"
+    if axis.status:
+        yield f"    status: {{ bus: crane, message: {axis.status} }}"
+    limits = f"max_pct: {FIRST_MAX_PCT}, deadband_pct: 0, rise_per_s: 5, fall_per_s: 5"
+    if axis.swing is None:
+        yield "    filter: { kind: off } # it makes nothing swing"
+        yield f"    limits: {{ {limits}, tail_s: 0.5, stop_s: 0.5 }}"
+        return
+    swing = axis.swing
+    if slewing := axis.slewing:
+        speeds = f"full_speed_rad_s: {slewing.full_speed_rad_s:g}"
+        yield f"    slewing: {{ {speeds}, largest_radius_m: {slewing.largest_radius_m:g} }}"
+    yield f"    # Ten swings in {swing.ten_swings_s:g} s, from {swing.first:g} to {swing.last:g}."
+    sway = swing.sway
+    shape = f"period_s: {sway.period_s:g}, decay_per_swing: {sway.decay_per_swing:g}"
+    yield f"    sway: {{ {shape}, full_speed_m_s: {sway.full_speed_m_s:g} }}"
+    if sensor := axis.sensor:
+        fusion = "" if sensor.fusion_s is None else f", fusion_s: {sensor.fusion_s:g}"
+        keys = f"message: {sensor.message}, signal: {sensor.signal}, kind: {sensor.kind}{fusion}"
+        yield "    # Sign, delay and noise: `canshaper sensor FILE --live --write`. Then use: damp."
+        timeout = f"timeout_ms: {sensor.timeout_ms}"
+        timeout += f", node: {sensor.node}" if sensor.node else ""
+        yield f"    sway_sensor: {{ bus: crane, {keys}, use: watch, {timeout} }}"
+    poles = ", ".join(f"{pole:g}" for pole in swing.filter.parameters()["poles_rad_s"])
+    yield "    # When the swing is measured: `canshaper robust FILE --axis NAME --write`."
+    yield f"    filter: {{ kind: gff, poles_rad_s: [{poles}] }}"
+    yield "    # First motion at reduced speed: raise max_pct when all is well."
+    speed = axis.slewing.full_speed_m_s if axis.slewing else swing.full_speed_m_s
+    distance = stop_distance_m(speed, joystick_timeout_ms, axis.timeout_ms)
+    yield "    # stop_distance_m: farthest that the tip may travel when it stops from max_pct: 100."
+    yield "    # `canshaper check` shows what the filter needs; make tail_s, stop_s and it smaller."
+    tail = f"reversal: brake_shaped, tail_s: {FIRST_TAIL_S:g}, stop_s: {FIRST_TAIL_S:g}"
+    yield f"    limits: {{ {limits}, {tail}, stop_distance_m: {distance:g} }}"
+
+
+def _scaling(scaling: FirstScaling) -> str:
+    """Its keys, each after a comma."""
+    text = "" if scaling.full is None else f", full: {scaling.full:.12g}"
+    text += "" if scaling.zero is None else f", zero: {scaling.zero:.12g}"
+    text += ", invert: true" if scaling.invert else ""
+    text += f", negative: {scaling.negative}" if scaling.negative else ""
+    if scaling.flags:
+        names = zip(("neutral", "negative", "positive"), scaling.flags, strict=True)
+        text += f", flags: {{ {', '.join(f'{key}: {name}' for key, name in names)} }}"
+    return text
+
+
+def _motion(motion: FirstMotion) -> Iterator[str]:
+    yield f"# While the crane slews, {motion.near_far} moves in a little and out again by itself."
+    yield "motion:"
+    yield "  crane:"
+    yield f"    slew: {motion.slew}"
+    yield f"    near_far: {motion.near_far}"
+    if motion.radius:
+        message, _, signal = motion.radius.partition(".")
+        where = f"bus: crane, message: {message}, signal: {signal}"
+        yield f"    radius: {{ {where}, timeout_ms: {RADIUS_TIMEOUT_MS} }}"

@@ -1,0 +1,103 @@
+"""What is not known exactly of a machine, and what a campaign of drives has to show for it."""
+
+from typing import Annotated, Any, TypeVar
+
+from pydantic import AfterValidator, Field, create_model
+
+from canshaper.config.section import Section, number
+
+# Of each drive, with what it is and its unit.
+MEASURES = {
+    "residual_deg": "largest swing that is left, deg",
+    "peak_deg": "largest swing, deg",
+    "run_on_s": "from the last release until the tip stands, s",
+    "run_on_m": "how far the tip gets meanwhile, m",
+    "travel_error_s": "way of an axis less what was asked, s of full speed",
+    "dip_pct": "largest fall of a command while the joystick is held, % of full command",
+}
+QUANTILES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}
+
+
+def _ordered(ends: list[float]) -> list[float]:
+    low, high = ends
+    if not low <= high:
+        raise ValueError(f"expected the lower end first, got {low:g} to {high:g}")
+    return ends
+
+
+def _end(least: float, most: float, unit: str) -> Any:
+    return number(least, most, unit, "end of the range")
+
+
+def _usual(low: float, high: float, text: str) -> Any:
+    return Field([low, high], min_length=2, max_length=2, description=f"{text}, from and to")
+
+
+_N = TypeVar("_N")
+Range = Annotated[list[_N], AfterValidator(_ordered)]
+
+
+class Uncertainty(Section):
+    """Ranges from which a campaign draws the crane of each drive, each value as likely as another.
+
+    Percentages are changes of what the nominal crane has. Each axis has a valve of its own.
+    """
+
+    length_pct: Range[Annotated[float, _end(-60, 100, "%")]] = _usual(
+        -15.0, 15.0, "length of the tool below its second joint"
+    )
+    damping_pct: Range[Annotated[float, _end(-95, 500, "%")]] = _usual(
+        -50.0, 100.0, "damping of its joints"
+    )
+    radius_m: Range[Annotated[float, _end(0.5, 30, "m")]] = _usual(
+        2.5, 6.5, "radius of the tip at the start; joint by joint it is not drawn"
+    )
+    sway_deg: Range[Annotated[float, _end(0, 30, "deg")]] = _usual(
+        0.0, 3.0, "swing at the start, along and across the boom"
+    )
+    load_mass: Range[Annotated[float, _end(1, 20, "times")]] = _usual(
+        1.0, 3.0, "mass with a load, of that without"
+    )
+    load_m: Range[Annotated[float, _end(0, 3, "m")]] = _usual(
+        0.0, 0.4, "how much lower the centre of mass is with a load"
+    )
+    valve_dead_time_s: Range[Annotated[float, _end(0, 0.2, "s")]] = _usual(
+        0.0, 0.04, "dead time of a valve"
+    )
+    valve_lag_s: Range[Annotated[float, _end(0.01, 1, "s")]] = _usual(
+        0.06, 0.14, "time constant of a valve"
+    )
+    valve_rate_per_s: Range[Annotated[float, _end(0.1, 100, "1/s")]] = _usual(
+        4.0, 6.0, "travel of a spool, in full strokes"
+    )
+    valve_deadband_pct: Range[Annotated[float, _end(0, 50, "% of full command")]] = _usual(
+        4.0, 6.0, "deadband of a valve"
+    )
+    valve_hysteresis_pct: Range[Annotated[float, _end(0, 20, "% of full stroke")]] = _usual(
+        0.0, 4.0, "play between command and spool of a valve"
+    )
+    valve_gain_pct: Range[Annotated[float, _end(-80, 100, "%")]] = _usual(
+        -15.0, 10.0, "full speed of an axis"
+    )
+    load_change_pct: Annotated[
+        float, number(0, 100, "% of the drives", "in which a load is picked up and put down")
+    ] = 40.0
+    sensor_fault_pct: Annotated[
+        float,
+        number(0, 100, "% of the drives", "with a fault of the sway sensors, where there are"),
+    ] = 10.0
+    bus_fault_pct: Annotated[
+        float, number(0, 100, "% of the drives", "with joystick frames lost, late or wrong")
+    ] = 10.0
+
+
+Limit = Annotated[float, number(0, 1e6, "", "the most that it may be")]
+_KEYS: dict[str, Any] = {
+    f"{measure}_{quantile}": (
+        Limit | None,
+        Field(None, description=f"most of the {quantile} quantile: {text}"),
+    )
+    for measure, text in MEASURES.items()
+    for quantile in QUANTILES
+}
+Accept = create_model("Accept", __base__=Section, __doc__="Limits of quantiles.", **_KEYS)

@@ -1,0 +1,144 @@
+"""What a deployment file says where the DBC has nothing, or something wrong."""
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import dataclass
+
+from cantools.database.can import Message, Signal
+
+from canshaper.codec.codecs import Chosen
+from canshaper.codec.layout import frame_length
+from canshaper.codec.signals import STEP_ROUNDING, raw_limits
+from canshaper.config.protection import Protected
+from canshaper.config.schema import DeploymentConfig, Scaling
+
+
+@dataclass(frozen=True)
+class Correction:
+    """Scaling of a signal; one with ``magnitude`` has no negative values."""
+
+    scaling: Scaling
+    magnitude: bool
+
+
+def scalings(config: DeploymentConfig, bus: str, message: str) -> dict[str, Correction]:
+    """Signals of a message whose scaling stands in the deployment file, by name."""
+    result: dict[str, Correction] = {}
+    for axis in config.axes.values():
+        command, valve = axis.command, axis.valve
+        joystick = config.joysticks.get(command.joystick)
+        rewritten = False
+        if joystick and config.gateway:
+            other = config.gateway.other(valve.bus)
+            rewritten = (joystick.bus, joystick.message) == (other, valve.message)
+        received = joystick is not None and (joystick.bus, joystick.message) == (bus, message)
+        sent = (valve.bus, valve.message) == (bus, message)
+        if received or (sent and rewritten):
+            one_way = bool(command.flags or command.negative)
+            for name in filter(None, (command.signal, command.negative)):
+                result[name] = Correction(command, one_way)
+        elif sent:
+            result[valve.signal] = Correction(valve, valve.direction is not None)
+    return {name: one for name, one in result.items() if one.scaling.corrects}
+
+
+def corrected(
+    message: Message, config: Protected, signals: Mapping[str, Correction]
+) -> Message | str:
+    """The message as it is on the bus of this machine, or why it cannot be.
+
+    Args:
+        message: that of the DBC.
+        config: the section that names it.
+        signals: the signals whose scaling it does not have right.
+    """
+    value = config.multiplexor
+    length = frame_length(message)
+    own = length == message.length and config.cycle_ms is None
+    if own and value is None and not signals:
+        return message
+    if isinstance(of_value := _of_value(message, value), str):
+        return of_value
+    for name, one in signals.items():
+        of_value = [_scaled(s, one) if s.name == name else s for s in of_value]
+    return Message(
+        message.frame_id,
+        message.name,
+        length,
+        of_value,
+        cycle_time=message.cycle_time if config.cycle_ms is None else config.cycle_ms,
+        comment=message.comments,
+        senders=message.senders,
+        dbc_specifics=message.dbc,
+        is_extended_frame=message.is_extended_frame,
+        is_fd=message.is_fd,
+        protocol=message.protocol,
+    )
+
+
+def chosen(message: Message, config: Protected) -> Chosen | None:
+    """Which frames of a multiplexed message are meant; None where it is not, or cannot be read."""
+    signal = multiplexor(message)
+    if config.multiplexor is None or signal is None:
+        return None
+    protecting = {config.alive_counter, config.checksum.signal if config.checksum else None}
+    alone = any(s.multiplexer_ids for s in message.signals if s.name in protecting)
+    return Chosen(signal.name, config.multiplexor, alone)
+
+
+def multiplexor(message: Message) -> Signal | None:
+    """The one signal that says which others are there; None where there is none, or several."""
+    signals = [s for s in message.signals if s.is_multiplexer]
+    chosen_by = {s.multiplexer_signal for s in message.signals if s.multiplexer_ids}
+    return signals[0] if len(signals) == 1 and chosen_by <= {signals[0].name} else None
+
+
+def _of_value(message: Message, value: int | None) -> list[Signal] | str:
+    """Signals of a message that are there with this value of its multiplexor."""
+    if value is None:
+        return list(message.signals)
+    signal = multiplexor(message)
+    if signal is None:
+        return f"expected a message with one multiplexor, got {message.name}"
+    low, high = raw_limits(signal)
+    named = {i for s in message.signals for i in s.multiplexer_ids or ()}
+    values = sorted(i for i in named if low <= i <= high)
+    if value not in values:
+        names = ", ".join(map(str, values))
+        return f"expected a value of {signal.name}, got {value}; there are {names}"
+    result = []
+    for one in message.signals:
+        if one.multiplexer_ids is None or value in one.multiplexer_ids:
+            there = copy(one)
+            there.is_multiplexer, there.multiplexer_ids = False, None
+            there.multiplexer_signal = None
+            if one is signal:
+                there.raw_initial = value
+            result.append(there)
+    return result
+
+
+def _scaled(signal: Signal, correction: Correction) -> Signal:
+    """The signal with the scaling of the deployment file; its zero is 0."""
+    scaling = correction.scaling
+    result = copy(signal)
+    result.offset -= scaling.zero or 0.0
+    step = abs(signal.scale) * (1.0 + STEP_ROUNDING)
+    if scaling.full is not None:
+        low, high = (0.0 if correction.magnitude else -scaling.full), scaling.full
+        # Two's complement reaches one step farther on one side.
+        reached = [raw * signal.scale + result.offset for raw in raw_limits(signal)]
+        if not signal.is_float and not correction.magnitude:
+            low = min(reached) if 0.0 < low - min(reached) <= step else low
+            high = max(reached) if 0.0 < max(reached) - high <= step else high
+        result.minimum, result.maximum = low, high
+    elif scaling.zero and signal.minimum is not None and signal.maximum is not None:
+        result.minimum, result.maximum = (
+            signal.minimum - scaling.zero,
+            signal.maximum - scaling.zero,
+        )
+    if scaling.invert:
+        result.scale, result.offset = -result.scale, -result.offset
+        ends = [None if end is None else -end for end in (result.maximum, result.minimum)]
+        result.minimum, result.maximum = ends
+    return result

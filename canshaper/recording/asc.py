@@ -1,0 +1,97 @@
+"""Vector's ASC."""
+
+import re
+from collections.abc import Iterator
+from typing import BinaryIO
+
+from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame, fits
+from canshaper.recording.text import SECOND_NS, id_text, lines, shown
+
+RTR = 0x10  # a remote frame, in the flags of a line of CAN FD
+_BASE = re.compile(r"base\s+(hex|dec)(?:\s+timestamps\s+(absolute|relative))?", re.IGNORECASE)
+_ASC = re.compile(
+    r"\s*(\d+)\.(\d{1,9})\s+(\d+)\s+(\S+)\s+(Rx|Tx|TxRq)\s+(?:([dr])\b\s*(.*))", re.ASCII
+)
+_ASC_ERROR = re.compile(r"\s*\d+\.\d+\s+(?:\d+|CANFD\s+\d+\s+\S+)\s+ErrorFrame", re.IGNORECASE)
+_ASC_FD = re.compile(r"\s*(\d+)\.(\d{1,9})\s+CANFD\s+(\d+)\s+(Rx|Tx|TxRq)\s+(\S+)\s+(.*)", re.ASCII)
+_STAMP = re.compile(r"\s*(\d{1,10})\.(\d{1,9})\s", re.ASCII)
+ASC_NUMBERS = "a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with numbers"
+
+
+def asc(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+    """Vector's ASC. What is neither a frame nor wrong (statistics, comments, events) is no loss."""
+    base, relative, before_ns = 16, False, 0
+    for raw in lines(file, place):
+        line = raw.decode("utf-8", "replace").rstrip()
+        if relative and (stamp := _STAMP.match(line)):
+            before_ns += int(stamp[1]) * SECOND_NS + int(stamp[2].ljust(9, "0"))
+        if match := _ASC.match(line):
+            seconds, fraction, channel, number, direction, kind, rest = match.groups()
+            count, *data = rest.split() or [""]
+            on_fd = False
+        elif _ASC_ERROR.match(line):
+            place.left_out["error"] += 1
+            continue
+        elif match := _ASC_FD.match(line):
+            seconds, fraction, channel, direction, number, rest = match.groups()
+            count, *data = _data(rest.split())
+            on_fd = True
+            kind = "r" if count == "R" else "d"
+        else:
+            if header := _BASE.match(line):
+                base = 10 if header[1].lower() == "dec" else 16
+                relative = bool(header[2]) and header[2].lower() == "relative"
+            continue
+        if direction == "TxRq":  # asked for, not yet on the bus; its Tx follows
+            continue
+        if kind == "r":
+            place.left_out["remote"] += 1
+            continue
+        extended = number[-1] in "xX"
+        try:
+            time_ns = before_ns or int(seconds) * SECOND_NS + int(fraction.ljust(9, "0"))
+            can_id, length, payload = _numbers(number, count, data, base, fd=on_fd)
+        except ValueError:
+            raise place.error(shown(raw), ASC_NUMBERS) from None
+        if len(payload) < length:
+            raise place.error(f"{len(payload)} of {length} bytes", "all of them")
+        if not fits(can_id, extended=extended):
+            raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with an x behind")
+        yield TimedFrame(time_ns, channel, can_id, extended, payload)
+
+
+def _numbers(
+    number: str, count: str, data: list[str], base: int, *, fd: bool
+) -> tuple[int, int, bytes]:
+    """Id, length and data of a line; on a channel of CAN FD the length is decimal.
+
+    Raises:
+        ValueError: something else stands there.
+    """
+    length = int(count) if fd else min(8, int(count, base))
+    digits = "".join((number, count, *data[:length]))
+    if not (digits.isascii() and digits.isalnum()):  # int() takes signs, _ and foreign digits too
+        raise ValueError
+    payload = bytes([int(byte, base) for byte in data[:length]])
+    return int(number.rstrip("xX"), base), length, payload
+
+
+def _data(words: list[str]) -> list[str]:
+    """Length and data of a line of a CAN FD channel, whose frames may be of both kinds.
+
+    Of a remote frame the length is R. Where length or flags are no numbers the length is empty,
+    for the caller to report.
+
+    In front are a name, where there is one, two flags and the length code; behind the data are
+    its duration, its bits and the flags of the frame.
+    """
+    if words and words[0] not in ("0", "1"):
+        words = words[1:]
+    try:
+        length, data = int(words[3]), words[4:]
+        flags = int(data[length:][2], 16)
+    except (IndexError, ValueError):
+        return [""]
+    if length > MOST_BYTES:
+        return [""]
+    return ["R"] if flags & RTR else [words[3], *data[:length]]

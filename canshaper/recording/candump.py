@@ -1,0 +1,107 @@
+"""candump's logs, as files and as they stand on the screen."""
+
+import re
+from binascii import unhexlify
+from collections.abc import Iterator
+from datetime import datetime
+from typing import BinaryIO
+
+from canshaper.codec.can_id import ERR_FLAG
+from canshaper.recording.frames import Place, TimedFrame, fits
+from canshaper.recording.text import SECOND_NS, id_text, lines, shown
+
+_new = tuple.__new__  # TimedFrame(...) in half the time
+
+# What nearly every line is: microseconds, and a data frame. Whether its digits are pairs is left to
+# who reads them: that is three times as quick as an expression of pairs.
+_QUICK = re.compile(rb"\((\d+)\.(\d{6})\) (\S+ [0-9A-Fa-f]+)#([0-9A-Fa-f]{0,16})(?: [RT])?\n")
+_CANDUMP = re.compile(
+    rb"\((\d+)\.(\d{1,9})\) (\S+ [0-9A-Fa-f]+)#"
+    rb"(?:((?:[0-9A-Fa-f]{2}){0,8})(?:_[0-9A-Fa-f])?|(R[0-9]?(?:_[0-9A-Fa-f])?)"
+    rb"|#[0-9A-Fa-f]((?:[0-9A-Fa-f]{2}){0,64}))(?: [RTrt])?\s*"
+)
+# As it stands on the screen, with -t a, A or z; the length of CAN FD has two digits.
+_SCREEN = re.compile(
+    rb"\s*(?:\(([^)]*)\)\s+)?(\S+)\s+(?:[RT]X [B -] [E -]\s+)?([0-9A-Fa-f]{3}|[0-9A-Fa-f]{8})"
+    rb"\s+\[(\d{1,2})\]\s*(remote request|(?:[0-9A-Fa-f]{2}(?:\s+|$))*)(.*)",
+    re.DOTALL,
+)
+_STAMP = re.compile(r"(?:(\d{4}-\d\d-\d\d \d\d:\d\d:\d\d)|(\d+))\.(\d{1,9})")
+CANDUMP_ALLOWED = "a line of candump -L, such as (1436509052.249713) can0 110#0102"
+TIMES = "times before the frames: candump -L, or candump -t a"
+
+
+def candump(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+    """``candump -L``, ``candump -l`` and python-can's logger: microseconds, or nanoseconds."""
+    quick = _QUICK.fullmatch
+    sources: dict[bytes, tuple[str, int, bool] | None] = {}
+    for line in lines(file, place):
+        match = quick(line)
+        if match is not None:
+            seconds, fraction, source, data = match.groups()
+            ns = int(fraction) * 1000
+        else:
+            if not line.strip():
+                continue
+            if (match := _CANDUMP.fullmatch(line)) is None:
+                if (frame := _screen(line, place)) is not None:
+                    yield frame
+                continue
+            seconds, fraction, source, data, _remote, of_fd = match.groups()
+            data = of_fd if data is None else data
+            ns = int(fraction.ljust(9, b"0"))
+        if source not in sources:
+            sources[source] = _source(source, line, place)
+        known = sources[source]
+        if known is None:
+            place.left_out["error"] += 1
+        elif data is None:
+            place.left_out["remote"] += 1
+        else:
+            try:  # int() refuses thousands of digits
+                time_ns, content = int(seconds) * SECOND_NS + ns, unhexlify(data)
+            except ValueError:
+                raise place.error(shown(line), CANDUMP_ALLOWED) from None
+            yield _new(TimedFrame, (time_ns, *known, content))
+
+
+def _source(source: bytes, line: bytes, place: Place) -> tuple[str, int, bool] | None:
+    """Channel and id of a line of candump; None for an error frame."""
+    channel, word = source.split()
+    can_id, extended = int(word, 16), len(word) == 8
+    if len(word) not in (3, 8):
+        raise place.error(shown(line), CANDUMP_ALLOWED)
+    if extended and can_id & ERR_FLAG:
+        return None
+    if not fits(can_id, extended=extended):
+        raise place.error(id_text(can_id), "an id of 11 bits in 3 digits, or of 29 in 8")
+    return channel.decode("ascii", "replace"), can_id, extended
+
+
+def _screen(line: bytes, place: Place) -> TimedFrame | None:
+    """A frame of a line as candump shows it; None where it is no data frame.
+
+    Raises:
+        LogError: it is no such line, or has no time.
+    """
+    match = _SCREEN.fullmatch(line)
+    if match is None:
+        raise place.error(shown(line), CANDUMP_ALLOWED)
+    stamp, channel, word, length, data, _ = match.groups()
+    if stamp is None:
+        raise place.error(shown(line), TIMES)
+    time = _STAMP.fullmatch(stamp.decode("ascii", "replace"))
+    if time is None:
+        raise place.error(shown(line), TIMES)
+    source = _source(channel + b" " + word, line, place)
+    if source is None or data.startswith(b"remote"):
+        place.left_out["error" if source is None else "remote"] += 1
+        return None
+    payload = bytes.fromhex(data.decode("ascii"))
+    if len(payload) < int(length):
+        raise place.error(f"{len(payload)} of {int(length)} bytes", "all of them")
+    day, seconds, fraction = time.groups()
+    whole = int(datetime.fromisoformat(day).timestamp()) if day else int(seconds)
+    time_ns = whole * SECOND_NS + int(fraction.ljust(9, "0"))
+    # What looks like bytes behind them is the text of -a.
+    return TimedFrame(time_ns, *source, payload[: int(length)])

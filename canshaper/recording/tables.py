@@ -1,0 +1,110 @@
+"""Logs that are tables with commas: python-can's, and GVRET's of SavvyCAN."""
+
+import re
+from base64 import b64decode
+from binascii import unhexlify
+from collections.abc import Callable, Iterator
+from decimal import Decimal
+from typing import BinaryIO
+
+from canshaper.recording.frames import LATEST_S, MOST_BYTES, Place, TimedFrame
+from canshaper.recording.text import SECOND_NS, id_text, lines, shown
+
+_CSV = re.compile(
+    rb"([0-9.e+-]+),(0x[0-9a-f]{1,8}),([01]),([01]),([01]),([0-9]{1,2}),([A-Za-z0-9+/]*=*)\s*"
+)
+CSV_HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data"
+# SavvyCAN before 2018 had no column for the direction.
+GVRET_HEADERS = ("Time Stamp,ID,Extended,Dir,Bus,LEN,D1", "Time Stamp,ID,Extended,Bus,LEN,D1")
+_GVRET = re.compile(
+    rb"(\d{1,19}),([0-9A-Fa-f]{1,8}),(true|false|[01]),(?:[RT]x,)?(\d+),(\d{1,2}),"
+    rb"((?:[0-9A-Fa-f]{1,2},)*[0-9A-Fa-f]{0,2})\s*",
+    re.IGNORECASE,
+)
+_TRUE = frozenset((b"true", b"1"))
+Reader = Callable[[bytes, Place], TimedFrame | None]
+
+_new = tuple.__new__  # TimedFrame(...) in half the time
+
+
+def csv(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+    """A table by its header."""
+    rows = lines(file, place)
+    header = next(rows, b"").strip().decode("utf-8", "replace").removeprefix("\ufeff")
+    if header == CSV_HEADER:
+        read: Reader = _python_can
+    elif header.startswith(GVRET_HEADERS):
+        read = _gvret
+    else:
+        expected = f"the header of python-can, {CSV_HEADER}, or of GVRET, {GVRET_HEADERS[0]}..."
+        raise place.error(shown(header.encode()), expected)
+    for row in rows:
+        if (frame := read(row, place)) is not None:
+            yield frame
+
+
+def _python_can(row: bytes, place: Place) -> TimedFrame | None:
+    """A row of python-can's table, which has no channels."""
+    match = _CSV.fullmatch(row)
+    if match is None:
+        raise place.error(shown(row), f"a row of {CSV_HEADER}")
+    time, number, extended, remote, error, length, data = match.groups()
+    if error == b"1" or remote == b"1":
+        place.left_out["error" if error == b"1" else "remote"] += 1
+        return None
+    try:
+        payload = b64decode(data)
+        time_ns = _time_ns(time)
+    except (ArithmeticError, ValueError):
+        raise place.error(shown(row), f"a row of {CSV_HEADER}") from None
+    if len(payload) > MOST_BYTES:
+        place.left_out["impossible"] += 1
+        return None
+    if len(payload) != int(length):
+        raise place.error(f"{len(payload)} of {length.decode()} bytes", "all of them")
+    can_id, wide = int(number, 16), extended == b"1"
+    if can_id >> (29 if wide else 11):
+        raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with extended 1")
+    frame: TimedFrame = _new(TimedFrame, (time_ns, "", can_id, wide, payload))
+    return frame
+
+
+def _time_ns(time: bytes) -> int:
+    """A time in seconds, without a float.
+
+    Raises:
+        ValueError, ArithmeticError: it is none, or none of a clock.
+    """
+    whole, _, part = time.partition(b".")
+    if whole.isdigit() and part.isdigit() and len(whole) <= 10 and len(part) <= 9:
+        return int(whole) * SECOND_NS + int(part.ljust(9, b"0"))
+    seconds = Decimal(time.decode("ascii"))
+    if abs(seconds) > LATEST_S:  # before it is a number of a million digits
+        raise ValueError
+    return int(seconds.scaleb(9).to_integral_value())
+
+
+def _gvret(row: bytes, place: Place) -> TimedFrame | None:
+    """A row of SavvyCAN's table: microseconds, buses from 0."""
+    if not row.strip():
+        return None
+    match = _GVRET.fullmatch(row)
+    if match is None:
+        raise place.error(shown(row), f"a row of {GVRET_HEADERS[0]}...")
+    time, number, extended, bus, length, data = match.groups()
+    count = int(length)
+    if count > MOST_BYTES:
+        place.left_out["impossible"] += 1
+        return None
+    if len(data) == 3 * count:  # as SavvyCAN writes them
+        payload = unhexlify(data.replace(b",", b""))
+    else:
+        payload = bytes([int(byte, 16) for byte in data.split(b",")[:count] if byte])
+    if len(payload) != count:
+        raise place.error(f"{len(payload)} of {count} bytes", "all of them")
+    can_id, wide = int(number, 16), extended.lower() in _TRUE
+    if can_id >> (29 if wide else 11):
+        raise place.error(id_text(can_id), "an id of 11 bits, or of 29 with Extended true")
+    content = (int(time) * 1000, bus.decode(), can_id, wide, payload)
+    frame: TimedFrame = _new(TimedFrame, content)
+    return frame

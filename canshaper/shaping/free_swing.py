@@ -1,0 +1,159 @@
+"""Swing that own motion does not explain, corrected by measurements with Kalman gains."""
+
+import math
+from collections.abc import Sequence
+
+from canshaper.shaping.kalman import kalman_gains
+from canshaper.shaping.sway import SwayMode, swing_over
+from canshaper.shaping.sway_sensor import (
+    TICK_OF_NOISE_S,
+    Measured,
+    SensorLimits,
+    SensorTiming,
+)
+
+# Process noise of a tick of 20 ms against a measurement noise of 1: of angle and rate, for the
+# quickness of the sensor's timing, and of the offset. That of a gyro may jump by no more than a
+# grapple's rate can: it has to be found before the damping of what is none does harm.
+ANGLE_PER_RATE = 0.02
+OFFSET_NOISE = {Measured.ANGLE: 0.02, Measured.RATE: 0.04}
+# What is expected at the first measurement, standard deviations: of the swing deg and deg/s, of the
+# offset a part of the largest one.
+FIRST_DEG, FIRST_DEG_S, FIRST_OFFSET = 10.0, 30.0, 1.0 / 12.0
+# From then on the gains are those of the steady state.
+FIRST_S = 4.0
+# Beside a second mode: process noise of the first one's rate and of its own, and what is expected
+# of it at the first measurement, deg and deg/s. So slow is the first one that the second, which is
+# driven too, hardly gets into it.
+QUICKNESS_BESIDE, SECOND_QUICKNESS = 0.4, 5.0
+FIRST_SECOND_DEG, FIRST_SECOND_DEG_S = 2.0, 20.0
+
+
+class FreeSwing:
+    """Free swing and offset of the sensor, corrected by measurements.
+
+    Args:
+        measured: angle or rate.
+        gains: of angle, rate and offset, for one measurement after the other from the first one;
+            the last ones stay.
+
+    Attributes:
+        angle, rate: of the free swing, rad and rad/s, at the time of the measurement.
+        offset: of the sensor, in its unit.
+    """
+
+    __slots__ = ("_first", "_gains", "_rates", "_steady", "angle", "offset", "rate")
+
+    def __init__(self, measured: Measured, gains: Sequence[tuple[float, ...]]) -> None:
+        self._rates = measured is Measured.RATE
+        self._first, self._steady = gains, gains[-1]
+        self._gains = iter(gains)
+        self.angle = self.rate = self.offset = 0.0
+
+    def step(self, by: tuple[float, float, float, float]) -> None:
+        """Swing on for a tick, in which an undriven swing changes by these."""
+        angle, rate = self.angle, self.rate
+        self.angle = angle + by[0] * angle + by[1] * rate
+        self.rate = rate + by[2] * angle + by[3] * rate
+
+    def error(self, unexplained: float) -> float:
+        """What a measurement shows beyond what is known; ``unexplained`` by the late model."""
+        return unexplained - (self.rate if self._rates else self.angle) - self.offset
+
+    def glide(self, tick_s: float) -> None:
+        """Go on for a tick without gravity."""
+        self.angle += tick_s * self.rate
+
+    def correct(self, error: float) -> float:
+        """Take over the error of a measurement; what is left of it."""
+        angle, rate, offset = next(self._gains, self._steady)
+        self.angle += angle * error
+        self.rate += rate * error
+        self.offset += offset * error
+        return error * (1.0 - offset - (rate if self._rates else angle))
+
+    def begin(self, unexplained: float) -> None:
+        """The first measurement."""
+        self.angle = self.rate = 0.0
+        self._gains = iter(self._first)
+        self.correct(self.error(unexplained))
+
+
+class TwoFreeSwings(FreeSwing):
+    """Free swing of the first mode, beside a second one that only keeps itself out of it.
+
+    Args:
+        measured: angle or rate.
+        gains: those of the first mode and offset, and then of angle and rate of the second mode.
+        by: what the second mode changes by in a tick, see ``step``.
+    """
+
+    __slots__ = ("_beside", "_beside_first", "_by", "_second")
+
+    def __init__(
+        self,
+        measured: Measured,
+        gains: Sequence[tuple[float, ...]],
+        by: tuple[float, float, float, float],
+    ) -> None:
+        super().__init__(measured, [(one[0], one[1], one[2]) for one in gains])
+        self._beside_first = [(one[3], one[4]) for one in gains]
+        self._by = by
+        self._beside = iter(self._beside_first)
+        self._second = FreeSwing(measured, [(0.0, 0.0, 0.0)])
+
+    def step(self, by: tuple[float, float, float, float]) -> None:
+        """Swing on for a tick."""
+        super().step(by)
+        self._second.step(self._by)
+
+    def error(self, unexplained: float) -> float:
+        """As without a second mode."""
+        return self._second.error(super().error(unexplained))
+
+    def correct(self, error: float) -> float:
+        """As without a second mode."""
+        angle, rate = next(self._beside, self._beside_first[-1])
+        second = self._second
+        second.angle += angle * error
+        second.rate += rate * error
+        return super().correct(error) - error * (rate if self._rates else angle)
+
+    def begin(self, unexplained: float) -> None:
+        """The first measurement."""
+        self._second.angle = self._second.rate = 0.0
+        self._beside = iter(self._beside_first)
+        super().begin(unexplained)
+
+
+def observer_gains(
+    mode: SwayMode, tick_s: float, timing: SensorTiming, limits: SensorLimits
+) -> list[tuple[float, ...]]:
+    """Kalman gains of the first measurements, and at last those of the steady state.
+
+    Of angle, rate and offset; of angle and rate of a second mode besides.
+
+    Args:
+        mode: of the swing.
+        tick_s: time between two measurements.
+        timing: of the sensor.
+        limits: what it may show.
+    """
+    swing, ticks, offset = swing_over(mode, tick_s), tick_s / TICK_OF_NOISE_S, limits.offset
+    rates, second = timing.measured is Measured.RATE, limits.second
+    quickness = timing.quickness if second is None else QUICKNESS_BESIDE
+    shown = [float(not rates), float(rates), 1.0]
+    step = [[1.0 + swing[0], swing[1], 0.0], [swing[2], 1.0 + swing[3], 0.0], [0.0, 0.0, 1.0]]
+    noise = [ANGLE_PER_RATE * quickness, quickness, OFFSET_NOISE[timing.measured]]
+    first = [math.radians(FIRST_DEG), math.radians(FIRST_DEG_S), FIRST_OFFSET * offset]
+    if second:
+        beside = swing_over(second, tick_s)
+        shown += shown[:2]
+        step = [[*row, 0.0, 0.0] for row in step]
+        step += [[0.0, 0.0, 0.0, 1.0 + beside[0], beside[1]]]
+        step += [[0.0, 0.0, 0.0, beside[2], 1.0 + beside[3]]]
+        noise += [ANGLE_PER_RATE * SECOND_QUICKNESS, SECOND_QUICKNESS]
+        first += [math.radians(FIRST_SECOND_DEG), math.radians(FIRST_SECOND_DEG_S)]
+    variances = [sd * sd * ticks for sd in noise], [(sd / limits.noise) ** 2 for sd in first]
+    gains = kalman_gains(step, shown, *variances)
+    return [*gains[: round(FIRST_S / tick_s)], gains[-1]]

@@ -1,0 +1,224 @@
+"""Numbers of a running machine, from the page: what is in force, who changed it, the way back."""
+
+import threading
+import time
+from collections.abc import Callable, Mapping
+from difflib import unified_diff
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, NamedTuple
+
+from canshaper.config.adjust import Key, value
+from canshaper.config.edit import edited
+from canshaper.config.load import load_config
+from canshaper.config.numbers import sections_of, write_numbers
+from canshaper.daemon import control_client as client
+from canshaper.errors import CanshaperError, ControlError
+
+POLL_S = 1.0
+MOST_CHANGES = 200
+OTHERS = "another program, or the file was read again"
+
+
+class Change(NamedTuple):
+    """What was changed at once.
+
+    Attributes:
+        time_s: time of day, seconds of the epoch.
+        who: by whom.
+        numbers: by key what it was, and what it became.
+    """
+
+    time_s: float
+    who: str
+    numbers: dict[str, tuple[float, float]]
+
+
+class LiveNumbers:
+    """The numbers of one daemon that its file lets be changed. Any thread may call.
+
+    Args:
+        file: the deployment file.
+        control: control socket of the daemon.
+        report: called with what was changed.
+
+    Attributes:
+        version: another one whenever there is something else to show.
+    """
+
+    def __init__(self, file: Path, control: Path, report: Callable[[str], None]) -> None:
+        self.version = 0
+        self._file, self._control, self._report = file, control, report
+        self._lock = threading.RLock()
+        self._table: dict[str, dict[str, float]] = {}
+        self._fault = ""
+        self._changes: list[Change] = []
+        self._before: list[dict[str, float]] = []  # numbers before each change of ours, to undo
+        self._other: dict[str, float] = {}  # the last numbers that were in force: B
+        self._stop = threading.Event()
+        self._thread = threading.Thread(target=self._watch, name="numbers")
+
+    def start(self) -> None:
+        """Begin to look what others change."""
+        self._thread.start()
+
+    def stop(self) -> None:
+        """End that."""
+        self._stop.set()
+        if self._thread.is_alive():
+            self._thread.join()
+
+    def shown(self) -> dict[str, Any]:
+        """Everything for the page."""
+        with self._lock:
+            return {
+                "table": self._table,
+                "fault": self._fault,
+                "undo": len(self._before),
+                "other": {k: v for k, v in self._other.items() if v != self._now().get(k)},
+                "changes": [change._asdict() for change in self._changes[-MOST_CHANGES:]],
+            }
+
+    def in_force(self) -> dict[str, float]:
+        """Every number as it is now, by key."""
+        with self._lock:
+            return self._now()
+
+    def change(self, values: Mapping[str, float], seen: Mapping[str, float], who: str) -> None:
+        """Change numbers, all or none.
+
+        Args:
+            values: by key.
+            seen: what the page showed of them: who comes second gets an error.
+            who: for the list of changes.
+
+        Raises:
+            ControlError: the daemon refuses or does not answer, or another page was first.
+        """
+        with self._lock:
+            self._look()
+            for key in values:
+                now = self._now().get(key)
+                if now is not None and seen.get(key) != now:
+                    who = next((c.who for c in reversed(self._changes) if key in c.numbers), OTHERS)
+                    raise ControlError(f"{key}: is {now:g} by now, changed by {who}; look again")
+            before = self._now()
+            self._set(values, who)
+            self._before.append({key: before[key] for key in values})
+
+    def undo(self, who: str) -> None:
+        """Take back the last change that was made here.
+
+        Raises:
+            ControlError: there is none, or the daemon refuses.
+        """
+        with self._lock:
+            self._look()
+            if not self._before:
+                raise ControlError("there is no change to take back")
+            self._set(self._before[-1], f"{who}, undo")
+            self._before.pop()
+
+    def swap(self, who: str) -> None:
+        """Go to the last numbers that were in force before these, and next time back.
+
+        Raises:
+            ControlError: there are none, or the daemon refuses.
+        """
+        with self._lock:
+            self._look()
+            now = self._now()
+            values = {key: one for key, one in self._other.items() if one != now.get(key)}
+            if not values:
+                raise ControlError("there are no other numbers to compare with")
+            self._set(values, f"{who}, A/B")
+            self._before.append({key: now[key] for key in values})
+
+    def difference(self) -> dict[str, str]:
+        """What writing would change in the file, and the file's hash; see ``write``.
+
+        Raises:
+            CanshaperError: the file cannot be read or changed.
+        """
+        with self._lock:
+            self._look()
+            before = self._file.read_text(encoding="utf-8")
+            after = before
+            for place, numbers in sections_of(self._unwritten()).items():
+                after = edited(after, place, numbers, str(self._file))
+            name = self._file.name
+            lines = unified_diff(
+                before.splitlines(), after.splitlines(), name, name, n=1, lineterm=""
+            )
+            return {"text": "\n".join(lines), "hash": _hash(before)}
+
+    def write(self, file_hash: str, who: str) -> None:
+        """Write the numbers that are in force into the file.
+
+        Args:
+            file_hash: of the file whose difference was looked at.
+            who: for the list of events.
+
+        Raises:
+            CanshaperError: the file is another one by now, or cannot be changed.
+        """
+        with self._lock:
+            self._look()
+            if _hash(self._file.read_text(encoding="utf-8")) != file_hash:
+                text = f"{self._file}: changed by someone else meanwhile; nothing was written"
+                raise ControlError(text)
+            values = self._unwritten()
+            write_numbers(self._file, values)
+            self._report(f"{who} wrote {', '.join(values) or 'nothing'} into {self._file.name}")
+            self.version += 1
+
+    def _unwritten(self) -> dict[str, float]:
+        """Numbers in force that are not those of the file as it is on the disk."""
+        axes = load_config(self._file)[0].axes
+        values = {}
+        for text, now in self._now().items():
+            key = Key.parsed(text)
+            assert key is not None  # the daemon has it
+            if key.axis in axes and value(axes[key.axis], key) != now:
+                values[text] = now
+        return values
+
+    def _now(self) -> dict[str, float]:
+        return {key: one["now"] for key, one in self._table.items()}
+
+    def _set(self, values: Mapping[str, float], who: str) -> None:
+        client.change(self._control, values)
+        self._look(who)
+
+    def _look(self, who: str = OTHERS) -> None:
+        """Read the table of the daemon; what is another number by now was changed by ``who``."""
+        before = self._now()
+        self._table = client.table(self._control)
+        now = self._now()
+        numbers = {k: (before[k], v) for k, v in now.items() if k in before and before[k] != v}
+        if numbers:
+            self._other = before
+            self._changes.append(Change(time.time(), who, numbers))
+            words = ", ".join(f"{k} {a:g} -> {b:g}" for k, (a, b) in numbers.items())
+            self._report(f"{words} ({who})")
+            if who == OTHERS:
+                self._before.clear()  # the way back is no longer known
+        if numbers or not before or self._fault:
+            self._fault = ""
+            self.version += 1
+
+    def _watch(self) -> None:
+        while True:
+            with self._lock:
+                try:
+                    self._look()
+                except CanshaperError as error:
+                    if str(error) != self._fault:
+                        self._fault = str(error)
+                        self.version += 1
+            if self._stop.wait(POLL_S):
+                return
+
+
+def _hash(text: str) -> str:
+    return sha256(text.encode()).hexdigest()

@@ -1,0 +1,104 @@
+"""The web side of the page for drives that are over: a list of them, and each as JSON."""
+
+import json
+import threading
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from starlette.requests import Request
+from starlette.responses import PlainTextResponse, Response
+from starlette.routing import Route
+from starlette.types import ASGIApp
+
+from canshaper import __version__
+from canshaper.errors import CanshaperError
+from canshaper.studio.access import Access
+from canshaper.studio.playback import Playback
+from canshaper.studio.server import links_of, page_app
+from canshaper.studio.stage import RAW
+from canshaper.studio.view import SWAY_OF
+
+COLORS = ("--shaped", "--other", "--raw")
+"""Of the cranes but the raw one, by the names in the style."""
+
+
+@dataclass
+class Choice:
+    """A drive that can be opened.
+
+    Attributes:
+        title: for the list.
+        load: makes it.
+    """
+
+    title: str
+    load: Callable[[], Playback]
+
+
+def playback_app(file: str, choices: Sequence[Choice], access: Access) -> ASGIApp:
+    """The page for drives that are over.
+
+    Args:
+        file: what was opened, for people.
+        choices: at least one; each is made when it is asked for, the last one is kept.
+        access: who may.
+    """
+    kept = _Kept(file, choices)
+
+    def drives(_request: Request) -> Response:
+        return _json([choice.title for choice in choices])
+
+    def drive(request: Request) -> Response:
+        number = request.path_params["number"]
+        if number >= len(choices):
+            return PlainTextResponse(f"expected a drive up to {len(choices) - 1}\n", 404)
+        try:
+            return Response(kept.drive(number), media_type="application/json")
+        except CanshaperError as error:
+            return PlainTextResponse(f"{error}\n", 500)
+
+    routes = [Route("/drives.json", drives), Route("/drive/{number:int}.json", drive)]
+    return page_app(routes, "playback.js", access)
+
+
+class _Kept:
+    """The drive that was asked for last; one at a time is made."""
+
+    def __init__(self, file: str, choices: Sequence[Choice]) -> None:
+        self._file, self._choices = file, choices
+        self._lock = threading.Lock()
+        self._number = -1
+        self._content = b""
+
+    def drive(self, number: int) -> bytes:
+        """A drive as JSON."""
+        with self._lock:
+            if number != self._number:
+                playback = self._choices[number].load()
+                content = {"hello": self._hello(playback), **playback.as_dict()}
+                self._content = json.dumps(content, separators=(",", ":")).encode()
+                self._number = number
+            return self._content
+
+    def _hello(self, playback: Playback) -> dict[str, Any]:
+        names = [film.name for film in playback.films]
+        colors = dict(zip((name for name in names if name != RAW), COLORS, strict=False))
+        return {
+            "version": __version__,
+            "file": self._file,
+            "axes": playback.axes,
+            "sway_of": SWAY_OF,
+            "cranes": names,
+            "colors": {RAW: "--raw", **colors},
+            "drives": False,
+            "machine": False,
+            "playback": True,
+            "profiles": False,
+            "sliders": {},
+            **links_of(playback.parameters),
+        }
+
+
+def _json(content: object) -> Response:
+    return Response(json.dumps(content), media_type="application/json")

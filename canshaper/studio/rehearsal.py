@@ -1,0 +1,149 @@
+"""The steps of the commissioning, for the page: a process of its own.
+
+A line of JSON asks, with the arguments of ``work``; a line answers.
+"""
+
+import json
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+from canshaper.commissioning.procedure.bench import Simulated
+from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
+from canshaper.commissioning.procedure.procedure import Procedure, Proposal
+from canshaper.commissioning.procedure.state import State, read_state
+from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.commissioning.procedure.steps.report import NAME as REPORT
+from canshaper.errors import CanshaperError, UsageError
+from canshaper.machine.binding import load_deployment
+from canshaper.report.console import OnProgress
+
+NICE = 10  # the cranes of the live page go first
+# The last results, not accepted yet.
+_proposals: dict[Path, Proposal] = {}
+
+
+class Reader:
+    """The person in front of the page, who is not asked for words and sees no bar."""
+
+    def ready(self, words: str) -> None:
+        """Nothing is waited for at the desk."""
+
+    def answer(self, _question: str, default: str) -> str:
+        """The default."""
+        return default
+
+    @contextmanager
+    def progress(self, _what: str) -> Iterator[OnProgress]:
+        """None is shown."""
+
+        def unseen(done: float, what: str | None = None) -> None:
+            pass
+
+        yield unseen
+
+
+def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool) -> dict[str, Any]:
+    """Do what the page asks for.
+
+    Args:
+        what: ``show``, ``run``, ``accept`` or ``skip``.
+        path: the deployment file.
+        changes: parameters of the simulated crane, NAME=VALUE.
+        step: name of the step; empty to show.
+        machine: whether that of the machine is shown; else its rehearsal.
+
+    Returns:
+        What the page shows, and under ``error`` why something was not done.
+    """
+    error, news = "", ""
+    try:
+        if what != "show":
+            with _procedure(path, changes) as procedure:
+                _do(procedure, path, what, step)
+                news = "; ".join(procedure.news)
+        return {**_shown(path, changes, machine=machine), "error": "", "news": news}
+    except (CanshaperError, OSError) as fault:
+        error = str(fault)
+    try:
+        return {**_shown(path, changes, machine=machine), "error": error, "news": news}
+    except (CanshaperError, OSError):
+        return {"file": path.name, "steps": [], "error": error, "news": news}
+
+
+@contextmanager
+def _procedure(path: Path, changes: list[str]) -> Iterator[Procedure]:
+    """The rehearsal of a file, while no other process works on it."""
+    load_deployment(path)  # what is wrong in it is named by its own name
+    files = Files(copy_for_rehearsal(path))
+    with files.locked():
+        state = read_state(files.state)
+        bench = Simulated(Reader(), changes or (state.changes if state else []))
+        yield Procedure(files, bench, load_deployment, STEPS, origin=path)
+
+
+def _do(procedure: Procedure, path: Path, what: str, name: str) -> None:
+    proposal = _proposals.pop(path, None)
+    step = procedure.step(name)
+    if what == "run":
+        _proposals[path] = procedure.run(step)
+    elif what == "skip":
+        procedure.skip(step)
+    elif proposal and proposal.step == name:
+        procedure.accept(proposal)
+    else:
+        raise UsageError(f"{name}: nothing to accept; run it first")
+
+
+def _shown(path: Path, changes: list[str], *, machine: bool) -> dict[str, Any]:
+    """How far it has come, and what the last run proposes."""
+    files = Files(path if machine else rehearsal_of(path))
+    state = read_state(files.state) or State(changes=changes)
+    deployment = load_deployment(path)
+    proposal = _proposals.get(path)
+    steps = []
+    for step in STEPS:
+        if not step.applies(deployment):
+            continue
+        record = state.of(step.name)
+        proposed = proposal if proposal and proposal.step == step.name else None
+        steps.append(
+            {
+                "name": step.name,
+                "title": step.title,
+                "status": record.status.value,
+                "at": record.at,
+                "why": record.why,
+                "parts": record.parts,
+                "poor": record.poor,
+                "pictures": [name for name in record.pictures if name.endswith(".png")],
+                "diff": proposed.diff if proposed else record.diff,
+                "proposed": bool(proposed) and not record.poor,
+            }
+        )
+    report = f"{REPORT}.html"
+    return {
+        "file": files.deployment.name,
+        "folder": str(files.folder),
+        "crane": " ".join(state.changes),
+        "report": report if (files.folder / report).is_file() else "",
+        "steps": steps,
+    }
+
+
+def main() -> None:
+    """Answer until no one asks any more; Ctrl-C is for the server, which ends it."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    os.nice(NICE)
+    answers, sys.stdout = sys.stdout, sys.stderr
+    for line in sys.stdin:
+        about = json.loads(line)
+        print(json.dumps(work(**{**about, "path": Path(about["path"])})), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,114 @@
+// States of an axis over time, a lane for each crane, and what happened as marks above them.
+
+const MARK_PX = 9; // height of the strip of marks
+const NEAR_PX = 6; // so near to the cursor a mark is named
+const HATCH_PX = 5;
+
+/** How a state looks: colour of the style, and lines for those that have to differ without colour. */
+const LOOKS = {
+  ready: ["--idle", 0],
+  wait: ["--warn", 0],
+  move: ["--focus", 0],
+  stop: ["--warn", 1],
+  bad: ["--bad", 2],
+};
+
+/**
+ * From and to when a lane was in which state; gaps where it is not known.
+ * @param rows [t, row] in order; @param get the state of a row: {state, level, reason}.
+ */
+export function spans(rows, get) {
+  const lane = [];
+  let last = null;
+  for (const [t, row] of rows) {
+    const now = get(row);
+    if (last) last.to = t;
+    if (last && last.state === now?.state && last.reason === now?.reason) continue;
+    last = now?.state ? { from: t, to: t, ...now } : null;
+    if (last) lane.push(last);
+  }
+  return lane;
+}
+
+/** Draw all lanes into a plot of uPlot. */
+export class Lanes {
+  /** @param names of the cranes, from the top; @param colors names in the style, by crane; @param css colour of the style by its name. */
+  constructor(names, colors, css) {
+    this.names = names;
+    this.colors = colors;
+    this.css = css;
+    this.spans = {}; // by crane, in the time of the plot
+    this.marks = []; // {t, source, text, level}, in the time of the plot
+  }
+
+  /** @param u the plot, whose x is time. */
+  draw(u) {
+    const { left, top, width, height } = u.bbox;
+    const pen = u.ctx;
+    const px = devicePixelRatio;
+    const strip = MARK_PX * px;
+    const tall = (height - strip) / this.names.length;
+    const x = (t) => Math.min(left + width, Math.max(left, u.valToPos(t, "x", true)));
+    pen.save();
+    this.names.forEach((name, i) => {
+      const y = top + strip + i * tall;
+      for (const span of this.spans[name] ?? []) {
+        const [from, to] = [x(span.from), x(span.to)];
+        if (to > from) this.bar(pen, from, y + px, to - from, tall - 2 * px, LOOKS[span.level], px);
+      }
+      pen.fillStyle = this.css(this.colors[name]);
+      pen.fillRect(left - 6 * px, y + px, 4 * px, tall - 2 * px);
+    });
+    for (const mark of this.marks) this.mark(pen, x(mark.t), top, mark, px);
+    pen.restore();
+  }
+
+  bar(pen, x, y, width, height, look, px) {
+    if (!look) return;
+    const [color, lines] = look;
+    pen.fillStyle = this.css(color);
+    pen.fillRect(x, y, width, height);
+    if (!lines) return;
+    pen.save();
+    pen.beginPath();
+    pen.rect(x, y, width, height);
+    pen.clip();
+    pen.strokeStyle = this.css("--panel");
+    pen.lineWidth = 1.5 * px;
+    pen.beginPath();
+    for (let at = x - height; at < x + width + height; at += HATCH_PX * px) {
+      pen.moveTo(at, y + height);
+      pen.lineTo(at + height, y);
+      if (lines > 1) {
+        pen.moveTo(at, y);
+        pen.lineTo(at + height, y + height);
+      }
+    }
+    pen.stroke();
+    pen.restore();
+  }
+
+  mark(pen, x, top, mark, px) {
+    pen.fillStyle = this.css({ warn: "--warn", bad: "--bad" }[mark.level] ?? "--quiet");
+    pen.beginPath();
+    pen.moveTo(x - 3 * px, top);
+    pen.lineTo(x + 3 * px, top);
+    pen.lineTo(x, top + (MARK_PX - 2) * px);
+    pen.fill();
+  }
+
+  /** States at a time, in words, in the order of the lanes. */
+  words(t) {
+    return this.names.map((name) => {
+      const span = (this.spans[name] ?? []).findLast((one) => one.from <= t && t <= one.to);
+      return span?.state ?? "not known";
+    });
+  }
+
+  /** The event whose mark is under the cursor; null where there is none. */
+  near(u) {
+    const of = (mark) => Math.abs(u.valToPos(mark.t, "x") - u.cursor.left);
+    const at = this.marks.filter((mark) => of(mark) < NEAR_PX).sort((a, b) => of(a) - of(b))[0];
+    return at ? `${at.source}: ${at.text}` : null;
+  }
+}

@@ -1,0 +1,126 @@
+// The cranes from the side, in two dimensions: where there is no WebGL.
+import { boomPoints, grapplePoints, MODELLED, SIMULATED } from "/static/geometry.js";
+
+const RAD = Math.PI / 180;
+const BEHIND_M = 1.5; // drawn behind the pillar
+const FREE_M = 0.7; // above, below and beyond what the crane reaches
+const TELESCOPE_M = 2.5; // its stroke
+const BOOM_PX = 6;
+const TRAIL = 90;
+const LEAP_S = 1; // a longer step is another part of a drive
+
+export class SideView {
+  /** @param canvas that has no WebGL context; @param hello what there is. */
+  constructor(canvas, hello) {
+    this.canvas = canvas;
+    this.hello = hello;
+    this.pen = canvas.getContext("2d");
+    this.overlay = false;
+    this.trails = Object.fromEntries(hello.cranes.map((name) => [name, []]));
+    const { boom, grapple } = hello;
+    this.reach = boom.main_boom_m + boom.outer_boom_m + TELESCOPE_M + FREE_M;
+    this.height = boom.pillar_m + boom.main_boom_m + FREE_M + grapple.l1;
+    this.paint();
+  }
+
+  /** Take the colours of the theme. */
+  paint() {
+    const style = getComputedStyle(document.documentElement);
+    const names = ["shaped", "raw", "other", "sky", "ground", "grid", "text", "quiet"];
+    this.colors = Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
+  }
+
+  setOverlay(on) {
+    this.overlay = on;
+  }
+
+  dispose() {} // nothing of it is kept outside of this page
+
+  add(shown) {
+    const leap = this.shown && !(shown.t >= this.shown.t && shown.t < this.shown.t + LEAP_S);
+    if (leap) for (const trail of Object.values(this.trails)) trail.length = 0;
+    this.shown = shown;
+    for (const [name, crane] of Object.entries(shown.cranes)) {
+      const trail = this.trails[name];
+      if (!crane.pose || !crane.sway) continue;
+      trail.push(this.points(crane).grapple);
+      if (trail.length > TRAIL) trail.shift();
+    }
+  }
+
+  /** Pivots and grapple as [radius, height]. */
+  points(crane) {
+    const points = boomPoints(this.hello.boom, crane.pose, crane.joints);
+    const hung = grapplePoints(this.hello.grapple, crane.sway);
+    const at = ([out, , up]) => [points.tip[0] + out, points.tip[1] + up];
+    return { ...points, joint: at(hung.joint), grapple: at(hung.grapple) };
+  }
+
+  draw() {
+    const { canvas, pen, colors } = this;
+    const sharp = Math.min(devicePixelRatio, 2);
+    const [w, h] = [canvas.clientWidth, canvas.clientHeight];
+    if (canvas.width !== Math.round(w * sharp)) canvas.width = Math.round(w * sharp);
+    if (canvas.height !== Math.round(h * sharp)) canvas.height = Math.round(h * sharp);
+    pen.setTransform(sharp, 0, 0, sharp, 0, 0);
+    pen.fillStyle = colors.sky;
+    pen.fillRect(0, 0, w, h);
+    const { cranes } = this.hello;
+    const part = this.overlay ? w : w / cranes.length;
+    const scale = Math.min(part / (this.reach + BEHIND_M), h / (this.height + FREE_M));
+    const ground = h - FREE_M * scale;
+    pen.fillStyle = colors.ground;
+    pen.fillRect(0, ground, w, h - ground);
+    cranes.forEach((name, i) => {
+      const left = this.overlay ? 0 : i * part;
+      const at = ([radius, height]) => [left + (radius + BEHIND_M) * scale, ground - height * scale];
+      this.drawCrane(name, this.shown?.cranes[name], at, i, left);
+    });
+  }
+
+  drawCrane(name, crane, at, number, left) {
+    const { pen, colors } = this;
+    const color = colors[this.hello.colors[name].slice(2)];
+    pen.textAlign = "left";
+    pen.font = "600 15px system-ui, sans-serif";
+    pen.fillStyle = color;
+    pen.fillText(name, left + 12, 22 + (this.overlay ? 20 * number : 0));
+    pen.font = "13px system-ui, sans-serif";
+    pen.fillStyle = colors.text;
+    if (!crane?.pose) {
+      pen.fillText("its pose is not on the bus", left + 12, 62);
+      return;
+    }
+    const angle = `slewed ${(((crane.pose[0] + 540) % 360) - 180).toFixed(0)}°`;
+    const across = crane.sway ? `, sway across the boom ${crane.sway[0].toFixed(1)}°` : "";
+    if (!this.overlay) {
+      pen.fillText(angle + across, left + 12, 42);
+      if (!crane.measured) pen.fillText(crane.simulated ? SIMULATED : MODELLED, left + 12, 62);
+    }
+    const points = this.points(crane);
+    this.line([[0, 0], [0, this.hello.boom.pillar_m], points.start].map(at), color, BOOM_PX + 2);
+    this.line([points.start, points.elbow, points.base, points.end].map(at), color, BOOM_PX);
+    this.line([points.end, points.tip].map(at), color, BOOM_PX - 2);
+    this.line([points.tip, [points.tip[0], 0]].map(at), colors.quiet, 1, [4, 4]);
+    this.line(this.trails[name].map(at), color, 1.5);
+    if (!crane.sway) return;
+    this.line([points.tip, points.joint, points.grapple].map(at), color, 3, crane.measured ? [] : [5, 4]);
+    const [x, y] = at(points.grapple);
+    pen.beginPath();
+    pen.arc(x, y, 9, 0, 360 * RAD);
+    if (crane.measured) pen.fill();
+    else pen.stroke();
+  }
+
+  line(points, color, width, dash = []) {
+    const { pen } = this;
+    pen.strokeStyle = pen.fillStyle = color;
+    pen.lineWidth = width;
+    pen.lineCap = pen.lineJoin = "round";
+    pen.setLineDash(dash);
+    pen.beginPath();
+    points.forEach(([x, y], i) => (i ? pen.lineTo(x, y) : pen.moveTo(x, y)));
+    pen.stroke();
+    pen.setLineDash([]);
+  }
+}

@@ -1,0 +1,3 @@
+// The theme that was chosen last on any of the pages, else that of the system.
+export const chosenTheme = () =>
+  localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: light)").matches ? "light" : "dark");

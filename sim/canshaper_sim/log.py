@@ -1,0 +1,110 @@
+"""A log that the grapple grips while the crane is driven, and how a long one swings in it.
+
+Grapple and log are one body on one pendulum. A long log adds a second swing by its mode, linear,
+in both planes alike; the part of the lean that each mode has is what the tool shows of it:
+
+    angle = (1 - share) pendulum + q,    q'' + 2 zeta omega q' + omega^2 q = share omega^2 lean
+
+with lean = a/g, the angle at which it would hang under the acceleration a of the tip.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from canshaper_sim.grapple import Grapple, Sway, TipMotion
+from canshaper_sim.ranges import check_ranges
+
+# name -> (lowest, highest) value.
+_ALLOWED = {
+    "grip_s": (0.0, math.inf),
+    "mass_kg": (0.0, 10_000.0),
+    "below_m": (-1.0, 5.0),
+    "second_period_s": (0.0, 2.0),
+    "second_share": (-1.0, 0.9),
+    "second_damping_ratio": (0.0, 0.9),
+}
+
+
+@dataclass(frozen=True, slots=True)
+class LogParameters:
+    """The log, and when it is gripped: seconds from the start, by default never."""
+
+    grip_s: float = math.inf
+    mass_kg: float = 500.0
+    below_m: float = 0.3  # its centre of mass below that of the grapple
+    second_period_s: float = 0.0  # 0: no second swing; 0.5 to 0.8 is usual with a long log
+    second_share: float = -0.2  # of the lean; a body that hangs below swings against it
+    second_damping_ratio: float = 0.04
+
+    def __post_init__(self) -> None:
+        check_ranges("log", self, _ALLOWED)
+
+    def gripped(self, time_s: float) -> bool:
+        """Whether it is in the grapple at that time."""
+        return time_s >= self.grip_s
+
+    def loaded(self, grapple: Grapple) -> Grapple:
+        """Grapple and log as one body: their mass, at their common centre."""
+        mass = grapple.m2_kg + self.mass_kg
+        return replace(grapple, m2_kg=mass, l2_m=grapple.l2_m + self.below_m * self.mass_kg / mass)
+
+
+class SecondSwing:
+    """The second swing of a long log in motion.
+
+    Args:
+        log: of a second period.
+        gravity_m_s2: of the crane.
+        sway: of the pendulum when it is gripped: the angle does not jump.
+    """
+
+    __slots__ = ("_by", "_gravity_m_s2", "_omega", "_ratio", "_share", "_step_s", "across", "along")
+
+    def __init__(self, log: LogParameters, gravity_m_s2: float, sway: Sway) -> None:
+        self._ratio, self._share = log.second_damping_ratio, log.second_share
+        self._omega = 2.0 * math.pi / log.second_period_s / math.sqrt(1.0 - self._ratio**2)
+        self._gravity_m_s2 = gravity_m_s2
+        share, self._step_s = self._share, 0.0
+        self._by = (1.0, 0.0, 0.0, 1.0)
+        self.across = share * sway.theta5_rad, share * sway.theta5_rate_rad_s
+        self.along = share * sway.theta6_rad, share * sway.theta6_rate_rad_s
+
+    def advance(self, step_s: float, tips: tuple[TipMotion, TipMotion, TipMotion]) -> None:
+        """Swing on for step_s seconds; the mean acceleration of the tip acts all the time."""
+        if step_s != self._step_s:
+            self._step_s, self._by = step_s, self._over(step_s)
+        start, middle, end = (_pulls(tip) for tip in tips)
+        lean = self._share / (6.0 * self._gravity_m_s2)
+        self.across = self._moved(self.across, -lean * (start[0] + 4.0 * middle[0] + end[0]))
+        self.along = self._moved(self.along, lean * (start[1] + 4.0 * middle[1] + end[1]))
+
+    def shown(self, sway: Sway) -> Sway:
+        """The swing of the tool, of that of its pendulum."""
+        rest, across, along = 1.0 - self._share, self.across, self.along
+        return Sway(
+            rest * sway.theta5_rad + across[0],
+            rest * sway.theta6_rad + along[0],
+            rest * sway.theta5_rate_rad_s + across[1],
+            rest * sway.theta6_rate_rad_s + along[1],
+        )
+
+    def _over(self, step_s: float) -> tuple[float, float, float, float]:
+        """What a free swing makes of (angle, rate) in that time, exactly."""
+        omega, ratio = self._omega, self._ratio
+        damped = omega * math.sqrt(1.0 - ratio**2)
+        fade = math.exp(-ratio * omega * step_s)
+        cosine = fade * math.cos(damped * step_s)
+        sine = fade * math.sin(damped * step_s) / damped
+        slow = ratio * omega * sine
+        return cosine + slow, sine, -omega * omega * sine, cosine - slow
+
+    def _moved(self, state: tuple[float, float], lean: float) -> tuple[float, float]:
+        by, off = self._by, state[0] - lean
+        return lean + by[0] * off + by[1] * state[1], by[2] * off + by[3] * state[1]
+
+
+def _pulls(tip: TipMotion) -> tuple[float, float]:
+    """Acceleration of the tip in slew direction and outwards, m/s^2."""
+    radius, rate, slew_rate = tip.radius_m, tip.radius_rate_m_s, tip.slew_rate_rad_s
+    tangential = radius * tip.slew_acceleration_rad_s2 + 2.0 * rate * slew_rate
+    return tangential, tip.radius_acceleration_m_s2 - radius * slew_rate**2

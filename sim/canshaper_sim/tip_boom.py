@@ -1,0 +1,104 @@
+"""What carries the grapple, and the boom whose tip is moved directly, coordinate by coordinate."""
+
+import math
+from typing import TYPE_CHECKING, Protocol
+
+from canshaper_sim.actuator import Actuator
+from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
+from canshaper_sim.grapple import TipMotion, new_tuple
+
+if TYPE_CHECKING:
+    from canshaper_sim.crane import CraneParameters
+
+
+class CraneBoom(Protocol):
+    """What carries the grapple: its actuators by axis name, and how they move the tip."""
+
+    axes: dict[str, Actuator]
+
+    @property
+    def pose(self) -> tuple[float, float, float, float, float, float]:
+        """theta1, radius, height and their rates; rad, m, per second."""
+
+    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
+        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
+
+
+class TipBoom:
+    """The tip itself, moved by a valve in each cylindrical coordinate."""
+
+    __slots__ = ("_lift", "_near_far", "_slew", "axes")
+
+    def __init__(self, parameters: "CraneParameters") -> None:
+        p = parameters
+        self._slew = Actuator(
+            p.slew, p.slew_full_speed_rad_s, p.start_theta1_rad, -math.inf, math.inf
+        )
+        self._near_far = Actuator(
+            p.near_far,
+            p.near_far_full_speed_m_s,
+            p.start_radius_m,
+            p.radius_min_m,
+            p.radius_max_m,
+        )
+        self._lift = Actuator(
+            p.lift, p.lift_full_speed_m_s, p.start_height_m, p.height_min_m, p.height_max_m
+        )
+        self.axes = {SLEW: self._slew, NEAR_FAR: self._near_far, LIFT: self._lift}
+
+    @property
+    def pose(self) -> tuple[float, float, float, float, float, float]:
+        """theta1, radius, height and their rates; rad, m, per second."""
+        slew, near_far, lift = self._slew, self._near_far, self._lift
+        return (
+            slew.position,
+            near_far.position,
+            lift.position,
+            slew.speed,
+            near_far.speed,
+            lift.speed,
+        )
+
+    def advance(self, step_s: float) -> tuple[TipMotion, TipMotion, TipMotion]:
+        """Move on by step_s seconds; tip motion at start, middle and end of the step."""
+        slew, near_far, lift = self._slew, self._near_far, self._lift
+        start_radius, start_radius_rate = near_far.position, near_far.speed
+        start_slew, start_slew_rate = slew.position, slew.speed
+        start_height, start_height_rate = lift.position, lift.speed
+        slew.advance(step_s)
+        near_far.advance(step_s)
+        lift.advance(step_s)
+        start = (
+            start_radius,
+            start_radius_rate,
+            near_far.start_acceleration,
+            start_slew_rate,
+            slew.start_acceleration,
+            lift.start_acceleration,
+            start_slew,
+            start_height,
+            start_height_rate,
+        )
+        middle = (
+            near_far.middle_position,
+            near_far.middle_speed,
+            near_far.middle_acceleration,
+            slew.middle_speed,
+            slew.middle_acceleration,
+            lift.middle_acceleration,
+            slew.middle_position,
+            lift.middle_position,
+            lift.middle_speed,
+        )
+        end = (
+            near_far.position,
+            near_far.speed,
+            near_far.end_acceleration,
+            slew.speed,
+            slew.end_acceleration,
+            lift.end_acceleration,
+            slew.position,
+            lift.position,
+            lift.speed,
+        )
+        return new_tuple(TipMotion, start), new_tuple(TipMotion, middle), new_tuple(TipMotion, end)

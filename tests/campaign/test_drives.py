@@ -1,0 +1,157 @@
+"""What a campaign draws, and what it measures of a drive."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.campaign.draw import Setting, draw_drive
+from canshaper.campaign.measure import measured_drive
+from canshaper.campaign.operators import OPERATORS, REST_S
+from canshaper.config.uncertainty import MEASURES, Uncertainty
+from canshaper.controller.controller import Controller
+from canshaper.design.lockstep import Simulation, drive
+from canshaper.machine.binding import load_deployment
+from canshaper.report.crane_metrics import crane_metrics
+from canshaper.shaping.axis import Axis
+from canshaper_sim.crane import CraneParameters
+from tests.faults.shipped import NAMES
+
+CONFIG = Path(__file__).resolve().parents[2] / "config"
+ROBUST = load_deployment(CONFIG / "forwarder-robust.yaml")
+SENSOR = load_deployment(CONFIG / "forwarder-sensor.yaml")
+RANGES = Uncertainty()
+
+
+def settings(count: int, ranges: Uncertainty = RANGES) -> list[Setting]:
+    return [draw_drive(SENSOR, seed, ranges) for seed in range(count)]
+
+
+def test_the_same_seed_is_the_same_drive_in_any_order() -> None:
+    there = [draw_drive(ROBUST, seed, RANGES) for seed in range(20)]
+    back = [draw_drive(ROBUST, seed, RANGES) for seed in reversed(range(20))]
+    for one, other in zip(there, reversed(back), strict=True):
+        assert (one.factors, one.script, one.fault) == (other.factors, other.script, other.fault)
+
+
+def test_two_files_meet_the_same_crane_and_operator() -> None:
+    plain = load_deployment(CONFIG / "forwarder.yaml")
+    for seed in range(20):
+        one, other = draw_drive(ROBUST, seed, RANGES), draw_drive(plain, seed, RANGES)
+        assert (one.factors, one.script) == (other.factors, other.script)
+        assert one.options["parameters"] == other.options["parameters"]
+
+
+def test_numbers_fill_their_ranges_and_do_not_leave_them() -> None:
+    drawn = settings(400)
+    for name, (low, high), scale in (
+        ("length_pct", RANGES.length_pct, 1.0),
+        ("damping_pct", RANGES.damping_pct, 1.0),
+        ("radius_m", RANGES.radius_m, 1.0),
+        ("slew_lag_s", RANGES.valve_lag_s, 1.0),
+        ("near_far_rate_limit_1_s", RANGES.valve_rate_per_s, 1.0),
+        ("slew_deadband", RANGES.valve_deadband_pct, 0.01),
+        ("slew_hysteresis", RANGES.valve_hysteresis_pct, 0.01),
+        ("near_far_gain_pct", RANGES.valve_gain_pct, 1.0),
+        ("slew_dead_time_s", RANGES.valve_dead_time_s, 1.0),
+    ):
+        values = [one.factors[name] for one in drawn]
+        tenth = 0.1 * scale * (high - low)
+        assert scale * low <= min(values) <= scale * low + tenth, name
+        assert scale * high - tenth <= max(values) <= scale * high + 1e-12, name
+
+
+def test_the_crane_is_what_was_drawn() -> None:
+    nominal = CraneParameters()
+    for one in settings(20):
+        crane, factors = one.options["parameters"], one.factors
+        assert crane is not None
+        assert crane.grapple.l2_m == nominal.grapple.longer(factors["length_pct"]).l2_m
+        assert crane.start_radius_m == factors["radius_m"]
+        assert crane.near_far.lag_s == factors["near_far_lag_s"]
+        assert crane.slew.rate_limit_1_s == factors["slew_rate_limit_1_s"]
+        gain = 1.0 + factors["slew_gain_pct"] / 100.0
+        assert crane.slew_full_speed_rad_s == gain * nominal.slew_full_speed_rad_s
+
+
+def test_loads_and_faults_come_as_often_as_the_file_says() -> None:
+    drawn = settings(600)
+    loaded = [one for one in drawn if one.options["loads"]]
+    assert abs(len(loaded) / 600 - RANGES.load_change_pct / 100.0) < 0.06
+    assert all(one.factors["load_mass"] == 1.0 for one in drawn if one not in loaded)
+    kinds = {one.fault for one in drawn}
+    assert {"joystick lost", "joystick late", "joystick garbled", "joystick silent"} <= kinds
+    assert {"sensor lost", "sensor stuck", "sensor reversed", "sensor jump"} <= kinds
+    none = Uncertainty(load_change_pct=0, bus_fault_pct=0, sensor_fault_pct=0)
+    assert all(not one.fault and not one.options["loads"] for one in settings(50, none))
+
+
+def test_every_operator_ends_with_a_rest_in_which_the_residual_shows() -> None:
+    drawn = settings(100)
+    assert {one.operator for one in drawn} == {*OPERATORS}
+    for one in drawn:
+        end_s = max((stroke.end_s for stroke in one.script.strokes), default=0.0)
+        assert one.script.duration_s == pytest.approx(end_s + REST_S)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_any_shipped_deployment_can_be_driven(name: str) -> None:
+    deployment = load_deployment(CONFIG / f"{name}.yaml")
+    row = measured_drive(deployment, 1, RANGES)
+    assert row["broken"] == 0
+    assert {*MEASURES} < {*row}
+
+
+@pytest.mark.parametrize("seed", [0, 2, 5, 11])
+def test_what_is_measured_on_the_fly_is_what_the_recorded_drive_shows(seed: int) -> None:
+    setting = draw_drive(ROBUST, seed, RANGES)
+    recording = drive(ROBUST, setting.script, **setting.options)
+    assert recording.crane is not None
+    recorded = crane_metrics(recording, recording.crane)
+    row = measured_drive(ROBUST, seed, RANGES)
+    # The frames have steps of 0.01 deg, 1 mm, and a hundredth of the speed where it stands.
+    assert row["residual_deg"] == pytest.approx(recorded.residual_deg, abs=0.02)
+    assert row["peak_deg"] == pytest.approx(recorded.peak_deg, abs=0.02)
+    assert row["run_on_m"] == pytest.approx(recorded.run_on_m, abs=0.01)
+
+
+def test_a_drive_does_not_depend_on_those_before_it() -> None:
+    alone = measured_drive(load_deployment(ROBUST.path), 4, RANGES)
+    deployment = load_deployment(ROBUST.path)
+    for seed in (8, 0):
+        measured_drive(deployment, seed, RANGES)
+    assert measured_drive(deployment, 4, RANGES) == alone
+
+
+def test_a_frame_that_the_guard_refuses_is_a_broken_promise(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert measured_drive(ROBUST, 2, RANGES)["broken"] == 0
+    act = Axis.act
+
+    def runs_on(self: Axis, *arguments: object, **named: object) -> object:
+        transition = act(self, *arguments, **named)  # type: ignore[arg-type]
+        if self.raw and abs(self.raw) < 60:  # a little faster than anybody asked
+            self.raw = self.raw + (3 if self.raw > 0 else -3)
+        return transition
+
+    monkeypatch.setattr(Axis, "act", runs_on)
+    row = measured_drive(ROBUST, 2, RANGES)
+    assert row["broken"] > 0
+    assert "output=refused" in row["why"]
+
+
+def test_late_lost_and_garbled_frames_reach_the_controller_as_such() -> None:
+    kinds = {}
+    for seed in range(300):
+        setting = draw_drive(ROBUST, seed, RANGES)
+        if setting.fault and setting.fault not in kinds:
+            simulation = Simulation(ROBUST, setting.script, **setting.options)
+            states = {runner.axis.state for _ in simulation.ticks() for runner in _axes(simulation)}
+            kinds[setting.fault] = len(states)
+    assert {*kinds} == {f"joystick {one}" for one in ("lost", "late", "garbled", "silent")}
+    assert max(kinds.values()) > 2  # some stop
+
+
+def _axes(simulation: Simulation) -> list:
+    controller: Controller = simulation.controller
+    return [*controller.axes.values()]

@@ -1,0 +1,45 @@
+"""Work on the processes of this machine: every job once, whatever becomes of a process."""
+
+from functools import partial
+from pathlib import Path
+
+import pytest
+
+from canshaper.campaign.engine import Processes
+from canshaper.errors import CampaignError
+from tests.campaign.jobs import always_dies, dies_once, fails, square
+
+pytestmark = pytest.mark.processes
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_every_job_has_its_result_once(count: int) -> None:
+    results = list(Processes(count).run(square, range(50)))
+    assert sorted(results) == [(n, n * n) for n in range(50)]
+
+
+def test_jobs_are_taken_a_few_ahead_only() -> None:
+    taken: list[int] = []
+    jobs = (taken.append(n) or n for n in range(1000))
+    results = Processes(2).run(square, jobs)
+    for _ in range(5):
+        next(results)
+    assert len(taken) < 20
+    results.close()  # type: ignore[attr-defined]
+
+
+def test_a_process_that_is_killed_loses_no_job_and_none_counts_twice(tmp_path: Path) -> None:
+    results = list(Processes(2).run(partial(dies_once, tmp_path / "died"), range(40)))
+    assert (tmp_path / "died").exists()
+    assert sorted(results) == [(n, n * n) for n in range(40)]
+
+
+def test_a_job_that_kills_every_process_ends_the_work() -> None:
+    with pytest.raises(CampaignError, match="the process died 3 times of"):
+        list(Processes(2).run(always_dies, range(40)))
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_what_a_job_raises_is_raised(count: int) -> None:
+    with pytest.raises(ValueError, match="no square of"):
+        list(Processes(count).run(fails, range(3)))

@@ -1,0 +1,29 @@
+"""A machine that ``canshaper init`` has described, in a folder of its own."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+
+ROOT = Path(__file__).parents[3]
+
+
+@pytest.fixture(scope="session")
+def described(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("described")
+    shutil.copy(ROOT / "dbc" / "forwarder.dbc", folder / "machine.dbc")
+    words = ["init", str(folder / "machine.yaml"), "--dbc", str(folder / "machine.dbc")]
+    made = CliRunner().invoke(app, words, input="\n" * 40)
+    assert made.exit_code == 0, made.output
+    return folder
+
+
+@pytest.fixture
+def machine(described: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    for path in described.iterdir():
+        shutil.copy(path, tmp_path)
+    monkeypatch.chdir(tmp_path)
+    return Path("machine.yaml")

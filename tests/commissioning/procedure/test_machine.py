@@ -1,0 +1,180 @@
+"""The machine bench: a real daemon on a real bus, which is ended with neutral valves."""
+
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.commissioning.calibration.drive import CalibrationDrive
+from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.write import speed_signal
+from canshaper.commissioning.procedure.bench import Mode, Task
+from canshaper.commissioning.procedure.machine import Machine
+from canshaper.commissioning.procedure.traffic import read_traffic
+from canshaper.errors import BusError, UsageError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.strokes import Script
+
+GROUP = f"239.81.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
+BUS = ["--interface", "udp_multicast", "--channel", GROUP]
+NEUTRAL = b"stopped valves=neutral"
+pytestmark = pytest.mark.processes
+
+
+class Hand:
+    """A person who is told, and whose operator moves the joysticks from then on.
+
+    Args:
+        also: called at every step of the progress.
+    """
+
+    def __init__(self, also: Any = None) -> None:
+        self._also = also
+        self._operator: subprocess.Popen[bytes] | None = None
+        self.told: list[str] = []
+
+    def ready(self, words: str) -> None:
+        self.told.append(words)
+        words_of = ["operator", "machine.yaml", *BUS, "--script", "random-3"]
+        self._operator = subprocess.Popen(
+            [sys.executable, "-m", "canshaper", *words_of], stdout=subprocess.DEVNULL
+        )
+
+    def answer(self, question: str, default: str) -> str:
+        self.told.append(question)
+        return default
+
+    @contextmanager
+    def progress(self, what: str) -> Iterator[Any]:
+        try:
+            yield self._also or (lambda *_: None)
+        finally:
+            if self._operator:
+                self._operator.terminate()
+                self._operator.wait()
+
+
+@pytest.fixture
+def deployment(machine: Path) -> Deployment:
+    text = machine.read_text()
+    line = "interface: socketcan, channel: can0"
+    assert line in text
+    machine.write_text(text.replace(line, f"interface: udp_multicast, channel: {GROUP}"))
+    return load_deployment(machine)
+
+
+def task(mode: Mode) -> Task:
+    return Task("Move it.", Script("moves", (), 12.0), mode)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("mode", "sends"), [(Mode.SHAPED, True), (Mode.DRY, False)])
+def test_a_drive_is_recorded_and_its_daemon_ended(
+    deployment: Deployment, mode: Mode, sends: bool
+) -> None:
+    hand = Hand()
+    Machine(hand, []).drive(deployment, Path("drive.log"), task(mode))
+    assert hand.told == ["Move it."]
+    traffic = read_traffic(Path("drive.log"), deployment)
+    assert any(axis.joystick.value for axis in traffic.axes.values())
+    assert {bool(axis.valve.value) for axis in traffic.axes.values()} == {sends}
+    assert all(axis.states for axis in traffic.axes.values())
+    assert (NEUTRAL in Path("drive.txt").read_bytes()) is sends
+
+
+@pytest.mark.long
+def test_ctrl_c_leaves_neutral_valves_and_no_file(deployment: Deployment) -> None:
+    def interrupted(*_: object) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        Machine(Hand(interrupted), []).drive(deployment, Path("drive.log"), task(Mode.RAW))
+    said = Path("drive.txt").read_bytes()
+    assert NEUTRAL in said
+    assert b"machine.commission.raw.yaml" in said
+    assert not Path("machine.commission.raw.yaml").exists()
+
+
+@pytest.mark.long
+def test_a_daemon_that_dies_is_reported(deployment: Deployment) -> None:
+    def killed(*_: object) -> None:
+        for pid in children("run"):
+            os.kill(pid, signal.SIGKILL)
+
+    with pytest.raises(UsageError, match="canshaper run ended with status -9"):
+        Machine(Hand(killed), []).drive(deployment, Path("drive.log"), task(Mode.SHAPED))
+
+
+def children(verb: str) -> list[int]:
+    """Own child processes of that verb."""
+    found = []
+    for line in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split():
+        if verb.encode() in Path(f"/proc/{line}/cmdline").read_bytes().split(b"\0"):
+            found.append(int(line))
+    return found
+
+
+@pytest.mark.long
+def test_the_daemon_ends_with_us(deployment: Deployment, tmp_path: Path) -> None:
+    """We are killed in the middle of a drive: the valves are sent neutral all the same."""
+    code = (
+        "import os, signal; from pathlib import Path\n"
+        "from canshaper.cli.person import Terminal\n"
+        "from canshaper.commissioning.procedure.machine import Machine\n"
+        "from canshaper.commissioning.procedure.bench import Mode\n"
+        "from canshaper.machine.binding import load_deployment\n"
+        "bench = Machine(Terminal(), [])\n"
+        "with bench._daemon(load_deployment(Path('machine.yaml')), Path('d.log'), Mode.SHAPED):\n"
+        "    os.kill(os.getpid(), signal.SIGKILL)\n"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == -signal.SIGKILL
+    said = tmp_path / "d.txt"
+    with subprocess.Popen(["tail", "-n", "+1", "-F", said], stdout=subprocess.PIPE) as tail:
+        assert tail.stdout
+        assert any(NEUTRAL in line for line in tail.stdout)  # without it the test hangs
+        tail.terminate()
+
+
+@pytest.mark.long
+def test_ctrl_c_ends_a_measurement_and_is_ctrl_c_again(deployment: Deployment) -> None:
+    def interrupted(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGINT)
+
+    before = signal.getsignal(signal.SIGINT)
+    speed = speed_signal(deployment, "slew", None)
+    drive = CalibrationDrive(deployment, "slew", speed, Ramp(0.03, 0.4))
+    with pytest.raises(KeyboardInterrupt):
+        Machine(Hand(interrupted), []).calibrate(deployment, drive, "It moves.")
+    assert drive.ended == "stopped: Ctrl-C"
+    assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_bus_that_cannot_be_opened(machine: Path) -> None:
+    with pytest.raises(BusError, match=r"canshaper run ended with status 3:\n.*bus "):
+        drive = Machine(Hand(), ["--channel", "nowhere9"]).drive
+        drive(load_deployment(machine), Path("drive.log"), task(Mode.SHAPED))
+
+
+def test_who_moves_the_valves_before_the_first_motion(machine: Path) -> None:
+    class Says(Hand):
+        def answer(self, question: str, default: str) -> str:
+            return super().answer(question, default) if self.told else "canshaper"
+
+    hand = Hand()
+    assert Machine(hand, []).raw_mode("swing") is Mode.LISTEN
+    assert "swing: who moves the valves" in hand.told[0]
+    assert Machine(Says(), []).raw_mode("swing") is Mode.RAW
+
+    class Nonsense(Hand):
+        def answer(self, question: str, default: str) -> str:
+            return "me"
+
+    with pytest.raises(UsageError, match="expected other or canshaper, got 'me'"):
+        Machine(Nonsense(), []).raw_mode("swing")

@@ -1,0 +1,43 @@
+"""The comparison of filters on a machine with sway sensors."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.design.comparison.candidates import candidates, with_candidate
+from canshaper.design.comparison.manoeuvres import manoeuvres
+from canshaper.design.comparison.measure import measure
+from canshaper.machine.binding import load_deployment
+
+FILE = Path(__file__).parents[3] / "config" / "forwarder-sensor.yaml"
+ZV, SENSED = "limit-aware ZV", "ZV +sensor"
+
+
+def test_a_sensor_that_damps_has_rows_of_its_own() -> None:
+    deployment = load_deployment(FILE)
+    every = {one.name: one for one in candidates(deployment)}
+    sensed = [name for name, one in every.items() if one.sensor]
+    assert sensed[0] == SENSED
+    assert len(sensed) == 4
+    for name, sensors in ((ZV, 0), (SENSED, 2)):
+        axes = with_candidate(deployment, every[name]).axes.values()
+        assert sum(axis.sway_sensor is not None for axis in axes) == sensors
+
+
+def test_a_sensor_that_only_watches_has_none(tmp_path: Path) -> None:
+    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(FILE.parents[1] / "dbc"))
+    path = tmp_path / "machine.yaml"
+    path.write_text(text.replace("use: damp", "use: watch", 1), encoding="utf-8")
+    assert not [one for one in candidates(load_deployment(path)) if one.sensor]
+
+
+@pytest.mark.parametrize("length_pct", [-30, 30])
+def test_with_it_a_wrong_length_leaves_little(length_pct: int) -> None:
+    deployment = load_deployment(FILE)
+    every = {one.name: one for one in candidates(deployment)}
+    pulse = next(one for one in manoeuvres() if one.name == "pulse near-far")
+    without, with_it = (
+        measure(deployment, every[name], pulse, length_pct).residual_deg for name in (ZV, SENSED)
+    )
+    assert without > 2.0
+    assert with_it < 0.8

@@ -1,0 +1,125 @@
+"""Swing that another axis makes, damped by an axis whose joystick no one touches."""
+
+import math
+
+import pytest
+
+from canshaper.shaping.states import CommandInput, State
+from canshaper.shaping.trust import Trust
+from tests.shaping.test_sensed import SCALE, TICK_S, Rig
+
+LARGEST, TIME_S = 0.25, 4.0
+
+
+def swinging(rig: Rig, push: float = 0.3) -> Rig:
+    """At rest after a drive that has proved the sensor; then the other axis makes it swing."""
+    rig.axis.allow_added(LARGEST, TIME_S)
+    rig.trusted()
+    for command in (0.8, 0.5, 0.2, 0.0):
+        rig.command = command
+        rig.run(3.0)
+    assert not rig.axis.commanded
+    assert rig.sensed.state is Trust.TRUSTED
+    rig.push = push
+    rig.run(1.1)
+    rig.push = 0.0
+    return rig
+
+
+def swing_deg(rig: Rig) -> float:
+    """Amplitude of the grapple's swing."""
+    omega = rig.real.mode.omega_rad_s
+    return SCALE * math.degrees(math.hypot(rig.real.angle, rig.real.rate / omega))
+
+
+def test_it_is_damped_within_the_bound_of_what_may_be_added() -> None:
+    rig, seen = swinging(Rig()), 0.0
+    assert swing_deg(rig) > 3.0
+    for _ in range(round(2.5 / TICK_S)):
+        rig.run(TICK_S, damps=True)
+        seen = max(seen, abs(rig.axis.sent))
+        assert rig.axis.applied == rig.axis.sent
+    assert 0.1 < seen <= LARGEST
+    assert swing_deg(rig) < 1.0
+    assert rig.sensed.state is Trust.TRUSTED
+    rig.run(1.0)
+    assert (rig.axis.state, rig.axis.raw) == (State.READY, 0)
+
+
+@pytest.mark.parametrize("damps", [False, True])
+def test_not_by_a_sensor_that_is_only_watched_and_not_where_no_other_axis_makes_it(
+    damps: bool,
+) -> None:
+    rig = swinging(Rig(damps=not damps))
+    for _ in range(50):
+        rig.run(TICK_S, damps=damps)
+        assert (rig.axis.state, rig.axis.raw) == (State.READY, 0)
+
+
+def test_not_by_an_axis_that_has_no_sensor_or_may_not_be_added_to() -> None:
+    rig = swinging(Rig())
+    rig.axis.allow_added(0.0, TIME_S)
+    rig.run(1.0, damps=True)
+    assert rig.axis.raw == 0
+    rig.axis.allow_added(LARGEST, TIME_S)
+    rig.axis.sensed = None
+    for _ in range(20):
+        rig.axis.act(CommandInput(enabled=True), 0.0, damps=True)
+        rig.axis.advance()
+        assert rig.axis.raw == 0
+
+
+def test_for_no_longer_than_may_be_added() -> None:
+    rig = swinging(Rig())
+    rig.axis.allow_added(LARGEST, 0.5)
+    rig.run(0.46, damps=True)
+    assert rig.axis.raw != 0
+    rig.run(0.3, damps=True)
+    assert rig.axis.raw == 0
+
+
+def test_a_held_joystick_counts_alone() -> None:
+    rig, twin = swinging(Rig()), swinging(Rig())
+    rig.command = twin.command = -0.3
+    for _ in range(round(1.5 / TICK_S)):
+        rig.run(TICK_S, damps=True)
+        twin.run(TICK_S)
+        assert rig.axis.raw == twin.axis.raw
+
+
+def test_a_grapple_that_leans_on_something_does_not_drive_it_away() -> None:
+    rig = swinging(Rig(), push=0.0)
+    way = 0.0
+    for _ in range(round(TIME_S / TICK_S)):
+        rig.run(TICK_S, math.radians(6.0), damps=True)
+        way += TICK_S * rig.axis.sent
+    assert rig.sensed.state in (Trust.JUMP, Trust.CONTACT, Trust.STUCK)
+    assert abs(way) < 0.1
+
+
+def test_what_it_does_for_another_axis_is_no_restlessness() -> None:
+    rig = swinging(Rig())
+    for _ in range(4):
+        rig.push = 0.3
+        rig.run(0.6, damps=True)
+        rig.push = -0.3
+        rig.run(0.6, damps=True)
+        assert rig.sensed.state is Trust.TRUSTED
+
+
+def test_unasked_for_nothing_is_damped() -> None:
+    rig = swinging(Rig())
+    rig.axis.tick(CommandInput(enabled=True))
+    assert rig.axis.raw == 0
+
+
+def test_the_path_of_the_other_axis_is_run_besides() -> None:
+    rig = swinging(Rig(), push=0.0)
+    for tick in range(100):  # the tip leads the grapple by the path
+        angle = rig.angle + SCALE * 0.1 * TICK_S * tick
+        rig.sensed.measure(angle, SCALE, commanded=False, damps=True)
+        rig.axis.act(CommandInput(enabled=True), 0.1, damps=True)
+        rig.axis.advance()
+        rig.real.step(rig.axis.applied)
+    assert rig.axis.sent == pytest.approx(0.1, abs=0.03)
+    assert rig.axis.applied == pytest.approx(rig.axis.sent - 0.1)

@@ -1,0 +1,44 @@
+"""The commissioning in a real browser: run, look, accept; on a phone nothing is cut off."""
+
+import shutil
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import pytest
+
+from tests.studio.conftest import ROOT, Studio
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Path:
+    text = (ROOT / "config" / "forwarder-robust.yaml").read_text()
+    shutil.copy(ROOT / "dbc" / "forwarder.dbc", tmp_path)
+    (tmp_path / "machine.yaml").write_text(text.replace("../dbc/", ""))
+    return tmp_path / "machine.yaml"
+
+
+def test_a_step_is_run_and_accepted(chromium: "Browser", machine: Path) -> None:
+    studio = Studio(file=str(machine))
+    try:
+        tab = chromium.new_page(viewport={"width": 390, "height": 800})
+        faults: list[str] = []
+        tab.on("console", lambda message: faults.append(message.text))
+        tab.on("pageerror", lambda error: faults.append(str(error)))
+        tab.goto(f"{studio.url}commission")
+        tab.locator("#steps button", has_text="check").click()
+        tab.locator("#run:not([disabled])").click()
+        tab.locator("#accept:not([hidden]):not([disabled])").click()
+        tab.locator("#steps .done", has_text="check").wait_for()
+        assert "max_pct: 40" in machine.with_name("machine.rehearsal.yaml").read_text()
+        tab.locator("#steps button", has_text="check").click()
+        assert "max_pct: 40" in tab.locator("#diff ins").all_inner_texts()[-1]
+        width = tab.evaluate("document.documentElement.scrollWidth")
+        assert width <= 390
+        tab.locator("#pictures img").wait_for()
+        assert faults == []
+        tab.close()
+    finally:
+        studio.stop()

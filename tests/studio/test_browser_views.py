@@ -1,0 +1,88 @@
+"""What can be shown instead of the cranes: from above, and what the filter leaves."""
+
+import re
+from collections.abc import Callable
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Page, expect
+
+from tests.studio.browser import enabled, undisturbed
+from tests.studio.conftest import Opened, Studio
+
+PAST = re.compile(r"(\w+): grapple up to (\d+) cm")
+
+
+def past_cm(page: Page) -> dict[str, int]:
+    """How far each grapple gets from its tip, as the plan says."""
+    words = page.get_attribute("#plan", "aria-label") or ""
+    return {name: int(cm) for name, cm in PAST.findall(words)}
+
+
+def test_from_above_the_raw_grapple_gets_farther(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    page.keyboard.press("b")
+    expect(page.locator("#plan")).to_be_visible()
+    expect(page.locator("#scene")).to_be_hidden()
+
+    def drive() -> None:
+        page.keyboard.down("a")
+        page.wait_for_timeout(900)
+        page.keyboard.up("a")
+        expect(page.locator("#axes .state[data-level=ready]")).to_have_count(6)
+        page.wait_for_timeout(3000)
+        cm = past_cm(page)
+        assert cm["raw"] > 20
+        assert cm["shaped"] < cm["raw"] / 3
+
+    undisturbed(page, drive)
+    page.keyboard.press("b")
+    expect(page.locator("#plan")).to_be_hidden()
+    expect(page.locator("#scene")).to_be_visible()
+
+
+def test_the_overshoot_of_a_drive_is_that_of_its_sway(tab: Callable[..., Page]) -> None:
+    """At the end the tip stands; the grapple hangs 1.2 m below its second joint, and a little."""
+    studio = Opened("forwarder.yaml", "--seed", "3")
+    try:
+        page = tab(studio)
+        page.click("#above")
+        page.select_option("#speed", "5")
+        page.click("#play")
+        expect(page.locator("#play")).to_have_text("Play")
+        expect(page.locator("#plan")).to_have_attribute("aria-label", PAST)
+        cm = past_cm(page)
+        assert cm["forwarder"] < cm["raw"]
+        expect(page.locator("#left")).to_be_hidden()
+    finally:
+        studio.stop()
+
+
+def test_what_the_filter_leaves_follows_its_slider(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    enabled(page)
+    page.click("#left")
+    words = page.locator("#residual-words")
+    expect(words).to_contain_text("The filter believes 1.38 m (line); the file says 1.38 m")
+    expect(page.locator("#residual canvas")).to_be_visible()
+    page.locator("#slider-length").focus()
+    page.keyboard.press("End")
+    expect(words).to_contain_text("The filter believes 2.75 m (line); the file says 1.38 m")
+    page.click("#tabs [data-axis=lift]")
+    expect(words).to_contain_text("no one curve")
+    expect(page.locator("#residual canvas")).to_have_count(0)
+    page.click("#left")
+    expect(page.locator("#scene")).to_be_visible()
+
+
+@pytest.mark.parametrize("view", ["#above", "#left"])
+def test_axe_finds_nothing(shared: Studio, tab: Callable[..., Page], view: str) -> None:
+    page = tab(shared)
+    page.click(view)
+    page.wait_for_timeout(1000)
+    found = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []

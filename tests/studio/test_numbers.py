@@ -1,0 +1,187 @@
+"""Numbers of a running daemon, changed by pages that listen to its machine."""
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from canshaper.daemon import control_client as client
+from tests.studio.conftest import Page
+from tests.studio.machine import A1, PERIOD, Machine
+
+
+@pytest.fixture
+def machine(tmp_path: Path) -> Iterator[Machine]:
+    one = Machine(tmp_path)
+    yield one
+    one.stop()
+
+
+class Hand:
+    """What a person at a page does with the numbers."""
+
+    def __init__(self, page: Page, who: str) -> None:
+        self.page, self.who = page, who
+        self.numbers: dict[str, Any] = page.shown.get("numbers", {})
+        self.difference: dict[str, str] = {}
+        self.until(lambda: bool(self.numbers.get("table")))
+
+    def look(self) -> None:
+        shown = self.page.look()
+        self.numbers = shown.get("numbers", self.numbers)
+        self.difference = shown.get("difference", self.difference)
+
+    def until(self, condition: Any) -> None:
+        for _ in range(600):
+            if condition():
+                return
+            self.look()
+        pytest.fail(f"not within 20 s: {self.numbers}, refused {self.page.refused}")
+
+    def ask(self, what: Any, **more: Any) -> None:
+        self.page.send(numbers=what, who=self.who, **more)
+
+    def change(self, **values: float) -> None:
+        self.change_of({{"period": PERIOD, "a1": A1}[name]: v for name, v in values.items()})
+
+    def change_of(self, values: dict[str, float]) -> None:
+        seen = {key: self.now(key) for key in values}
+        self.ask({"change": values, "seen": seen})
+
+    def now(self, key: str) -> float:
+        return float(self.numbers["table"][key]["now"])
+
+    def changes(self) -> list[tuple[str, dict[str, list[float]]]]:
+        return [(one["who"], one["numbers"]) for one in self.numbers["changes"]]
+
+
+def test_a_number_is_changed_taken_back_and_compared_with_the_one_before(machine: Machine) -> None:
+    with machine.studio.page() as page:
+        hand = Hand(page, "Aino")
+        before = machine.now(PERIOD)
+        hand.change(period=2.5)
+        hand.until(lambda: hand.now(PERIOD) == 2.5)
+        assert machine.now(PERIOD) == 2.5
+        for wanted in (before, 2.5, before):  # A, B, A
+            hand.ask("swap")
+            hand.until(lambda wanted=wanted: hand.now(PERIOD) == wanted)
+            assert machine.now(PERIOD) == wanted
+        for wanted in (2.5, before, 2.5, before):  # every change is taken back
+            hand.ask("undo")
+            hand.until(lambda wanted=wanted: hand.now(PERIOD) == wanted)
+        assert machine.now(PERIOD) == before
+        assert hand.numbers["undo"] == 0
+        hand.ask("undo")
+        hand.until(lambda: page.refused)
+        assert page.refused == ["there is no change to take back"]
+        assert hand.changes()[0] == ("Aino", {PERIOD: [before, 2.5]})
+        assert hand.changes()[-1] == ("Aino, undo", {PERIOD: [2.5, before]})
+        assert f"{PERIOD} {before:g} -> 2.5 (Aino)" in page.texts()
+
+
+def test_who_comes_second_is_told_who_was_first(machine: Machine) -> None:
+    with machine.studio.page() as one, machine.studio.page() as two:
+        first, second = Hand(one, "Aino"), Hand(two, "Björn")
+        before = first.now(PERIOD)
+        first.change(period=2.5)
+        first.until(lambda: first.now(PERIOD) == 2.5)
+        second.ask({"change": {PERIOD: 2.6}, "seen": {PERIOD: before}})
+        second.until(lambda: two.refused)
+        assert two.refused == [f"{PERIOD}: is 2.5 by now, changed by Aino; look again"]
+        assert machine.now(PERIOD) == 2.5
+
+
+def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
+    with machine.studio.page() as page:
+        hand = Hand(page, "")
+        before = machine.now(PERIOD), machine.now(A1)
+        hand.change(period=9.0, a1=0.7)
+        hand.until(lambda: page.refused)
+        assert "expected 1.8 to 3, got 9" in page.refused[-1]
+        assert (machine.now(PERIOD), machine.now(A1)) == before
+        for nonsense in (
+            "all",
+            3,
+            {"change": 3, "seen": {}},
+            {"change": {PERIOD: "1"}, "seen": {}},
+        ):
+            page.refused.clear()
+            hand.ask(nonsense)
+            hand.until(lambda: page.refused)
+            assert "numbers: expected" in page.refused[-1]
+        hand.change(period=2.5)
+        hand.until(hand.changes)
+        assert hand.changes()[-1][0] == f"page {page.hello['page']}"  # who names nobody
+
+
+def test_what_others_change_is_seen(machine: Machine) -> None:
+    with machine.studio.page() as page:
+        hand = Hand(page, "Aino")
+        hand.change(a1=0.7)
+        hand.until(lambda: hand.now(A1) == 0.7)
+        client.change(machine.control, {PERIOD: 2.2})
+        hand.until(lambda: hand.now(PERIOD) == 2.2)
+        assert hand.changes()[-1][0].startswith("another program")
+        assert hand.numbers["undo"] == 0  # the way back is no longer known
+
+
+def test_the_file_gets_what_is_in_force_once_its_difference_was_seen(machine: Machine) -> None:
+    before = machine.file.read_text()
+    with machine.studio.page() as page:
+        hand = Hand(page, "Aino")
+        hand.change(period=2.5)
+        hand.until(lambda: hand.now(PERIOD) == 2.5)
+        hand.ask("difference")
+        hand.until(lambda: hand.difference)
+        lines = hand.difference["text"].splitlines()
+        assert [line for line in lines if line[0] == "+" and "2.5" in line]
+        assert machine.file.read_text() == before
+        machine.file.write_text(before + "# by another editor\n")
+        hand.ask("write", hash=hand.difference["hash"])
+        hand.until(lambda: page.refused)
+        assert "changed by someone else meanwhile; nothing was written" in page.refused[-1]
+        assert machine.file.read_text() == before + "# by another editor\n"
+        hand.difference = {}
+        hand.ask("difference")
+        hand.until(lambda: hand.difference)
+        hand.ask("write", hash=hand.difference["hash"])
+        hand.until(lambda: any("Aino wrote" in text for text in page.texts()))
+        assert machine.in_file("period_s") == 2.5
+        assert machine.file.read_text().endswith("# by another editor\n")
+        hand.difference = {}
+        hand.ask("difference")
+        hand.until(lambda: hand.difference)
+        assert hand.difference["text"] == ""
+
+
+def test_a_daemon_that_is_gone_is_told_and_its_return_too(machine: Machine) -> None:
+    with machine.studio.page() as page:
+        hand = Hand(page, "Aino")
+        machine.daemon.terminate()
+        machine.daemon.wait()
+        hand.until(lambda: "no daemon with a control section?" in hand.numbers["fault"])
+        hand.change(period=2.5)
+        hand.until(lambda: page.refused)
+        machine.start_daemon()
+        hand.until(lambda: hand.numbers["fault"] == "")
+        assert hand.now(PERIOD) == machine.now(PERIOD)
+
+
+def test_only_a_machine_of_ones_own_file_is_adjusted(tmp_path: Path) -> None:
+    def told(*arguments: str) -> str:
+        result = CliRunner().invoke(app, ["studio", "--port", "0", *arguments])
+        assert result.exit_code == 2, result.output
+        return " ".join(result.output.split())
+
+    assert "--adjust, --control: expected with --shadow --adjust" in told("--adjust")
+    assert "--adjust: shipped with the package; copy it" in told("--shadow", "--adjust")
+    text = (
+        (Path("config/forwarder.yaml")).read_text().replace("../dbc/", f"{Path('dbc').resolve()}/")
+    )
+    (tmp_path / "own.yaml").write_text(text)
+    assert "this file has no control section" in told(
+        str(tmp_path / "own.yaml"), "--shadow", "--adjust"
+    )

@@ -1,0 +1,96 @@
+"""Tests of mutants: pytest collects once, then each mutant is a fork that runs what reaches it."""
+
+import os
+import shutil
+import signal
+import tempfile
+
+import pytest
+from mutmut.mutation.trampoline import set_mutant_under_test
+from mutmut.state import state
+from mutmut.utils.format_utils import mangled_name_from_mutant_name
+from mutmut.workers.timeout import register_timeout
+
+FAILED, UNREACHED = 1, 33  # as mutmut counts: a test failed; none of the tests calls the function
+
+
+class Forks:
+    """pytest plugin: instead of running the tests, run those of each mutant in a fork.
+
+    Args:
+        mutants: mutmut's names.
+        processes: how many at a time.
+
+    Attributes:
+        exit_codes: of each mutant.
+    """
+
+    def __init__(self, mutants: list[str], processes: int) -> None:
+        self.exit_codes: dict[str, int] = {}
+        self._mutants = mutants
+        self._processes = processes
+        self._running: dict[int, tuple[str, str]] = {}  # mutant and its folder
+
+    def pytest_runtestloop(self, session: pytest.Session) -> bool:
+        """Run the tests of every mutant."""
+        for number, name in enumerate(self._mutants, 1):
+            reaching = state().tests_by_mangled_function_name.get(
+                mangled_name_from_mutant_name(name), set()
+            )
+            items = sorted(
+                (item for item in session.items if item.nodeid in reaching), key=_duration_s
+            )
+            if not items:
+                self.exit_codes[name] = UNREACHED
+                continue
+            if len(self._running) == self._processes:
+                self._wait()
+            self._start(name, items)
+            print(f"{number} of {len(self._mutants)}: {name}", flush=True)
+        while self._running:
+            self._wait()
+        return True
+
+    def _start(self, name: str, items: list[pytest.Item]) -> None:
+        temporary = tempfile.mkdtemp()
+        pid = os.fork()
+        if not pid:
+            os.environ["PYTEST_DEBUG_TEMPROOT"] = temporary
+            _run(name, items)
+        # Long: on a busy machine a limit by the clock would kill what survives.
+        register_timeout(pid, 60.0 + 30.0 * sum(_duration_s(item) for item in items))
+        self._running[pid] = name, temporary
+
+    def _wait(self) -> None:
+        pid, status = os.wait()
+        name, temporary = self._running.pop(pid)
+        self.exit_codes[name] = os.waitstatus_to_exitcode(status)
+        shutil.rmtree(temporary, ignore_errors=True)
+
+
+class Verdict:
+    """pytest plugin of a fork: ends it at the first failure, or where a loop never ends."""
+
+    def pytest_runtest_logreport(self, report: pytest.TestReport) -> None:
+        """One test that fails is enough."""
+        if report.failed:
+            os._exit(FAILED)
+
+
+def _run(name: str, items: list[pytest.Item]) -> None:
+    """Run the tests with a mutant; does not return."""
+    try:
+        set_mutant_under_test(name)
+        items[0].config.pluginmanager.register(Verdict())
+        for item, following in zip(items, [*items[1:], None], strict=True):
+            # By processor time: four times what it takes without a mutant, and two seconds more.
+            signal.setitimer(signal.ITIMER_PROF, 2.0 + 4.0 * _duration_s(item))
+            item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
+        os._exit(0)
+    except BaseException:
+        os._exit(FAILED)
+
+
+def _duration_s(item: pytest.Item) -> float:
+    duration_s: float = state().duration_by_test[item.nodeid]
+    return duration_s
