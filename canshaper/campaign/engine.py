@@ -1,25 +1,18 @@
-"""Many pieces of work on the processes of this machine, or on a Dask cluster: the same results.
+"""Work on a Dask cluster or in jobs of Slurm, with the results of this machine's processes.
 
 Every piece is done once, and its result handed out once, whatever becomes of the process that had
 it: one that dies costs time, no result.
 """
 
-import multiprocessing
-import signal
 import subprocess
-from collections import deque
-from collections.abc import Callable, Generator, Iterable, Iterator
-from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from concurrent.futures.process import BrokenProcessPool
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from itertools import islice
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Any, Protocol, TypeVar
 
 from canshaper.errors import CampaignError, WorkerError
 from canshaper.machine.identity import program_sha256
 
-# A piece whose process dies so often is what kills it.
-MOST_DEATHS = 3
 # A scheduler answers at once, or is not there; workers of a batch system may start later.
 CONNECT_S, WORKERS_S = 10.0, 60.0
 
@@ -40,82 +33,6 @@ class Engine(Protocol):
         Raises:
             CampaignError: the processes die of it, or the cluster is gone.
         """
-
-
-class _Queue(Generic[J]):
-    """Jobs that are still to do, each with how often its process died."""
-
-    def __init__(self, jobs: Iterable[J]) -> None:
-        self._jobs = iter(jobs)
-        self._again: deque[tuple[J, int]] = deque()
-
-    def take(self) -> tuple[J, int] | None:
-        """The next one; None where there is none."""
-        if self._again:
-            return self._again.popleft()
-        return next(((job, 0) for job in self._jobs), None)
-
-    def put_back(self, job: J, deaths: int) -> None:
-        """The process of a job died."""
-        if deaths + 1 >= MOST_DEATHS:
-            raise CampaignError(f"the process died {MOST_DEATHS} times of {job}")
-        self._again.append((job, deaths + 1))
-
-
-@dataclass
-class Processes:
-    """Processes of this machine.
-
-    Attributes:
-        count: how many; by default one a processor. With 1 the work is done in this one.
-    """
-
-    count: int | None = None
-
-    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
-        """Do every job; see ``Engine``."""
-        if self.count == 1:
-            yield from ((job, work(job)) for job in jobs)
-            return
-        queue, ends = _Queue(jobs), False
-        while not ends:
-            with ProcessPoolExecutor(self.count, initializer=_ignore_interrupts) as pool:
-                try:
-                    ends = yield from self._drain(pool, work, queue)
-                except BaseException:
-                    pool.shutdown(wait=False, cancel_futures=True)
-                    for process in multiprocessing.active_children():
-                        process.terminate()
-                    raise
-
-    def _drain(
-        self, pool: ProcessPoolExecutor, work: Callable[[J], R], queue: _Queue[J]
-    ) -> Generator[tuple[J, R], None, bool]:
-        """Do all; whether it is done. It is not where a process died, which takes all down."""
-        doing: dict[Future[R], tuple[J, int]] = {}
-        ahead, dead = 2 * (self.count or multiprocessing.cpu_count()), False
-        while True:
-            while not dead and len(doing) < ahead and (item := queue.take()):
-                try:
-                    doing[pool.submit(work, item[0])] = item
-                except BrokenProcessPool:
-                    queue.put_back(item[0], item[1] - 1)  # it never began
-                    dead = True
-            if not doing:
-                return not dead
-            for future in wait(doing, return_when=FIRST_COMPLETED).done:
-                job, deaths = doing.pop(future)
-                try:
-                    result = future.result()
-                except BrokenProcessPool:
-                    queue.put_back(job, deaths)
-                    dead = True
-                else:
-                    yield job, result
-
-
-def _ignore_interrupts() -> None:
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
 
 
 @dataclass

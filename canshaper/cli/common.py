@@ -98,7 +98,8 @@ def engine(
     processes: int | None, scheduler: str | None, cluster: Literal["slurm"] | None = None
 ) -> "Engine":
     """Who does much work: processes of this machine, workers of a scheduler, or jobs of Slurm."""
-    from canshaper.campaign.engine import Cluster, Processes, Slurm
+    from canshaper.campaign.engine import Cluster, Slurm
+    from canshaper.design.parallel import Processes
 
     def on_refusal(text: str) -> None:
         echo(f"refused: {text}", err=True)

@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 from typer.testing import CliRunner, Result
 
-from canshaper.campaign.engine import Processes
 from canshaper.campaign.store import parts
 from canshaper.cli.app import app
+from canshaper.design.parallel import Processes
 
 CONFIG = Path(__file__).resolve().parents[2] / "config"
 PLAIN = str(CONFIG / "forwarder.yaml")

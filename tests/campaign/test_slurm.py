@@ -11,10 +11,11 @@ from pathlib import Path
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.campaign.engine import Processes, Slurm
+from canshaper.campaign.engine import Slurm
 from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
 from canshaper.cli.app import app
+from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
 
 pytest.importorskip("dask_jobqueue", reason="not installed: pip install 'canshaper[cluster]'")

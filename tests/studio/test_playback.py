@@ -10,12 +10,12 @@ from urllib.request import urlopen
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.campaign.engine import Processes
 from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
 from canshaper.cli.app import app
 from canshaper.cli.common import loader
 from canshaper.cli.playback import opened_drives
+from canshaper.design.parallel import Processes
 from canshaper.studio import film
 from canshaper.studio.playback import Playback
 from tests.studio.conftest import WAIT_S, Opened

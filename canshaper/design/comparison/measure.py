@@ -1,17 +1,16 @@
 """Driving one candidate through one manoeuvre, and all of them on all processors."""
 
 import math
-import multiprocessing
-import signal
 from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import dataclass, replace
+from functools import cache, partial
 from itertools import pairwise
 from pathlib import Path
 
 from canshaper.design.comparison.candidates import AXES, Candidate, with_candidate
 from canshaper.design.comparison.manoeuvres import LOAD_M, LOAD_MASS, Manoeuvre
 from canshaper.design.lockstep import drive
+from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.report.metrics import axis_metrics
@@ -144,30 +143,17 @@ def measure_all(
     """
     jobs = [(c, t, p) for c in candidates for t in tasks for p in t.lengths_pct]
     outcomes = []
-    with ProcessPoolExecutor(processes, initializer=_load, initargs=(file,)) as pool:
-        futures = [pool.submit(_measure, *job) for job in jobs]
-        try:
-            for done, future in enumerate(as_completed(futures), 1):
-                outcomes.append(future.result())
-                on_progress(done / len(jobs))
-        except BaseException:
-            pool.shutdown(wait=False, cancel_futures=True)
-            for worker in multiprocessing.active_children():
-                worker.terminate()
-            raise
+    for done, (_, outcome) in enumerate(Processes(processes).run(partial(_measure, file), jobs), 1):
+        outcomes.append(outcome)
+        on_progress(done / len(jobs))
     order = {(c.name, t.name, p): i for i, (c, t, p) in enumerate(jobs)}
     return sorted(outcomes, key=lambda o: order[o.candidate, o.manoeuvre, o.length_pct])
 
 
-_deployment: Deployment | None = None
+def _measure(file: Path, job: tuple[Candidate, Manoeuvre, int]) -> Outcome:
+    return measure(_deployment(file), *job)
 
 
-def _load(file: Path) -> None:
-    global _deployment  # noqa: PLW0603  (one deployment a process)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
-    _deployment = load_deployment(file)
-
-
-def _measure(candidate: Candidate, task: Manoeuvre, length_pct: int) -> Outcome:
-    assert _deployment is not None
-    return measure(_deployment, candidate, task, length_pct)
+@cache  # loaded once a process
+def _deployment(file: Path) -> Deployment:
+    return load_deployment(file)

@@ -1,11 +1,16 @@
 """Work on the processes of this machine: every job once, whatever becomes of a process."""
 
+import multiprocessing
+import os
+import signal
+from collections.abc import Iterator
 from functools import partial
+from itertools import count
 from pathlib import Path
 
 import pytest
 
-from canshaper.campaign.engine import Processes
+from canshaper.design.parallel import Processes
 from canshaper.errors import CampaignError
 from tests.campaign.jobs import always_dies, dies_once, fails, square
 
@@ -43,3 +48,20 @@ def test_a_job_that_kills_every_process_ends_the_work() -> None:
 def test_what_a_job_raises_is_raised(count: int) -> None:
     with pytest.raises(ValueError, match="no square of"):
         list(Processes(count).run(fails, range(3)))
+
+
+def test_ctrl_c_in_the_midst_of_handing_out_ends_the_processes() -> None:
+    def jobs() -> Iterator[int]:
+        for number in count():
+            if number == 7:
+                os.kill(os.getpid(), signal.SIGINT)  # no exception here, nor in the pool's lines
+            yield number
+
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            list(Processes(2).run(square, jobs()))
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert not multiprocessing.active_children()

@@ -1,0 +1,134 @@
+"""Many pieces of work on the processes of this machine."""
+
+import multiprocessing
+import signal
+from collections import deque
+from collections.abc import Callable, Generator, Iterable, Iterator
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import current_thread, main_thread
+from typing import Generic, TypeVar
+
+from canshaper.errors import CampaignError
+
+# A piece whose process dies so often is what kills it.
+MOST_DEATHS = 3
+# How soon Ctrl-C is seen.
+WAIT_S = 0.2
+
+J = TypeVar("J")
+R = TypeVar("R")
+
+
+class _Queue(Generic[J]):
+    """Jobs that are still to do, each with how often its process died."""
+
+    def __init__(self, jobs: Iterable[J]) -> None:
+        self._jobs = iter(jobs)
+        self._again: deque[tuple[J, int]] = deque()
+
+    def take(self) -> tuple[J, int] | None:
+        """The next one; None where there is none."""
+        if self._again:
+            return self._again.popleft()
+        return next(((job, 0) for job in self._jobs), None)
+
+    def put_back(self, job: J, deaths: int) -> None:
+        """The process of a job died."""
+        if deaths + 1 >= MOST_DEATHS:
+            raise CampaignError(f"the process died {MOST_DEATHS} times of {job}")
+        self._again.append((job, deaths + 1))
+
+
+@dataclass
+class Processes:
+    """Processes of this machine.
+
+    Attributes:
+        count: how many; by default one a processor. With 1 the work is done in this one.
+    """
+
+    count: int | None = None
+
+    def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
+        """Do every job once; each with its result, in any order.
+
+        Interrupted it ends at once, and so do its processes.
+
+        Args:
+            work: what to do; a function of a module, or ``functools.partial`` of one.
+            jobs: taken one by one, a few more than are being done.
+
+        Raises:
+            CampaignError: the processes die of a job.
+        """
+        if self.count == 1:
+            yield from ((job, work(job)) for job in jobs)
+            return
+        queue, ends = _Queue(jobs), False
+        with _interrupt_seen() as interrupted:
+            while not ends:
+                with ProcessPoolExecutor(self.count, initializer=_ignore_interrupts) as pool:
+                    try:
+                        ends = yield from self._drain(pool, work, queue, interrupted)
+                    except BaseException:
+                        for process in multiprocessing.active_children():
+                            process.terminate()
+                        pool.shutdown(cancel_futures=True)
+                        raise
+
+    def _drain(
+        self,
+        pool: ProcessPoolExecutor,
+        work: Callable[[J], R],
+        queue: _Queue[J],
+        interrupted: Callable[[], bool],
+    ) -> Generator[tuple[J, R], None, bool]:
+        """Do all; whether it is done. It is not where a process died, which takes all down."""
+        doing: dict[Future[R], tuple[J, int]] = {}
+        ahead, dead = 2 * (self.count or multiprocessing.cpu_count()), False
+        while True:
+            while not dead and len(doing) < ahead and (item := queue.take()):
+                try:
+                    doing[pool.submit(work, item[0])] = item
+                except BrokenProcessPool:
+                    queue.put_back(item[0], item[1] - 1)  # it never began
+                    dead = True
+            if not doing:
+                return not dead
+            for future in wait(doing, WAIT_S, FIRST_COMPLETED).done:
+                job, deaths = doing.pop(future)
+                try:
+                    result = future.result()
+                except BrokenProcessPool:
+                    queue.put_back(job, deaths)
+                    dead = True
+                else:
+                    yield job, result
+            if interrupted():
+                raise KeyboardInterrupt
+
+
+@contextmanager
+def _interrupt_seen() -> Iterator[Callable[[], bool]]:
+    """Whether Ctrl-C came, instead of an exception at any place.
+
+    Within the pool's own lines an exception would leave a lock taken, for which its end then waits
+    for ever. A thread that is not the main one gets none, nor does a shell's background job.
+    """
+    seen = []
+    before = signal.getsignal(signal.SIGINT)
+    if before is not signal.default_int_handler or current_thread() is not main_thread():
+        yield lambda: False
+        return
+    signal.signal(signal.SIGINT, lambda *_: seen.append(True))
+    try:
+        yield lambda: bool(seen)
+    finally:
+        signal.signal(signal.SIGINT, before)
+
+
+def _ignore_interrupts() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
