@@ -49,6 +49,39 @@ def test_the_cursor_tells_values(shared: Studio, tab: Callable[..., Page]) -> No
         expect(page.locator(f"{legend} b").nth(1)).to_have_text(" 0.0")
 
 
+HISTORY = """async () => {
+    const { History } = await import("/static/history.js");
+    const history = new History(["speed"], ["axis"], 10, 6);
+    const look = { state: "ready", level: "ready", reason: "at rest" };
+    for (let t = 0; t < 25; t += 1) {
+        history.push(t, { speed: t % 2 ? t : null }, { axis: t < 20 ? look : null });
+    }
+    const rows = Array.from({ length: history.length }, (_, row) => row);
+    const long = { t: rows.map((row) => history.time(row)),
+        speed: rows.map((row) => history.value(row, "speed")),
+        state: rows.map((row) => history.look(row, "axis")?.state ?? null),
+        from: [0, 20.5, 21, 99].map((t) => history.from(t)),
+        after: [0, 20.5, 21, 99].map((t) => history.after(t)) };
+    for (let i = 0; i < 35; i += 1) history.push(100 + i / 10, {}, { axis: look });
+    return { long, many: [history.length, history.first, history.last, history.looks.length] };
+}"""
+
+
+def test_the_charts_forget_what_is_too_old_or_too_much(
+    shared: Studio, tab: Callable[..., Page]
+) -> None:
+    """Ten rows, 6 s: of rows a second apart 6 s are kept, of rows 0.1 s apart ten."""
+    kept = tab(shared).evaluate(HISTORY)
+    assert kept["long"] == {
+        "t": [18, 19, 20, 21, 22, 23, 24],
+        "speed": [None, 19, None, 21, None, 23, None],
+        "state": ["ready", "ready", None, None, None, None, None],
+        "from": [0, 3, 3, 7],
+        "after": [0, 3, 4, 7],
+    }
+    assert kept["many"] == [10, 102.5, 103.4, 2]
+
+
 def test_what_was_driven_is_saved_as_a_table_and_as_a_picture(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:

@@ -1,9 +1,11 @@
 // Command, sway and states of an axis: the last ten minutes, of which a part is shown.
+import { History } from "/static/history.js";
 import { Lanes, spans } from "/static/lanes.js";
 import uPlot from "/static/vendor/uplot.js";
 
 const KEPT_S = 600;
 const WINDOWS_S = [5, 10, 20, 60, 180, KEPT_S];
+const MOST_ROWS = KEPT_S * 36; // the studio sends thirty pictures a second
 const MOST_POINTS = 1200; // of a line: there are no more dots across
 const MOST_EVENTS = 500; // as many as the studio keeps
 const DRAW_MS = 100;
@@ -19,7 +21,10 @@ export class Charts {
     this.hello = hello;
     this.axis = hello.axes[0];
     this.drawn = 0;
-    this.rows = []; // [t, {axis: {joystick, [crane]: {valve, sway, predicted, state, level, reason}}}]
+    this.history = new History(
+      hello.axes.flatMap((axis) => [`${axis} joystick`, ...hello.cranes.flatMap((c) => [`${axis} valve ${c}`, `${axis} sway ${c}`, `${axis} model ${c}`])]),
+      hello.axes.flatMap((axis) => hello.cranes.map((c) => `${axis} ${c}`)), MOST_ROWS, KEPT_S,
+    );
     this.events = []; // {t, source, text, level}
     this.lanes = new Lanes(hello.cranes, hello.colors, css);
     this.main = hello.cranes[0];
@@ -34,10 +39,10 @@ export class Charts {
     this.destroy();
     const { cranes } = this.hello;
     const color = (name) => css(this.hello.colors[name]);
-    const lines = [{ label: "joystick", stroke: css("--joystick"), get: (v) => v.joystick, dash: [5, 4] },
-      ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), get: (v) => v[c]?.valve, width: 2 }))];
-    const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), get: (v) => v[c]?.sway, width: 2 })),
-      { label: "model", stroke: css("--predicted"), get: (v) => v[this.main]?.predicted, dash: [3, 3] }];
+    const lines = [{ label: "joystick", stroke: css("--joystick"), of: "joystick", dash: [5, 4] },
+      ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), of: `valve ${c}`, width: 2 }))];
+    const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), of: `sway ${c}`, width: 2 })),
+      { label: "model", stroke: css("--predicted"), of: `model ${this.main}`, dash: [3, 3] }];
     this.command = this.plot("chart-command", "legend-command", lines, 100, { range: [-105, 105] });
     this.sway = this.plot("chart-sway", "legend-sway", sways, 1, {
       range: (_, low, high) => {
@@ -46,7 +51,7 @@ export class Charts {
       },
     });
     this.states = this.plot("chart-states", "legend-states",
-      cranes.map((c) => ({ label: c, stroke: color(c), get: () => null })), 1, { range: [0, 1] }, (u) => this.lanes.draw(u));
+      cranes.map((c) => ({ label: c, stroke: color(c) })), 1, { range: [0, 1] }, (u) => this.lanes.draw(u));
   }
 
   destroy() {
@@ -84,9 +89,9 @@ export class Charts {
 
   /** Up to when is shown, and where zero is: now, or the begin of a drive that is over. */
   window() {
-    const last = this.rows.at(-1)?.[0] ?? 0;
+    const last = this.history.last ?? 0;
     if (this.at === null) return [this.stoppedAt ?? last, this.stoppedAt ?? last];
-    const first = this.rows[0]?.[0] ?? 0;
+    const first = this.history.first ?? 0;
     return [Math.max(first + this.seconds, Math.min(last, this.at + this.seconds / 2)), 0];
   }
 
@@ -138,33 +143,28 @@ export class Charts {
 
   /** Keep one picture of the machine. */
   add(shown) {
-    const row = {};
+    const [numbers, states] = [{}, {}];
     for (const axis of this.hello.axes) {
-      row[axis] = { joystick: shown.cranes[this.main]?.axes[axis].joystick };
+      numbers[`${axis} joystick`] = shown.cranes[this.main]?.axes[axis].joystick;
       for (const [name, crane] of Object.entries(shown.cranes)) {
         const way = this.hello.sway_of[axis];
-        row[axis][name] = {
-          valve: crane.axes[axis].valve,
-          sway: way && (crane.measured || crane.simulated) ? crane.sway?.[way === "across" ? 0 : 1] : null,
-          predicted: crane.axes[axis].predicted,
-          state: crane.axes[axis].state,
-          level: crane.axes[axis].level,
-          reason: crane.axes[axis].reason,
-        };
+        const one = crane.axes[axis];
+        numbers[`${axis} valve ${name}`] = one.valve;
+        numbers[`${axis} sway ${name}`] = way && (crane.measured || crane.simulated) ? crane.sway?.[way === "across" ? 0 : 1] : null;
+        numbers[`${axis} model ${name}`] = one.predicted;
+        states[`${axis} ${name}`] = one;
       }
     }
-    const last = this.rows.at(-1);
-    if (last && shown.t < last[0]) [this.rows, this.events] = [[], []]; // another studio
-    this.rows.push([shown.t, row]);
-    // Not one by one: an array of that length is moved.
-    if (shown.t - this.rows[0][0] > 1.1 * KEPT_S) {
-      this.rows.splice(0, this.rows.findIndex(([t]) => shown.t - t <= KEPT_S));
+    if (shown.t < this.history.last) { // another studio
+      this.history.clear();
+      this.events = [];
     }
+    this.history.push(shown.t, numbers, states);
   }
 
   /** Stop the picture, or let it go on; nothing is lost meanwhile. */
   pause(on) {
-    this.stoppedAt = on ? this.rows.at(-1)?.[0] ?? null : null;
+    this.stoppedAt = on ? this.history.last ?? null : null;
     this.drawn = 0;
   }
 
@@ -179,17 +179,18 @@ export class Charts {
   csv() {
     const plots = [["command", this.command], ["sway", this.sway]];
     const columns = this.hello.axes.flatMap((axis) => plots.flatMap(([what, plot]) =>
-      plot.lines.map((line) => [`${axis} ${what} ${line.label}`, (row) => line.get(row[axis]), plot.factor])));
+      plot.lines.map((line) => [`${axis} ${what} ${line.label}`, `${axis} ${line.of}`, plot.factor])));
     const states = this.hello.axes.flatMap((axis) => this.hello.cranes.map((c) => [axis, c]));
     const titles = [...columns.map(([name]) => name), ...states.map(([axis, c]) => `${axis} state ${c}`)];
     const lines = [["seconds", ...titles].join(",")];
-    for (const [t, row] of this.rows) {
-      const cells = columns.map(([, get, factor]) => {
-        const value = get(row);
-        return value == null ? "" : String(Math.round(1000 * value * factor) / 1000);
+    const { history } = this;
+    for (let row = 0; row < history.length; row += 1) {
+      const cells = columns.map(([, column, factor]) => {
+        const value = history.value(row, column);
+        return value === null ? "" : String(Math.round(1000 * value * factor) / 1000);
       });
-      const words = states.map(([axis, c]) => `"${row[axis][c]?.state ?? ""}"`);
-      lines.push([(t - this.rows[0][0]).toFixed(3), ...cells, ...words].join(","));
+      const words = states.map(([axis, c]) => `"${history.look(row, `${axis} ${c}`)?.state ?? ""}"`);
+      lines.push([(history.time(row) - history.first).toFixed(3), ...cells, ...words].join(","));
     }
     return `${lines.join("\n")}\n`;
   }
@@ -211,21 +212,22 @@ export class Charts {
   }
 
   draw(now) {
-    if (now - this.drawn < DRAW_MS || !this.rows.length) return;
+    const { history } = this;
+    if (now - this.drawn < DRAW_MS || !history.length) return;
     this.drawn = now;
     const [end, zero] = this.window();
-    const inside = this.rows.filter(([t]) => t <= end && end - t <= this.seconds);
-    const every = Math.ceil(inside.length / MOST_POINTS);
-    const rows = every > 1 ? inside.filter((_, i) => i % every === 0) : inside;
-    const x = rows.map(([t]) => t - zero);
+    const [from, to] = [history.from(end - this.seconds), history.after(end)];
+    const every = Math.max(1, Math.ceil((to - from) / MOST_POINTS));
+    const rows = Array.from({ length: Math.ceil((to - from) / every) }, (_, i) => from + i * every);
+    const x = rows.map((row) => history.time(row) - zero);
     for (const plot of [this.command, this.sway]) {
-      plot.setData([x, ...plot.lines.map((s) => rows.map(([, row]) => {
-        const value = s.get(row[this.axis]);
-        return value == null ? null : value * plot.factor;
+      plot.setData([x, ...plot.lines.map(({ of }) => rows.map((row) => {
+        const value = history.value(row, `${this.axis} ${of}`);
+        return value === null ? null : value * plot.factor;
       }))]);
     }
-    const own = inside.map(([t, row]) => [t - zero, row[this.axis]]); // not one state may be left out
-    for (const name of this.hello.cranes) this.lanes.spans[name] = spans(own, (row) => row[name]);
+    // Not one state may be left out.
+    for (const name of this.hello.cranes) this.lanes.spans[name] = spans(history, `${this.axis} ${name}`, from, to, zero);
     this.lanes.marks = this.events.filter(({ t }) => t <= end && end - t <= this.seconds).map((one) => ({ ...one, t: one.t - zero }));
     this.states.setData([x, ...this.hello.cranes.map(() => x.map(() => null))]);
   }

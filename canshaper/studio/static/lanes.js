@@ -13,21 +13,21 @@ const LOOKS = {
   bad: ["--bad", 2],
 };
 
-/**
- * From and to when a lane was in which state; gaps where it is not known.
- * @param rows [t, row] in order; @param get the state of a row: {state, level, reason}.
- */
-export function spans(rows, get) {
-  const lane = [];
+/** From and to when a lane of the history was in which state, less `zero`; gaps where it is not known. */
+export function spans(history, lane, begin, end, zero) {
+  const found = [];
   let last = null;
-  for (const [t, row] of rows) {
-    const now = get(row);
+  let before = null;
+  for (let row = begin; row < end; row += 1) {
+    const look = history.look(row, lane);
+    const t = history.time(row) - zero;
     if (last) last.to = t;
-    if (last && last.state === now?.state && last.reason === now?.reason) continue;
-    last = now?.state ? { from: t, to: t, ...now } : null;
-    if (last) lane.push(last);
+    if (last && look === before) continue;
+    before = look;
+    last = look && { from: t, to: t, ...look };
+    if (last) found.push(last);
   }
-  return lane;
+  return found;
 }
 
 /** Draw all lanes into a plot of uPlot. */
