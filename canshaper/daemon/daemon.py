@@ -1,9 +1,8 @@
-"""The daemon: buses, controller and loop together; signals; what people read."""
+"""The daemon: buses, controller and loop together; signals."""
 
 import logging
 import os
 import signal
-import time
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from types import FrameType
@@ -15,9 +14,7 @@ from canshaper.bus.port import Port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
-from canshaper.controller.events import StateEvent
 from canshaper.controller.guarded import Guarded
-from canshaper.daemon.config_reload import ConfigReload
 from canshaper.daemon.control_server import ControlServer
 from canshaper.daemon.follow import TickFollower
 from canshaper.daemon.gateway import InlineGateway
@@ -29,30 +26,28 @@ from canshaper.daemon.ports import (
     new_ports,
     open_ports,
     received_at_first,
+    send_neutral,
     waiting,
 )
 from canshaper.daemon.realtime import Collector, lock_memory, refuse_huge_pages
+from canshaper.daemon.reloads import Reloads
+from canshaper.daemon.reporter import Reporter, flush
 from canshaper.daemon.standstill import Standstill
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.filters import unfit
 from canshaper.machine.identity import program_sha256
-from canshaper.shaping.states import State
 
 log = logging.getLogger("canshaper")
 
-# How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
-NEUTRAL_TRIES_S = 0.1
-SECOND_NS = 1_000_000_000
 # No one receives our frames there, or we no one's.
 OFF_BUS = frozenset(
-    (
+    {
         BusState.BUS_OFF,
         BusState.NOT_CONFIRMED,
         BusState.DOWN,
         BusState.GONE,
         BusState.WRONG_DEVICE,
-    )
+    }
 )
 
 
@@ -70,19 +65,12 @@ class Daemon:
     """
 
     def __init__(self, load: Callable[[], Deployment], folder: Path | None = None) -> None:
-        self._load = load
         self._stop = False
-        self._reload = False  # asked for and not yet begun
-        self._reading: ConfigReload | None = None
-        self._next: Deployment | None = None  # read, and good
-        self._waiting_told = False
         self._manager = ServiceManager()
         self._collector = Collector()
+        self._reporter = Reporter(self._manager)
+        self._reloads = Reloads(load, self._reporter.refused)
         self._black_box = BlackBox(folder)
-        self._logged_fault = FrameFault.NONE
-        self._log_again_ns = 0
-        self._told_ns = 0
-        self._latest_ns = 0
         deployment = load()
         program_sha256()  # kept from now on: to read the program takes longer than a tick
         self._ports = open_ports(deployment, {}, self._on_fault)
@@ -106,7 +94,7 @@ class Daemon:
         self._send_neutral()  # most valves want to see it before they listen to anything else
         self._black_box.begin(boottime_ns())
         log.info("started file=%s axes=%s", self._controller.deployment.path, names)
-        self._log_identity()
+        self._reporter.identity()
         self._manager.ready(f"started, axes {names}")
         try:
             while not self._stop:
@@ -118,8 +106,7 @@ class Daemon:
             close_ports(self._ports.values())
             if self._line:
                 self._line.close()
-            if self._reading:
-                self._reading.end()
+            self._reloads.end()
             if self._control:
                 self._control.close()
             self._black_box.close()
@@ -137,11 +124,11 @@ class Daemon:
         io_cycle(self._guarded, self._ports, now_ns, missed, self._standstill)
         if self._line:
             self._line.pass_others()
-        self._latest_ns = max(self._latest_ns, late_ns)
+        self._reporter.late(late_ns)
         self._housekeeping(now_ns)
         applied = False
-        if self._next and controller.neutral and not self._stop:
-            applied = self._apply(self._next)
+        if self._reloads.ready and controller.neutral and not self._stop:
+            applied = self._apply(self._reloads.ready)
         return not (self._stop or applied)
 
     def _wait(self, seconds: float) -> None:
@@ -153,48 +140,23 @@ class Daemon:
         """Report what changed; everything that may take time comes after the frames are out."""
         controller = self._controller
         self._manager.ping(now_ns)
-        for event in controller.events:
-            tripped = isinstance(event, StateEvent) and event.transition.new is State.TRIPPED
-            log.log(logging.WARNING if tripped else logging.INFO, "%s", event.text)
+        self._reporter.events()
         self._black_box.after_tick(now_ns, controller.events, neutral=controller.neutral)
         controller.events.clear()
         for name, port in self._ports.items():
             if port.state in OFF_BUS:
                 self._guarded.on_bus_off(name)
-            if port.state is not self._bus_states[name]:
-                self._bus_states[name] = port.state
-                level = logging.INFO if port.state is BusState.UP else logging.WARNING
-                log.log(level, "bus=%s state=%s", name, port.state.value)
-        fault = controller.counters.last_fault
-        if fault is not self._logged_fault and now_ns >= self._log_again_ns:
-            self._logged_fault = fault
-            if fault is not FrameFault.NONE:  # the counters of a reload begin without a fault
-                self._log_again_ns = now_ns + SECOND_NS  # two faults in turn must not flood the log
-                log.warning("fault=%s counts=%s", fault.name, controller.counters.values)
-        if self._reload or self._reading or self._next:
-            self._prepare_reload()
+        self._reporter.buses()
+        self._reporter.faults(now_ns)
+        self._reloads.step(neutral=controller.neutral)
         if self._line:
             self._line.check(now_ns, neutral=controller.neutral)
         if self._control:
             self._control.serve(self._answer, now_ns)
-        if now_ns >= self._told_ns:
-            self._told_ns = now_ns + SECOND_NS
-            self._manager.status(self._summary())
+        if self._reporter.status(now_ns):
             self._send_identity()
-            self._latest_ns = 0
-            for handler in logging.getLogger().handlers:
-                handler.flush()  # a reader that was slow may be back
+            flush()  # a reader that was slow may be back
         self._collector.pause(now_ns)
-
-    def _summary(self) -> str:
-        """One line for people: axes, buses, lateness of the last second, deadlines missed."""
-        axes = [f"{n} {r.axis.state.name}" for n, r in self._controller.axes.items()]
-        buses = [f"{n} {state.value}" for n, state in self._bus_states.items()]
-        missed = self._controller.counters.values["MissedDeadlines"]
-        first = ["listen-only"] if self._controller.deployment.listen_only else []
-        return ", ".join(
-            [*first, *axes, *buses, f"late {self._latest_ns / 1000:.0f} us", f"missed {missed}"]
-        )
 
     def _answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
         """One request from the control socket."""
@@ -226,7 +188,7 @@ class Daemon:
             self._controller.carry_over(before)
         self._guarded = self._black_box.around(Guarded(self._controller), self._controller)
         self._adjuster = Adjuster(self._controller)
-        self._bus_states = dict.fromkeys(self._ports, BusState.UP)
+        self._reporter.use(self._controller, self._ports)
         self._tick_ns = deployment.config.tick_ms * 1_000_000
         follows = deployment.config.tick is not None
         self._follower = TickFollower(deployment, self._controller) if follows else None
@@ -248,31 +210,6 @@ class Daemon:
             log.warning("control=none socket=%s %s", path, error.strerror or error)
             return None
 
-    def _prepare_reload(self) -> None:
-        """A step towards the deployment as its files are now: the loop never waits for it.
-
-        Nothing is begun while something moves: even a new process costs a tick a millisecond.
-        """
-        neutral = self._controller.neutral
-        if self._reload and neutral:
-            if self._reading:  # of files that may have changed since
-                self._reading.end()
-            self._reload, self._reading, self._next = False, None, None
-            try:
-                self._reading = ConfigReload(self._load)
-            except OSError as error:
-                self._refuse(f"cannot read: {error.strerror}")
-        elif self._reading and (found := self._reading.result()) is not None:
-            self._reading = None
-            if isinstance(found, Deployment):
-                self._next = found
-            else:
-                self._refuse(found)
-        waiting = not neutral and bool(self._reload or self._next)
-        if waiting and not self._waiting_told:
-            log.info("reload=waiting until every axis is neutral")
-        self._waiting_told = waiting
-
     def _apply(self, deployment: Deployment) -> bool:
         """Replace the deployment, if its buses can be opened; else go on as before.
 
@@ -282,7 +219,7 @@ class Daemon:
             Whether it was replaced; a loop with its tick has to begin.
         """
         self._manager.reloading()
-        self._next = None
+        self._reloads.ready = None
         config = self._controller.deployment.config
         opened = {bus: self._ports[name] for name, bus in config.buses.items()}
         ports: dict[str, Port] = {}
@@ -292,7 +229,7 @@ class Daemon:
         except BusError as error:
             close_ports(new_ports(ports, opened))
             self._manager.ready("as before")
-            self._refuse(str(error))
+            self._reporter.refused(str(error))
             return False
         self._send_neutral()
         closed = [port for port in opened.values() if port not in ports.values()]
@@ -316,9 +253,9 @@ class Daemon:
         self._standstill = Standstill(deployment, before=self._standstill)
         self._control = self._open_control(deployment)
         log.info("reload=applied file=%s", deployment.path)
-        self._log_identity()
+        self._reporter.identity()
         self._manager.ready("reload applied")
-        self._told_ns = boottime_ns() + SECOND_NS
+        self._reporter.hold_status()
         self._collector.freeze()
         return True
 
@@ -329,39 +266,11 @@ class Daemon:
         for frame in waited:
             self._controller.receive(frame, now_ns)
 
-    def _refuse(self, why: str) -> None:
-        """Report why a reload changes nothing."""
-        lines = why.splitlines()
-        for line in lines:
-            log.error("reload=refused %s", line)
-        self._manager.status(f"reload refused: {lines[0]}")
-        self._told_ns = boottime_ns() + SECOND_NS
-
     # -- ends ----------------------------------------------------------------------------------
 
     def _send_neutral(self) -> None:
-        """Send every valve neutral, for a while again where a queue is full."""
-        waiting: list[Frame] = self._guarded.neutral_frames()
-        until = time.monotonic() + NEUTRAL_TRIES_S
-        while waiting:
-            waiting = [f for f in waiting if not self._ports[f.bus].send(f)]
-            if time.monotonic() > until:
-                break
-            if waiting:
-                time.sleep(0.005)
-        for frame in waiting:
-            log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)
-
-    def _log_identity(self) -> None:
-        """What runs, by its hashes: a machine that was signed off is compared with these."""
-        for line in self._controller.deployment.identity.lines():
-            log.info("identity %s", line)
-        if count := self._controller.deployment.messages.warnings()[0]:
-            text = "of messages and tables in the DBC files that are not used"
-            text += "; canshaper check shows them"
-            log.warning("dbc-warnings=%d %s", count, text)
-        for place, fault in unfit(self._controller.deployment.config):
-            log.warning("unfit=%s %s", ".".join(str(part) for part in place), fault)
+        """Send every valve neutral."""
+        send_neutral(self._ports, self._guarded.neutral_frames())
 
     def _send_identity(self) -> None:
         """The digest of what runs, where a message carries it and its bus may be used."""
@@ -377,7 +286,7 @@ class Daemon:
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGHUP:
-            self._reload = True
+            self._reloads.ask()
         elif self._stop:
             self._leave_at_once(number)
         else:
@@ -388,6 +297,5 @@ class Daemon:
         for frame in self._guarded.neutral_frames():
             self._ports[frame.bus].send(frame)
         log.warning("stopped at-once signal=%s", signal.Signals(number).name)
-        for handler in logging.getLogger().handlers:
-            handler.flush()
+        flush()
         os._exit(128 + number)

@@ -1,5 +1,6 @@
 """The open buses of a daemon, from one deployment to the next."""
 
+import logging
 import time
 from collections.abc import Callable, Iterable, Mapping
 
@@ -9,6 +10,10 @@ from canshaper.config.bus import Bus
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.deployment import Deployment
 
+log = logging.getLogger("canshaper")
+
+# How long the last neutral frames are tried when a queue is full: two ticks of the slowest loop.
+NEUTRAL_TRIES_S = 0.1
 # Until what was sent last has left a queue of some frames, also on a bus with other traffic.
 ON_THE_BUS_S = 0.1
 
@@ -71,3 +76,16 @@ def close_ports(ports: Iterable[Port]) -> None:
     """Close them."""
     for port in ports:
         port.close()
+
+
+def send_neutral(ports: Mapping[str, Port], frames: list[Frame]) -> None:
+    """Send neutral frames, for a while again where a queue is full; what was not sent is logged."""
+    until = time.monotonic() + NEUTRAL_TRIES_S
+    while frames:
+        frames = [f for f in frames if not ports[f.bus].send(f)]
+        if time.monotonic() > until:
+            break
+        if frames:
+            time.sleep(0.005)
+    for frame in frames:
+        log.error("neutral=not-sent bus=%s id=%#x", frame.bus, frame.can_id)

@@ -13,6 +13,7 @@ import pytest
 
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
+from canshaper.daemon import reloads
 from canshaper.daemon.daemon import Daemon
 from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
 from canshaper.daemon.standstill import Standstill
@@ -283,7 +284,7 @@ def test_a_read_that_is_overtaken_is_ended_and_so_is_the_last_one(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     Slow.all.clear()
-    monkeypatch.setattr(module, "ConfigReload", Slow)
+    monkeypatch.setattr(reloads, "ConfigReload", Slow)
     at(bench, {5: bench.reload, 10: bench.reload})
     assert [one.ended for one in Slow.all] == [True, True]
 
@@ -294,7 +295,7 @@ def test_without_a_process_to_read_in_a_reload_is_refused(
     def none(_load: object) -> None:
         raise BlockingIOError(11, "no more processes")
 
-    monkeypatch.setattr(module, "ConfigReload", none)
+    monkeypatch.setattr(reloads, "ConfigReload", none)
     at(bench, {5: bench.reload})
     assert [line for line in log() if "reload=" in line] == [
         "ERROR reload=refused cannot read: no more processes"
@@ -308,7 +309,7 @@ def test_what_cannot_be_read_is_refused_line_by_line(
         def result(self) -> str:  # type: ignore[override]
             return "machine.yaml:1: one\nmachine.yaml:2: two"
 
-    monkeypatch.setattr(module, "ConfigReload", Broken)
+    monkeypatch.setattr(reloads, "ConfigReload", Broken)
     at(bench, {5: bench.reload})
     assert [line for line in log() if "reload=" in line] == [
         "ERROR reload=refused machine.yaml:1: one",

@@ -15,7 +15,7 @@ from canshaper.config.bus import Bus
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.daemon import daemon as module
-from canshaper.daemon import loop, standstill
+from canshaper.daemon import loop, reloads, reporter, standstill
 from canshaper.daemon import ports as service_ports
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import BusError
@@ -99,13 +99,13 @@ class Bench:
         self.rig = Rig(self.file)  # for its joysticks
         self._tick = 0
         self._handlers: dict[int, Any] = {}
-        for one in (module, loop, service_ports):
+        for one in (loop, service_ports):
             monkeypatch.setattr(one, "time", self)
-        for one in (module, loop, standstill):
+        for one in (module, reporter, loop, standstill):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
         monkeypatch.setattr(service_ports, "open_port", self._open)
-        monkeypatch.setattr(module, "ConfigReload", Read)
+        monkeypatch.setattr(reloads, "ConfigReload", Read)
         monkeypatch.setattr(module, "Collector", Uncollected)
         for name in ("lock_memory", "refuse_huge_pages"):
             monkeypatch.setattr(module, name, lambda: None)

@@ -19,6 +19,7 @@ from canshaper.daemon import daemon as module
 from canshaper.daemon import gateway as gateway_module
 from canshaper.daemon import loop as loop_module
 from canshaper.daemon import ports as ports_module
+from canshaper.daemon import reloads, reporter
 from canshaper.daemon import standstill as standstill_module
 from canshaper.errors import ConfigError, GatewayError
 from canshaper.machine.binding import load_deployment
@@ -225,13 +226,13 @@ class Bench:
 
     def _replaced(self) -> Iterator[tuple[Any, str, Any]]:
         yield time, "monotonic_ns", self.now_ns
-        for one in (module, loop_module, standstill_module):
+        for one in (module, reporter, loop_module, standstill_module):
             yield one, "boottime_ns", self.now_ns
         yield time, "monotonic", lambda: self.now_ns() / 1e9
         yield time, "sleep", self.sleep
         yield module.signal, "signal", self._handlers.__setitem__
         yield ports_module, "open_port", self._open
-        yield module, "ConfigReload", self._read
+        yield reloads, "ConfigReload", self._read
         yield module, "Controller", Unrefused
         yield module, "Collector", Uncollected
         yield module, "ControlServer", self._control

@@ -1,0 +1,67 @@
+"""A deployment read anew while the loop goes on: asked for, read beside it, then taken."""
+
+import logging
+from collections.abc import Callable
+
+from canshaper.daemon.config_reload import ConfigReload
+from canshaper.machine.deployment import Deployment
+
+log = logging.getLogger("canshaper")
+
+
+class Reloads:
+    """Steps of a reload, none of which the loop waits for.
+
+    Args:
+        load: reads the deployment; called in another process.
+        refuse: called with why a reload changes nothing.
+
+    Attributes:
+        ready: the deployment that was read, and is good; None where there is none.
+    """
+
+    def __init__(self, load: Callable[[], Deployment], refuse: Callable[[str], object]) -> None:
+        self._load = load
+        self._refuse = refuse
+        self._asked = False
+        self._reading: ConfigReload | None = None
+        self.ready: Deployment | None = None
+        self._waiting_told = False
+
+    def ask(self) -> None:
+        """Begin one at the next step; a signal handler may call it."""
+        self._asked = True
+
+    def step(self, *, neutral: bool) -> None:
+        """Go a step towards the deployment as its files are now.
+
+        Nothing is begun while something moves: even a new process costs a tick a millisecond.
+
+        Args:
+            neutral: nothing moves.
+        """
+        if not (self._asked or self._reading or self.ready):
+            return
+        if self._asked and neutral:
+            self.end()  # of files that may have changed since
+            self._asked, self.ready = False, None
+            try:
+                self._reading = ConfigReload(self._load)
+            except OSError as error:
+                self._refuse(f"cannot read: {error.strerror}")
+        elif self._reading and (result := self._reading.result()) is not None:
+            self._reading = None
+            if isinstance(result, Deployment):
+                self.ready = result
+            else:
+                self._refuse(result)
+        waiting = not neutral and bool(self._asked or self.ready)
+        if waiting and not self._waiting_told:
+            log.info("reload=waiting until every axis is neutral")
+        self._waiting_told = waiting
+
+    def end(self) -> None:
+        """End what is being read, if something is."""
+        if self._reading:
+            self._reading.end()
+            self._reading = None
