@@ -82,8 +82,8 @@ def sensor_of(
 def slewing_of(axis: str) -> "FirstSlewing | None":
     """How an axis turns the crane; None where it does not."""
     from canshaper.config.first import FirstSlewing
+    from canshaper.config.limits import Slewing
     from canshaper.config.load import limits
-    from canshaper.config.schema import Slewing
 
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
@@ -100,7 +100,7 @@ def _ten_swings_s(period_s: float) -> tuple[float, float]:
     And with the shortest period that may then be set on the running machine.
     """
     from canshaper.config.first import PERIOD_RANGE, Stopwatch, ten_swings_s
-    from canshaper.config.schema import Limits
+    from canshaper.config.limits import Limits
     from canshaper.machine.filters import filter_fault
 
     low, high = ten_swings_s()

@@ -1,6 +1,6 @@
 """Schema of the deployment file. Unknown keys are errors; every number has a range and a unit."""
 
-from typing import Annotated, Literal, Self
+from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
@@ -9,8 +9,8 @@ from canshaper.config.control import Control
 from canshaper.config.filters import Filter
 from canshaper.config.gateway import Gateway
 from canshaper.config.input import Input
+from canshaper.config.limits import Limits, Slewing
 from canshaper.config.motion import Motion
-from canshaper.config.origin import Origin
 from canshaper.config.protection import Protected
 from canshaper.config.schedule import Breakpoint, LoadState, Profile, ProfileSwitch, schedule_fault
 from canshaper.config.section import Section, number
@@ -19,9 +19,7 @@ from canshaper.config.sway_sensor import SwaySensor
 from canshaper.config.switch import Switch, SwitchNames
 from canshaper.config.uncertainty import Accept, Uncertainty
 from canshaper.config.version import VERSION
-from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.registry import KINDS
-from canshaper.shaping.valve_curve import ValveCurve
 
 
 class Joystick(Input):
@@ -179,100 +177,6 @@ class Feedback(Input):
 
 class Status(Protected):
     """A status message for displays and tools."""
-
-
-class Slewing(Section):
-    """What full speed of a slewing axis is in angle, and how far out the tip may be meanwhile."""
-
-    full_speed_rad_s: Annotated[
-        float, number(0.05, 3, "rad/s", "angular speed at full slew command")
-    ]
-    largest_radius_m: Annotated[
-        float, number(0.5, 40, "m", "radius of the tip when the boom is all out")
-    ]
-
-
-class Limits(Section):
-    """Output limits of an axis; see ``OutputLimits``."""
-
-    max_pct: Annotated[float, number(1, 100, "% of full speed", "fastest output")] = 100.0
-    min_pct: Annotated[float, number(0, 50, "% of full speed", "outputs below this are zero")] = 0.0
-    rise_per_s: Annotated[
-        float, number(0.2, 100, "full speeds per s", "fastest growth of the output")
-    ] = 5.0
-    fall_per_s: Annotated[
-        float, number(1, 100, "full speeds per s", "fastest fall of the output to zero")
-    ] = 5.0
-    deadband_pct: Annotated[
-        float, number(0, 50, "% of full command", "deadband of the valve, jumped over")
-    ] = 0.0
-    curve_command_pct: (
-        list[Annotated[float, number(-100, 100, "% of full command", "command")]] | None
-    ) = None
-    """Of the measured valve, instead of ``deadband_pct``: its commands (% of full command)."""
-    curve_speed_pct: (
-        list[Annotated[float, number(-100, 100, "% of full speed", "speed at a command")]] | None
-    ) = None
-    """Of the measured valve: the speed at each of these commands (% of full speed)."""
-    curve_origin: Origin | None = Field(None, description="where this curve comes from")
-    tail_s: Annotated[
-        float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
-    ] = 2.0
-    stop_s: Annotated[
-        float, number(0.1, 5, "s", "longest shaped stop after the input was lost")
-    ] = 2.0
-    stop_distance_m: (
-        Annotated[float, number(0.05, 200, "m", "farthest that the tip may travel when it stops")]
-        | None
-    ) = None
-    allow_faster: bool = Field(False, description="the output may exceed what the operator asks")
-    allow_reverse: bool = Field(False, description="the output may go against the joystick")
-    reversal: Literal["stop", "brake_shaped"] = Field(
-        "stop",
-        description="after a reversal of the joystick: stop at the rate limit, or run on along the"
-        " filter within the tail",
-    )
-
-    @model_validator(mode="after")
-    def _ordered(self) -> Self:
-        if self.min_pct >= self.max_pct:
-            raise ValueError(f"min_pct: expected less than max_pct, got {self.min_pct:g}")
-        if self.curve() and self.deadband_pct:
-            raise ValueError("expected one of deadband_pct and a curve, got both")
-        if self.curve_origin and not self.curve():
-            raise ValueError("curve_origin: expected a curve with it, got none")
-        return self
-
-    @property
-    def slowest_per_s(self) -> float:
-        """The slower of both rates: what the valve follows in either direction."""
-        return min(self.rise_per_s, self.fall_per_s)
-
-    def curve(self) -> ValveCurve | None:
-        """The measured valve, where it is.
-
-        Raises:
-            ValueError: the points are no curve of a valve.
-        """
-        command, speed = self.curve_command_pct, self.curve_speed_pct
-        if command is None and speed is None:
-            return None
-        return ValveCurve([v / 100.0 for v in command or []], [v / 100.0 for v in speed or []])
-
-    def output_limits(self) -> OutputLimits:
-        """The same in fractions of full scale."""
-        return OutputLimits(
-            maximum=self.max_pct / 100.0,
-            minimum=self.min_pct / 100.0,
-            rise_per_s=self.rise_per_s,
-            fall_per_s=self.fall_per_s,
-            deadband=self.deadband_pct / 100.0,
-            curve=self.curve(),
-            tail_s=self.tail_s,
-            allow_faster=self.allow_faster,
-            allow_reverse=self.allow_reverse,
-            brake_shaped=self.reversal == "brake_shaped",
-        )
 
 
 class AxisConfig(Section):

@@ -3,7 +3,7 @@
 from bisect import bisect_right
 from itertools import pairwise
 
-from canshaper.config.schema import Limits
+from canshaper.config.limits import Limits
 
 
 class Opening:

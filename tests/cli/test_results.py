@@ -19,7 +19,7 @@ from canshaper.commissioning.calibration.fit import Calibration, Direction
 from canshaper.commissioning.calibration.plot import in_file
 from canshaper.commissioning.doctor.measure import Run
 from canshaper.commissioning.doctor.plot import figure as doctor_figure
-from canshaper.config.schema import Limits
+from canshaper.config.limits import Limits
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.report import html

@@ -5,7 +5,7 @@ import random
 import pytest
 
 from canshaper.codec.signals import FieldSet
-from canshaper.config.schema import Limits
+from canshaper.config.limits import Limits
 from canshaper.guard.bits import CommandBits, JoystickBits
 from canshaper.guard.opening import openings
 from canshaper.machine.binding import load_deployment

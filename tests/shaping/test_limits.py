@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.config.schema import Limits
+from canshaper.config.limits import Limits
 from canshaper.shaping.limits import (
     OutputLimits,
     RecentCommand,
