@@ -149,13 +149,13 @@ def check_mtu(bus: Bus, root: Path = ROOT) -> None:
 
 def device_fault(bus: Bus, device: Device) -> str | None:
     """Why a device is not the one of a bus; None where it is, or the bus asks for none."""
-    wanted = expected(bus, device)
-    wrong = [key for key, value in wanted.items() if getattr(device, key) != value]
+    values = expected(bus, device)
+    wrong = [key for key, value in values.items() if getattr(device, key) != value]
     if not wrong:
         return None
-    asked = ", ".join(f"{_WORDS[key]} {wanted[key]}" for key in wrong)
+    needed = ", ".join(f"{_WORDS[key]} {values[key]}" for key in wrong)
     there = ", ".join(_text(key, getattr(device, key)) for key in wrong)
-    return f"expected {asked}, but {device.name} has {there}"
+    return f"expected {needed}, but {device.name} has {there}"
 
 
 def expected(bus: Bus, device: Device) -> dict[str, str | int]:
@@ -165,11 +165,11 @@ def expected(bus: Bus, device: Device) -> dict[str, str | int]:
     """
     if bus.match is None:
         return {}
-    wanted: dict[str, str | int] = bus.match.model_dump(exclude_none=True)
+    values: dict[str, str | int] = bus.match.model_dump(exclude_none=True)
     for key in ("bitrate", "data_bitrate"):
         if (rate := getattr(bus, key)) is not None and getattr(device, key) is not None:
-            wanted.setdefault(key, rate)
-    return wanted
+            values.setdefault(key, rate)
+    return values
 
 
 def match_fault(bus: Bus) -> str | None:
@@ -190,14 +190,14 @@ def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates
     match = bus.match
     if match is None or (match.serial is None and match.path is None):
         return ""
-    wanted = match.model_dump(exclude_none=True, exclude={"bitrate"})
+    values = match.model_dump(exclude_none=True, exclude={"bitrate"})
     names = []
     for directory in sorted((root / "sys/class/net").glob("*")):
         try:
             device = read_device(directory.name, root, ask_kernel)
         except OSError:  # it went away, or is no interface
             continue
-        if all(getattr(device, key) == value for key, value in wanted.items()):
+        if all(getattr(device, key) == value for key, value in values.items()):
             names.append(device.name)
     if names == [bus.channel]:
         return ""

@@ -23,7 +23,7 @@ from canshaper.machine.routing import BusRoutes
 # Frames taken in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
 # empties any backlog and still cannot hold up the tick for ever.
 MOST_FRAMES = 2000
-# Of ids that nobody knows; the rest is dropped, their count is "at least".
+# Of ids that no one knows; the rest is dropped, their count is "at least".
 MOST_UNKNOWN = 20
 # Frames of one id under way for so long without one of them getting onto the bus: one waits, one is
 # being sent, one more for a confirmation that comes just after the tick. A slow bus with a fast
@@ -135,15 +135,15 @@ class RawPort:
                 yield frame
 
     def background(self) -> Iterator[Frame]:
-        """What can wait until the valves have been told: our own frames, seen back, are taken in.
+        """What can wait until the valves have their frames: our own, seen back, are taken in.
 
-        Frames of other senders with our ids, and of ids that nobody knows, are handed out.
+        Frames of other senders with our ids, and of ids that no one knows, are handed out.
         """
         for number, most in ((1, MOST_FRAMES), (2, MOST_UNKNOWN)):
             yield from self._background(number, most)
         if self._sockets and (dropped := dropped_frames(self._sockets[:2])) != self._dropped:
             self._dropped = dropped
-            self._forget()  # confirmations may be among them
+            self._invalidate()  # confirmations may be among them
             self._on_fault(FrameFault.FRAMES_LOST)
 
     def _background(self, number: int, most: int) -> Iterator[Frame]:
@@ -263,7 +263,7 @@ class RawPort:
         """Queue nothing more for a while."""
         self.state = state
         self._not_before_ns = time.monotonic_ns() + PROBE_NS
-        self._forget()
+        self._invalidate()
 
     def _blocked(self) -> bool:
         """Whether this frame must wait; one at a time may try whether it gets through."""
@@ -271,10 +271,10 @@ class RawPort:
         if now_ns < self._not_before_ns:
             return True
         self._not_before_ns = now_ns + PROBE_NS
-        self._forget()
+        self._invalidate()
         return False
 
-    def _forget(self) -> None:
+    def _invalidate(self) -> None:
         self._unconfirmed.clear()
         self._since_ns.clear()
 
@@ -294,7 +294,7 @@ class RawPort:
             if self.state is not BusState.DOWN:
                 self._on_fault(FrameFault.BUS_DOWN)
             self.state = BusState.DOWN
-            self._forget()  # the queue is emptied with the interface
+            self._invalidate()  # the queue is emptied with the interface
             self._claimed.clear()
         elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
             self.state = BusState.FAILED
@@ -317,7 +317,7 @@ class RawPort:
         self._waiting = [_poll(one) for one in sockets]
         self._receive = sockets[0].recvmsg
         self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
-        self._forget()
+        self._invalidate()
         self._claimed.clear()
         self._dropped = 0
         self._not_before_ns = 0
@@ -345,7 +345,7 @@ class RawPort:
         self.name, self._ids = name, ids
         self._valves, self._claims = _words(ids.valves), _words(ids.claims)
         self._fd = _words(ids.fd)
-        self._forget()
+        self._invalidate()
         if self._sockets:
             try:
                 set_filters(self._sockets, ids)

@@ -32,7 +32,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     """Open the sockets of one interface, and look at its device where the deployment names one.
 
     With ``ids`` there are three: for the messages that are taken; for those that we send, which
-    hears our own frames back, other senders and the error frames; for ids that nobody knows. So
+    hears our own frames back, other senders and the error frames; for ids that no one knows. So
     neither our own frames nor a flood of foreign ones stand before a joystick's. Without ``ids``,
     one for everything.
 
@@ -86,7 +86,7 @@ def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
         if flag and ids.canopen:
             words += [(base, mask | EFF_FLAG) for base, mask, _ in SERVICES]
         if flag and ids.in_line:
-            words = []  # no filter at all: nothing is heard
+            words = []  # no filter at all: nothing is received
         filters = filter_words((word | flag, mask) for word, mask in words)
         one.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
 

@@ -6,7 +6,7 @@ from typing import Any
 from canshaper.codec.signals import ROUNDING, VelocitySignal
 from canshaper.shaping.states import Reason
 
-# The position that may stand beside the neutral flag, as a part of full: neutral switch and
+# The position that may stand next to the neutral flag, as a part of full: neutral switch and
 # position sensor are two parts and do not meet at one angle. More is a sensor that is broken.
 SMALL_IN_NEUTRAL = 0.05
 # (neutral, negative, positive) to sign and largest position; every other set is contradictory. No

@@ -56,7 +56,7 @@ class BusState(Enum):
     BUS_OFF = "bus-off"
     """The controller has left the bus."""
     NOT_CONFIRMED = "not-confirmed"
-    """Our frames do not get onto the bus: nobody listens, or it is blocked."""
+    """Our frames do not get onto the bus: no one listens, or it is blocked."""
     DOWN = "down"
     """The interface is set down."""
     GONE = "gone"

@@ -31,7 +31,7 @@ def name_bytes(name: J1939Name) -> bytes:
     """The NAME as it is sent: 64 bits, lowest byte first; the lower number wins (SAE J1939-81).
 
     The bit for a node that may choose another address stays 0: our address is the one that
-    valves are told to listen to.
+    valves are set to listen to.
     """
     fields = (
         (name.identity_number, 21),

@@ -14,7 +14,7 @@ class RewrittenMessage(ValveMessage):
     """The message of a joystick as it leaves on the other bus.
 
     Args:
-        sender: its place on that bus, and its protection, which is made anew.
+        sender: its place on that bus, and its protection, which is computed again.
         enable: name of its enable switch.
         ours: names of the signals that the axes put in.
 

@@ -193,8 +193,8 @@ def _second(
     try:
         period_s, damping_ratio, range_pct = (float(word) for word in text.split(","))
     except ValueError:
-        wanted = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20"
-        raise UsageError(f"--second: expected {wanted}, got {text!r}") from None
+        form = "PERIOD,DAMPING,RANGE, such as 0.6,0.1,20"
+        raise UsageError(f"--second: expected {form}, got {text!r}") from None
     try:
         values = (period_s, damping_ratio, range_pct)
         return second_mode(first, *values, tick_s=tick_s, rate_per_s=rate_per_s)

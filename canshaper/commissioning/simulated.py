@@ -7,7 +7,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import LockStep
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.joysticks import JoystickNode
@@ -72,7 +72,7 @@ def log_simulated(
 
         def write(frame: Frame, time_s: float) -> None:
             time_ns, channel = round(1e9 * time_s), buses[frame.bus].channel
-            log.write(Heard(time_ns, frame.bus, channel, *frame[1:], "").line())
+            log.write(ReceivedFrame(time_ns, frame.bus, channel, *frame[1:], "").line())
 
         lock_step = LockStep(deployment, Controller(deployment), plant, [hand], write)
         while lock_step.time_ms < 1000.0 * script.duration_s:

@@ -12,7 +12,7 @@ def read_bounded(path: Path, most_bytes: int) -> bytes:
     Raises:
         OSError: it cannot be read, is a device, a pipe or a directory, or has more bytes.
     """
-    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # nobody need write to a pipe
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK)  # no one need write to a pipe
     try:
         mode = os.fstat(number).st_mode
         if stat.S_ISDIR(mode):

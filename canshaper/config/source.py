@@ -170,7 +170,7 @@ def _scalar(node: yaml.ScalarNode) -> str | int | float | bool | None:
     """Value of a scalar as YAML 1.2 and its readers see it.
 
     PyYAML follows YAML 1.1, where off is false, 010 is 8, 1:30 is 90 and 1e3 is text. The first
-    is the name of a filter here; the others would be numbers that nobody meant.
+    is the name of a filter here; the others would be numbers that no one meant.
     """
     text: str = node.value
     plain = node.style is None

@@ -115,7 +115,7 @@ def _listening(path: Path, mode: int) -> socket.socket:
 
 
 def _is_dead(path: Path) -> bool:
-    """Whether a socket is there that nobody listens at: left by a daemon that was killed."""
+    """Whether a socket is there that no one listens at: left by a daemon that was killed."""
     if not path.is_socket():
         return False
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET | socket.SOCK_NONBLOCK) as one:
@@ -142,7 +142,7 @@ def _answered(data: bytes, answer: Answer, peer: str) -> bytes:
         request = json.loads(data, parse_int=float)
         if not isinstance(request, dict):
             raise ValueError('expected {} or {"set": {KEY: VALUE}}, got no object')
-        told = answer(request, peer)
+        reply = answer(request, peer)
     except (ValueError, ArithmeticError, RecursionError) as error:
-        told = {"error": str(error)}
-    return json.dumps(told).encode()
+        reply = {"error": str(error)}
+    return json.dumps(reply).encode()

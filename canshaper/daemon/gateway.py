@@ -98,7 +98,7 @@ class Bridge:
                     if error.errno in GONE or (self._matched and error.errno == errno.ENETDOWN):
                         self._gone()
                         return count
-                    break  # down: told by the port of this bus
+                    break  # down: reported by the port of this bus
                 count += 1
                 try:
                     destination.send(data)
@@ -140,11 +140,11 @@ class InlineGateway:
         assert gateway is not None  # only such deployments have one
         self._bridge: Bridge | None = None
         self._check_ns = 0
-        self._told: str | None = None
+        self._logged: str | None = None
         first, second = (deployment.config.buses[bus] for bus in gateway.between)
         self._kernel = gateway.forwarding == "kernel"
         self._real = {first.interface, second.interface} == {"socketcan"}
-        self._wanted = passing_rules(deployment)
+        self._rules = passing_rules(deployment)
         if not self._real:
             log.warning("gateway=nothing-passes others are passed on with socketcan only")
         elif not self._kernel:
@@ -192,8 +192,8 @@ class InlineGateway:
         if not self._kernel or not self._real or not neutral or now_ns < self._check_ns:
             return
         self._check_ns = now_ns + CHECK_NS
-        if (found := rules_fault(self._wanted)) != self._told:
-            self._told = found
+        if (found := rules_fault(self._rules)) != self._logged:
+            self._logged = found
             level = logging.WARNING if found else logging.INFO
             log.log(level, "gateway=%s", found or "rules-right")
 
@@ -203,13 +203,13 @@ class InlineGateway:
             self._bridge.close()
 
 
-def rules_fault(wanted: list[Rule]) -> str:
+def rules_fault(expected: list[Rule]) -> str:
     """What is wrong with the kernel's rules while the daemon runs; empty where nothing is."""
     try:
-        found = between({rule.source for rule in wanted}, rules())
+        found = between({rule.source for rule in expected}, rules())
     except GatewayError as error:
         return f"rules-not-known {error}"
-    more, missing = difference(found, wanted)
-    faults = [f"rules-missing {len(missing)} of {len(wanted)}"] if missing else []
+    more, missing = difference(found, expected)
+    faults = [f"rules-missing {len(missing)} of {len(expected)}"] if missing else []
     faults += [f"rules-too-many {', '.join(map(str, more))}"] if more else []
     return "; ".join(faults)

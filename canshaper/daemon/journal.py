@@ -82,7 +82,7 @@ class JournalHandler(logging.Handler):
 
 
 def _own_terminal(fd: int) -> int:
-    """A terminal that says it is writable may take one byte; opened anew, it can refuse the rest.
+    """A terminal that says it is writable may take one byte; opened again, it can refuse the rest.
 
     To set the flag on the descriptor we were given would set it for the shell, too.
     """

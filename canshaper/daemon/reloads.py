@@ -1,4 +1,4 @@
-"""A deployment read anew while the loop goes on: asked for, read beside it, then taken."""
+"""A deployment read again while the loop goes on, in a process of its own."""
 
 import logging
 from collections.abc import Callable

@@ -46,11 +46,11 @@ class BusDrive:
     missed_deadlines: int
 
 
-def choose_transport(wish: str, deployment: Deployment) -> Transport:
-    """SocketCAN where its channel opens, otherwise multicast; ``wish`` may name one.
+def choose_transport(request: str, deployment: Deployment) -> Transport:
+    """SocketCAN where its channel opens, otherwise multicast; ``request`` may name one.
 
     Raises:
-        DriveError: the deployment has several buses or cranes, or the wished transport does not
+        DriveError: the deployment has several buses or cranes, or the requested transport does not
             open.
     """
     if len(deployment.config.buses) > 1 or cranes(deployment):
@@ -58,15 +58,15 @@ def choose_transport(wish: str, deployment: Deployment) -> Transport:
     # A group of this process alone: two demos on one machine must not hear each other.
     group = f"239.{1 + os.getpid() // 65536 % 250}.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
     multicast = Transport("udp_multicast", group, "udp_multicast (python-can)")
-    channel = "vcan0" if wish == "auto" else wish
+    channel = "vcan0" if request == "auto" else request
     socketcan = Transport("socketcan", channel, f"{channel} (SocketCAN)")
-    if wish == "udp_multicast":
+    if request == "udp_multicast":
         return multicast
     try:
         for port in open_ports(on_transport(deployment, socketcan)).values():
             port.close()
     except BusError as error:
-        if wish == "auto":
+        if request == "auto":
             return multicast
         raise DriveError(str(error)) from None
     return socketcan
@@ -92,7 +92,7 @@ def drive_on_bus(
     bypass: bool,
     on_progress: Callable[[float], None],
 ) -> BusDrive:
-    """Drive a script with the three processes; the frames heard on the bus are recorded.
+    """Drive a script with the three processes; the frames received on the bus are recorded.
 
     Args:
         deployment: the machine.
@@ -150,7 +150,7 @@ def _listen(
         if report:
             report()
         elif time.monotonic() > limit:
-            raise DriveError(f"no frames within {START_LIMIT_S:g} s; heard {recorder.seen}")
+            raise DriveError(f"no frames within {START_LIMIT_S:g} s; received {recorder.seen}")
 
 
 class Crew:

@@ -45,7 +45,7 @@ def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         yield from _frames(reader, place, start_ns, 1)
     except Exception as error:  # of many kinds, where the file is damaged
         if not wrong:
-            raise place.error(_told(error), "a BLF log that is whole") from error
+            raise place.error(_reason(error), "a BLF log that is whole") from error
     if wrong:
         raise place.cut_off(wrong)
 
@@ -81,7 +81,7 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         needs = "MF4 logs need asammdf, which is missing: pip install asammdf"
         raise place.error("an MF4 log", f"another format, or: {needs}") from None
     except Exception as error:  # of many kinds, where the file is damaged
-        raise place.error(_told(error), "an MF4 log that is whole") from error
+        raise place.error(_reason(error), "an MF4 log that is whole") from error
 
 
 def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
@@ -93,7 +93,7 @@ def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
         finally:
             reader.stop()
     except (sqlite3.Error, TypeError, ValueError) as error:
-        raise place.error(_told(error), "a database of python-can's logger") from error
+        raise place.error(_reason(error), "a database of python-can's logger") from error
 
 
 def _frames(
@@ -125,5 +125,5 @@ def _frames(
         yield _new(TimedFrame, (start_ns + ns, name, can_id, extended, bytes(data)))
 
 
-def _told(error: Exception) -> str:
+def _reason(error: Exception) -> str:
     return f"{type(error).__name__} {error}".rstrip()

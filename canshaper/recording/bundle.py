@@ -31,7 +31,7 @@ def pack(
         log: the recorded log.
         deployment: whose buses were recorded; its file and DBC files go in, so that the paths in
             the file hold when it is unpacked.
-        history: what the status messages told.
+        history: what the status messages reported.
         facts: anything else about the recording.
 
     Raises:
@@ -113,7 +113,7 @@ def _extract(bundle: zipfile.ZipFile, member: zipfile.ZipInfo, folder: Path) -> 
 
 def history_lines(history: History) -> list[str]:
     """Every change with its time, then the counters as they were last."""
-    lines = [f"{time_text(told.time_ns)} {told.text}" for told in history.changes]
+    lines = [f"{time_text(event.time_ns)} {event.text}" for event in history.changes]
     if history.counted_ns is not None:
         counters = " ".join(f"{name}={count}" for name, count in history.counters.items())
         last = time_text(history.counted_ns)

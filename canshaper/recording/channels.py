@@ -14,9 +14,9 @@ class Kind(Enum):
     """What a frame is to the daemon of a deployment."""
 
     RECEIVED = "received"
-    """It waits in the first socket, and is read before the valves are told."""
+    """It waits in the first socket, and is read before the valves have their frames."""
     OTHER = "other"
-    """It is seen too, after the valves were told."""
+    """It is seen too, after the valves have their frames."""
     SENT = "sent"
     """The daemon sends such frames."""
     IGNORED = "ignored"
@@ -40,9 +40,9 @@ def bus_of_channel(
     buses = deployment.config.buses
     chosen: dict[str, str] = {}
     for name, bus in buses.items():
-        wanted = given.get(name)
-        tries = [wanted] if wanted is not None else [bus.channel, name]
-        if wanted is None and len(found) == 1 and len(buses) == 1:
+        named = given.get(name)
+        tries = [named] if named is not None else [bus.channel, name]
+        if named is None and len(found) == 1 and len(buses) == 1:
             tries += found
         channel = next((c for c in tries if c in found), None)
         names = ", ".join(repr(c) for c in sorted(found)) or "none"
@@ -61,7 +61,7 @@ class Sorter:
 
     def __init__(self, deployment: Deployment) -> None:
         self._buses = deployment.routing.buses
-        # Other interfaces hand out all there is before the valves are told.
+        # Other interfaces hand out all there is before the valves have their frames.
         self._raw = {n: b.interface == "socketcan" for n, b in deployment.config.buses.items()}
         # It carries the digest of the program that ran, which need not be this one.
         identity = deployment.identity_status

@@ -6,7 +6,7 @@ from typing import Any
 from canshaper.codec.status import LAST_FAULT, StatusCodec
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 
 
 @dataclass(frozen=True, slots=True)
@@ -35,7 +35,7 @@ class AxisStatus:
 
 
 @dataclass(frozen=True, slots=True)
-class Told:
+class HistoryEvent:
     """One line for people: a state that is new, or a counter that has gone up."""
 
     time_ns: int
@@ -48,7 +48,7 @@ class History:
     Attributes:
         axes: last status by axis.
         counters: last counters of the service, and LastFault by its name.
-        counted_ns: when they were told; None before.
+        counted_ns: when they were reported; None before.
         changes: every change, oldest first.
     """
 
@@ -59,7 +59,7 @@ class History:
         self.counters: dict[str, int] = {}
         self.last_fault = ""
         self.counted_ns: int | None = None
-        self.changes: list[Told] = []
+        self.changes: list[HistoryEvent] = []
         self._axes = {a.status.sender.key: n for n, a in deployment.axes.items() if a.status}
         self._codecs: dict[Key, StatusCodec[Any]] = {
             axis.status.sender.key: axis.status for axis in deployment.axes.values() if axis.status
@@ -67,7 +67,7 @@ class History:
         if deployment.status:
             self._codecs[deployment.status.sender.key] = deployment.status
 
-    def take(self, frame: Heard) -> None:
+    def take(self, frame: ReceivedFrame) -> None:
         """Take a data frame; one that is no status is passed over."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
@@ -98,4 +98,4 @@ class History:
 
     def _note(self, time_ns: int, text: str) -> None:
         if len(self.changes) < self.MOST_CHANGES:
-            self.changes.append(Told(time_ns, text))
+            self.changes.append(HistoryEvent(time_ns, text))

@@ -26,7 +26,7 @@ LOOK_S = 0.2
 UNTOLD_S = 0.01
 
 
-class Heard(NamedTuple):
+class ReceivedFrame(NamedTuple):
     """One frame, as it was received.
 
     Attributes:
@@ -96,7 +96,7 @@ class Listener:
             if opened.fileno() >= 0:
                 self._files.append(opened)
 
-    def frames(self, timeout_s: float = LOOK_S) -> list[Heard]:
+    def frames(self, timeout_s: float = LOOK_S) -> list[ReceivedFrame]:
         """All frames that wait, by time; after the timeout perhaps none.
 
         Raises:
@@ -107,7 +107,7 @@ class Listener:
             select.select(self._files, [], [], timeout_s if all_told else UNTOLD_S)
         except (OSError, ValueError) as error:
             raise BusError(f"cannot read: {error}") from error
-        heard: list[Heard] = []
+        received: list[ReceivedFrame] = []
         for one, (name, channel) in self._sockets.items():
             try:
                 take = _raw if isinstance(one, socket.socket) else _python_can
@@ -115,14 +115,14 @@ class Listener:
                     found = take(one, name, channel)
                     if found is None:
                         break
-                    heard.append(found)
+                    received.append(found)
             except (OSError, can.CanError) as error:
                 text = getattr(error, "strerror", None) or str(error)
                 raise BusError(f"bus {name}: cannot read {channel}: {text}") from error
         raw = [one for one in self._sockets if isinstance(one, socket.socket)]
         self.lost = dropped_frames(raw)
-        heard.sort(key=lambda frame: frame.time_ns)
-        return heard
+        received.sort(key=lambda frame: frame.time_ns)
+        return received
 
     def close(self) -> None:
         """Close the buses."""
@@ -133,7 +133,7 @@ class Listener:
         self._files.clear()
 
 
-def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
+def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
     """The next frame of SocketCAN; None when none waits."""
     try:
         data, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
@@ -144,14 +144,14 @@ def _raw(one: socket.socket, bus: str, channel: str) -> Heard | None:
     word, payload, flags = Packet.unpack(data)
     if word & ERR_FLAG:
         can_id = ERR_FLAG | word & EFF_MASK
-        return Heard(time_ns, bus, channel, can_id, True, payload, "error")
+        return ReceivedFrame(time_ns, bus, channel, can_id, True, payload, "error")
     extended = bool(word & EFF_FLAG)
     can_id = word & (EFF_MASK if extended else SFF_MASK)
     remote = "remote" if word & RTR_FLAG else ""
-    return Heard(time_ns, bus, channel, can_id, extended, payload, remote, flags)
+    return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
 
 
-def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
+def _python_can(one: can.BusABC, bus: str, channel: str) -> ReceivedFrame | None:
     """The next frame of python-can; None when none waits."""
     message = one.recv(0)
     if message is None:
@@ -165,4 +165,4 @@ def _python_can(one: can.BusABC, bus: str, channel: str) -> Heard | None:
         kind = "remote"
     elif message.is_fd:
         flags = FDF | (BRS if message.bitrate_switch else 0)
-    return Heard(time_ns, bus, channel, can_id, extended, bytes(message.data), kind, flags)
+    return ReceivedFrame(time_ns, bus, channel, can_id, extended, bytes(message.data), kind, flags)

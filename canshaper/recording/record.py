@@ -1,4 +1,4 @@
-"""Recording: every frame of the buses into a log, and what the status messages told meanwhile."""
+"""Every frame of the buses into a log, and what the status messages reported meanwhile."""
 
 import time
 from collections import Counter
@@ -19,7 +19,7 @@ class Recording:
     Attributes:
         frames: by kind, the empty one for data frames.
         lost: frames that the kernel could not keep for us.
-        history: what the status messages told.
+        history: what the status messages reported.
         seconds: how long.
     """
 

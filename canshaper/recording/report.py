@@ -124,7 +124,8 @@ def verdict_lines(one: Replayed, *, examples: bool) -> Iterator[str]:
     yield f"{one.name}: {verdict.compared} frames sent, {_same(verdict.different)}"
     start_ns = one.trace.start_ns or 0
     for time_ns, difference in verdict.examples if examples else ():
-        yield f"  {(time_ns - start_ns) / 1e9:.3f} s: {_told(one.deployment, difference)}"
+        text = _difference_text(one.deployment, difference)
+        yield f"  {(time_ns - start_ns) / 1e9:.3f} s: {text}"
 
 
 def _same(different: int) -> str:
@@ -133,7 +134,7 @@ def _same(different: int) -> str:
     return f"{different} not the same"
 
 
-def _told(deployment: Deployment, difference: Difference) -> str:
+def _difference_text(deployment: Deployment, difference: Difference) -> str:
     """A difference in the words of the DBC."""
     bus, can_id, extended = difference.key
     found = [

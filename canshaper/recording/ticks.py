@@ -31,7 +31,7 @@ class Tick:
         number: of its deadline, from 0.
         now_ns: when it was.
         received: frames that came since the tick before, with their arrival, in order.
-        others: those among them that are read after the valves were told.
+        others: those among them that are read after the valves have their frames.
     """
 
     number: int

@@ -81,7 +81,7 @@ class Trace:
     def _recording(self, sent: int, sway: int) -> Recording:
         axes = {}
         for name, columns in self._rows.items():
-            told = list(columns[sent])
+            applied = list(columns[sent])
             swings = list(columns[sway]) if name in self._models else None
-            axes[name] = AxisTrace(list(columns[0]), told, told, swings)
+            axes[name] = AxisTrace(list(columns[0]), applied, applied, swings)
         return Recording(list(self._t_s), axes)

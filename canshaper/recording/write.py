@@ -10,7 +10,7 @@ from canshaper.recording.ticks import Result, Tick
 
 
 class LogWriter:
-    """Writes what was heard and what was sent, as ``candump -L`` does.
+    """Writes what was received and what was sent, as ``candump -L`` does.
 
     Args:
         file: where to.

@@ -37,13 +37,13 @@ def time_to_95_s(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float | 
     speed = {k: stroke.direction * trace.speed[k] for k in held}
     lost = [k for k in held if speed[k] < LOST_AGAIN * stroke.level]
     start = lost[-1] if lost else stroke.press
-    wanted = REACHED * stroke.level
-    reached = next((k for k in range(start, held.stop) if speed[k] >= wanted), None)
+    threshold = REACHED * stroke.level
+    reached = next((k for k in range(start, held.stop) if speed[k] >= threshold), None)
     if reached is None:
         return None
     if reached == stroke.press:
         return 0.0
-    return _crossing_s(t_s, speed, reached - 1, wanted) - t_s[stroke.press]
+    return _crossing_s(t_s, speed, reached - 1, threshold) - t_s[stroke.press]
 
 
 def run_on_s(t_s: list[float], speed: Sequence[float], rest: range) -> float:

@@ -267,9 +267,9 @@ class Axis:
                 target = one_movement
         self._added = added
         if added or self._own != self._limited or self._dropped:
-            low, high, wish = self._drive_both(command, target)
+            low, high, unrounded = self._drive_both(command, target)
         else:
-            wish = 0.0
+            unrounded = 0.0
             self._limited = self._own = rate_limited(target, self._limited, self._rise, self._fall)
         limited = self._limited
         if limited < low:  # on its way back in
@@ -280,7 +280,7 @@ class Axis:
             limited, low, high, limits.deadband, self._grid_steps, curve=limits.curve
         )
         if added:
-            self._carry = within(self._carry + wish - self.sent, -MOST_CARRY, MOST_CARRY, 0.0)
+            self._carry = within(self._carry + unrounded - self.sent, -MOST_CARRY, MOST_CARRY, 0.0)
 
     def _drive_both(self, command: float, target: float) -> tuple[float, float, float]:
         """Limit the axis' own part and the added one together.
@@ -299,18 +299,18 @@ class Axis:
         largest = self._largest_added if self._added else 0.0
         low, high = range_with_added(command, recent.low, recent.high, target, largest)
         low, high = max(low, -maximum), min(high, maximum)
-        aim = wish = target
+        aim = unrounded = target
         if self._added:
             step = 1.0 / self._grid_steps
-            wish = within(target + self._added, low, high, 0.0)
-            aim = within(wish, low, high, max(limits.minimum, 0.5 * step))
+            unrounded = within(target + self._added, low, high, 0.0)
+            aim = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
             if aim:
                 aim = within(aim + within(self._carry, -step, step, 0.0), low, high, 0.0)
         self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
         if self._dropped * self._limited < 0.0:  # the way to the other side begins at rest
             self._limited = 0.0
         self._dropped = 0.0
-        return low, high, wish
+        return low, high, unrounded
 
     def _rest(self) -> None:
         self._recent.clear()

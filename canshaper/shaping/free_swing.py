@@ -22,7 +22,7 @@ OFFSET_NOISE = {Measured.ANGLE: 0.02, Measured.RATE: 0.04}
 FIRST_DEG, FIRST_DEG_S, FIRST_OFFSET = 10.0, 30.0, 1.0 / 12.0
 # From then on the gains are those of the steady state.
 FIRST_S = 4.0
-# Beside a second mode: process noise of the first one's rate and of its own, and what is expected
+# With a second mode: process noise of the first one's rate and of its own, and what is expected
 # of it at the first measurement, deg and deg/s. So slow is the first one that the second, which is
 # driven too, hardly gets into it.
 QUICKNESS_BESIDE, SECOND_QUICKNESS = 0.4, 5.0
@@ -80,7 +80,7 @@ class FreeSwing:
 
 
 class TwoFreeSwings(FreeSwing):
-    """Free swing of the first mode, beside a second one that only keeps itself out of it.
+    """Free swing of the first mode, next to a second one that only keeps itself out of it.
 
     Args:
         measured: angle or rate.
@@ -147,11 +147,11 @@ def observer_gains(
     noise = [ANGLE_PER_RATE * quickness, quickness, OFFSET_NOISE[timing.measured]]
     first = [math.radians(FIRST_DEG), math.radians(FIRST_DEG_S), FIRST_OFFSET * offset]
     if second:
-        beside = swing_over(second, tick_s)
+        other = swing_over(second, tick_s)
         shown += shown[:2]
         step = [[*row, 0.0, 0.0] for row in step]
-        step += [[0.0, 0.0, 0.0, 1.0 + beside[0], beside[1]]]
-        step += [[0.0, 0.0, 0.0, beside[2], 1.0 + beside[3]]]
+        step += [[0.0, 0.0, 0.0, 1.0 + other[0], other[1]]]
+        step += [[0.0, 0.0, 0.0, other[2], 1.0 + other[3]]]
         noise += [ANGLE_PER_RATE * SECOND_QUICKNESS, SECOND_QUICKNESS]
         first += [math.radians(FIRST_SECOND_DEG), math.radians(FIRST_SECOND_DEG_S)]
     variances = [sd * sd * ticks for sd in noise], [(sd / limits.noise) ** 2 for sd in first]

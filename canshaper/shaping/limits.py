@@ -62,7 +62,7 @@ class RecentCommand:
         self.high = 0.0
 
     def clear(self) -> None:
-        """Forget every command: nothing was asked within the tail."""
+        """Invalidate every command: nothing was commanded within the tail."""
         self._largest.clear()
         self._smallest.clear()
         self.low = self.high = 0.0
@@ -191,7 +191,7 @@ def on_grid(
         curve: instead of the deadband, where the valve is measured.
 
     Returns:
-        (raw step of the frame, velocity which that step gives: what the filter must be told).
+        (raw step of the frame, velocity which that step gives: what the filter must be given).
     """
     if curve is not None:
         return _on_curve(velocity, low, high, curve, steps)

@@ -21,7 +21,7 @@ from canshaper.shaping.trust import (
 FADE_S = 0.6
 # The same where the grapple leans on something: what it shows there drives the crane.
 CONTACT_FADE_S = 0.1
-# How much of the free swing is fed back beside a second mode: that of the first one is not known
+# How much of the free swing is fed back next to a second mode: that of the first one is not known
 # as well, and a command that follows it drives the second one.
 BESIDE_WEIGHT = 0.75
 

@@ -9,7 +9,7 @@ from typing import Any
 from canshaper.shaping.registry import KINDS
 from canshaper.shaping.sway import SwayMode
 
-# Positions between two sets that are told apart: 1 to 2 % of their difference.
+# Positions between two sets that differ: 1 to 2 % of their difference.
 STEPS_BETWEEN = 64
 
 

@@ -3,8 +3,8 @@
 A filter that spreads a tap over a second or two wants less in a tick than the least step of the
 valve's frame. Rounded to steps that is a row of twitches, and limit-aware feedback adds its own for
 what rounding leaves out. So while the joystick is back in neutral after a small stroke, the travel
-still due decides: the axis moves by the least step where less is wanted, never further than is due,
-and then rests. Of a large stroke that would cut the feedback which damps its swing: what was
+still due decides: the axis moves by the least step where less is commanded, never further than is
+due, and then rests. Of a large stroke that would cut the feedback which damps its swing: what was
 commanded since the axis was at rest has to be small altogether.
 """
 

@@ -20,7 +20,7 @@ class NumbersChannel:
 
     Args:
         numbers: of the machine.
-        page: number of the page, who names nobody.
+        page: number of the page, who names no one.
     """
 
     def __init__(self, numbers: LiveNumbers, page: int) -> None:

@@ -101,7 +101,7 @@ def play_log(
     if drives[0].box is None and start_ns is not None:
         film = CraneFilm(RECORDED, first, *window)
         _recorded(film, drives[0], first, start_ns)
-        if film.view.heard:
+        if film.view.received_any:
             playback.films.insert(0, film)
     if any(film.full for film in playback.films):
         playback.notes.append("only the first ten minutes are shown; --from and --to choose others")

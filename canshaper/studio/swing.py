@@ -26,7 +26,7 @@ class Swing:
         """Take a sway, across and along the boom."""
         self._sways.append((now_s, math.hypot(*sway_deg)))
 
-    def forget(self) -> None:
+    def invalidate(self) -> None:
         """Begin again."""
         self._sways.clear()
 

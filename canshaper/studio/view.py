@@ -147,7 +147,7 @@ class CraneView:
             if not self._crane_there:
                 self._report("the crane is silent; its pose is the last one", "bad")
                 self.sway_deg = None
-                self._swing.forget()
+                self._swing.invalidate()
         there = self.daemon_there(now_s)
         if there is not self._daemon_there:
             self._daemon_there = there
@@ -160,16 +160,16 @@ class CraneView:
                     axis.state = axis.reason = axis.valve = axis.profile = None
 
     @property
-    def heard(self) -> bool:
-        """Whether the daemon or the crane was ever heard."""
+    def received_any(self) -> bool:
+        """Whether the daemon or the crane ever sent a frame."""
         return max(self._daemon_s, self._crane_s) > -math.inf
 
     def daemon_there(self, now_s: float) -> bool:
-        """Whether the daemon has been heard lately."""
+        """Whether the daemon has sent a frame lately."""
         return now_s - self._daemon_s < SILENT_S
 
     def crane_there(self, now_s: float) -> bool:
-        """Whether the crane's own messages have been heard lately."""
+        """Whether the crane's own messages have sent a frame lately."""
         return now_s - self._crane_s < SILENT_S
 
     def values(self, now_s: float) -> dict[str, Any]:

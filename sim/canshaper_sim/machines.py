@@ -114,18 +114,18 @@ def build_machine(
     raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {name!r}")
 
 
-def machine_for(axes: Mapping[str, object], wish: str | None = None) -> str:
-    """The machine for a deployment with these axes; `wish` may name one.
+def machine_for(axes: Mapping[str, object], requested: str | None = None) -> str:
+    """The machine for a deployment with these axes; `requested` may name one.
 
-    Without a wish a deployment with a joint of the boom is driven joint by joint, every other one
-    moves the tip.
+    Without one a deployment with a joint of the boom is driven joint by joint, every other moves
+    the tip.
 
     Raises:
         DesignError: no such machine.
     """
-    if wish is None:
+    if requested is None:
         joints = {*JOINT_AXES} - {SLEW}
         return JOINTS if joints & axes.keys() else TIP
-    if wish not in AXES_OF:
-        raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {wish!r}")
-    return wish
+    if requested not in AXES_OF:
+        raise DesignError(f"machine: expected one of {', '.join(MACHINES)}, got {requested!r}")
+    return requested

@@ -1,4 +1,4 @@
-"""A recorded drive: what the operator asked, what the valves were told, what the crane did."""
+"""A recorded drive: what the operator asked, what the valves were sent, what the crane did."""
 
 from dataclasses import dataclass
 

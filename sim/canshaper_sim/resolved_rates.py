@@ -1,4 +1,4 @@
-"""Joint rates for a wanted tip velocity: three boom joints, two coordinates, bounds on every joint.
+"""Joint rates for a commanded tip velocity: three boom joints, two coordinates, bounds on each.
 
 Joint rates are fractions of full speed u, tip velocities m/s. With A the Jacobian in these units,
 
@@ -81,16 +81,16 @@ class ResolvedRates:
             r[2] * y_r + z[2] * y_z,
         )
 
-    def within(self, rates: Vector, bounds: Bounds, wish: float = 0.0) -> tuple[float, Vector]:
+    def within(self, rates: Vector, bounds: Bounds, preferred: float = 0.0) -> tuple[float, Vector]:
         """Put rates within the bounds.
 
         Args:
             rates: least-squares rates p.
             bounds: the bounds.
-            wish: the t that is wanted where the bounds leave a choice.
+            preferred: the t that is preferred where the bounds leave a choice.
 
         Returns:
-            (s, s p + t n): the largest s the bounds allow, at most 1, and t nearest to the wish.
+            (s, s p + t n): the largest s the bounds allow, at most 1, t nearest to ``preferred``.
         """
         floors, ceilings, scale = self._lines(rates, bounds)
         for at_low, by_low in floors:
@@ -103,7 +103,7 @@ class ResolvedRates:
         if floors:
             low = max(at - scale * by for at, by in floors)
             high = min(at - scale * by for at, by in ceilings)
-            t = min(max(wish, low), high) if low <= high else 0.5 * (low + high)
+            t = min(max(preferred, low), high) if low <= high else 0.5 * (low + high)
         (a, b, c), (low_b, high_b) = rates, bounds
         return scale, (
             min(max(scale * a + t * n[0], low_b[0]), high_b[0]),

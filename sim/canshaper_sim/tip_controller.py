@@ -133,13 +133,13 @@ class TipController:
         """Rates of the boom joints, fractions of full speed."""
         solver = ResolvedRates(self._boom.jacobian(*joints), self._full, self._p.damping_m_s)
         radius_speed, height_speed = self._tip_full[1] * near_far, self._tip_full[2] * lift
-        wanted = solver.least_squares(radius_speed, height_speed)
+        rates_of_tip = solver.least_squares(radius_speed, height_speed)
         # First what the joints are fast enough for, on a straight way whatever is asked.
-        scale, _ = solver.within(wanted, _FULL_SPEED)
+        scale, _ = solver.within(rates_of_tip, _FULL_SPEED)
         radius_speed, height_speed = scale * radius_speed, scale * height_speed
-        wanted = (scale * wanted[0], scale * wanted[1], scale * wanted[2])
-        wish = self._posture(joints, solver.free, min(1.0, math.hypot(near_far, lift)))
-        scale, rates = solver.within(wanted, limits, wish)
+        rates_of_tip = (scale * rates_of_tip[0], scale * rates_of_tip[1], scale * rates_of_tip[2])
+        preferred = self._posture(joints, solver.free, min(1.0, math.hypot(near_far, lift)))
+        scale, rates = solver.within(rates_of_tip, limits, preferred)
         if scale < 1.0 and near_far and lift:
             # A limit stops the straight way: slide along it with each coordinate by itself.
             for part in ((radius_speed, 0.0), (0.0, height_speed)):

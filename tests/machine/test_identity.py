@@ -12,7 +12,7 @@ from canshaper.commissioning.monitor.state import Monitor
 from canshaper.machine import identity as module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [
@@ -101,7 +101,7 @@ def said(deployment: Deployment, *digests: int) -> list[str]:
     monitor = Monitor(deployment)
     for i, value in enumerate(digests):
         frame: Frame = status.frame(value)
-        monitor.take(Heard(i, frame.bus, "can0", *frame[1:], ""))
+        monitor.take(ReceivedFrame(i, frame.bus, "can0", *frame[1:], ""))
     return [event.text for event in monitor.events]
 
 

@@ -13,7 +13,7 @@ from canshaper.controller.controller import Controller
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 
 ROOT = Path(__file__).parents[2]
 ACTIVE_SET = "SG_ ActiveSet : 4|4@1+ (1,0) [0|15]"
@@ -35,7 +35,7 @@ def shown(deployment: Deployment) -> tuple[dict[str, object], str]:
     """Status of the first axis as a monitor decodes and shows it."""
     monitor = Monitor(deployment)
     for frame in Controller(deployment).tick(0):
-        monitor.take(Heard(0, frame.bus, "can0", *frame[1:], ""))
+        monitor.take(ReceivedFrame(0, frame.bus, "can0", *frame[1:], ""))
     return monitor.history.axes["slew"].values, screen(monitor, 0, 120, 40, plain=True).plain
 
 

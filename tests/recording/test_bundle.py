@@ -11,7 +11,7 @@ import pytest
 from canshaper.errors import LogError
 from canshaper.machine.binding import load_deployment
 from canshaper.recording.bundle import history_lines, pack, unpack
-from canshaper.recording.history import History, Told
+from canshaper.recording.history import History, HistoryEvent
 
 ROOT = Path(__file__).parents[2]
 
@@ -32,7 +32,7 @@ def packed(machine: Path, tmp_path: Path) -> Path:
     log.write_text("(1.0) can0 110#00\n")
     deployment = load_deployment(machine)
     history = History(deployment)
-    history.changes.append(Told(1_763_750_000_123_000_000, "axis=slew state=READY"))
+    history.changes.append(HistoryEvent(1_763_750_000_123_000_000, "axis=slew state=READY"))
     history.counted_ns = 1_763_750_001_000_000_000
     history.counters, history.last_fault = {"MissedDeadlines": 3}, "MISSED_DEADLINE"
     bundle = tmp_path / "bundle.zip"

@@ -101,7 +101,7 @@ def doctor(
 
 def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
     from canshaper.commissioning.doctor.finding import Finding, Level
-    from canshaper.commissioning.doctor.listen import heard_findings, listen
+    from canshaper.commissioning.doctor.listen import arrival_findings, listen
     from canshaper.report.console import progress_bar
 
     try:
@@ -111,4 +111,4 @@ def _listened(deployment: "Deployment", seconds: float) -> "list[Finding]":
         remedy = "fix the interface first"
         why = error.strerror if isinstance(error, OSError) else error
         return [Finding("joysticks", Level.BAD, f"cannot listen: {why}", remedy)]
-    return heard_findings(deployment, listened)
+    return arrival_findings(deployment, listened)

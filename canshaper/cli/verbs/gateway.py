@@ -46,21 +46,21 @@ def gateway(
     kernel = deployment.config.gateway.forwarding == "kernel"
     passing = passing_rules(deployment) if kernel else []
     fallback = fallback_rules(deployment) if kernel else []
-    wanted = {"running": passing, "away": passing + fallback, "down": []}
+    rules_of = {"running": passing, "away": passing + fallback, "down": []}
     ends = channels(deployment)
     if state == "show":
         found = between(ends, rules())
-        states = [name for name, those in wanted.items() if sorted(found) == sorted(those)]
+        states = [name for name, those in rules_of.items() if sorted(found) == sorted(those)]
         echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
         for rule in found:
             echo(f"  {rule}")
         if not {"running", "away"} & {*states}:
             raise typer.Exit(EXIT_OTHER_RULES)
         return
-    if wanted[state]:
+    if rules_of[state]:
         _look_at_devices(deployment)
         load_module()
-    removed, added = make(ends, wanted[state])
+    removed, added = make(ends, rules_of[state])
     echo(f"{' '.join(ends)}: {state}, {len(added)} rules added, {len(removed)} removed")
     for rule in (rule for rule in removed if rule not in passing + fallback):
         echo(f"  removed {rule}")

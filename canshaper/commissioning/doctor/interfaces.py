@@ -209,8 +209,8 @@ def fd(link: Link, bus: Bus) -> list[Finding]:
     rate = link.data_bitrate
     if rate is None or rate == bus.data_bitrate:
         return [Finding(subject, Level.OK, f"on, data {rate} bit/s" if rate else "on")]
-    wanted = f"{bus.data_bitrate} bit/s" if bus.data_bitrate else "none"
-    text = f"data {rate} bit/s, in the file data_bitrate {wanted}"
+    expected = f"{bus.data_bitrate} bit/s" if bus.data_bitrate else "none"
+    text = f"data {rate} bit/s, in the file data_bitrate {expected}"
     return [Finding(subject, Level.BAD if bus.data_bitrate else Level.WARNING, text, WRONG_RATE)]
 
 

@@ -40,16 +40,16 @@ def listen(
     inputs = inputs_of(deployment)
     names = {bound.key: name for name, bound in inputs.items()}
     finder = InputFinder(deployment.config.buses, inputs.values())
-    heard: dict[str, list[int]] = {}
+    arrivals_ns: dict[str, list[int]] = {}
     sockets: dict[socket.socket, str] = {}
     try:
         for bus, config in deployment.config.buses.items():
-            wanted = [name for key, name in names.items() if key[0] == bus]
-            if wanted and config.interface == "socketcan":
+            expected = [name for key, name in names.items() if key[0] == bus]
+            if expected and config.interface == "socketcan":
                 (one,) = open_sockets(config, None)
                 sockets[one] = bus
                 one.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-                heard |= {name: [] for name in wanted}
+                arrivals_ns |= {name: [] for name in expected}
         begin = time.monotonic()
         while sockets and (passed := time.monotonic() - begin) < seconds:
             on_progress(passed)
@@ -58,11 +58,11 @@ def listen(
                 if taken := _next(one, sockets[one]):
                     frame, time_ns = taken
                     if bound := finder.find(frame, time_ns):
-                        heard[names[bound.key]].append(time_ns)
+                        arrivals_ns[names[bound.key]].append(time_ns)
     finally:
         for one in sockets:
             one.close()
-    return heard
+    return arrivals_ns
 
 
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
@@ -77,13 +77,13 @@ def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
     return None if time_ns is None else (frame, time_ns)
 
 
-def heard_findings(deployment: Deployment, heard: dict[str, list[int]]) -> list[Finding]:
+def arrival_findings(deployment: Deployment, arrivals_ns: dict[str, list[int]]) -> list[Finding]:
     """Period and gaps of each message against its cycle and its timeout."""
     findings = []
     for name, bound in inputs_of(deployment).items():
-        if name in heard:
+        if name in arrivals_ns:
             cycle_ms = bound.message.cycle_time or 0
-            findings.append(_regular(name, heard[name], cycle_ms, bound.config.timeout_ms))
+            findings.append(_regular(name, arrivals_ns[name], cycle_ms, bound.config.timeout_ms))
         else:
             findings.append(Finding(name, Level.NOTE, "not on SocketCAN: not listened to"))
     return findings

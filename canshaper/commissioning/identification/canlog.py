@@ -95,7 +95,7 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
 def read_can(
     path: Path,
     label: str,
-    wanted: Mapping[str, str],
+    names: Mapping[str, str],
     messages: Messages,
     *,
     deployment: Deployment | None = None,
@@ -108,7 +108,7 @@ def read_can(
     Args:
         path: the log.
         label: state of the grapple in it.
-        wanted: "Message.Signal" of each axis.
+        names: "Message.Signal" of each axis.
         messages: of the DBC files.
         deployment: names the commands of the axes and the signal of the grapple, where known.
         channel: bus of the log that is read; by default all of them.
@@ -121,7 +121,7 @@ def read_can(
     """
     readers = {
         axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis))
-        for axis, name in wanted.items()
+        for axis, name in names.items()
     }
     grapple = deployment.load_state if deployment else None
     weight = None

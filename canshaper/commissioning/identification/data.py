@@ -101,9 +101,9 @@ def logged(
         report = partial(on_progress, what=path.name)
         if is_table(path):
             table = read_table(path, report)
-            wanted: dict[str, str | None] = {**signals}
-            wanted = wanted or {axis_named(axis, deployment): None}
-            shown = {a: series_of(table, label, c, about_s) for a, c in wanted.items()}
+            columns: dict[str, str | None] = {**signals}
+            columns = columns or {axis_named(axis, deployment): None}
+            shown = {a: series_of(table, label, c, about_s) for a, c in columns.items()}
         else:
             shown = read_can(
                 path,

@@ -78,10 +78,10 @@ class Table:
         Raises:
             IdentificationError: there is none; tells those that are there.
         """
-        wanted = name.strip().lower()
+        lower = name.strip().lower()
         for known in self.columns:
             plain = _named(known)[0].lower()
-            if wanted in (known.lower(), plain):
+            if lower in (known.lower(), plain):
                 return known
         raise IdentificationError(
             f"{self.path}: expected a column, got {name!r}; there are {', '.join(self.columns)}"

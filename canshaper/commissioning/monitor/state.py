@@ -7,8 +7,8 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.finder import InputFinder
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.channels import Key
-from canshaper.recording.history import History, Told
-from canshaper.recording.listen import Heard
+from canshaper.recording.history import History, HistoryEvent
+from canshaper.recording.listen import ReceivedFrame
 
 # Rates are counted over so long.
 WINDOW_NS = 2_000_000_000
@@ -37,16 +37,16 @@ class MessageRate:
         """It came."""
         self.last_ns = time_ns
         self.times.append(time_ns)
-        self.forget(time_ns)
+        self.invalidate(time_ns)
 
-    def forget(self, now_ns: int) -> None:
+    def invalidate(self, now_ns: int) -> None:
         """What is older than the window does not count."""
         while self.times and self.times[0] <= now_ns - WINDOW_NS:
             self.times.popleft()
 
     def per_s(self, now_ns: int) -> float:
         """Frames a second."""
-        self.forget(now_ns)
+        self.invalidate(now_ns)
         return len(self.times) * 1e9 / WINDOW_NS
 
     def silent_s(self, now_ns: int) -> float | None:
@@ -61,7 +61,7 @@ class MessageRate:
 
 
 class Monitor:
-    """Takes every frame that is heard.
+    """Takes every frame that is received.
 
     Args:
         deployment: the machine.
@@ -77,7 +77,7 @@ class Monitor:
     def __init__(self, deployment: Deployment) -> None:
         self.deployment = deployment
         self.history = History(deployment)
-        self.events: deque[Told] = deque(maxlen=MOST_EVENTS)
+        self.events: deque[HistoryEvent] = deque(maxlen=MOST_EVENTS)
         self.others: Counter[str] = Counter()
         self.messages: dict[Key, MessageRate] = {}
         self._finder = InputFinder(deployment.config.buses, deployment.inputs())
@@ -101,7 +101,7 @@ class Monitor:
         name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
         self.messages.setdefault(key, MessageRate(name, cycle))
 
-    def take(self, frame: Heard) -> None:
+    def take(self, frame: ReceivedFrame) -> None:
         """Take a frame."""
         self._buses[frame.bus].take(frame.time_ns)
         if frame.kind:
@@ -130,7 +130,7 @@ class Monitor:
 
     def note(self, time_ns: int, text: str) -> None:
         """Note something that did not come with a frame."""
-        self.events.append(Told(time_ns, text))
+        self.events.append(HistoryEvent(time_ns, text))
 
     def frames_per_s(self, bus: str, now_ns: int) -> float:
         """All frames of a bus."""

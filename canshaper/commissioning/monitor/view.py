@@ -125,7 +125,7 @@ def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[
     status = monitor.history.axes.get(name)
     if status is None:
         has_status = monitor.deployment.axes[name].status is not None
-        missing = "no status heard" if has_status else "the deployment gives it no status message"
+        missing = "no status received" if has_status else "it has no status message"
         yield Text(f"{name:{NAME}.{NAME}} {missing}", DIM)
         yield Text()
         return
@@ -156,7 +156,7 @@ def _counters(monitor: Monitor, now_ns: int) -> Iterator[Text]:
         yield Text("the deployment gives the service no status message", DIM)
         return
     if history.counted_ns is None:
-        yield Text("no counters heard", DIM)
+        yield Text("no counters received", DIM)
         return
     text = Text("counters", DIM)
     stale_s = monitor.counters_stale_s(now_ns)
@@ -193,9 +193,9 @@ def _line(cells: Sequence[tuple[str, str]], width: int) -> Text:
 
 
 def _rate(rate: MessageRate, now_ns: int) -> tuple[str, str]:
-    wanted = f" ({1000 / rate.cycle_ms:.3g})" if rate.cycle_ms else ""
+    expected = f" ({1000 / rate.cycle_ms:.3g})" if rate.cycle_ms else ""
     wrong = _wrong(rate, now_ns)
-    text = f"{rate.name} {rate.per_s(now_ns):.3g}{wanted}"
+    text = f"{rate.name} {rate.per_s(now_ns):.3g}{expected}"
     return (f"{text} {wrong}", STALE) if wrong else (text, "")
 
 

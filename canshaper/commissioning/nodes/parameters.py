@@ -82,10 +82,10 @@ def parameters(name: str, node: Node, used: Sequence[tuple[Pdo, Use]]) -> list[P
         node: the node, as its EDS has it.
         used: its PDOs that the deployment uses.
     """
-    wanted = [*_services(node), *(one for pdo, use in used for one in _of_pdo(node, pdo, use))]
+    needed = [*_services(node), *(one for pdo, use in used for one in _of_pdo(node, pdo, use))]
     different = {
         key: (value, why)
-        for key, value, why in wanted
+        for key, value, why in needed
         if node.variable(*key) and node.value(*key) != value
     }
     parameters = [Parameter(name, *key, *one) for key, one in different.items()]
@@ -136,7 +136,7 @@ def _of_pdo(node: Node, pdo: Pdo, use: Use) -> Iterator[_Wanted]:
         yield _ANALOGUE_ON, 1, "analogue inputs are sent"
 
 
-def write(bus: Bus, nodes: Mapping[str, Node], wanted: Sequence[Parameter]) -> Iterator[str]:
+def write(bus: Bus, nodes: Mapping[str, Node], parameters: Sequence[Parameter]) -> Iterator[str]:
     """Set parameters one after the other, each read before and after; says what was done.
 
     Raises:
@@ -148,7 +148,7 @@ def write(bus: Bus, nodes: Mapping[str, Node], wanted: Sequence[Parameter]) -> I
             name: network.add_node(canopen.RemoteNode(node.id, node.objects))
             for name, node in nodes.items()
         }
-        for parameter in wanted:
+        for parameter in parameters:
             yield _set(remote[parameter.node], parameter)
 
 

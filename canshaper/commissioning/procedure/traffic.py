@@ -18,7 +18,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.machine.inputs import BoundInput, BoundJoystick
 from canshaper.recording.channels import Key
 from canshaper.recording.history import History
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 from canshaper.recording.log import LogFile
 
 # Part of full beyond which a value is a code, not a deflection.
@@ -97,7 +97,7 @@ class _Reader:
                 raw: dict[str, Any] = Layout(axis.valve_message).decode(frame.data)
                 if (steps := axis.valve.read(raw)) is not None:
                     traffic.axes[axis.name].valve.add(time_s, steps / axis.valve.steps)
-        self._history.take(Heard(time_ns, frame.bus, "", *frame[1:], ""))
+        self._history.take(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
         traffic.missed_deadlines = self._history.counters.get("MissedDeadlines")
         for name, status in self._history.axes.items():
             states = traffic.axes[name].states

@@ -177,10 +177,10 @@ def step_response(mode: SwayMode, tick_s: float, shaper_for: ShaperFor) -> list[
     y: list[float] = []
     still = 0
     while still < _STILL_S / tick_s and len(y) < _LONGEST_S / tick_s:
-        wanted = shaper.step(1.0)
-        sway.step(wanted)
-        still = still + 1 if y and abs(wanted - y[-1]) < _AT_END * tick_s else 0
-        y.append(wanted)
+        command = shaper.step(1.0)
+        sway.step(command)
+        still = still + 1 if y and abs(command - y[-1]) < _AT_END * tick_s else 0
+        y.append(command)
     return y
 
 

@@ -159,7 +159,7 @@ def _read(body: bytes, names: dict[int, str]) -> Rule:
     return Rule(ends[0], ends[1], Pattern(value, mask), changes, flags, hops)
 
 
-def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
     """Make the rules between these interfaces exactly these; others stay as they are.
 
     Returns:
@@ -168,7 +168,7 @@ def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule],
     Raises:
         GatewayError: the kernel refuses.
     """
-    more, missing = difference(between(interfaces, rules()), wanted)
+    more, missing = difference(between(interfaces, rules()), expected)
     for rule in more:
         remove(rule)
     for rule in missing:
@@ -176,10 +176,10 @@ def make(interfaces: Iterable[str], wanted: Iterable[Rule]) -> tuple[list[Rule],
     return more, missing
 
 
-def difference(found: Iterable[Rule], wanted: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+def difference(found: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
     """(rules that are too many, rules that are missing)."""
     more, missing = list(found), []
-    for rule in wanted:
+    for rule in expected:
         if rule in more:
             more.remove(rule)  # one of them: the same rule twice would pass each frame twice
         else:

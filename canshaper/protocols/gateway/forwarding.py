@@ -111,5 +111,5 @@ class Gateway(BusProtocol):
             self.forwarding[key] = ForwardedJoystick(bound.valve.message, joystick, runners)
 
     def usual(self, frame: Frame) -> bool:
-        """What nobody knows there is what is passed on."""
+        """What no one knows there is what is passed on."""
         return frame.bus in self._buses

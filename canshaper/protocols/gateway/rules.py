@@ -14,9 +14,9 @@ from canshaper.protocols.gateway.passing import Pattern, all_but, exactly
 
 
 def excluded(deployment: Deployment) -> frozenset[Pattern]:
-    """Frames that nobody passes on, in neither direction.
+    """Frames that no one passes on, in neither direction.
 
-    Those of the joysticks, which only we pass on; all that we send ourselves, so that nobody can
+    Those of the joysticks, which only we pass on; all that we send ourselves, so that no one can
     send it through us; and what the deployment blocks.
     """
     gateway = deployment.config.gateway

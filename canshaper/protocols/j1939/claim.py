@@ -39,7 +39,7 @@ class AddressClaim:
         config: address and NAME.
         answered: groups (PGN) that are sent on request by others of us.
         cyclic: groups that are sent anyhow; a request for one is answered by the next of them.
-        guest: the address may be another's: we ask first, claim it only when nobody answers, give
+        guest: the address may be another's: we ask first, claim it only when no one answers, give
             it up to whoever claims it, whatever the NAME, and refuse nothing.
 
     Attributes:

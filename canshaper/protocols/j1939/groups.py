@@ -98,7 +98,7 @@ class ReceivedGroup:
     """The inputs of one group: of one address each, or of whatever address comes.
 
     Args:
-        own: our address on the bus; nobody else may send from it.
+        own: our address on the bus; no one else may send from it.
 
     Attributes:
         of: input by the address it is received from.

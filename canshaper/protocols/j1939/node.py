@@ -17,7 +17,7 @@ class Node:
     Args:
         bus: name of the bus.
         config: address and NAME.
-        cyclic: groups (PGN) that are sent anyhow, so that nobody has to ask for them.
+        cyclic: groups (PGN) that are sent anyhow, so that no one has to ask for them.
         guest: whether the address may be another's, and no fault is sent.
 
     Attributes:

@@ -100,7 +100,7 @@ def convolved(first: Sequence[float], second: Sequence[float]) -> list[float]:
 
 
 def ei_taps(mode: SwayMode, tick_s: float, residual: float) -> list[float]:
-    """Extra-insensitive: ``residual`` of the swing is left at the nominal period, zero beside it.
+    """Extra-insensitive: ``residual`` of the swing is left at the nominal period, zero next to it.
 
     Three impulses half a swing apart, (1+V)/4, (1-V)/2, (1+V)/4, each smaller by the decay of half
     a swing; between two ticks an impulse is shared linearly (error (omega T)^2 / 8 at most).

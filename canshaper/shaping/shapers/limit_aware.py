@@ -70,7 +70,7 @@ class LimitAware:
         """Output for this tick's command, before limits."""
         sway, twin = self._sway, self._twin
         twin.step(self._asked)
-        if sway.angle == 0.0 == sway.rate:  # never moved, or started anew after a fault
+        if sway.angle == 0.0 == sway.rate:  # never moved, or started again after a fault
             twin.angle = twin.rate = 0.0
         self._asked = asked = self._shaper.step(command)
         return (

@@ -59,8 +59,8 @@ class SCurve:
         # s T + (s - j T) T + ... <= |left|
         steps = abs(left) / (change * self._tick_s)
         reachable = change * 0.5 * (math.sqrt(1.0 + 8.0 * steps) - 1.0)
-        wanted = math.copysign(min(self._rate, reachable), left)
-        self._slope += min(max(wanted - self._slope, -change), change)
+        reference = math.copysign(min(self._rate, reachable), left)
+        self._slope += min(max(reference - self._slope, -change), change)
         step = self._slope * self._tick_s
         if step * left > 0.0 and abs(step) >= abs(left) and abs(self._slope) <= change:
             step, self._slope = left, 0.0  # arrived

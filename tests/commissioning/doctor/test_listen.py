@@ -17,7 +17,7 @@ from canshaper.cli.verbs.doctor import _listened
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor import listen as listening
 from canshaper.commissioning.doctor.finding import Finding, Level
-from canshaper.commissioning.doctor.listen import heard_findings
+from canshaper.commissioning.doctor.listen import arrival_findings
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.binding import load_deployment
 from tests.commissioning.doctor.conftest import ROOT, SHIPPED
@@ -33,7 +33,7 @@ def at(gaps_ms: Iterable[float]) -> list[int]:
 
 def judged(gaps_ms: Iterable[float]) -> Finding:
     heard = {"joystick left": at(gaps_ms), "joystick right": at([20.0] * 50)}
-    left, right = heard_findings(DEPLOYMENT, heard)
+    left, right = arrival_findings(DEPLOYMENT, heard)
     assert (right.subject, right.level) == ("joystick right", Level.OK)
     return left
 
@@ -66,7 +66,7 @@ def test_what_is_said() -> None:
 
 def test_other_buses_are_not_listened_to(two_buses: Path) -> None:
     heard = {"joystick left": at([20.0] * 50)}
-    found = heard_findings(load_deployment(two_buses), heard)
+    found = arrival_findings(load_deployment(two_buses), heard)
     assert [(f.subject, f.level) for f in found] == [
         ("joystick left", Level.OK),
         ("joystick right", Level.NOTE),
@@ -119,7 +119,7 @@ def test_joysticks_of_j1939_are_heard_from_whatever_address(
         "joystick left": 20,
         "joystick right": 20,
     }
-    assert {f.level for f in heard_findings(deployment, heard)} == {Level.OK}
+    assert {f.level for f in arrival_findings(deployment, heard)} == {Level.OK}
 
 
 @pytest.mark.parametrize(

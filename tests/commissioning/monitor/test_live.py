@@ -91,7 +91,7 @@ class Terminal:
 def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
     terminal = Terminal()
     try:
-        terminal.wait_for("no status heard")
+        terminal.wait_for("no status received")
         with running("run", log=tmp_path / "run"):
             terminal.wait_for(r"slew +NEUTRAL_WAIT")
             with running("operator", log=tmp_path / "operator"):

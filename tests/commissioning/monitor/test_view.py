@@ -12,7 +12,7 @@ from canshaper.codec.frame import Frame
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import bar, screen, status_line
 from canshaper.machine.deployment import Deployment
-from canshaper.recording.listen import Heard
+from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.states import Reason, State
 from tests.rigs.j1939 import bjm
 from tests.rigs.reports import report
@@ -35,9 +35,9 @@ def deployment() -> Deployment:
     return loader("forwarder.yaml")()
 
 
-def heard(frame: Frame | None, time_ns: int) -> Heard:
+def heard(frame: Frame | None, time_ns: int) -> ReceivedFrame:
     assert frame is not None
-    return Heard(time_ns, frame.bus, "vcan0", frame.can_id, frame.extended, frame.data, "")
+    return ReceivedFrame(time_ns, frame.bus, "vcan0", frame.can_id, frame.extended, frame.data, "")
 
 
 def told(
@@ -45,7 +45,7 @@ def told(
     time_ns: int = NOW,
     state: State = State.ACTIVE,
     reason: Reason = Reason.JOYSTICK_MOVED,
-) -> list[Heard]:
+) -> list[ReceivedFrame]:
     """Status of all axes and of the service."""
     frames = [
         heard(axis.status.frame(report(state, reason, 0.5, -0.25, 3.4)), time_ns)
@@ -122,8 +122,8 @@ def test_it_fits_the_terminal(deployment: Deployment) -> None:
 def test_before_anything_is_heard_it_says_so(deployment: Deployment) -> None:
     lines = text(Monitor(deployment), NOW)
     assert "SILENT" in lines[0]
-    assert sum("no status heard" in line for line in lines) == 3
-    assert any("no counters heard" in line for line in lines)
+    assert sum("no status received" in line for line in lines) == 3
+    assert any("no counters received" in line for line in lines)
     assert any("JoystickLeft 0 (50) NEVER" in line for line in lines)
 
 
@@ -140,12 +140,14 @@ def test_what_is_stale_says_stale(deployment: Deployment) -> None:
     assert "STALE 2.5s" in status_line(monitor, NOW + 2_500 * MS)
 
 
-def test_rates_are_told_beside_those_of_the_dbc(deployment: Deployment) -> None:
+def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for i in range(200):
-        monitor.take(Heard(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), ""))
+        monitor.take(ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), ""))
         if i % 2:
-            monitor.take(Heard(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), ""))
+            monitor.take(
+                ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), "")
+            )
     lines = "\n".join(text(monitor, NOW + 199 * 20 * MS))
     assert "JoystickLeft 50 (50)  " in lines
     assert "JoystickRight 25 (50) SLOW" in lines
@@ -167,9 +169,11 @@ def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
 
 def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    monitor.take(Heard(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
-    monitor.take(Heard(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
-    monitor.take(Heard(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, ""))  # unknown numbers
+    monitor.take(ReceivedFrame(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
+    monitor.take(ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
+    monitor.take(
+        ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, "")
+    )  # unknown numbers
     for frame in told(deployment)[1:]:
         monitor.take(frame)
     lines = "\n".join(text(monitor, NOW))
@@ -181,7 +185,7 @@ def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
 def test_a_deployment_without_status_messages(deployment: Deployment) -> None:
     axes = {n: replace(axis, status=None) for n, axis in deployment.axes.items()}
     lines = text(Monitor(replace(deployment, axes=axes, status=None)), NOW)
-    assert sum("the deployment gives it no status message" in line for line in lines) == 3
+    assert sum("it has no status message" in line for line in lines) == 3
     assert any("gives the service no status message" in line for line in lines)
 
 

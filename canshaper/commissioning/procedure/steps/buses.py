@@ -7,7 +7,7 @@ from matplotlib.figure import Figure
 
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.interfaces import bus_findings
-from canshaper.commissioning.doctor.listen import heard_findings
+from canshaper.commissioning.doctor.listen import arrival_findings
 from canshaper.commissioning.procedure.bench import Task
 from canshaper.commissioning.procedure.step import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import Traffic, read_traffic
@@ -38,7 +38,7 @@ def run(context: Context) -> Outcome:
     context.bench.drive(deployment, log, Task(words, Script("rest", (), LISTEN_S)))
     traffic = read_traffic(log, deployment)
     outcome = Outcome(files=[log])
-    findings = heard_findings(deployment, traffic.inputs)
+    findings = arrival_findings(deployment, traffic.inputs)
     if not context.bench.simulated:
         findings += bus_findings(deployment.config.buses, deployment.config.tick_ms)
     for name in deployment.config.buses:
