@@ -1,7 +1,7 @@
 """A simulated crane with its controller in this process: where processes share no bus.
 
-As on systems other than Linux. The frames are those of a bus; the controller is the daemon's,
-behind its output guard and in its I/O cycle.
+As on systems other than Linux, and for deployments with several buses. The frames are those of a
+bus; the controller is the daemon's, behind its output guard and in its I/O cycle.
 """
 
 from collections.abc import Mapping, Sequence
@@ -10,9 +10,10 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.adjust import Adjuster
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
-from canshaper.design.lockstep import LockStep
+from canshaper.design.lockstep import LockStep, driven_part
 from canshaper.errors import DriveError
 from canshaper.machine.deployment import Deployment
+from canshaper_sim.cranes import cranes, one_crane
 from canshaper_sim.hand import Hand, Held
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
@@ -27,6 +28,7 @@ class InProcessCrane:
     Args:
         deployment: the machine; its buses are not opened.
         changes: parameters of the crane, NAME=VALUE.
+        crane: which one it is, where the deployment has several; the others' joysticks stand still.
 
     Attributes:
         cycle_ms: of the joysticks.
@@ -35,21 +37,25 @@ class InProcessCrane:
         DriveError: no simulated crane fits the deployment.
     """
 
-    def __init__(self, deployment: Deployment, changes: Sequence[str] = ()) -> None:
-        self._hand = _HeldHand(deployment)
+    def __init__(
+        self, deployment: Deployment, changes: Sequence[str] = (), crane: str | None = None
+    ) -> None:
+        driven = driven_part(deployment, crane)
+        self._hand = _HeldHand(driven)
+        others = [_HeldHand(one_crane(deployment, n)) for n in cranes(deployment) if n != crane]
         self.cycle_ms = self._hand.hand.cycle_ms
         self._controller = Controller(deployment)
         self._adjuster = Adjuster(self._controller)
         self._frames: list[Frame] = []
         try:
-            plant = PlantNode(deployment, changed_parameters([*changes]))
+            plant = PlantNode(driven, changed_parameters([*changes]))
         except ValueError as error:
             raise DriveError(str(error)) from None
         self._lock_step = LockStep(
             deployment,
             Guarded(self._controller),
             plant,
-            [self._hand],
+            [self._hand, *others],
             lambda frame, _time_s: self._frames.append(frame),
             received=deployment.routing.received,
         )

@@ -11,6 +11,7 @@ from typing import Any
 from canshaper.codec.frame import Frame
 from canshaper.daemon import control_client as client
 from canshaper.daemon.loop import run_at_deadlines
+from canshaper.design.lockstep import driven_part
 from canshaper.design.processes import Transport, on_transport
 from canshaper.errors import ControlError
 from canshaper.machine.deployment import Deployment
@@ -114,20 +115,26 @@ class Stage:
             if name == SHAPED:
                 self._control = crane.control
 
-    def drive_here(self, changes: Sequence[str] = ()) -> None:
+    def drive_here(self, changes: Sequence[str] = (), crane: str | None = None) -> None:
         """Put both simulated cranes into this process: where there are no buses to share.
 
         Args:
             changes: parameters of the cranes, NAME=VALUE.
+            crane: which one is driven, where the deployment has several. Then without sliders:
+                they change the numbers of all.
 
         Raises:
-            DriveError: no simulated crane fits the deployment.
+            DriveError: no simulated crane fits the deployment, or there is none of that name.
         """
+        whole = self.deployment
+        self.deployment = driven_part(whole, crane)
         self._seat()
+        if crane:
+            self.sliders, self.positions = {}, {}
         for name in (SHAPED, RAW):
-            crane = InProcessCrane(self.deployment, changes)
-            self._cycle_ms = crane.cycle_ms
-            self.cranes[name] = Seen(self._view(name), {}, shaped=name == SHAPED, here=crane)
+            here = InProcessCrane(whole, changes, crane)
+            self._cycle_ms = here.cycle_ms
+            self.cranes[name] = Seen(self._view(name), {}, shaped=name == SHAPED, here=here)
 
     def _seat(self) -> None:
         """A driver's seat, and the sliders."""

@@ -48,18 +48,17 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 class Studio:
-    """``canshaper studio`` as a process."""
+    """``canshaper studio`` as a process; with no groups its cranes are in that process."""
 
     def __init__(
-        self, *options: str, file: str = "forwarder.yaml", groups: tuple[str, str] | None = None
+        self, *options: str, file: str = "forwarder.yaml", groups: tuple[str, ...] | None = None
     ) -> None:
-        self.groups = groups or free_groups()
-        self._command = [sys.executable, "-m", "canshaper", "studio", file, "--port", "0"]
-        self._command += ["--interface", "udp_multicast", *options]
-        if "--shadow" not in options:
-            self._command += [word for g in self.groups for word in ("--channel", g)]
-        else:
-            self._command += ["--channel", self.groups[0]]
+        self.groups = free_groups() if groups is None else groups
+        self._command = [sys.executable, "-m", "canshaper", "studio", file, "--port", "0", *options]
+        if self.groups:
+            self._command += ["--interface", "udp_multicast"]
+        shown = self.groups[:1] if "--shadow" in options else self.groups
+        self._command += [word for group in shown for word in ("--channel", group)]
         self.start()
 
     def start(self, port: int = 0) -> None:
@@ -173,9 +172,26 @@ class Page:
         self.send(do="enable")
         self.until(lambda s: self.states() == {"ready"}, "axes ready")
 
+    def hold(
+        self, level: float, condition: Callable[[dict[str, Any]], bool], what: str = ""
+    ) -> dict[str, Any]:
+        """Hold all joysticks out until something is so.
+
+        On a busy machine a page is silent for longer than it may be, and enable goes: then again.
+        """
+
+        def held(_shown: dict[str, Any]) -> bool:
+            if self.shown["driver"] != self.hello["page"] or not self.shown["enable"]:
+                self.drive()
+            self.joysticks = dict.fromkeys(self.hello["axes"], level)
+            return condition(self.shown)
+
+        return self.until(held, what)
+
     def states(self) -> set[str]:
-        """Levels of all axes."""
-        return {axis["level"] for c in self.shown["cranes"].values() for axis in c["axes"].values()}
+        """Levels of all axes; one without a status message has none."""
+        axes = [axis for c in self.shown["cranes"].values() for axis in c["axes"].values()]
+        return {axis["level"] for axis in axes if axis["state"]}
 
     def texts(self) -> list[str]:
         """What happened."""

@@ -23,8 +23,11 @@ from canshaper.machine.binding import load_deployment
 from canshaper.studio.client import MOST_BYTES, MOST_NONSENSE, MOST_PER_S
 from canshaper.studio.server import MOST_PAGES
 from canshaper_sim.hand import Hand, Held
+from tests.faults.shipped import NAMES
 from tests.studio.conftest import ROOT, WAIT_S, Listener, Page, Studio, command_of
 
+# Their cranes are in the page's process: each crane has one multicast group.
+SEVERAL_BUSES = ("gateway-forwarder", "two-cranes", "pvedcc-forwarder")
 NONSENSE = [
     "",
     "x",
@@ -59,6 +62,10 @@ NONSENSE = [
 
 def pose(shown: dict[str, Any]) -> list[Any]:
     return [crane["pose"] for crane in shown["cranes"].values()]
+
+
+def flat(poses: list[Any]) -> list[float]:
+    return [number for one in poses for number in one]
 
 
 def valves(shown: dict[str, Any], crane: str) -> list[float]:
@@ -453,15 +460,51 @@ def test_nothing_is_left_in_the_temporary_directory(
     assert not list(tmp_path.iterdir())
 
 
-@pytest.mark.parametrize(
-    "file", ["forwarder-robust", "forwarder-joints", "j1939-forwarder", "canopen-forwarder"]
-)
-def test_every_shipped_machine_can_be_driven(own: Callable[..., Studio], file: str) -> None:
-    with own(file=f"{file}.yaml").page() as page:
+def test_of_two_cranes_the_named_one_is_driven(own: Callable[..., Studio]) -> None:
+    with own("--crane", "rear", file="two-cranes.yaml", groups=()).page() as page:
         page.drive()
-        assert page.joysticks is not None
-        page.joysticks["slew"] = 0.3
-        page.until(lambda s: s["cranes"]["shaped"]["pose"][0] > 1.0, "shaped crane")
-        page.until(lambda s: s["cranes"]["raw"]["pose"][0] > 1.0, "raw crane")
-        assert page.shown["cranes"]["raw"]["axes"]["slew"]["state"] == "moving, unshaped"
-        assert page.shown["cranes"]["shaped"]["axes"]["slew"]["state"] == "moving, shaped"
+        assert page.hello["axes"] == ["slew", "near_far", "lift", "rotator"]
+        names = {source for crane in page.shown["cranes"].values() for source in crane["sources"]}
+        assert any("rear" in name for name in names) and not any("front" in n for n in names)
+
+
+@pytest.mark.parametrize(
+    ("options", "says"),
+    [
+        (("--crane", "middle"), "crane: expected one of front, rear, got 'middle'"),
+        (("--interface", "udp_multicast"), "expected a deployment with one bus and crane"),
+        (("--crane", "rear", "--shadow"), "--crane: expected without --shadow"),
+    ],
+)
+def test_a_wrong_wish_for_two_cranes_is_told(options: tuple[str, ...], says: str) -> None:
+    command = [sys.executable, "-m", "canshaper", "studio", "two-cranes.yaml", *options]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 2
+    assert says in " ".join(done.stderr.split())
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", NAMES)
+def test_every_shipped_machine_is_driven_with_all_its_axes(
+    own: Callable[..., Studio], name: str
+) -> None:
+    """Both cranes move as their joysticks say, and every valve goes back to zero."""
+    groups = () if name in SEVERAL_BUSES else None
+    with own(file=f"{name}.yaml", groups=groups).page() as page:
+        page.drive()
+        before = pose(page.shown)
+
+        def moving(shown: dict[str, Any]) -> bool:
+            cranes = shown["cranes"].items()
+            slew = {n: crane["axes"]["slew"]["state"] for n, crane in cranes}
+            return (
+                slew == {"shaped": "moving, shaped", "raw": "moving, unshaped"}
+                and all(min(valves(shown, n)) > 0.1 for n, _ in cranes)
+                and all(
+                    abs(a - b) > 0.02 for a, b in zip(flat(pose(shown)), flat(before), strict=True)
+                )
+            )
+
+        page.hold(0.3, moving, "all axes of both cranes in motion")
+        page.joysticks = dict.fromkeys(page.hello["axes"], 0.0)
+        page.until(lambda s: not any(valves(s, "shaped") + valves(s, "raw")), "at rest")

@@ -14,6 +14,7 @@ import typer
 
 from canshaper.cli.common import (
     CHANNEL,
+    CRANE,
     INTERFACE,
     SENSOR,
     SET,
@@ -75,6 +76,7 @@ def studio(
     interface: str | None = INTERFACE,
     channel: list[str] | None = CHANNEL,
     changes: list[str] | None = SET,
+    crane: str | None = CRANE,
 ) -> None:
     """Serve a page with a crane to drive: raw and shaped side by side under one joystick.
 
@@ -82,7 +84,8 @@ def studio(
     nothing but joystick frames; everything shown is read from the buses. Without --channel the
     buses are python-can's udp_multicast; with two of them (vcan0 and vcan1) SocketCAN, the first
     for the shaped crane. With --shadow nothing is started and nothing is sent. On other systems
-    than Linux there are no buses: both cranes and their controllers run in this process.
+    than Linux there are no buses, and a deployment with several has too few: both cranes and their
+    controllers run in this process.
 
     With --adjust too the page changes numbers of the running daemon, on its PC, within the limits
     of the file's section "control".
@@ -132,6 +135,8 @@ def studio(
             raise UsageError("--with: expected with a log, a black box, --seed or --campaign")
         if (adjust or control) and not (adjust and shadow):
             raise UsageError("--adjust, --control: expected with --shadow --adjust")
+        if crane and shadow:
+            raise UsageError("--crane: expected without --shadow, which shows all")
         if not LINUX and (shadow or interface or channel):
             raise UsageError(f"studio with a bus: expected Linux, got {sys.platform}")
         from canshaper.studio.commission import Commission
@@ -140,7 +145,7 @@ def studio(
         if shadow:
             stage = _machine(file, interface, channel, (control,) if adjust else None)
         else:
-            stage = _cranes(stack, file, interface, channel or [], changes or [])
+            stage = _cranes(stack, file, interface, channel or [], changes or [], crane)
         own = deployment_path(file) == Path(file)
         commission = Commission(Path(file) if own else None, changes or [], machine=shadow)
         stack.callback(commission.close)
@@ -172,22 +177,25 @@ def _cranes(
     interface: str | None,
     channel: list[str],
     changes: list[str],
+    crane: str | None,
 ) -> "Stage":
-    """Simulated cranes to drive."""
+    """Simulated cranes to drive; of several the first one."""
     from canshaper.studio.crane import copied
     from canshaper.studio.events import Events
     from canshaper.studio.stage import Stage
+    from canshaper_sim.cranes import cranes
 
     directory = Path(stack.enter_context(tempfile.TemporaryDirectory()))
     transports = _transports(interface, channel) if LINUX else []
     _, deployment = copied(deployment_path(file), directory)
-    if len(deployment.config.buses) > 1:
-        raise UsageError("this deployment has several buses; only --shadow shows it")
     stage = Stage(deployment, Events())
-    if LINUX:
+    crane = crane or next(iter(cranes(deployment)), None)
+    if LINUX and len(deployment.config.buses) == 1 and not crane:
         stage.drive(transports, directory, changes)
+    elif interface or channel:
+        raise UsageError("--interface, --channel: expected a deployment with one bus and crane")
     else:
-        stage.drive_here(changes)
+        stage.drive_here(changes, crane)
     return stage
 
 
