@@ -1,5 +1,6 @@
 """A hand on protected joysticks, and the deployment reading them; plain cantools and crccheck."""
 
+import math
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
@@ -125,9 +126,8 @@ class Hand(threading.Thread):
             "LiftUp": int(self.lift > 0),
         }
         # A hand is never quite still.
-        slew = (
-            self.slew - 0.1 * (self._count % 2) if self.slew > 0 and not self.frozen else self.slew
-        )
+        trembles = self.slew and not self.frozen
+        slew = self.slew - math.copysign(0.1 * (self._count % 2), self.slew) * bool(trembles)
         left = self.encode("JoystickLeft", Slew=slew, NearFar=0, Checksum=0, **switches)
         right = self.encode("JoystickRight", Lift=abs(self.lift), Rotate=0, **flags, **switches)
         stop = self.encode("EmergencyStop", Stop=self.stop, AliveCounter=self._count)

@@ -17,6 +17,7 @@ import cantools
 ROOT = Path(__file__).resolve().parents[2]
 FILE = ROOT / "config" / "forwarder.yaml"
 DBC = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc")
+DBC.add_dbc_file(ROOT / "dbc" / "sway-sensor.dbc")
 # Only to end a test that hangs; emulated processors are slow.
 ANSWER_S = 120.0
 JOYSTICKS = (("JoystickLeft", ("Slew", "NearFar")), ("JoystickRight", ("Lift", "Rotate")))

@@ -11,9 +11,10 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import IO
 
-from tests.hil.hand import hand_on, write_deployment
+from tests.hil.hand import hand_on
 from tests.hil.machine import open_bus, service
 from tests.soak.drive import Soak, WrongMove, count_frames
+from tests.soak.sensor import relay, write_files
 
 
 def main() -> int:
@@ -23,7 +24,7 @@ def main() -> int:
     parser.add_argument("--seed", type=int, default=1)
     options = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="canshaper-soak-"))
-    file = write_deployment(folder)
+    file, plant = write_files(folder)
     log = folder / "bus.log"
     wrong: list[str] = []
     begin = told = time.monotonic()
@@ -31,13 +32,14 @@ def main() -> int:
         log.open("wb") as written,
         candump_into(written),
         service(folder / "daemon.log", "run", str(file)) as daemon,
-        service(folder / "plant.log", "sim", str(file)),
+        service(folder / "plant.log", "sim", str(plant)),
         open_bus("vcan0") as bus,
         hand_on("vcan0", folder / "protected.dbc") as hand,
+        relay() as sensor,
     ):
         daemon.wait_log("started file=")
         memory = [_memory_kib(daemon.process.pid)]
-        soak = Soak(daemon, hand, bus, log, options.seed)
+        soak = Soak(daemon, hand, bus, log, relay=sensor, seed=options.seed)
         while time.monotonic() - begin < options.minutes * 60.0:
             try:
                 soak.sequence()
@@ -50,6 +52,7 @@ def main() -> int:
                 minutes = (told - begin) / 60.0
                 print(
                     f"{minutes:.0f} min, {soak.counts['sequences']} sequences, "
+                    f"{soak.counts['sequences with faults of the sensor']} of the sensor, "
                     f"{len(wrong)} wrong moves",
                     flush=True,
                 )

@@ -17,9 +17,12 @@ import can
 from tests.hil.frame_faults import AT_ONCE, FAULTS
 from tests.hil.hand import Hand
 from tests.hil.machine import Service, message_name, wait_for
+from tests.soak.sensor import KINDS, NAMED, Relay
+from tests.soak.sensor_judge import TAIL, Logged, SlewJudge
 
 MARK = 0x7E0
 VALVES = {"Slew": 0x200, "Lift": 0x202}
+STATUSES = {"Slew": "SlewSensedStatus", "Lift": "LiftStatus"}
 STOPPED = ("NEUTRAL_WAIT", "TRIPPED")
 FOREIGN = bytes.fromhex("7DEE")
 # Valve frames between the mark and the fault: the hand's next frame, and what an emulated machine
@@ -50,9 +53,9 @@ class Witness:
         except can.CanError:  # told once, from the time when the interface was down
             self._bus.send(message)
 
-    def until_mark(self) -> list[tuple[int, bytes]]:
-        """Frames (id, data) up to the next mark, which is waited for."""
-        frames: list[tuple[int, bytes]] = []
+    def until_mark(self) -> list[Logged]:
+        """Frames up to the next mark, which is waited for."""
+        frames: list[Logged] = []
         until = time.monotonic() + 120.0
         while True:
             line = self._file.readline()
@@ -63,12 +66,13 @@ class Witness:
                 time.sleep(0.02)
                 continue
             line, self._rest = self._rest + line, ""
-            key, _, data = line.split()[2].partition("#")
+            time_s, _, frame = line.split()[:3]
+            key, _, data = frame.partition("#")
             if len(key) > 3 or data.startswith("R"):  # error frames, remote frames
                 continue
             if int(key, 16) == MARK:
                 return frames
-            frames.append((int(key, 16), bytes.fromhex(data)))
+            frames.append(Logged(int(key, 16), bytes.fromhex(data), float(time_s[1:-1])))
 
 
 class Soak:
@@ -78,9 +82,12 @@ class Soak:
         counts: sequences, faults by name, valve frames and so on.
     """
 
-    def __init__(self, daemon: Service, hand: Hand, bus: can.BusABC, log: Path, seed: int) -> None:
+    def __init__(
+        self, daemon: Service, hand: Hand, bus: can.BusABC, log: Path, *, relay: Relay, seed: int
+    ) -> None:
         self._daemon = daemon
         self._hand = hand
+        self._relay = relay
         self._bus = bus
         self._witness = Witness(log, bus)
         self._random = random.Random(seed)
@@ -103,14 +110,17 @@ class Soak:
     def sequence(self) -> None:
         """Ready, drive, fault, stop, way back; a wrong move raises."""
         pick = self._random
+        self.counts["sequences"] += 1
+        if self.counts["sequences"] % 4 == 0:
+            self._sensor_sequence(pick.choice([*KINDS]))
+            return
         kind = pick.choice([*FAULTS, *self._others, *self._harmless])
         axis = FAULTS[kind].axis if kind in FAULTS else "Slew"
         self._ready(axis)
         value = pick.choice((-1, 1)) * pick.uniform(30.0, 100.0)
         setattr(self._hand, axis.lower(), round(value, 1))
         self._frames(axis, pick.randrange(5, 120))
-        self._witness.mark()
-        self._witness.until_mark()
+        self._marked()
         if kind in self._harmless:
             self._harmless[kind]()
             self._frames(axis, 60)
@@ -119,22 +129,71 @@ class Soak:
         else:
             self._fault(kind, axis)
         self.counts[kind] += 1
-        self.counts["sequences"] += 1
+
+    def _sensor_sequence(self, kind: str) -> None:
+        """A fault of the sway sensor in motion, perhaps before it is trusted; to rest with it."""
+        pick, hand, judge = self._random, self._hand, SlewJudge()
+        self._ready("Slew")
+        self._marked()
+        hand.slew = pick.choice((-1, 1)) * round(pick.uniform(50.0, 100.0), 1)
+        if pick.random() < 0.8 and not self._until_trusted():
+            judge.wrong.append("the sensor is not trusted again")
+        self._frames("Slew", pick.randrange(1, 60))
+        before = self._marked()
+        self._relay.change = KINDS[kind](pick)
+        after = pick.choice(("held", "released", "reversed"))
+        if after == "reversed":
+            hand.slew = -hand.slew
+        if after != "released":
+            self._frames("Slew", 150)
+        held = self._marked()
+        hand.slew = 0.0
+        self._frames("Slew", TAIL + 40)
+        rest = self._marked()
+        judge.read_all(before)
+        judge.begin_fault()
+        judge.read_all(held)
+        if not judge.follows():
+            judge.wrong.append(f"{judge.sensor}, and it does not do what the joystick asks")
+        judge.read_all(rest)
+        if missing := NAMED.get(kind, set()) - {*judge.said}:
+            judge.wrong.append(f"{missing} is not told, only {dict(judge.said)}")
+        if judge.stood_still:
+            self.counts["not judged: joysticks or daemon stood still"] += 1
+            return
+        self.counts[kind] += 1
+        self.counts["sequences with faults of the sensor"] += 1
+        self.counts[f"{kind}, {after}: {judge.sensor}"] += 1
+        self.counts["valve frames judged"] += judge.valves
+        if judge.wrong:
+            raise WrongMove(f"{kind}, {after}: {judge.wrong[:3]} and {len(judge.wrong)} in all")
+
+    def _until_trusted(self) -> bool:
+        """Slew to and fro until the sensor is trusted, its way back; whether it is."""
+        for place in range(1, 150):
+            status = self._status("Slew")
+            if str(status["SwaySensor"]) == "TRUSTED":
+                self.counts["sensor trusted, then its fault"] += 1
+                return True
+            if str(status["State"]) in STOPPED:
+                return False
+            if place % 15 == 0:
+                self._hand.slew = -self._hand.slew
+        return False
 
     def _fault(self, kind: str, axis: str) -> None:
         if kind in FAULTS:
             FAULTS[kind].make(self._hand)
         else:
             self._others[kind]()
-        wait_for(self._bus, f"{axis}Status", lambda s: str(s["State"]) in STOPPED)
+        wait_for(self._bus, STATUSES[axis], lambda s: str(s["State"]) in STOPPED)
         # The fault goes away with the joystick still deflected: nothing may move.
         self._hand.spoil = lambda _id, data: [data]
         self._hand.enable, self._hand.stop = 1, 0
         self._frames(axis, self._random.randrange(5, 40))
-        self._witness.mark()
-        frames = self._witness.until_mark()
+        frames = self._marked()
         frames = frames[_begin(kind, frames) :]
-        valves = [data for key, data in frames if key == VALVES[axis]]
+        valves = [data for key, data, _ in frames if key == VALVES[axis]]
         ours = [data[0] for data in valves if data != FOREIGN]
         moving = FAULTS[kind].moving if kind in FAULTS else AT_ONCE
         self._judge(kind, ours, moving + SLACK)
@@ -149,20 +208,31 @@ class Soak:
 
     # -- parts ---------------------------------------------------------------------------------
 
-    def _status(self, axis: str) -> dict:
+    def _marked(self) -> list[Logged]:
+        """Frames of the log from the last mark to now."""
+        self._witness.mark()
+        return self._witness.until_mark()
+
+    def _drain(self) -> None:
+        """Pass over what has come on the bus up to now."""
         with suppress(can.CanError):  # once, when the interface has gone down
             while self._bus.recv(0):
                 pass
-        return wait_for(self._bus, f"{axis}Status", lambda s: True)
+
+    def _status(self, axis: str) -> dict:
+        self._drain()
+        return wait_for(self._bus, STATUSES[axis], lambda s: True)
 
     def _frames(self, axis: str, count: int) -> None:
-        """Let so many valve frames pass."""
+        """Let so many valve frames pass from now on."""
+        self._drain()
         for _ in range(count):
             wait_for(self._bus, f"{axis}Command", lambda v: True)
 
     def _ready(self, axis: str) -> None:
         """The stated way back, at most 60 presses of the reset."""
         self._hand.rest()
+        self._relay.change = lambda degrees: degrees
         self._send("20000100#0000000000000000")  # the controller has restarted
         for i in range(60):
             self._hand.reset = i % 2
@@ -180,16 +250,14 @@ class Soak:
         self._daemon.process.send_signal(signal.SIGSTOP)
         for _ in range(self._random.randrange(15, 60)):  # more than the joysticks' timeout
             wait_for(self._bus, "JoystickLeft", lambda v: True)
-        self._witness.mark()
-        self._witness.until_mark()  # judged is what comes after
+        self._marked()  # judged is what comes after
         self._daemon.process.send_signal(signal.SIGCONT)
 
     def _interface_down(self) -> None:
         subprocess.run(["ip", "link", "set", "vcan0", "down"], check=True)
         time.sleep(self._random.uniform(0.05, 0.5))
         subprocess.run(["ip", "link", "set", "vcan0", "up"], check=True)
-        self._witness.mark()
-        self._witness.until_mark()  # judged is what comes after
+        self._marked()  # judged is what comes after
 
     def _step_clock(self) -> None:
         now = time.clock_gettime(time.CLOCK_REALTIME)
@@ -213,21 +281,23 @@ class Soak:
         file.write_text(good)
 
 
-def _begin(kind: str, frames: list[tuple[int, bytes]]) -> int:
+def _begin(kind: str, frames: list[Logged]) -> int:
     """Place of the first frame that shows the fault; 0 where the mark is as near.
 
     A silence begins with the last frame before it: the last one before the valve's first neutral.
     """
     shows = [
         place
-        for place, (key, data) in enumerate(frames)
+        for place, (key, data, _) in enumerate(frames)
         if (kind in FAULTS and FAULTS[kind].begins(key.to_bytes(2, "big"), data))
         or (kind == "second sender" and data == FOREIGN)
     ]
     if kind not in ("silent", "emergency stop lost"):
         return shows[0] if shows else 0
     valve = VALVES[FAULTS[kind].axis]
-    neutral = next((i for i, (key, data) in enumerate(frames) if key == valve and not data[0]), 0)
+    neutral = next(
+        (i for i, (key, data, _) in enumerate(frames) if key == valve and not data[0]), 0
+    )
     return max((place for place in shows if place < neutral), default=0)
 
 
