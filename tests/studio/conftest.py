@@ -274,7 +274,7 @@ def tab(chromium: "Browser") -> Iterator[Callable[..., "Tab"]]:
     faults: list[str] = []
     tabs: list[Tab] = []
 
-    def open_one(studio: Studio, **options: object) -> "Tab":
+    def open_one(studio: Studio, **options: Any) -> "Tab":
         tabs.append(opened(chromium, studio.url, faults, **options))
         return tabs[-1]
 

@@ -1,6 +1,6 @@
 """How much memory the page takes while it is driven.
 
-nice python -m tests.studio.heap --minutes 10
+nice python -m tests.studio.heap --minutes 26
 """
 
 import argparse

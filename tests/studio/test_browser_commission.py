@@ -5,8 +5,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
+from playwright.sync_api import expect
 
+from tests.studio.browser import WAIT_MS
 from tests.studio.conftest import ROOT, Studio
+from tests.studio.test_browser_languages import LOCALES, is_good
+from tests.studio.test_languages import texts
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser
@@ -24,6 +28,7 @@ def test_a_step_is_run_and_accepted(chromium: "Browser", machine: Path) -> None:
     studio = Studio(file=str(machine))
     try:
         tab = chromium.new_page(viewport={"width": 390, "height": 800})
+        tab.set_default_timeout(WAIT_MS)
         faults: list[str] = []
         tab.on("console", lambda message: faults.append(message.text))
         tab.on("pageerror", lambda error: faults.append(str(error)))
@@ -40,5 +45,22 @@ def test_a_step_is_run_and_accepted(chromium: "Browser", machine: Path) -> None:
         tab.locator("#pictures img").wait_for()
         assert faults == []
         tab.close()
+    finally:
+        studio.stop()
+
+
+def test_it_speaks_every_language(chromium: "Browser", machine: Path) -> None:
+    """What the procedure itself says is English, and marked as such."""
+    studio = Studio(file=str(machine))
+    try:
+        for language, locale in LOCALES.items():
+            context = chromium.new_context(locale=locale, viewport={"width": 390, "height": 800})
+            page, table = context.new_page(), texts(language)
+            page.goto(f"{studio.url}commission")
+            expect(page.locator("#title")).to_have_text(table["step.buses"])
+            expect(page.locator("#run")).to_have_text(table["commission.run"])
+            expect(page.locator("#steps small").first).to_have_text(table["status.open"])
+            is_good(page, language)
+            context.close()
     finally:
         studio.stop()

@@ -1,5 +1,6 @@
 // Command, sway and states of an axis: the last ten minutes, of which a part is shown.
 import { History } from "/static/history.js";
+import { nameOf, text } from "/static/language.js";
 import { Lanes, spans } from "/static/lanes.js";
 import uPlot from "/static/vendor/uplot.js";
 
@@ -39,10 +40,11 @@ export class Charts {
     this.destroy();
     const { cranes } = this.hello;
     const color = (name) => css(this.hello.colors[name]);
-    const lines = [{ label: "joystick", stroke: css("--joystick"), of: "joystick", dash: [5, 4] },
-      ...cranes.map((c) => ({ label: c === "machine" ? "valve" : c, stroke: color(c), of: `valve ${c}`, width: 2 }))];
-    const sways = [...cranes.map((c) => ({ label: c === "machine" ? "measured" : c, stroke: color(c), of: `sway ${c}`, width: 2 })),
-      { label: "model", stroke: css("--predicted"), of: `model ${this.main}`, dash: [3, 3] }];
+    const named = (crane) => ({ label: nameOf("crane", crane), name: crane }); // in the legend, in the table
+    const lines = [{ label: text("chart.joystick"), name: "joystick", stroke: css("--joystick"), of: "joystick", dash: [5, 4] },
+      ...cranes.map((c) => ({ ...(c === "machine" ? { label: text("chart.valve"), name: "valve" } : named(c)), stroke: color(c), of: `valve ${c}`, width: 2 }))];
+    const sways = [...cranes.map((c) => ({ ...(c === "machine" ? { label: text("chart.measured"), name: "measured" } : named(c)), stroke: color(c), of: `sway ${c}`, width: 2 })),
+      { label: text("chart.model"), name: "model", stroke: css("--predicted"), of: `model ${this.main}`, dash: [3, 3] }];
     this.command = this.plot("chart-command", "legend-command", lines, 100, { range: [-105, 105] });
     this.sway = this.plot("chart-sway", "legend-sway", sways, 1, {
       range: (_, low, high) => {
@@ -51,7 +53,7 @@ export class Charts {
       },
     });
     this.states = this.plot("chart-states", "legend-states",
-      cranes.map((c) => ({ label: c, stroke: color(c) })), 1, { range: [0, 1] }, (u) => this.lanes.draw(u));
+      cranes.map((c) => ({ ...named(c), stroke: color(c) })), 1, { range: [0, 1] }, (u) => this.lanes.draw(u));
   }
 
   destroy() {
@@ -69,7 +71,7 @@ export class Charts {
       scales: { x: { time: false, range: () => this.range() }, y },
       hooks: { setCursor: [(u) => this.showCursor(u)], ready: [(u) => this.listen(u)], draw: [...(paint ? [paint] : []), (u) => this.line(u)] },
       axes: paint ? [{ show: false }, { ...axis, size: 38, values: (_, v) => v.map(() => ""), grid: { show: false } }]
-        : [{ ...axis, size: 22, values: (_, v) => v.map((s) => (s || this.stoppedAt || this.at !== null ? `${s} s` : "now")) }, { ...axis, size: 38 }],
+        : [{ ...axis, size: 22, values: (_, v) => v.map((s) => (s || this.stoppedAt || this.at !== null ? `${s} s` : text("chart.now"))) }, { ...axis, size: 38 }],
       series: [{}, ...series.map((s) => ({ stroke: s.stroke, width: s.width ?? 1.5, dash: s.dash, points: { show: false } }))],
     }, [[], ...series.map(() => [])], host);
     plot.lines = series;
@@ -80,7 +82,7 @@ export class Charts {
       const line = document.createElement("i");
       line.style.setProperty("--color", s.stroke);
       const value = document.createElement("b");
-      item.append(line, s.label, value);
+      item.append(line, value, s.label); // of a long name the end is cut off, not the value
       return item;
     }));
     plot.values = legend.querySelectorAll("b");
@@ -127,7 +129,7 @@ export class Charts {
     const words = states && t !== null ? this.lanes.words(t) : [];
     plot.values?.forEach((element, i) => {
       const value = t === null || states ? null : plot.data[i + 1][at];
-      set(element, words[i] ? ` ${words[i]}` : value == null ? "" : ` ${value.toFixed(1)}`);
+      set(element, words[i] ?? (value == null ? "" : value.toFixed(1)));
     });
     if (!states) return;
     const mark = t === null ? null : this.lanes.near(plot);
@@ -166,6 +168,8 @@ export class Charts {
   pause(on) {
     this.stoppedAt = on ? this.history.last ?? null : null;
     this.drawn = 0;
+    // The range may be the same one, but its end is now no more.
+    for (const plot of [this.command, this.sway]) plot.redraw(false, true);
   }
 
   /** Show more seconds, or fewer. */
@@ -179,7 +183,7 @@ export class Charts {
   csv() {
     const plots = [["command", this.command], ["sway", this.sway]];
     const columns = this.hello.axes.flatMap((axis) => plots.flatMap(([what, plot]) =>
-      plot.lines.map((line) => [`${axis} ${what} ${line.label}`, `${axis} ${line.of}`, plot.factor])));
+      plot.lines.map((line) => [`${axis} ${what} ${line.name}`, `${axis} ${line.of}`, plot.factor])));
     const states = this.hello.axes.flatMap((axis) => this.hello.cranes.map((c) => [axis, c]));
     const titles = [...columns.map(([name]) => name), ...states.map(([axis, c]) => `${axis} state ${c}`)];
     const lines = [["seconds", ...titles].join(",")];
@@ -236,7 +240,7 @@ export class Charts {
     this.axis = axis;
     this.drawn = 0;
     const way = this.hello.sway_of[axis];
-    document.getElementById("sway-of").textContent = way ? `degrees, ${way} the boom` : "this axis excites none";
+    document.getElementById("sway-of").textContent = text(way ? `chart.${way}` : "chart.nosway");
   }
 
   resize() {

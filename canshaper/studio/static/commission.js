@@ -1,4 +1,5 @@
 // The commissioning, step by step: what the server says is shown, nothing is kept here.
+import { language, text, translate } from "/static/language.js";
 import { chosenTheme } from "/static/theme.js";
 
 const byId = (id) => document.getElementById(id);
@@ -43,22 +44,22 @@ function draw() {
   const step = current();
   byId("file").textContent = shown.file ? `${shown.file} ${shown.crane ?? ""}` : "";
   byId("kind").hidden = !shown.file;
-  byId("kind").textContent = shown.machine ? "machine: at the terminal" : "rehearsal, simulated crane";
+  byId("kind").textContent = text(shown.machine ? "commission.machine" : "commission.rehearsal");
   byId("report").hidden = !shown.report;
   byId("report").href = `/commission/files/${shown.report}`;
   byId("steps").replaceChildren(...shown.steps.map((one) => item(one, step)));
   if (step) drawStep(step);
   else if (!asked) {
-    byId("title").textContent = "No file to commission";
-    byId("said").textContent = "A shipped file is copied first: canshaper studio machine.yaml";
+    byId("title").textContent = text("commission.nofile");
+    say(text("commission.copy", { command: "canshaper studio machine.yaml" }), language);
   }
 }
 
 function item(one, step) {
   const li = element("li", undefined, { className: one.status });
-  const button = element("button", `${one.name}: ${one.title}`);
+  const button = element("button", `${one.name}: ${titleOf(one)}`);
   if (one === step) button.setAttribute("aria-current", "step");
-  button.append(element("small", one.at ? `${one.status}, ${one.at.replace("T", " ")}` : one.status));
+  button.append(element("small", [text(`status.${one.status}`), one.at?.replace("T", " ")].filter(Boolean).join(", ")));
   button.addEventListener("click", () => { chosen = one.name; draw(); });
   li.append(button);
   return li;
@@ -66,21 +67,34 @@ function item(one, step) {
 
 function drawStep(step) {
   const busy = asked || Boolean(shown.busy);
-  byId("title").textContent = step.title;
-  byId("said").textContent = busy ? "Under way" : step.why || step.status;
+  byId("title").textContent = titleOf(step);
+  if (!busy && step.why) say(step.why, "en");
+  else say(text(busy ? "commission.busy" : `status.${step.status}`), language);
   for (const [id, offered] of [["run", true], ["accept", step.proposed], ["skip", step.status === "open"]]) {
     byId(id).hidden = shown.machine || !offered;
     byId(id).disabled = busy;
   }
-  byId("run").textContent = step.at ? "Run again" : "Run";
+  byId("run").textContent = text(step.at ? "commission.again" : "commission.run");
   byId("poor").replaceChildren(...step.poor.map((fault) => element("li", fault)));
   byId("parts").replaceChildren(...step.parts.map(part));
-  byId("wrote").textContent = step.proposed ? `Would write into ${shown.file}` : "Written";
+  byId("wrote").textContent = text(step.proposed ? "commission.would" : "commission.written", { file: shown.file });
   byId("wrote").hidden = byId("diff").hidden = !step.diff;
   byId("diff").replaceChildren(...step.diff.split("\n").map(line));
   byId("pictures").replaceChildren(...step.pictures.map((name) => element("img", undefined, {
-    src: `/commission/files/${name}?${encodeURIComponent(step.at)}`, alt: `${step.title}: ${name}`,
+    src: `/commission/files/${name}?${encodeURIComponent(step.at)}`, alt: `${titleOf(step)}: ${name}`,
   })));
+}
+
+/** Title of a step; one that the page does not know has that of the procedure. */
+function titleOf(step) {
+  const key = `step.${step.name}`;
+  const found = text(key);
+  return found === key ? step.title : found;
+}
+
+/** Say how the step is: what the procedure says is English. */
+function say(words, lang) {
+  Object.assign(byId("said"), { textContent: words, lang });
 }
 
 function part(one) {
@@ -110,5 +124,6 @@ for (const what of ["run", "accept", "skip"]) {
     ask(`/commission/${what}/${name}`, "POST");
   });
 }
+translate(byId("language"));
 document.documentElement.dataset.theme = chosenTheme();
 ask("/commission/state");

@@ -1,6 +1,7 @@
 // One crane in three dimensions: its parts, its name, and where they are. z is up, as in the model.
 import * as THREE from "/static/vendor/three.js";
-import { boomPoints, grapplePoints, MODELLED, SIMULATED } from "/static/geometry.js";
+import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
 const TRAIL = 90;
@@ -117,7 +118,7 @@ export class Crane {
   write() {
     const canvas = document.createElement("canvas");
     const pen = canvas.getContext("2d");
-    const lines = this.modelled ? [this.title, this.simulated ? SIMULATED : MODELLED] : [this.title];
+    const lines = this.modelled ? [this.title, text(this.simulated ? "page.simulated" : "page.modelled")] : [this.title];
     [canvas.width, canvas.height] = [512, 128];
     pen.textAlign = "center";
     lines.forEach((line, i) => {
@@ -126,8 +127,8 @@ export class Crane {
       pen.strokeStyle = css("--bg").getStyle(); // readable in front of its own colour
       pen.lineWidth = 8;
       pen.lineJoin = "round";
-      pen.strokeText(line, 256, i ? 112 : 60);
-      pen.fillText(line, 256, i ? 112 : 60);
+      pen.strokeText(line, 256, i ? 112 : 60, canvas.width);
+      pen.fillText(line, 256, i ? 112 : 60, canvas.width);
     });
     this.label.material.map?.dispose();
     this.label.material.map = new THREE.CanvasTexture(canvas);

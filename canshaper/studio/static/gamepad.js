@@ -1,15 +1,16 @@
 // A gamepad: its sticks, and what its buttons do. A button counts when it goes down, not before it
 // was seen up: one that is held while the gamepad is connected does nothing.
 
+import { nameOf, text } from "/static/language.js";
+
 /** By the number in the standard mapping of browsers. */
 const BUTTONS = [
-  { number: 0, name: "A", action: "enable", does: "enable" },
-  { number: 1, name: "B", action: "release", does: "release enable: stop" },
-  { number: 2, name: "X", action: "antisway", does: "anti-sway" },
-  { number: 3, name: "Y", action: "profile", does: "next profile" },
-  { number: 9, name: "Start", action: "reset", does: "reset" },
+  { number: 0, name: "A", action: "enable" },
+  { number: 1, name: "B", action: "release" },
+  { number: 2, name: "X", action: "antisway" },
+  { number: 3, name: "Y", action: "profile" },
+  { number: 9, name: "Start", action: "reset" },
 ];
-const STICKS = ["left stick ↔", "left stick ↕", "right stick ↔", "right stick ↕"];
 const DEAD = 0.1;
 
 export class Gamepad {
@@ -43,8 +44,9 @@ export class Gamepad {
     this.host.hidden = !pad;
     if (!pad) return;
     const usual = !pad.mapping || pad.mapping === "standard";
-    const rows = [...this.ways.map((w) => [STICKS[w.gamepad], w.axis.replace("_", "-")]),
-      ...BUTTONS.filter(({ action }) => this.on[action]).map(({ number, name, does }) => [usual ? name : `button ${number + 1}`, does])];
+    const rows = [...this.ways.map((w) => [text(`stick.${w.gamepad}`), nameOf("axis", w.axis)]),
+      ...BUTTONS.filter(({ action }) => this.on[action]).map(({ number, name, action }) =>
+        [usual ? name : text("gamepad.button", { number: number + 1 }), text(`gamepad.${action}`)])];
     this.host.replaceChildren(...rows.flatMap(([part, does]) => [
       Object.assign(document.createElement("kbd"), { textContent: part }),
       Object.assign(document.createElement("span"), { textContent: does }),

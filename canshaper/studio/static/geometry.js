@@ -1,10 +1,6 @@
 // Where the parts of a crane are: metres, z upwards, the boom in the plane of radius and height.
 // As in sim/canshaper_sim/kinematics.py and grapple.py.
 
-/** What is to be known of a crane that is not measured. */
-export const MODELLED = "sway: the daemon's model";
-export const SIMULATED = "pose and sway: simulated";
-
 const RAD = Math.PI / 180;
 const COMFORT = 0.94; // of the reach: a straight arm is hardly ever driven
 

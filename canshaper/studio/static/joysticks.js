@@ -1,5 +1,6 @@
 // Where the joysticks are: mouse on two pads, keyboard, gamepad. The largest deflection counts.
 import { Gamepad } from "/static/gamepad.js";
+import { nameOf, text } from "/static/language.js";
 
 const RAMP_S = 0.12; // a hand moves a joystick from neutral to full in that time
 const FINE = 0.4; // with Shift
@@ -12,9 +13,6 @@ const WAYS = [
   { pad: 1, way: "y", keys: ["ArrowUp", "ArrowDown"], gamepad: 3 },
   { pad: 1, way: "x", keys: ["ArrowRight", "ArrowLeft"], gamepad: 2 },
 ];
-const NAMES = { slew: ["right", "left"], near_far: ["out", "in"], lift: ["up", "down"],
-  lift_cylinder: ["up", "down"], knuckle: ["out", "in"], extension: ["out", "in"] };
-
 const ARROWS = { ArrowUp: "↑", ArrowDown: "↓", ArrowLeft: "←", ArrowRight: "→" };
 const SHIFTS = ["ShiftLeft", "ShiftRight"];
 
@@ -44,11 +42,11 @@ export class Joysticks {
   nameKeys(names) {
     const keyName = (code) => ARROWS[code] ?? (names?.get(code) ?? code.replace("Key", "")).toUpperCase();
     this.keys.replaceChildren();
-    const rows = this.ways.map((w) => [w.keys.map(keyName), `${w.axis.replace("_", "-")} ${(NAMES[w.axis] ?? ["+", "−"]).join(" / ")}`]);
-    for (const [names, text] of [...rows, [["⇧"], "gently"], [["Space"], "release enable: stop"]]) {
+    const rows = this.ways.map((w) => [w.keys.map(keyName), `${nameOf("axis", w.axis)} ${wayOf(w.axis)}`]);
+    for (const [names, does] of [...rows, [["⇧"], text("key.gently")], [[text("key.space")], text("key.stop")]]) {
       const left = document.createElement("span");
       for (const name of names) left.append(Object.assign(document.createElement("kbd"), { textContent: name }), " ");
-      this.keys.append(left, Object.assign(document.createElement("span"), { textContent: text }));
+      this.keys.append(left, Object.assign(document.createElement("span"), { textContent: does }));
     }
   }
 
@@ -58,7 +56,7 @@ export class Joysticks {
     const svg = document.createElementNS(SVG, "svg");
     svg.setAttribute("viewBox", "-60 -60 120 120");
     svg.setAttribute("role", "application");
-    svg.setAttribute("aria-label", `Joystick for ${ways.map((w) => w.axis).join(" and ")}; keys as shown`);
+    svg.setAttribute("aria-label", text("page.pad", { axes: ways.map((w) => nameOf("axis", w.axis)).join(", ") }));
     svg.id = `pad${number}`;
     const add = (name, attributes) => {
       const element = document.createElementNS(SVG, name);
@@ -70,9 +68,9 @@ export class Joysticks {
     if (ways.some((w) => w.way === "x")) add("line", { class: "cross", x1: -46, x2: 46, y1: 0, y2: 0 });
     if (ways.some((w) => w.way === "y")) add("line", { class: "cross", x1: 0, x2: 0, y1: -46, y2: 46 });
     for (const w of ways) {
-      const label = add("text", { class: "label", "text-anchor": "middle",
-        x: w.way === "x" ? 38 : 0, y: w.way === "x" ? -6 : -50 });
-      label.textContent = w.axis.replace("_", "-");
+      const label = add("text", { class: "label", "text-anchor": w.way === "x" ? "end" : "middle",
+        x: w.way === "x" ? 55 : 0, y: w.way === "x" ? -17 : -50 });
+      label.textContent = nameOf("axis", w.axis);
     }
     const knob = add("circle", { class: "knob", r: 13 });
     const sent = add("circle", { class: "sent", r: 3.5 });
@@ -140,6 +138,13 @@ export class Joysticks {
       }
     }
   }
+}
+
+/** Names of the two ways of an axis, the positive one first. */
+function wayOf(axis) {
+  const key = `way.${axis}`;
+  const found = text(key);
+  return found === key ? "+ / −" : found;
 }
 
 /** Change an attribute only where it is another: each change draws the pad anew. */

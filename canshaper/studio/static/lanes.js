@@ -1,5 +1,7 @@
 // States of an axis over time, a lane for each crane, and what happened as marks above them.
 
+import { text } from "/static/language.js";
+
 const MARK_PX = 9; // height of the strip of marks
 const NEAR_PX = 6; // so near to the cursor a mark is named
 const HATCH_PX = 5;
@@ -101,7 +103,7 @@ export class Lanes {
   words(t) {
     return this.names.map((name) => {
       const span = (this.spans[name] ?? []).findLast((one) => one.from <= t && t <= one.to);
-      return span?.state ?? "not known";
+      return span?.state ?? text("page.unknown");
     });
   }
 

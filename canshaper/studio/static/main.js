@@ -1,4 +1,5 @@
 // The page: it sends where the joysticks are and shows what is on the buses, nothing else.
+import { language, nameOf, text } from "/static/language.js";
 import { Link } from "/static/link.js";
 import { Numbers } from "/static/numbers.js";
 import { Panel } from "/static/panel.js";
@@ -29,7 +30,7 @@ function begin(found) {
   closedFor = "";
   const same = hello && JSON.stringify({ ...found, page: 0 }) === JSON.stringify({ ...hello, page: 0 });
   hello = found;
-  byId("file").textContent = hello.machine ? `${hello.file} — listening only` : hello.file;
+  byId("file").textContent = hello.machine ? text("file.listening", { file: hello.file }) : hello.file;
   byId("controls").hidden = !hello.drives;
   byId("hands").hidden = !hello.drives;
   byId("profile").hidden = !hello.profiles;
@@ -64,21 +65,22 @@ function show(message) {
   shell.charts.add(message);
   shell.show(message);
   panel.show(message, mine);
-  for (const [, time, source, text, level, clock] of message.events ?? []) {
-    panel.event(time, source, text, level);
-    shell.charts.mark(clock, source, text, level);
+  for (const [, time, source, words, level, clock] of message.events ?? []) {
+    panel.event(time, source, words, level);
+    shell.charts.mark(clock, source, words, level);
   }
-  for (const text of message.refused ?? []) panel.event(Date.now() / 1000, "page", `refused: ${text}`, "warn");
+  for (const why of message.refused ?? []) panel.event(Date.now() / 1000, "page", text("event.refused", { text: why }), "warn", language);
   inForce = message.numbers?.table ?? inForce;
   shell.residual.follow([message.sliders, inForce]);
   if (message.numbers) numbers.show(message.numbers);
   if (message.difference) numbers.ask(message.difference);
   fresh();
   byId("hint").hidden = !mine || message.enable;
+  byId("language").disabled = mine && message.enable; // another one begins the page anew
   if (!hello.drives) return;
   byId("seat").hidden = false;
-  if (mine) pill("seat", message.enable ? "you drive" : "you drive: press enable", message.enable ? "ok" : "warn");
-  else pill("seat", message.driver === null ? "nobody drives" : "another page drives", "warn");
+  if (mine) pill("seat", text(message.enable ? "seat.drive" : "seat.enable"), message.enable ? "ok" : "warn");
+  else pill("seat", text(message.driver === null ? "seat.nobody" : "seat.other"), "warn");
   byId("take").hidden = mine;
   for (const id of ["enable", "antisway", "reset", "profile"]) byId(id).disabled = !mine;
   const profiles = Object.values(Object.values(message.cranes)[0].axes).map((axis) => axis.profile);
@@ -100,22 +102,20 @@ function fresh() {
   stale = old;
   byId("banner").hidden = !old || !hello;
   if (!old) {
-    const silent = Object.entries(shown?.cranes ?? {}).filter(([, crane]) => !crane.daemon).map(([name]) => name);
-    if (silent.length) pill("link", `daemon silent: ${silent.join(", ")}`, "bad");
-    else pill("link", "connected", "ok");
+    const silent = Object.entries(shown?.cranes ?? {}).filter(([, crane]) => !crane.daemon).map(([name]) => nameOf("crane", name));
+    if (silent.length) pill("link", text("link.silent", { cranes: silent.join(", ") }), "bad");
+    else pill("link", text("link.connected"), "ok");
   } else if (hello) {
-    pill("link", "no connection", "bad");
-    const since = Number.isFinite(age) ? ` for ${(age / 1000).toFixed(1)} s` : "";
-    const hand = hello.drives ? "; joysticks are in neutral there" : "";
-    byId("banner").textContent = closedFor
-      ? `The studio has closed the connection: ${closedFor}. Trying again.`
-      : `No connection to the studio${since}: all that is shown is old${hand}. Trying again.`;
+    pill("link", text("link.none"), "bad");
+    const since = Number.isFinite(age) ? text("banner.oldFor", { s: (age / 1000).toFixed(1) }) : text("banner.old");
+    const hand = hello.drives ? ` ${text("banner.neutral")}` : "";
+    byId("banner").textContent = closedFor ? text("banner.closed", { reason: closedFor }) : since + hand;
   }
 }
 
-function pill(id, text, level) {
+function pill(id, words, level) {
   const element = byId(id);
-  if (element.textContent !== text) element.textContent = text;
+  if (element.textContent !== words) element.textContent = words;
   element.className = `pill ${level}`;
 }
 
@@ -174,10 +174,11 @@ setInterval(() => {
 /** Say in large words that the page stood still. */
 function hiccup(ms, now) {
   const drove = shown?.driver === hello.page && shown.enable;
-  byId("hiccup").querySelector("b").textContent = `The page stood still for ${(ms / 1000).toFixed(1)} s`;
-  byId("hiccup").querySelector("span").textContent = drove ? "The joysticks went to neutral: let go of them, then drive on." : "";
+  const stood = text("hiccup.stood", { s: (ms / 1000).toFixed(1) });
+  byId("hiccup").querySelector("b").textContent = stood;
+  byId("hiccup").querySelector("span").textContent = drove ? text("hiccup.drove") : "";
   byId("hiccup").hidden = false;
-  panel?.event(Date.now() / 1000, "page", `the page stood still for ${(ms / 1000).toFixed(1)} s`, "warn");
+  panel?.event(Date.now() / 1000, "page", stood, "warn", language);
   hiccupUntil = now + TOLD_MS;
 }
 

@@ -1,5 +1,7 @@
 // Numbers of a running machine: what is in force, another value, the way back, and the file.
 
+import { text } from "/static/language.js";
+
 const make = (tag, attributes = {}, ...children) => {
   const element = Object.assign(document.createElement(tag), attributes);
   element.append(...children);
@@ -49,10 +51,10 @@ export class Numbers {
   }
 
   row(key, { low, high }) {
-    const input = make("input", { type: "number", min: low, max: high, step: "any", ariaLabel: `Another value of ${key}`, oninput: () => this.ready() });
+    const input = make("input", { type: "number", min: low, max: high, step: "any", ariaLabel: text("numbers.anotherOf", { key }), oninput: () => this.ready() });
     const cells = { now: make("td"), file: make("td"), other: make("td"), input };
     this.part("table").append(make("tr", {}, make("td", {}, key), cells.now, cells.file, cells.other,
-      make("td", {}, `${short(low)} to ${short(high)}`), make("td", {}, input)));
+      make("td", {}, text("numbers.fromTo", { low: short(low), high: short(high) })), make("td", {}, input)));
     return cells;
   }
 
@@ -76,13 +78,13 @@ export class Numbers {
   }
 
   /** Show what would be written, and ask. */
-  ask({ text, hash }) {
+  ask({ text: lines, hash }) {
     this.hash = hash;
-    this.part("lines").replaceChildren(...(text || "nothing: the file has the numbers that are in force").split("\n").map((line) => {
+    this.part("lines").replaceChildren(...(lines || text("numbers.nothing")).split("\n").map((line) => {
       const level = { "+": "ok", "-": "bad" }[line[0]] ?? "quiet";
       return make("span", { className: level }, `${line}\n`);
     }));
-    this.part("really").disabled = !text;
+    this.part("really").disabled = !lines;
     this.dialog.showModal();
   }
 }

@@ -1,12 +1,10 @@
 // States, events, sliders and the large numbers.
 
+import { language, meaning, nameOf, text } from "/static/language.js";
+
 const MOST_EVENTS = 300;
 const OLD_S = 0.5;
 const SHOW_MS = 150; // no one reads faster
-const WORDS = {
-  calm: ["Filter", "fast", "calm"],
-  length: ["Pendulum length that the filter believes", "shorter", "longer"],
-};
 
 const make = (tag, attributes = {}, ...children) => {
   const element = document.createElement(tag);
@@ -31,14 +29,15 @@ export class Panel {
     this.shownAt = -SHOW_MS;
     this.cells = {};
     const body = document.querySelector("#axes tbody");
-    body.replaceChildren(make("tr", {}, make("th", {}, "axis"), ...hello.cranes.map((c) => coloured(make("th", {}, c), hello.colors[c]))));
+    body.replaceChildren(make("tr", {}, make("th", {}, text("page.axis")), ...hello.cranes.map((c) => coloured(make("th", {}, nameOf("crane", c)), hello.colors[c]))));
     for (const axis of hello.axes) {
-      const row = make("tr", {}, make("td", {}, axis.replace("_", "-")));
+      const row = make("tr", {}, make("td", {}, nameOf("axis", axis)));
       for (const crane of hello.cranes) {
         const state = make("span", { className: "state" });
-        const reason = make("div", { className: "quiet" });
-        this.cells[`${crane} ${axis}`] = { state, reason };
-        row.append(make("td", {}, state, reason));
+        const reason = make("div", { className: "quiet", lang: "en" });
+        const means = make("div", { className: "means" });
+        this.cells[`${crane} ${axis}`] = { state, reason, means };
+        row.append(make("td", {}, state, reason, means));
       }
       body.append(row);
     }
@@ -47,7 +46,7 @@ export class Panel {
       { number: make("b", { id: `swing-${crane}` }, "–"), from: make("span", { className: "quiet" }) }]));
     // In the order in which the cranes stand in the picture.
     swings.replaceChildren(...Object.entries(this.swings).map(([crane, { number, from }]) => {
-      const box = make("div", { className: "swing" }, make("b", {}, crane), number, from);
+      const box = make("div", { className: "swing" }, make("b", {}, nameOf("crane", crane)), number, from);
       box.style.setProperty("--color", `var(${hello.colors[crane]})`);
       return box;
     }));
@@ -64,7 +63,7 @@ export class Panel {
     const host = document.getElementById("sliders");
     host.replaceChildren();
     for (const [name, { range, numbers }] of Object.entries(this.hello.sliders)) {
-      const [title, low, high] = WORDS[name];
+      const title = text(`slider.${name}`);
       // By its logarithm: half and double are as far from the middle.
       const input = make("input", { type: "range", id: `slider-${name}`, min: Math.log2(range[0]), max: Math.log2(range[1]), step: 0.01, value: 0 });
       const value = make("b");
@@ -75,7 +74,7 @@ export class Panel {
         const byAxis = {};
         for (const [key, v, p] of numbers) {
           const [, axis, , number] = key.split(".");
-          (byAxis[axis.replace("_", "-")] ??= []).push(`${number.replace(/_(s|m|rad_s)$/, "")} ${(v * f ** p).toPrecision(3)}`);
+          (byAxis[nameOf("axis", axis)] ??= []).push(`${number.replace(/_(s|m|rad_s)$/, "")} ${(v * f ** p).toPrecision(3)}`);
         }
         set(found, Object.entries(byAxis).map(([axis, all]) => `${axis} ${all.join(" ")}`).join(" · "));
       };
@@ -84,19 +83,19 @@ export class Panel {
         showFactor(factor());
         slide(name, factor());
       });
-      const back = make("button", { className: "back", title: "Back to what the file says", onclick: () => {
+      const back = make("button", { className: "back", title: text("slider.back"), onclick: () => {
         input.value = 0;
         input.dispatchEvent(new Event("input"));
       } }, "× 1.00");
-      back.setAttribute("aria-label", `${title}: back to × 1.00`);
+      back.setAttribute("aria-label", text("slider.backTo", { title }));
       const label = make("label", { htmlFor: input.id }, `${title} `, value);
       host.append(make("div", { className: "slider" }, back, label, input,
-        make("div", { className: "ends" }, make("span", {}, low), found, make("span", {}, high))));
+        make("div", { className: "ends" }, make("span", {}, text(`slider.${name}.low`)), found, make("span", {}, text(`slider.${name}.high`)))));
       this.sliders[name] = { input, showFactor, back };
       showFactor(1);
     }
     if (!host.children.length && this.hello.drives) {
-      host.append(make("p", { className: "quiet" }, "No filter of this deployment has numbers for sliders."));
+      host.append(make("p", { className: "quiet" }, text("slider.none")));
     }
   }
 
@@ -109,13 +108,15 @@ export class Panel {
       const { number, from } = this.swings[name];
       const known = crane.swing != null && crane.sway;
       set(number, known ? `±${crane.swing.toFixed(1)}°` : "–");
-      if (!known) set(from, "swing not known");
-      else set(from, crane.measured ? "swing, measured" : crane.simulated ? "swing, simulated" : "swing, by the model");
+      if (!known) set(from, text("swing.unknown"));
+      else set(from, text(crane.measured ? "swing.measured" : crane.simulated ? "swing.simulated" : "swing.modelled"));
       from.parentElement.classList.toggle("modelled", Boolean(known && !crane.measured));
       if (this.hello.machine) this.showSources(crane.sources);
       for (const [axis, values] of Object.entries(crane.axes)) {
-        const { state, reason } = this.cells[`${name} ${axis}`];
-        set(state, values.state ?? (crane.daemon ? "not known" : "daemon silent"));
+        const { state, reason, means } = this.cells[`${name} ${axis}`];
+        state.lang = values.state ? "en" : language;
+        set(state, values.state ?? text(crane.daemon ? "page.unknown" : "page.silent"));
+        set(means, [values.state, values.reason].map(meaning).filter(Boolean).join(": "));
         state.dataset.level = values.level;
         set(reason, values.reason ?? "");
       }
@@ -130,14 +131,12 @@ export class Panel {
       }
     }
     const first = Object.values(shown.cranes)[0];
-    const late = first?.late_us == null ? "" : `daemon: latest tick of the last second ${(first.late_us / 1000).toFixed(2)} ms, ${first.missed} missed`;
+    const late = first?.late_us == null ? "" : text("page.late", { ms: (first.late_us / 1000).toFixed(2), missed: first.missed });
     set(document.getElementById("late"), late);
-    const silent = Object.entries(shown.cranes).filter(([, crane]) => !crane.crane).map(([name]) => name);
+    const silent = Object.entries(shown.cranes).filter(([, crane]) => !crane.crane).map(([name]) => nameOf("crane", name));
     let note = "";
     if (silent.length && !this.hello.playback) {
-      note = this.hello.drives
-        ? `Not heard: the crane (${silent.join(", ")}); its pose is not measured, its sway that of the model`
-        : "Position and sway are not on the bus: pose not measured, sway that of the model";
+      note = this.hello.drives ? text("note.silent", { cranes: silent.join(", ") }) : text("note.nobus");
     }
     set(document.getElementById("note"), note);
   }
@@ -151,17 +150,18 @@ export class Panel {
       }
       const one = this.sources[name];
       set(one.rate, `${rate}/s`);
-      set(one.age, age === null ? "never" : `${age.toFixed(age < 10 ? 2 : 0)} s`);
+      set(one.age, age === null ? text("sources.never") : `${age.toFixed(age < 10 ? 2 : 0)} s`);
       one.age.parentElement.classList.toggle("old", age === null || age > OLD_S);
     }
   }
 
-  event(time, source, text, level) {
+  /** Add what happened. @param words of the studio: English; the page's own are in its language. */
+  event(time, source, words, level, lang = "en") {
     const list = document.getElementById("events");
     const stamp = this.hello.playback ? `${time.toFixed(2)} s` : new Date(time * 1000).toTimeString().slice(0, 8);
     const down = list.scrollHeight - list.scrollTop - list.clientHeight < 30;
-    list.append(make("li", {}, make("time", {}, stamp), coloured(make("span", { className: "source" }, source), this.hello.colors[source]),
-      make("span", { className: level }, text)));
+    list.append(make("li", {}, make("time", {}, stamp), coloured(make("span", { className: "source" }, source === "page" ? text("event.page") : nameOf("crane", source)), this.hello.colors[source]),
+      make("span", { className: level, lang }, words)));
     while (list.children.length > MOST_EVENTS) list.firstChild.remove();
     if (down) list.scrollTop = list.scrollHeight;
   }

@@ -1,6 +1,7 @@
 // The cranes from above, on one scale: the way of tip and grapple, and how far the grapple gets past
 // a tip that stands.
 import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { nameOf, text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
 const KEPT_S = 12;
@@ -77,7 +78,7 @@ export class Plan {
     this.metres(at, scale, middle, w, h);
     const names = Object.entries(this.ways);
     names.forEach(([name, way], i) => this.way(name, way, at, 22 + 20 * i));
-    const words = `From above. ${names.map(([name, way]) => `${name}: ${said(way)}`).join("; ")}`;
+    const words = `${text("page.above")} ${names.map(([name, way]) => `${nameOf("crane", name)}: ${said(way)}`).join("; ")}`;
     if (words !== this.words) canvas.setAttribute("aria-label", words);
     this.words = words;
   }
@@ -106,7 +107,7 @@ export class Plan {
     const color = this.colors[this.hello.colors[name]];
     pen.font = "600 15px system-ui, sans-serif";
     pen.fillStyle = pen.strokeStyle = color;
-    pen.fillText(`${name}: ${said(way)}`, 44, line);
+    pen.fillText(`${nameOf("crane", name)}: ${said(way)}`, 44, line);
     if (!last) return;
     pen.lineWidth = 1;
     this.line(way.points.map((p) => at(p.tip)), [5, 3]);
@@ -138,9 +139,9 @@ export class Plan {
 }
 
 function said(way) {
-  if (!way.points.length) return "no pose";
-  if (way.overshoot === null) return "tip moves";
-  return `grapple up to ${Math.round(100 * way.overshoot)} cm from the tip that stands`;
+  if (!way.points.length) return text("above.nopose");
+  if (way.overshoot === null) return text("above.moves");
+  return text("above.overshoot", { cm: Math.round(100 * way.overshoot) });
 }
 
 function distance([x, y], [u, v]) {

@@ -1,4 +1,5 @@
 // The page of a drive that is over: all its pictures are here, and a time bar goes through them.
+import { text } from "/static/language.js";
 import { Panel } from "/static/panel.js";
 import { Shell } from "/static/shell.js";
 
@@ -51,10 +52,10 @@ class Drive {
 
 async function open(number) {
   play(false);
-  pill("opening the drive", "");
+  pill(text("play.opening"), "");
   const answer = await fetch(`/drive/${number}.json`);
   if (!answer.ok) {
-    pill("cannot be opened", "bad");
+    pill(text("play.fault"), "bad");
     byId("banner").hidden = false;
     byId("banner").textContent = await answer.text();
     return;
@@ -62,25 +63,25 @@ async function open(number) {
   byId("banner").hidden = true;
   drive = new Drive(await answer.json());
   const { hello } = drive;
-  byId("file").textContent = `${hello.file} — a drive that is over`;
+  byId("file").textContent = text("play.over", { file: hello.file });
   byId("title").textContent = drive.title;
   shell.begin(hello);
   panel = new Panel(hello, () => {});
   drive.times.forEach((_, i) => shell.charts.add(drive.message(i)));
-  for (const [t, source, text, level] of drive.events) {
-    shell.charts.mark(t, source, text, level);
-    panel.event(t, source, text, level);
+  for (const [t, source, words, level] of drive.events) {
+    shell.charts.mark(t, source, words, level);
+    panel.event(t, source, words, level);
   }
-  byId("notes").replaceChildren(...drive.notes.map((text) => Object.assign(document.createElement("li"), { textContent: text })));
+  byId("notes").replaceChildren(...drive.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note, lang: "en" })));
   const bar = byId("time");
   Object.assign(bar, { min: drive.first, max: drive.last, step: PICTURE_S });
   shell.charts.onseek = seek;
   seek(drive.first);
-  pill("opened", "ok");
+  pill(text("play.opened"), "ok");
 }
 
-function pill(text, level) {
-  byId("link").textContent = text;
+function pill(words, level) {
+  byId("link").textContent = words;
   byId("link").className = `pill ${level}`;
 }
 
@@ -93,14 +94,13 @@ function seek(t) {
   panel.show(message, false, true);
   const bar = byId("time");
   bar.value = at;
-  const text = `${at.toFixed(2)} s`;
-  bar.setAttribute("aria-valuetext", text);
-  byId("at").textContent = `${text} of ${drive.last.toFixed(2)} s`;
+  bar.setAttribute("aria-valuetext", `${at.toFixed(2)} s`);
+  byId("at").textContent = text("play.at", { at: at.toFixed(2), last: drive.last.toFixed(2) });
 }
 
 function play(on) {
   playing = on;
-  byId("play").textContent = on ? "Stop" : "Play";
+  byId("play").textContent = text(on ? "play.stop" : "play.play");
   byId("play").setAttribute("aria-pressed", on);
   if (on && at >= drive.last) seek(drive.first);
 }

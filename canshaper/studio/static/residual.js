@@ -1,4 +1,5 @@
 // What the filter in force leaves of the swing, over the length that the pendulum really has.
+import { text } from "/static/language.js";
 import uPlot from "/static/vendor/uplot.js";
 
 const SOON_MS = 300; // a slider that is dragged asks once
@@ -43,7 +44,7 @@ export class Residual {
     const curve = this.curves?.[this.axis];
     if (this.host.hidden || !this.curves) return;
     if (!curve) {
-      this.legend.textContent = "This axis has no swing, or several filters: there is no one curve.";
+      this.legend.textContent = text("left.none");
       return;
     }
     const { believes, file } = curve;
@@ -53,12 +54,14 @@ export class Residual {
       width: this.host.clientWidth, height: this.host.clientHeight - this.legend.offsetHeight,
       legend: { show: false }, cursor: { drag: { setScale: false, x: false } }, padding: [12, 20, 0, 0],
       scales: { x: { time: false }, y: { range: (_, __, high) => [0, Math.max(20, high ?? 0) * 1.05] } },
-      axes: [{ ...axis, label: "length of the pendulum, m" }, { ...axis, size: 56, label: "swing that is left, %" }],
+      axes: [{ ...axis, label: text("left.length") }, { ...axis, size: 56, label: text("left.swing") }],
       series: [{}, { stroke: css("--shaped"), width: 2.5, points: { show: false } }],
       hooks: { draw: [(u) => { mark(u, believes, css("--text"), []); mark(u, file, css("--other"), [6, 4]); }] },
     }, [curve.lengths_m, curve.left.map((part) => 100 * part)], this.host);
     const left = at(curve, file);
-    this.legend.textContent = `The filter believes ${believes.toFixed(2)} m (line); the file says ${file.toFixed(2)} m (dashed), where it leaves ${(100 * left).toFixed(1)} % of the swing.`;
+    this.legend.textContent = text("left.words", {
+      believes: believes.toFixed(2), file: file.toFixed(2), percent: (100 * left).toFixed(1),
+    });
   }
 
   resize() {

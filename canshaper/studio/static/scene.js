@@ -1,6 +1,7 @@
 // The cranes in three dimensions. Inside `world` z is up, as in the model.
 import * as THREE from "/static/vendor/three.js";
 import { Crane, css } from "/static/crane.js";
+import { nameOf, text } from "/static/language.js";
 
 const APART_M = 6.4;
 const NEARER = 0.88;
@@ -47,7 +48,7 @@ export class Scene {
     this.world.add(this.ground);
     this.cranes = {};
     hello.cranes.forEach((name, i) => {
-      const crane = new Crane(hello, name, hello.colors[name]);
+      const crane = new Crane(hello, nameOf("crane", name), hello.colors[name]);
       crane.side = ((hello.cranes.length - 1) / 2 - i) * APART_M;
       this.cranes[name] = crane;
       this.world.add(crane.group);
@@ -158,7 +159,7 @@ export class Scene {
 /** Whether there is no graphics card. */
 function drawnBySoftware() {
   const gl = document.createElement("canvas").getContext("webgl2");
-  if (!gl) throw new Error("this browser has no WebGL");
+  if (!gl) throw new Error(text("page.nowebgl"));
   const info = gl?.getExtension("WEBGL_debug_renderer_info");
   const name = info ? String(gl.getParameter(info.UNMASKED_RENDERER_WEBGL)) : "";
   gl?.getExtension("WEBGL_lose_context")?.loseContext();

@@ -1,5 +1,6 @@
 // What a live page and one of a drive that is over have in common: picture, charts, and their buttons.
 import { Charts } from "/static/charts.js";
+import { nameOf, text, translate } from "/static/language.js";
 import { Plan } from "/static/plan.js";
 import { Residual } from "/static/residual.js";
 import { Scene } from "/static/scene.js";
@@ -10,6 +11,7 @@ const byId = (id) => document.getElementById(id);
 
 export class Shell {
   constructor() {
+    translate(byId("language"));
     this.other = null; // what is shown instead of the cranes
     byId("pause").onclick = () => this.pause(this.charts.stoppedAt === null);
     byId("longer").onclick = () => this.charts.zoom(1);
@@ -44,7 +46,7 @@ export class Shell {
     }
     byId("tabs").replaceChildren(...hello.axes.map((axis) => {
       const tab = document.createElement("button");
-      tab.textContent = axis.replace("_", "-");
+      tab.textContent = nameOf("axis", axis);
       tab.setAttribute("role", "tab");
       tab.dataset.axis = axis;
       tab.onclick = () => this.choose(axis);
@@ -59,9 +61,9 @@ export class Shell {
   flat(why) {
     const canvas = byId("scene").cloneNode(); // this one may have a context of the other kind
     byId("scene").replaceWith(canvas);
-    canvas.setAttribute("aria-label", "View of the cranes from the side");
+    canvas.setAttribute("aria-label", text("scene.side"));
     this.scene = new SideView(canvas, this.hello);
-    byId("flat").textContent = `No 3-D picture (${why}): view from the side.`;
+    byId("flat").textContent = text("page.flat", { why });
   }
 
   choose(axis) {

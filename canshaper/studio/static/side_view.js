@@ -1,5 +1,6 @@
 // The cranes from the side, in two dimensions: where there is no WebGL.
-import { boomPoints, grapplePoints, MODELLED, SIMULATED } from "/static/geometry.js";
+import { boomPoints, grapplePoints } from "/static/geometry.js";
+import { nameOf, text } from "/static/language.js";
 
 const RAD = Math.PI / 180;
 const BEHIND_M = 1.5; // drawn behind the pillar
@@ -84,18 +85,18 @@ export class SideView {
     pen.textAlign = "left";
     pen.font = "600 15px system-ui, sans-serif";
     pen.fillStyle = color;
-    pen.fillText(name, left + 12, 22 + (this.overlay ? 20 * number : 0));
+    pen.fillText(nameOf("crane", name), left + 12, 22 + (this.overlay ? 20 * number : 0));
     pen.font = "13px system-ui, sans-serif";
     pen.fillStyle = colors.text;
     if (!crane?.pose) {
-      pen.fillText("its pose is not on the bus", left + 12, 62);
+      pen.fillText(text("nopose.crane"), left + 12, 62);
       return;
     }
-    const angle = `slewed ${(((crane.pose[0] + 540) % 360) - 180).toFixed(0)}°`;
-    const across = crane.sway ? `, sway across the boom ${crane.sway[0].toFixed(1)}°` : "";
+    const angle = text("page.slewed", { deg: (((crane.pose[0] + 540) % 360) - 180).toFixed(0) });
+    const across = crane.sway ? `, ${text("page.across", { deg: crane.sway[0].toFixed(1) })}` : "";
     if (!this.overlay) {
       pen.fillText(angle + across, left + 12, 42);
-      if (!crane.measured) pen.fillText(crane.simulated ? SIMULATED : MODELLED, left + 12, 62);
+      if (!crane.measured) pen.fillText(text(crane.simulated ? "page.simulated" : "page.modelled"), left + 12, 62);
     }
     const points = this.points(crane);
     this.line([[0, 0], [0, this.hello.boom.pillar_m], points.start].map(at), color, BOOM_PX + 2);

@@ -1,0 +1,140 @@
+"""The page in each of its languages, in a real browser."""
+
+import json
+import os
+import re
+import signal
+from collections.abc import Callable
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, Page, Route, expect
+
+from tests.studio.browser import SOON_MS
+from tests.studio.conftest import Studio
+from tests.studio.test_languages import ENGLISH, OTHERS, PLACE, texts
+
+LOCALES = {"en": "en-GB", "de": "de-AT", "fi": "fi-FI", "sv": "sv-SE"}
+STAND_STILL = "ms => { const t = performance.now(); while (performance.now() - t < ms); }"
+# What can be read or is read out, but for what is marked as English.
+SAID = """() => {
+    const said = [];
+    for (const one of document.querySelectorAll("body, body *")) {
+        if (one.closest("[lang=en], #language")) continue;
+        said.push(one.title, one.getAttribute("aria-label"));
+        for (const node of one.childNodes) if (node.nodeType === 3) said.push(node.data);
+    }
+    return [...new Set(said.map((text) => text?.trim()).filter(Boolean))];
+}"""
+CUT_OFF = """() => [...document.querySelectorAll("body *")].filter((one) => one.offsetParent
+    && (one.getBoundingClientRect().right > innerWidth + 1
+        || (one.matches("button, select, .pill, a") && one.scrollWidth > one.clientWidth + 1
+            && one.clientWidth > 0))).map((one) => one.outerHTML.slice(0, 90))"""
+
+
+def in_language(tab: Callable[..., Page], studio: Studio, language: str) -> Page:
+    """A phone of a person who reads that language."""
+    heard = re.compile(f"^{texts(language)['link.connected']}$")
+    size = {"width": 390, "height": 844}
+    return tab(studio, heard=heard, locale=LOCALES[language], viewport=size)
+
+
+def english_said(page: Page, language: str) -> list[str]:
+    """What the page says in English although its language has a text of its own."""
+    english, own = texts(ENGLISH), texts(language)
+    said, found = page.evaluate(SAID), []
+    for key, text in english.items():
+        if text != own[key]:
+            pattern = re.compile(".+".join(re.escape(part) for part in PLACE.split(text)))
+            found += [one for one in said if pattern.fullmatch(one) and one not in own.values()]
+    return found
+
+
+def is_good(page: Page, language: str) -> None:
+    """Nothing is English, cut off, or found by axe."""
+    if language != ENGLISH:
+        assert english_said(page, language) == []
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
+    assert page.evaluate(CUT_OFF) == []
+    found = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+
+
+@pytest.mark.parametrize("language", [ENGLISH, *OTHERS])
+def test_the_page_speaks_the_language_of_the_browser(
+    own: Callable[..., Studio], tab: Callable[..., Page], language: str
+) -> None:
+    """At rest, driven, after it stood still, and when the studio is gone."""
+    studio, table = own(), texts(language)
+    page = in_language(tab, studio, language)
+    assert page.get_attribute("html", "lang") == language
+    assert page.input_value("#language") == language
+    expect(page.locator("#fps")).not_to_have_text("0")
+    expect(page.locator("#seat")).to_have_text(table["seat.enable"])
+    is_good(page, language)
+    page.keyboard.press("e")
+    expect(page.locator("#seat")).to_have_text(table["seat.drive"])
+    ready = page.locator("#axes tr:nth-child(2) td:nth-child(2)")
+    expect(ready.locator(".state")).to_have_text("ready")  # the daemon's term
+    meaning = f"{table['term.ready']}: {table['term.joystick in neutral']}"
+    expect(ready.locator(".means")).to_have_text("" if language == ENGLISH else meaning)
+    expect(page.locator("#language")).to_be_disabled()
+    page.evaluate(STAND_STILL, 900)
+    stood = table["hiccup.stood"].split("{s}")[0].strip()
+    expect(page.locator("#hiccup b")).to_contain_text(stood, timeout=SOON_MS)
+    is_good(page, language)
+    os.kill(studio.process.pid, signal.SIGSTOP)
+    try:
+        expect(page.locator("#link")).to_have_text(table["link.none"])
+        expect(page.locator("#banner")).to_contain_text(table["banner.neutral"])
+        is_good(page, language)
+    finally:
+        os.kill(studio.process.pid, signal.SIGCONT)
+    expect(page.locator("#link")).to_have_text(table["link.connected"])
+
+
+def test_views_and_axes_are_in_the_language(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = in_language(tab, own(), "fi")
+    for view, words in (("#above", "#plan"), ("#left", "#residual-words")):
+        page.click(view)
+        expect(page.locator(words)).to_be_visible()
+        page.wait_for_timeout(1000)
+        assert english_said(page, "fi") == []
+    expect(page.locator("#residual-words")).to_contain_text("Suodin olettaa")
+    page.click("#tabs [data-axis=lift]")
+    expect(page.locator("#residual-words")).to_have_text(texts("fi")["left.none"])
+    with page.expect_download() as download:
+        page.click("#csv")
+    head = download.value.path().read_text().partition("\n")[0]
+    assert "slew command joystick" in head and "lift sway shaped" in head  # names of the file
+
+
+def test_the_language_is_chosen_and_kept(shared: Studio, tab: Callable[..., Page]) -> None:
+    page = tab(shared)
+    page.select_option("#language", "sv")  # the page begins again
+    expect(page.locator("#link")).to_have_text(texts("sv")["link.connected"])
+    page.reload()
+    expect(page.locator("#reset")).to_contain_text(texts("sv")["button.reset"])
+    assert page.get_attribute("html", "lang") == "sv"
+
+
+@pytest.mark.parametrize("lost", ["a key", "the table"])
+def test_what_a_language_lacks_is_english(shared: Studio, chromium: Browser, lost: str) -> None:
+    table = texts("sv")
+    del table["button.reset"]
+
+    def answer(route: Route) -> None:
+        if lost == "a key":
+            route.fulfill(content_type="application/json", body=json.dumps(table))
+        else:
+            route.fulfill(status=404)
+
+    page = chromium.new_context(locale="sv-SE").new_page()
+    page.route("**/languages/sv.json", answer)
+    page.goto(shared.url)
+    expect(page.locator("#reset span")).to_have_text("Reset")
+    other = table["button.enable"] if lost == "a key" else "Enable"
+    expect(page.locator("#enable span")).to_have_text(other)
+    page.context.close()

@@ -1,0 +1,95 @@
+"""The texts of the page: every language has every text, and the page has no text besides."""
+
+import json
+import re
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
+from canshaper.studio.server import STATIC
+
+ENGLISH, OTHERS = "en", ("de", "fi", "sv")
+PLACE = re.compile(r"\{\w+\}")
+KEY = re.compile(r"""data-t(?:-\w+)?="([\w.]+)"|["`]([a-z]\w*(?:\.\w+)+)["`]""")
+NOT_TEXTS = re.compile(r"\.(js|csv|png|json)$")
+# Keys that scripts put together, by what they begin with.
+COMPOSED = ("term.", "axis.", "way.", "crane.", "slider.", "stick.", "gamepad.", "chart.a")
+COMPOSED += ("status.", "step.")
+NAMES = {"canshaper", "canshaper studio", "Commissioning, canshaper studio", "studio"}
+NAMES |= {"CSV", "PNG", "A/B"}
+
+
+def texts(language: str) -> dict[str, str]:
+    """The table of a language."""
+    table: dict[str, str] = json.loads((STATIC / "languages" / f"{language}.json").read_text())
+    return table
+
+
+def test_there_are_the_languages_that_the_page_offers() -> None:
+    found = {path.stem for path in (STATIC / "languages").iterdir()}
+    assert found == {ENGLISH, *OTHERS}
+    offered = re.search(r"LANGUAGES = \{(.*?)\}", (STATIC / "language.js").read_text())
+    assert offered and set(re.findall(r"(\w+):", offered[1])) == found
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_every_language_has_every_text_with_its_placeholders(language: str) -> None:
+    english, own = texts(ENGLISH), texts(language)
+    assert list(own) == list(english)
+    for key, text in own.items():
+        assert text.strip() and sorted(PLACE.findall(text)) == sorted(PLACE.findall(english[key]))
+
+
+def test_states_and_reasons_are_those_of_the_daemon() -> None:
+    """Each of them has a meaning in every language; in English it is its own."""
+    terms = {key[5:]: text for key, text in texts(ENGLISH).items() if key.startswith("term.")}
+    daemon = [one.words for one in (*STATE_TEXTS.values(), *REASON_TEXTS.values())]
+    assert terms == {words: words for words in daemon}
+
+
+def asked_for(path: Path) -> set[str]:
+    """Keys of texts in a page or script."""
+    found = {one or other for one, other in KEY.findall(path.read_text())}
+    return {key for key in found if not NOT_TEXTS.search(key)}
+
+
+def test_the_page_asks_for_every_text_and_for_no_other() -> None:
+    keys = set(texts(ENGLISH))
+    found: set[str] = set()
+    for path in (*STATIC.glob("*.js"), *STATIC.glob("*.html")):
+        found |= asked_for(path)
+    assert found <= keys
+    assert [key for key in keys - found if not key.startswith(COMPOSED)] == []
+
+
+class Words(HTMLParser):
+    """Words that stand in a page itself."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.found: set[str] = set()
+        self._key = False
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self._key = tag == "kbd"
+        self.found |= {value for name, value in attrs if name in ("title", "aria-label") and value}
+
+    def handle_data(self, data: str) -> None:
+        if re.search(r"[A-Za-z]", data) and not self._key:
+            self.found.add(data.strip())
+        self._key = False
+
+
+@pytest.mark.parametrize("page", ["index.html", "commission.html"])
+def test_the_page_itself_has_names_only(page: str) -> None:
+    words = Words()
+    words.feed((STATIC / page).read_text())
+    assert words.found <= NAMES
+
+
+def test_every_step_of_the_commissioning_has_its_title() -> None:
+    titles = {key[5:]: text for key, text in texts(ENGLISH).items() if key.startswith("step.")}
+    assert titles == {step.name: step.title for step in STEPS}
