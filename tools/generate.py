@@ -10,7 +10,9 @@ from enum import IntEnum
 from pathlib import Path
 from typing import TypeVar
 
+from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
+from canshaper.controller.counters import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
@@ -77,6 +79,14 @@ def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iter
         yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} |"
 
 
+def fault_rows() -> Iterator[str]:
+    """Table of the faults."""
+    yield "| no. | fault | counted in | meaning |"
+    yield "|---|---|---|---|"
+    for fault, text in FAULT_TEXTS.items():
+        yield f"| {int(fault)} | {fault.name} | {Counters.SIGNAL_OF.get(fault, '')} | {text} |"
+
+
 def _names(reasons: frozenset[Reason]) -> str:
     """Reasons by name; most of a kind as that kind, with those that are missing."""
     words = []
@@ -100,6 +110,7 @@ def generated(root: Path) -> dict[Path, str]:
         "states": state_rows(),
         "diagram": diagram(),
         "reasons": reason_rows(Reason, REASON_TEXTS),
+        "faults": fault_rows(),
     }
     return {**files, page: with_sections(page.read_text(encoding="utf-8"), sections)}
 

@@ -42,7 +42,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.START: ReasonText(
         "nothing received yet",
         "nothing received yet",
-        "joysticks on, bus up",
+        "joysticks on, bus up; `candump can0` shows the joystick's id, and the DBC has that id, "
+        "29-bit ids with bit 31 set",
     ),
     Reason.JOYSTICK_NEUTRAL: ReasonText(
         "joystick in neutral",
@@ -81,7 +82,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.JOYSTICK_NOT_NEUTRAL: ReasonText(
         "let go of the joystick",
         "the joystick is deflected before the axis is ready",
-        "let go of the joystick",
+        "let go of the joystick; one that rests off centre: repair or calibrate it, or "
+        "`neutral_pct` up to what it needs, no further",
     ),
     Reason.ENABLE_OFF: ReasonText(
         "enable is off",
@@ -91,7 +93,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.JOYSTICK_TIMEOUT: ReasonText(
         "no joystick message",
         "no joystick message within `timeout_ms`",
-        "bus, joystick",
+        "joystick, wiring, bus load (`canshaper check FILE`), `canshaper doctor FILE --listen 60`",
         fmi=9,
     ),
     Reason.JOYSTICK_ERROR: ReasonText(
@@ -121,7 +123,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.SWITCH_INVALID: ReasonText(
         "a switch is invalid",
         "enable is neither 0 nor 1",
-        "joystick",
+        "joystick; the right signal? Two bits with 2 = error, 3 = not available are normal on "
+        "J1939",
         fmi=2,
     ),
     Reason.JOYSTICK_CONTRADICTORY: ReasonText(
@@ -139,14 +142,15 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.JOYSTICK_UNTRUSTED: ReasonText(
         "joystick messages are not right",
         "wrong checksum, repeated or jumping alive counter, or too few good ones for `qualify`",
-        "joystick, a gateway that repeats, two senders of one id",
+        "joystick, a gateway that repeats, two senders of one id; its manual: width and start of "
+        "the counter, kind of checksum, data ID",
         fmi=2,
     ),
     Reason.LOOP_OVERRUN: ReasonText(
         "the daemon is too late",
         "ten ticks in a row missed a deadline, or more than one in six for long; over "
         "after fifty punctual ones. An axis in BYPASS_ON goes on",
-        "load of the PC",
+        "load of the PC: `sudo canshaper doctor FILE`",
         fmi=12,
     ),
     Reason.ADDRESS_NOT_CLAIMED: ReasonText(
@@ -169,7 +173,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.ENABLE_LOST: ReasonText(
         "enable released in motion",
         "enable released in motion",
-        "press enable again with the joystick in neutral",
+        "press enable again with the joystick in neutral; a switch that bounces: J1939 buttons may "
+        "report 2 or 3 for a moment",
     ),
     Reason.OUTPUT_INVALID: ReasonText(
         "the filter gave no number",
@@ -180,14 +185,15 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.SEND_FAILED: ReasonText(
         "a valve frame did not go out",
         "the valve frame did not go out in motion",
-        "bus, queue; reset",
+        "bit rate, cable, 120 ohms at both ends, `restart-ms 100`, queue: "
+        "`ip -details -statistics link show can0`; reset",
         fmi=9,
     ),
     Reason.LOOP_STALLED: ReasonText(
         "the daemon stood still",
         "the loop stood still for longer than the shortest `timeout_ms` of a joystick, the "
         "emergency stop, or a valve (less the ticks that it may have waited for its frame)",
-        "load of the PC; reset",
+        "load of the PC: `sudo canshaper doctor FILE`; reset",
         fmi=12,
     ),
     Reason.EMERGENCY_STOP: ReasonText(
@@ -205,7 +211,8 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
     Reason.SECOND_SENDER: ReasonText(
         "somebody else commands this valve",
         "a frame with the id of this axis' valve, in J1939 with its group, came from another node",
-        "end the other one; reset after 1 s without its frames",
+        "end the other one, such as the controller of before (until it is off `--listen-only`); "
+        "reset after 1 s without its frames",
         fmi=14,
     ),
     Reason.ADDRESS_LOST: ReasonText(

@@ -8,6 +8,7 @@ from typing import Any
 import cantools
 import pytest
 
+from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
@@ -60,7 +61,9 @@ def test_a_valve_state_of_another_message_keeps_its_table() -> None:
     assert generate["with_value_tables"](text, {"State": State}) == text
 
 
-def test_every_reason_and_state_has_its_texts() -> None:
+def test_every_reason_fault_and_state_has_its_texts() -> None:
+    assert [*FAULT_TEXTS] == [*FrameFault]
+    assert all(FAULT_TEXTS.values())
     assert REASON_TEXTS.keys() == {*Reason}
     assert STATE_TEXTS.keys() == {*State}
     assert all(text.words and text.cause for text in REASON_TEXTS.values())
