@@ -72,11 +72,12 @@ def diagram() -> Iterator[str]:
 
 def reason_rows(reasons: Iterable[Key], texts: Mapping[Key, ReasonText]) -> Iterator[str]:
     """Table of the reasons."""
-    yield "| no. | reason | meaning | what helps |"
-    yield "|---|---|---|---|"
+    yield "| no. | reason | meaning | what helps | FMI |"
+    yield "|---|---|---|---|---|"
     for reason in reasons:
         text = texts[reason]
-        yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} |"
+        fmi = "" if text.fmi is None else text.fmi
+        yield f"| {int(reason)} | {reason.name} | {text.cause} | {text.remedy} | {fmi} |"
 
 
 def fault_rows() -> Iterator[str]:

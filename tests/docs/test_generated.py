@@ -46,9 +46,9 @@ def test_a_reason_that_is_added_reaches_dbc_and_page() -> None:
     text = (ROOT / "dbc" / "forwarder.dbc").read_text(encoding="utf-8")
     new = generate["with_value_tables"](text, {"Reason": ADDED})
     assert new.count('74 "HOSE_BURST" ;') == text.count('73 "OUTPUT_REFUSED" ;')
-    texts = {**REASON_TEXTS, 74: ReasonText("a hose burst", "no pressure", "a new hose")}
+    texts = {**REASON_TEXTS, 74: ReasonText("a hose burst", "no pressure", "a new hose", fmi=7)}
     rows = list(generate["reason_rows"](ADDED, texts))
-    assert rows[-1] == "| 74 | HOSE_BURST | no pressure | a new hose |"
+    assert rows[-1] == "| 74 | HOSE_BURST | no pressure | a new hose | 7 |"
     page = "a\n<!-- generated: reasons -->\nLAST YEAR\n<!-- end: reasons -->\nb\n"
     written = generate["with_sections"](page, {"reasons": rows})
     assert rows[-1] in written
