@@ -21,6 +21,8 @@ from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import Bus
 from canshaper.design.processes import choose_transport, drive_on_bus
+from canshaper.errors import DriveError
+from canshaper.machine.deployment import Deployment
 from canshaper_sim.operator import script_named
 
 CARD, WIRE = "out0", "wire0"
@@ -30,6 +32,8 @@ CANNOT = 75
 ETH_P_ALL, ETH_P_IP = 3, 0x0800
 PACKET_OUTGOING = 4
 FRAMES = 50
+# One is enough where the machine has time for it.
+DRIVES = 3
 # A frame is there at once or never; what is not to come is waited for behind one that does.
 WAIT_S = 20.0
 
@@ -63,16 +67,28 @@ def main() -> None:
     told = {"sent": FRAMES, "received": len(received)}
     if not shared:
         file = loader("forwarder.yaml")()
-        script = script_named("pulse-slew", list(file.axes))
-        way = choose_transport("udp_multicast", file)
-        done_drive = drive_on_bus(file, way, script, [], bypass=False, on_progress=lambda _: None)
-        told["drive"] = max(done_drive.recording.axes["slew"].sent) > 0
+        told["drive"] = any(slewed(file) for _ in range(DRIVES))
     told["outside"] = outgoing(capture)
     told["from_outside"] = injected(sender, receiver, capture.getsockname()[4])
     for port in (sender, receiver):
         port.close()
     assert not faults, faults
     print(json.dumps(told))
+
+
+def slewed(deployment: Deployment) -> bool:
+    """Whether the daemon commanded slewing in a drive of processes on this machine.
+
+    Where a busy machine holds a joystick's frames up, the axis waits for neutral until the end.
+    """
+    script = script_named("pulse-slew", list(deployment.axes))
+    way = choose_transport("udp_multicast", deployment)
+    try:
+        drive = drive_on_bus(deployment, way, script, [], bypass=False, on_progress=lambda _: None)
+    except DriveError as error:  # the processes have not started in time
+        print(error)
+        return False
+    return max(drive.recording.axes["slew"].sent) > 0
 
 
 def taken(port: Port, last: int) -> list[int]:

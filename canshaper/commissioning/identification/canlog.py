@@ -14,6 +14,7 @@ from canshaper.codec.signals import find_signal, special_codes
 from canshaper.commissioning.identification.commands import Commands, Samples
 from canshaper.commissioning.identification.series import Kind, Series, Unit, ordered, unit_of
 from canshaper.errors import CutOffError, IdentificationError, LogError
+from canshaper.inputs.sway_sensor import GOOD_MERIT
 from canshaper.machine.database import Messages
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.frames import TimedFrame
@@ -22,13 +23,14 @@ from canshaper.recording.log import LogFile
 
 @dataclass
 class _Reader:
-    """A signal that is looked for in a log."""
+    """A signal that is looked for in a log; ``merit`` is the signal of its figure of merit."""
 
     name: str
     message: Message
     signal: Signal
     unit: Unit
     source: int | None = None
+    merit: str | None = None
     samples: Samples = field(default_factory=Samples)
     senders: set[tuple[str, int]] = field(default_factory=set)
     wrong_length: int = 0
@@ -58,9 +60,11 @@ class _Reader:
         if len(data) < self.message.length:
             self.wrong_length += 1
             return
-        raw = self._layout.decode(data[: self.message.length])[self.signal.name]
+        values = self._layout.decode(data[: self.message.length])
+        raw = values[self.signal.name]
         value = raw * self.signal.scale + self.signal.offset
-        if raw in self._special or not self._low <= value <= self._high:
+        poor = self.merit is not None and values[self.merit] != GOOD_MERIT
+        if poor or raw in self._special or not self._low <= value <= self._high:
             self.no_value += 1
             return
         self.samples.add(time_s, value * self.unit.factor)
@@ -110,7 +114,7 @@ def read_can(
         label: state of the grapple in it.
         names: "Message.Signal" of each axis.
         messages: of the DBC files.
-        deployment: names the commands of the axes and the signal of the grapple, where known.
+        deployment: names commands, signal of the grapple and figures of merit, where known.
         channel: bus of the log that is read; by default all of them.
         sources: address of the sender of each axis, in J1939; by default that of the DBC.
         on_progress: called with the part that is read, 0 to 1.
@@ -119,8 +123,9 @@ def read_can(
         IdentificationError: a signal is not in the log, or from two senders.
         LogError: the log cannot be read.
     """
+    merits = _merits(deployment)
     readers = {
-        axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis))
+        axis: _Reader(name, *bind(name, messages), (sources or {}).get(axis), merits.get(name))
         for axis, name in names.items()
     }
     grapple = deployment.load_state if deployment else None
@@ -151,6 +156,16 @@ def read_can(
             [*notes, *faults],
         )
     return result
+
+
+def _merits(deployment: Deployment | None) -> dict[str, str]:
+    """Figure of merit of each "Message.Signal" that a sway sensor of the deployment measures."""
+    sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
+    return {
+        f"{one.message.message.name}.{one.signal.name}": one.config.merit
+        for one in sensors
+        if one.config.merit
+    }
 
 
 def _read(

@@ -3,6 +3,7 @@
 import gzip
 import math
 from pathlib import Path
+from typing import Any
 
 import can
 import numpy as np
@@ -240,3 +241,30 @@ def test_a_long_log_tells_how_far_it_is(tmp_path: Path, deployment: Deployment) 
     assert told == sorted(told)
     assert told[-1] == 1.0
     assert any(0.0 < part < 1.0 for part in told)
+
+
+def test_a_measurement_of_poor_merit_is_left_out(tmp_path: Path) -> None:
+    """Of a sway sensor with a figure of merit, as the daemon leaves it out."""
+    deployment = load_deployment(ROOT / "config" / "j1939-sensor.yaml")
+    found = deployment.messages.find("SSI2")
+    assert not isinstance(found, str)
+    message = found[1]
+    rows = []
+    for number in range(40):
+        raw = {s.name: 0 for s in message.signals} | {"PitchAngle": 4_000_000 + number}
+        raw["PitchMerit"] = 2 if number in (7, 8) else 0
+        raw["RollMerit"] = 1 if number == 9 else 0
+        data = message.encode(raw, scaling=False, strict=False)
+        can_id = message.frame_id & 0x1FFFFF00 | 0x19
+        rows.append(f"({1000 + 0.02 * number:.6f}) can0 {can_id:08X}#{data.hex()}")
+    log = tmp_path / "a.log"
+    write(log, rows)
+    names = {"near_far": "SSI2.PitchAngle"}
+    sources = {"near_far": 0x19}
+    bound: dict[str, Any] = {"deployment": deployment, "sources": sources}
+    series = read_can(log, "", names, deployment.messages, **bound)["near_far"]
+    assert len(series.value) == 38
+    assert not [t for t in series.time_s if 0.13 < t < 0.17]
+    assert "2 values were not available, errors or out of range and left out" in series.notes[0]
+    plain = read_can(log, "", names, deployment.messages, sources=sources)["near_far"]
+    assert len(plain.value) == 40
