@@ -9,6 +9,8 @@ from playwright.sync_api import Page, expect
 
 from tests.studio.conftest import Studio
 from tests.studio.machine import A1, PERIOD, Machine
+from tests.studio.test_browser_languages import english_said, in_language
+from tests.studio.test_languages import OTHERS, texts
 
 
 @pytest.fixture
@@ -76,3 +78,11 @@ def test_a_machine_that_is_only_listened_to_has_none(
 ) -> None:
     page = tab(own("--shadow"))
     expect(page.locator("#numbers")).to_be_hidden()
+
+
+def test_they_are_in_the_language(machine: Machine, tab: Callable[..., Page]) -> None:
+    for language in OTHERS:
+        page = in_language(tab, machine.studio, language)
+        other = texts(language)["numbers.anotherOf"].replace("{key}", PERIOD)
+        expect(page.get_by_label(other)).to_be_visible()
+        assert english_said(page, language) == []

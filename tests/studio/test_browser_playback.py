@@ -10,6 +10,8 @@ from playwright.sync_api import Page, expect
 
 from tests.studio.conftest import Opened, Studio
 from tests.studio.drives import black_box, recorded
+from tests.studio.test_browser_languages import LOCALES, is_good
+from tests.studio.test_languages import OTHERS, texts
 
 SIZES = [(390, 844), (1024, 700), (1920, 1080)]
 
@@ -135,6 +137,15 @@ def test_axe_finds_nothing(log: Opened, tab: Callable[..., Page], scheme: str) -
     page = tab(log, color_scheme=scheme)
     found = Axe().run(page).response["violations"]
     assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+
+
+@pytest.mark.parametrize("language", OTHERS)
+def test_it_is_in_the_language(log: Opened, tab: Callable[..., Page], language: str) -> None:
+    table, size = texts(language), {"width": 390, "height": 844}
+    heard = re.compile(table["play.opened"])
+    page = tab(log, heard=heard, locale=LOCALES[language], viewport=size)
+    expect(page.locator("#play")).to_have_text(table["play.play"])
+    is_good(page, language)
 
 
 def test_a_studio_that_is_gone_leaves_the_drive_on_the_page(
