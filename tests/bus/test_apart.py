@@ -103,7 +103,9 @@ def test_frames_that_had_no_room_are_reported_once(
     port.close()
 
 
-def test_frames_of_slcan_pass_both_ways(slcan: Port, line: SerialLine) -> None:
+def test_frames_of_slcan_pass_both_ways(
+    slcan: Port, line: SerialLine, faults: list[FrameFault]
+) -> None:
     assert slcan.send(FRAME)
     until(lambda: text(FRAME) in line.read())
     line.write(b"t1108010203040506")
@@ -111,6 +113,7 @@ def test_frames_of_slcan_pass_both_ways(slcan: Port, line: SerialLine) -> None:
     frames: list[Frame] = []
     until(lambda: frames.extend(slcan.frames()) or len(frames) == 2)
     assert frames == [FRAME, Frame("crane", 0x110, True, b"\x1f")]
+    assert faults == [], "none is lost"
 
 
 def test_frames_of_socketcand_pass_both_ways(socketcand: Port, server: Socketcand) -> None:

@@ -100,6 +100,35 @@ def test_a_bus_that_is_gone_is_a_fault_and_no_error(
     assert port.send(FRAME)
 
 
+def test_an_interface_that_never_blocks_has_failed_with_its_time_out(
+    adapter: Adapter, port: Port, faults: list[FrameFault]
+) -> None:
+    adapter.always = can.CanTimeoutError("full")
+    assert not port.send(FRAME)
+    assert port.state is BusState.FAILED
+    assert faults == []
+    adapter.always = None
+    assert port.send(FRAME)
+    assert port.state is BusState.FAILED, "until a frame comes"
+
+
+@pytest.mark.parametrize(
+    ("interface", "options", "passed"),
+    [
+        ("serial", {}, {"timeout": 0.01}),
+        ("serial", {"timeout": 0.5}, {"timeout": 0.5}),
+        ("socketcand", {}, {"tcp_tune": True}),
+        ("virtual", {}, {}),
+    ],
+)
+def test_an_interface_is_opened_as_its_kind_needs_unless_the_file_says_otherwise(
+    adapter: Adapter, interface: str, options: dict[str, Any], passed: dict[str, Any]
+) -> None:
+    bus_module.open_python_can(Bus(interface=interface, channel="x", options=options))
+    common = {"interface", "channel", "ignore_config", "receive_own_messages"}
+    assert {key: adapter.options[key] for key in adapter.options.keys() - common} == passed
+
+
 def test_without_a_file_descriptor_it_is_minus_one(port: Port) -> None:
     assert port.fileno() == -1
 
