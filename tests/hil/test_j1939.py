@@ -23,6 +23,11 @@ from tests.rigs.j1939 import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
 NAME = 0x20008100FFE00001
 AVC0 = 0x0CFE3000 | OWN
 FIRST_SPN = 520192
+DM1 = 0xFECA
+# Address claim, request, transport: the kernel keeps them for itself, or their destination varies.
+TRANSPORT = {0xEEFF, 0xEAFF, 0xECFF, 0xEBFF}
+SHIPPED = ("j1939-forwarder", "js6000-forwarder", "remote-forwarder")
+OTHER_VALVES = ("remote-forwarder",)  # of 11 bits
 
 
 class Joysticks(threading.Thread):
@@ -304,16 +309,54 @@ def first_words(daemon: Service) -> list[can.Message]:
     return came
 
 
-def test_a_drive_is_read_by_cantools_and_by_tshark(tmp_path: Path) -> None:
-    log = drive(tmp_path)
-    assert not_decoded(log) == []
+class Kernel(threading.Thread):
+    """A socket of the kernel's J1939 for all: NAME and group of what comes from our address."""
+
+    def __init__(self) -> None:
+        super().__init__(daemon=True)
+        kernel_has_j1939()
+        self.seen: set[tuple[int, int]] = set()
+        self._ended = threading.Event()
+        self._socket = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939)
+        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
+        nothing = socket.J1939_NO_NAME, socket.J1939_NO_PGN, socket.J1939_NO_ADDR
+        self._socket.bind(("vcan0", *nothing))
+        self._socket.settimeout(0.5)  # how often it looks whether it is to end
+
+    def run(self) -> None:
+        while not self._ended.is_set():
+            with suppress(TimeoutError):
+                _, (_, name, group, source) = self._socket.recvfrom(2000)
+                if source == OWN:
+                    self.seen.add((name, group))
+
+    def end(self) -> None:
+        self._ended.set()
+        self.join()
+        self._socket.close()
+
+
+@pytest.mark.parametrize("name", SHIPPED)
+def test_a_drive_is_read_by_cantools_by_tshark_and_by_the_kernel(tmp_path: Path, name: str) -> None:
+    file = FILE.with_name(f"{name}.yaml")
+    kernel = Kernel()
+    kernel.start()
+    try:
+        log = drive(tmp_path, file=file)
+    finally:
+        kernel.end()
+    assert not_decoded(log, file) == []
+    sent = {m.arbitration_id >> 8 & 0x3FFFF for m in ours(log)} - TRANSPORT
+    valves = {0xFE30, 0xFE31, 0xFE32}
+    assert sent >= (valves | {DM1} if name not in OTHER_VALVES else {DM1})
+    assert {(NAME, group) for group in sent} <= kernel.seen
     seen = as_wireshark_sees(log)
     if seen is None:
-        pytest.skip("no tshark here; cantools has decoded every frame")
+        pytest.skip("no tshark here; cantools and the kernel have read every frame")
     counts, errors = seen
     assert errors == []
-    groups = {(int(group), int(source)) for group, source in counts}
-    assert groups >= {(0xFE30, OWN), (0xFE31, OWN), (0xFE32, OWN), (0xFDD6, 0x33), (0xFE10, 0x80)}
+    groups = {(int(group), int(source)) for group, source in counts if group}
+    assert groups >= {(0xFDD6, 0x33), *((group, OWN) for group in sent)}
     assert counts["60928", str(OWN)] >= 1
     assert counts["65226", str(OWN)] >= 5  # DM1, once a second
 
