@@ -26,7 +26,7 @@ FIRST_SPN = 520192
 DM1 = 0xFECA
 # Address claim, request, transport: the kernel keeps them for itself, or their destination varies.
 TRANSPORT = {0xEEFF, 0xEAFF, 0xECFF, 0xEBFF}
-SHIPPED = ("j1939-forwarder", "js6000-forwarder", "remote-forwarder")
+SHIPPED = ("j1939-forwarder", "j1939-rollers", "js6000-forwarder", "remote-forwarder")
 OTHER_VALVES = ("remote-forwarder",)  # of 11 bits
 
 
