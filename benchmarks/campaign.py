@@ -15,9 +15,9 @@ import tempfile
 import time
 from pathlib import Path
 
-from canshaper.campaign.engine import Processes
 from canshaper.campaign.run import Source, run_campaign
 from canshaper.campaign.store import Store
+from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
 from canshaper.shipped import deployment_path
 

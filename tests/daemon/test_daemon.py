@@ -509,12 +509,21 @@ class Left(Exception):
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
 def test_a_second_signal_to_stop_leaves_at_once_with_neutral_valves(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]], number: int
+    bench: Bench,
+    monkeypatch: pytest.MonkeyPatch,
+    caplog: pytest.LogCaptureFixture,
+    log: Callable[[], list[str]],
+    number: int,
 ) -> None:
     codes: list[int] = []
+    sent: set[int] = set()  # by then: the end of the loop sends neutral as well
+    flushed: list[int] = []
+    monkeypatch.setattr(caplog.handler, "flush", lambda: flushed.append(1))
 
     def leave(code: int) -> None:
+        assert len(flushed) == 2  # after that of the last line itself
         codes.append(code)
+        sent.update(frame.can_id for frame in bench.sent)
         raise Left
 
     monkeypatch.setattr(module.os, "_exit", leave)
@@ -523,13 +532,14 @@ def test_a_second_signal_to_stop_leaves_at_once_with_neutral_valves(
         bench.joysticks()
         if tick == 5:
             bench.sent.clear()
+            flushed.clear()
             for _ in range(2):
                 bench._handlers[number](number, None)
 
     with pytest.raises(Left):
         bench.run(script)
     valves = {frame.can_id for frame in bench.rig.controller.neutral_frames()}
-    assert {frame.can_id for frame in bench.sent} >= valves
+    assert sent >= valves
     assert codes == [128 + number]
     assert f"WARNING stopped at-once signal={signal.Signals(number).name}" in log()
 

@@ -104,6 +104,7 @@ class Bench:
         for one in (module, reporter, loop, standstill):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
+        monkeypatch.setattr(module.os, "_exit", lambda code: pytest.fail(f"left with {code}"))
         monkeypatch.setattr(service_ports, "open_port", self._open)
         monkeypatch.setattr(reloads, "ConfigReload", Read)
         monkeypatch.setattr(module, "Collector", Uncollected)
