@@ -5,6 +5,7 @@ import logging
 import weakref
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -104,7 +105,8 @@ class Bench:
         for one in (module, reporter, loop, standstill):
             monkeypatch.setattr(one, "boottime_ns", lambda: self.now_ns)
         monkeypatch.setattr(module.signal, "signal", self._handlers.__setitem__)
-        monkeypatch.setattr(module.os, "_exit", lambda code: pytest.fail(f"left with {code}"))
+        leave = lambda code: pytest.fail(f"left with {code}")  # noqa: E731
+        monkeypatch.setattr(module, "os", SimpleNamespace(_exit=leave))
         monkeypatch.setattr(service_ports, "open_port", self._open)
         monkeypatch.setattr(reloads, "ConfigReload", Read)
         monkeypatch.setattr(module, "Collector", Uncollected)
