@@ -18,7 +18,7 @@ from tests.hil.frame_faults import AT_ONCE, FAULTS
 from tests.hil.hand import Hand
 from tests.hil.machine import DBC, Service, message_name, wait_for
 from tests.soak.sensor import KINDS, NAMED, Relay
-from tests.soak.sensor_judge import TAIL, Logged, SlewJudge
+from tests.soak.sensor_judge import FADED, TAIL, Logged, SlewJudge
 
 MARK = 0x7E0
 VALVES = {"Slew": 0x200, "Lift": 0x202}
@@ -149,7 +149,7 @@ class Soak:
         if after == "reversed":
             hand.slew = -hand.slew
         if after != "released":
-            self._frames("Slew", 150)
+            self._frames("Slew", FADED + 25)
         held = self._marked()
         hand.slew = 0.0
         self._frames("Slew", TAIL + 40)
@@ -158,7 +158,8 @@ class Soak:
         judge.begin_fault()
         judge.read_all(held)
         if not judge.follows():
-            judge.wrong.append(f"{judge.sensor}, and it does not do what the joystick asks")
+            given = f"{judge.velocity:.3f} for {judge.command:.3f}"
+            judge.wrong.append(f"{judge.sensor}, and not what the joystick asks: {given}")
         judge.read_all(rest)
         if missing := NAMED.get(kind, set()) - {*judge.said}:
             judge.wrong.append(f"{missing} is not told, only {dict(judge.said)}")

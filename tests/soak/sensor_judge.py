@@ -18,8 +18,8 @@ NEUTRAL, DEADBAND, STEPS = 0.02, 0.05, 125
 STEP = 1.0 / STEPS / (1.0 - DEADBAND)
 # Frames that come so late stop an axis, whatever the sensor does: timeouts of the file less a tick.
 LATE_S = 0.08
-# Until what a sensor added has faded, in 30, and the filter has answered.
-FADED = 125
+# Until what a sensor added has faded, in 30, and G_FF has answered a reversal out of full swing.
+FADED = 150
 # Frames from the joystick's to the valve's that heeds it.
 SLACK = 5
 
@@ -37,6 +37,7 @@ class SlewJudge:
 
     Attributes:
         wrong: what must not be.
+        velocity, command: last ones of valve and joystick, parts of full.
         sensor: last of what the status said of the sensor.
         said: how often each was said.
         valves: frames of the valve.
@@ -52,7 +53,7 @@ class SlewJudge:
         self._came_s: dict[int, float] = {}
         self.velocity = 0.0
         self._asked: list[float] = []  # at each frame of the valve
-        self._command = 0.0
+        self.command = 0.0
         self._trusted = 0  # the valve's frame at which it was so last
 
     def begin_fault(self) -> None:
@@ -70,7 +71,7 @@ class SlewJudge:
     def _read(self, key: int, data: bytes) -> None:
         if key == JOYSTICK:
             command = int.from_bytes(data[:2], "little", signed=True) / 1000.0
-            self._command = command if abs(command) > NEUTRAL else 0.0
+            self.command = command if abs(command) > NEUTRAL else 0.0
         elif key == STATUS:
             state, self.sensor = STATES[data[0] & 15], SENSOR[data[0] >> 4]
             self.said[self.sensor] += 1
@@ -83,7 +84,7 @@ class SlewJudge:
 
     def _valve(self, raw: int) -> None:
         self.valves += 1
-        self._asked.append(self._command)
+        self._asked.append(self.command)
         recent = self._asked[-TAIL - SLACK :]
         low, high = min(0.0, *recent), max(0.0, *recent)
         if min(recent[-SLACK:]) > 0.0:  # not against the joystick
@@ -106,4 +107,4 @@ class SlewJudge:
         """Whether the valve is sent what the joystick asks, where no sensor moves it any more."""
         if self.valves - self._trusted < FADED or len({*self._asked[-FADED:]}) > 2:
             return True
-        return abs(self.velocity - self._command) <= 3.0 * STEP
+        return abs(self.velocity - self.command) <= 3.0 * STEP
