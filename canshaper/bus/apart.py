@@ -181,20 +181,20 @@ class BusApart:
         empty_ns = boottime_ns()
         while not self._closing:
             asked_ns = boottime_ns()
-            found: can.Message | Exception | None
+            result: can.Message | Exception | None
             try:
-                found = self._bus.recv(0)
+                result = self._bus.recv(0)
             except Exception as error:  # as above
-                found = error
-            if found is not None:
+                result = error
+            if result is not None:
                 # One too many where the loop reads one meanwhile: bad news too early is no harm.
                 self.lost += len(self._received) == MOST_RECEIVED
-                self._received.append((found, empty_ns))
+                self._received.append((result, empty_ns))
                 with suppress(OSError):  # it is full, which says as much; or closed
                     self._news.send(b"\0")
-            if not isinstance(found, can.Message):
+            if not isinstance(result, can.Message):
                 empty_ns = asked_ns
-                self._pause(failed=found is not None)
+                self._pause(failed=result is not None)
 
     def _pause(self, *, failed: bool) -> None:
         """Until there may be a frame."""

@@ -192,10 +192,10 @@ class InlineGateway:
         if not self._kernel or not self._real or not neutral or now_ns < self._check_ns:
             return
         self._check_ns = now_ns + CHECK_NS
-        if (found := rules_fault(self._rules)) != self._logged:
-            self._logged = found
-            level = logging.WARNING if found else logging.INFO
-            log.log(level, "gateway=%s", found or "rules-right")
+        if (fault := rules_fault(self._rules)) != self._logged:
+            self._logged = fault
+            level = logging.WARNING if fault else logging.INFO
+            log.log(level, "gateway=%s", fault or "rules-right")
 
     def close(self) -> None:
         """Pass nothing on any more."""
@@ -206,10 +206,10 @@ class InlineGateway:
 def rules_fault(expected: list[Rule]) -> str:
     """What is wrong with the kernel's rules while the daemon runs; empty where nothing is."""
     try:
-        found = between({rule.source for rule in expected}, rules())
+        present = between({rule.source for rule in expected}, rules())
     except GatewayError as error:
         return f"rules-not-known {error}"
-    more, missing = difference(found, expected)
+    more, missing = difference(present, expected)
     faults = [f"rules-missing {len(missing)} of {len(expected)}"] if missing else []
     faults += [f"rules-too-many {', '.join(map(str, more))}"] if more else []
     return "; ".join(faults)

@@ -173,7 +173,7 @@ def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Mess
 
     Not of J1939 where the sender is to be named besides.
     """
-    found = [
+    sensors = [
         (message, signal)
         for message in messages
         if message.cycle_time and message.cycle_time <= 1000.0 * swing_s / LEAST_SAMPLES
@@ -181,7 +181,7 @@ def sway_sensors(messages: Sequence[Message], swing_s: float) -> list[tuple[Mess
         for signal in message.signals
         if any(signal.unit in units for units in UNITS.values())
     ]
-    return sorted(found, key=lambda one: not SWAY.search(f"{one[0].name}.{one[1].name}"))
+    return sorted(sensors, key=lambda one: not SWAY.search(f"{one[0].name}.{one[1].name}"))
 
 
 def is_status(message: Message) -> bool:

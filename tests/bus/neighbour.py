@@ -64,16 +64,16 @@ def main() -> None:
     for number in range(FRAMES):
         assert sender.send(Frame("crane", 0x100 + number, False, b"x"))
     received = taken(receiver, 0x100 + FRAMES - 1)
-    told = {"sent": FRAMES, "received": len(received)}
+    outcome = {"sent": FRAMES, "received": len(received)}
     if not shared:
         file = loader("forwarder.yaml")()
-        told["drive"] = any(slewed(file) for _ in range(DRIVES))
-    told["outside"] = outgoing(capture)
-    told["from_outside"] = injected(sender, receiver, capture.getsockname()[4])
+        outcome["drive"] = any(slewed(file) for _ in range(DRIVES))
+    outcome["outside"] = outgoing(capture)
+    outcome["from_outside"] = injected(sender, receiver, capture.getsockname()[4])
     for port in (sender, receiver):
         port.close()
     assert not faults, faults
-    print(json.dumps(told))
+    print(json.dumps(outcome))
 
 
 def slewed(deployment: Deployment) -> bool:

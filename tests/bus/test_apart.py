@@ -166,9 +166,9 @@ def test_a_blocked_serial_line_is_seen_and_nothing_of_it_comes_later(
     line.read()
     taken = fill(slcan, least=2 * THEIR_BYTES // len(text(FRAME)))
     assert slcan.state is BusState.NOT_CONFIRMED
-    told = len(faults)
+    reported = len(faults)
     assert not slcan.send(FRAME), "held for a while"
-    assert faults == [FrameFault.NOT_CONFIRMED] * told, "told once"
+    assert faults == [FrameFault.NOT_CONFIRMED] * reported, "reported once"
     until(lambda: slcan.send(FRAME._replace(can_id=0x333)))
     until(lambda: b"t3338" in line.read())
     # The other end of a pseudo-terminal has a buffer of its own, as an adapter has.
@@ -212,7 +212,7 @@ def test_what_was_sent_last_leaves_before_the_goodbye(slcan: Port, line: SerialL
     assert line.read().endswith(text(FRAME) + b"C\r")
 
 
-# -- an interface that is told when to go on -----------------------------------------------------
+# -- an interface that waits for a sign to go on -------------------------------------------------
 
 
 class Held:

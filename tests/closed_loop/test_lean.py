@@ -39,16 +39,16 @@ def test_valves_and_crane_do_the_same_whether_anybody_listens(
         receive(self, frame)
 
     monkeypatch.setattr(PlantNode, "receive", received)
-    heard: list[Frame] = []
+    received: list[Frame] = []
     drives = []
-    for on_frame in (lambda frame, _time_s: heard.append(frame), None):
+    for on_frame in (lambda frame, _time_s: received.append(frame), None):
         sent.clear()
         again = load_deployment(deployment.path)  # with alive counters that begin again
         simulation = Simulation(again, script, on_frame, crane=crane)
         states = [(time_ms, simulation.plant.crane.state) for time_ms in simulation.ticks()]
         drives.append(([*sent], states))
     assert drives[0] == drives[1]
-    assert {*sent} < {*heard}
+    assert {*sent} < {*received}
 
 
 def test_no_status_is_sent_where_nobody_listens() -> None:

@@ -241,8 +241,8 @@ def test_every_long_log(measured: Measured, share: float | None) -> None:
 @pytest.mark.long
 @KINDS
 def test_what_a_second_swing_that_is_not_there_costs(sensor: Setup) -> None:
-    beside = replace(sensor, second_s=0.63)
-    small, large = residuals(beside, (0, -15, 15)), residuals(beside, (-30, 30))
+    two_modes = replace(sensor, second_s=0.63)
+    small, large = residuals(two_modes, (0, -15, 15)), residuals(two_modes, (-30, 30))
     print(f"15 %: {max(small.values()):.2f}, 30 %: {max(large.values()):.2f} degrees")
     assert max(small.values()) < 2.2
     assert max(large.values()) < 7.2

@@ -465,10 +465,10 @@ def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
     with caplog.at_level("INFO", "canshaper"):
         bench.run(script)
     assert "reload=applied" in caplog.text
-    told = "of messages and tables in the DBC files that are not used"
-    told += "; canshaper check shows them"
+    warning = "of messages and tables in the DBC files that are not used"
+    warning += "; canshaper check shows them"
     assert [text for text in caplog.messages if "dbc-warnings" in text] == [
-        f"dbc-warnings=1 {told}"
+        f"dbc-warnings=1 {warning}"
     ]
 
 

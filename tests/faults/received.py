@@ -100,7 +100,7 @@ class ReceivedStop(Received):
         self.says_stop = False
 
     def whole(self, word: int) -> None:
-        """A stop is a stop, whoever says so."""
+        """A stop is a stop, whichever message says so."""
         if self._signal.get(word) != 0:
             self.says_stop = True
             self.presses += 1
@@ -184,7 +184,7 @@ class ReceivedJoystick(Received):
     def whole(self, word: int) -> None:
         if (enable := self.joystick.enable) is None:
             return
-        if enable.get(word) == 0:  # released is released, whoever says so
+        if enable.get(word) == 0:  # released is released, whichever message says so
             self._release()
         if enable.get(word) != 1:  # of a joystick that another one's switch enables, any code
             for one in self._rollers:

@@ -1,4 +1,4 @@
-"""What was measured on a simulated crane is told by check, and moves no valve of a machine."""
+"""What was measured on a simulated crane is reported by check, and moves no valve of a machine."""
 
 import re
 from collections.abc import Callable
@@ -65,8 +65,8 @@ def test_run_refuses_a_simulated_valve_on_a_real_bus(tmp_path: Path) -> None:
         f"{file}:{line_of(file, 'curve_origin')}: axes.slew.limits.curve_origin: expected a valve"
         " measured on the machine, got one of a simulated crane, on socketcan none0;"
     )
-    for told in ("--simulated", "--listen-only"):
-        assert invoke("run", file, told).exit_code == 3  # there is no such bus
+    for option in ("--simulated", "--listen-only"):
+        assert invoke("run", file, option).exit_code == 3  # there is no such bus
 
 
 @pytest.mark.parametrize("words", [("--channel", "vcan99"), ("--interface", "no_such_interface")])

@@ -162,7 +162,7 @@ class Soak:
             judge.wrong.append(f"{judge.sensor}, and not what the joystick asks: {given}")
         judge.read_all(rest)
         if missing := NAMED.get(kind, set()) - {*judge.said}:
-            judge.wrong.append(f"{missing} is not told, only {dict(judge.said)}")
+            judge.wrong.append(f"{missing} is not reported, only {dict(judge.said)}")
         if judge.stood_still:
             self.counts["not judged: joysticks or daemon stood still"] += 1
             return

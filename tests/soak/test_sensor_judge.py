@@ -1,4 +1,4 @@
-"""The soak's judge of sensor faults: a right drive passes, each wrong one is told."""
+"""The soak's judge of sensor faults: a right drive passes, each wrong one is reported."""
 
 import pytest
 

@@ -24,7 +24,7 @@ FLAGS = [
 # Only to end a test that hangs.
 WAIT_MS = 60_000
 expect.set_options(timeout=WAIT_MS)
-HEARD = re.compile("^(connected|opened|daemon silent: machine)$")
+CONNECTED = re.compile("^(connected|opened|daemon silent: machine)$")
 NO_GAMEPAD = "() => { navigator.getGamepads = () => []; }"
 TRIES = 8
 SOON_MS = 10_000
@@ -59,12 +59,12 @@ def browser() -> Iterator[Browser]:
 
 
 def opened(
-    one: Browser, url: str, faults: list[str], heard: re.Pattern[str] = HEARD, **options: Any
+    one: Browser, url: str, faults: list[str], shown: re.Pattern[str] = CONNECTED, **options: Any
 ) -> Page:
     """A tab with the page; errors of the console, of scripts and of requests go to ``faults``.
 
     Args:
-        heard: what the page says of its connection when it is open.
+        shown: what the page says of its connection when it is open.
         options: of the context, such as viewport and locale.
     """
     page = one.new_context(**options).new_page()
@@ -85,7 +85,7 @@ def opened(
     page.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url}"))
     page.on("response", lambda a: faults.append(f"{a.status} {a.url}") if a.status > 399 else None)
     page.goto(url)
-    expect(page.locator("#link")).to_have_text(heard, timeout=WAIT_MS)
+    expect(page.locator("#link")).to_have_text(shown, timeout=WAIT_MS)
     return page
 
 

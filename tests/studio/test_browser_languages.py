@@ -34,9 +34,9 @@ CUT_OFF = """() => [...document.querySelectorAll("body *")].filter((one) => one.
 
 def in_language(tab: Callable[..., Page], studio: Studio, language: str) -> Page:
     """A phone of a person who reads that language."""
-    heard = re.compile(f"^{texts(language)['link.connected']}$")
+    shown = re.compile(f"^{texts(language)['link.connected']}$")
     size = {"width": 390, "height": 844}
-    return tab(studio, heard=heard, locale=LOCALES[language], viewport=size)
+    return tab(studio, shown=shown, locale=LOCALES[language], viewport=size)
 
 
 def english_said(page: Page, language: str) -> list[str]:

@@ -18,7 +18,7 @@ SIZES = [(390, 844), (1024, 700), (1920, 1080)]
 
 @pytest.fixture
 def box(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Opened]:
-    """The black box of a trip, with another deployment beside it."""
+    """The black box of a trip, with another deployment next to it."""
     path = black_box(tmp_path, monkeypatch)
     studio = Opened(str(path), "--with", "forwarder-robust.yaml")
     yield studio
@@ -142,8 +142,8 @@ def test_axe_finds_nothing(log: Opened, tab: Callable[..., Page], scheme: str) -
 @pytest.mark.parametrize("language", OTHERS)
 def test_it_is_in_the_language(log: Opened, tab: Callable[..., Page], language: str) -> None:
     table, size = texts(language), {"width": 390, "height": 844}
-    heard = re.compile(table["play.opened"])
-    page = tab(log, heard=heard, locale=LOCALES[language], viewport=size)
+    shown = re.compile(table["play.opened"])
+    page = tab(log, shown=shown, locale=LOCALES[language], viewport=size)
     expect(page.locator("#play")).to_have_text(table["play.play"])
     is_good(page, language)
 

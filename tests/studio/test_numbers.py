@@ -171,17 +171,17 @@ def test_a_daemon_that_is_gone_is_told_and_its_return_too(machine: Machine) -> N
 
 
 def test_only_a_machine_of_ones_own_file_is_adjusted(tmp_path: Path) -> None:
-    def told(*arguments: str) -> str:
+    def refusal(*arguments: str) -> str:
         result = CliRunner().invoke(app, ["studio", "--port", "0", *arguments])
         assert result.exit_code == 2, result.output
         return " ".join(result.output.split())
 
-    assert "--adjust, --control: expected with --shadow --adjust" in told("--adjust")
-    assert "--adjust: shipped with the package; copy it" in told("--shadow", "--adjust")
+    assert "--adjust, --control: expected with --shadow --adjust" in refusal("--adjust")
+    assert "--adjust: shipped with the package; copy it" in refusal("--shadow", "--adjust")
     text = (
         (Path("config/forwarder.yaml")).read_text().replace("../dbc/", f"{Path('dbc').resolve()}/")
     )
     (tmp_path / "own.yaml").write_text(text)
-    assert "this file has no control section" in told(
+    assert "this file has no control section" in refusal(
         str(tmp_path / "own.yaml"), "--shadow", "--adjust"
     )

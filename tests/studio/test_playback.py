@@ -26,12 +26,12 @@ ALL = (0.0, None)
 
 
 def opened(
-    file: object, *beside: str, seeds: tuple[int, ...] = (), **more: Any
+    file: object, *others: str, seeds: tuple[int, ...] = (), **more: Any
 ) -> tuple[Playback, dict[str, Any]]:
     """A drive as the page gets it: the object, and by crane the pictures with their times."""
     options = {"channels": (), "window": ALL, "changes": (), "folder": None, **more}
     folder = options.pop("folder")
-    playback = opened_drives(str(file), beside, seeds, folder, **options)[0].load()
+    playback = opened_drives(str(file), others, seeds, folder, **options)[0].load()
     content = json.loads(json.dumps(playback.as_dict()))
     cranes = {
         name: [
@@ -149,20 +149,20 @@ def test_what_cannot_be_opened_is_told(tmp_path: Path) -> None:
     log = recorded(tmp_path / "drive.log", without=frozenset((0x110, 0x111)))
     (tmp_path / "none").mkdir()
 
-    def told(*arguments: object) -> str:
+    def refusal(*arguments: object) -> str:
         result = CliRunner().invoke(app, ["studio", "--port", "0", *map(str, arguments)])
         assert result.exit_code == 2, result.output
         return " ".join(result.output.split())
 
-    assert "--with is missing: which deployment? A log has none" in told(log)
-    assert "got none of its joystick messages" in told(log, "--with", "forwarder.yaml")
-    assert "expected a deployment file, got the log" in told(log, "--seed", "3")
-    assert "expected with a log, a black box" in told("forwarder.yaml", "--with", "x.yaml")
+    assert "--with is missing: which deployment? A log has none" in refusal(log)
+    assert "got none of its joystick messages" in refusal(log, "--with", "forwarder.yaml")
+    assert "expected a deployment file, got the log" in refusal(log, "--seed", "3")
+    assert "expected with a log, a black box" in refusal("forwarder.yaml", "--with", "x.yaml")
     many = [word for _ in range(3) for word in ("--with", "forwarder.yaml")]
-    assert "--with: expected 2 at most, got 3" in told(log, *many)
-    assert "none: expected the drives of a campaign" in told("--campaign", tmp_path / "none")
-    assert "expected the folder of a campaign" in told("--campaign", tmp_path / "there")
-    missing = told(tmp_path / "there.log", "--with", "forwarder.yaml")
+    assert "--with: expected 2 at most, got 3" in refusal(log, *many)
+    assert "none: expected the drives of a campaign" in refusal("--campaign", tmp_path / "none")
+    assert "expected the folder of a campaign" in refusal("--campaign", tmp_path / "there")
+    missing = refusal(tmp_path / "there.log", "--with", "forwarder.yaml")
     assert "there.log" in missing
     assert "No such file" in missing
 

@@ -22,7 +22,7 @@ class Mode(Enum):
     """Who moves the valves while a step listens."""
 
     LISTEN = "listen"
-    """Whoever moves them without us."""
+    """The person who moves them, without us."""
     DRY = "dry"
     """The same; the daemon computes, and sends no valve frame."""
     RAW = "raw"

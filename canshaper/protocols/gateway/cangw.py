@@ -176,9 +176,9 @@ def make(interfaces: Iterable[str], expected: Iterable[Rule]) -> tuple[list[Rule
     return more, missing
 
 
-def difference(found: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
+def difference(present: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[Rule], list[Rule]]:
     """(rules that are too many, rules that are missing)."""
-    more, missing = list(found), []
+    more, missing = list(present), []
     for rule in expected:
         if rule in more:
             more.remove(rule)  # one of them: the same rule twice would pass each frame twice

@@ -88,8 +88,8 @@ function drawStep(step) {
 /** Title of a step; one that the page does not know has that of the procedure. */
 function titleOf(step) {
   const key = `step.${step.name}`;
-  const found = text(key);
-  return found === key ? step.title : found;
+  const title = text(key);
+  return title === key ? step.title : title;
 }
 
 /** Say how the step is: what the procedure says is English. */

@@ -35,7 +35,7 @@ export class Joysticks {
     this.gamepad = new Gamepad(document.getElementById("gamepad"), this.ways);
     this.keys = keys;
     this.nameKeys();
-    // What is printed on the keys of this keyboard; not every browser tells.
+    // What is printed on the keys of this keyboard; not every browser reports it.
     navigator.keyboard?.getLayoutMap?.().then((names) => this.nameKeys(names), () => {});
   }
 
@@ -114,16 +114,16 @@ export class Joysticks {
     const step = Math.min(0.1, (now - this.at) / 1000) / RAMP_S;
     this.at = now;
     const sticks = this.gamepad.read();
-    const found = {};
+    const values = {};
     const fine = SHIFTS.some((key) => this.down.has(key)) ? FINE : 1;
     for (const w of this.ways) {
       const aim = (this.down.has(w.keys[0]) - this.down.has(w.keys[1])) * fine;
       w.key += limited(aim - w.key, step);
       const all = [w.key, w.mouse, sticks?.[w.gamepad] ?? 0];
       w.now = all.reduce((a, b) => (Math.abs(b) > Math.abs(a) ? b : a));
-      found[w.axis] = Math.round(w.now * w.sign * 1000) / 1000;
+      values[w.axis] = Math.round(w.now * w.sign * 1000) / 1000;
     }
-    return found;
+    return values;
   }
 
   /** Draw the knobs where the hand is, and what counts of it. */
@@ -143,8 +143,8 @@ export class Joysticks {
 /** Names of the two ways of an axis, the positive one first. */
 function wayOf(axis) {
   const key = `way.${axis}`;
-  const found = text(key);
-  return found === key ? "+ / −" : found;
+  const words = text(key);
+  return words === key ? "+ / −" : words;
 }
 
 /** Change an attribute only where it is another: each change draws the pad anew. */

@@ -17,7 +17,7 @@ const LOOKS = {
 
 /** From and to when a lane of the history was in which state, less `zero`; gaps where it is not known. */
 export function spans(history, lane, begin, end, zero) {
-  const found = [];
+  const parts = [];
   let last = null;
   let before = null;
   for (let row = begin; row < end; row += 1) {
@@ -27,9 +27,9 @@ export function spans(history, lane, begin, end, zero) {
     if (last && look === before) continue;
     before = look;
     last = look && { from: t, to: t, ...look };
-    if (last) found.push(last);
+    if (last) parts.push(last);
   }
-  return found;
+  return parts;
 }
 
 /** Draw all lanes into a plot of uPlot. */

@@ -25,8 +25,8 @@ const [own, english] = await Promise.all([table(language), table("en")]);
 
 /** A text with {name} replaced by values; the key itself where there is none. */
 export function text(key, values = {}) {
-  const found = own[key] ?? english[key] ?? key;
-  return found.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
+  const template = own[key] ?? english[key] ?? key;
+  return template.replace(/\{(\w+)\}/g, (whole, name) => values[name] ?? whole);
 }
 
 /** Name of an axis or crane; one that the page does not know stays as in the file. */
@@ -37,8 +37,8 @@ export function nameOf(kind, name) {
 
 /** What a state or reason of the daemon means; nothing in English, where it says so itself. */
 export function meaning(words) {
-  const found = own[`term.${words}`];
-  return found && found !== words ? found : "";
+  const meaning = own[`term.${words}`];
+  return meaning && meaning !== words ? meaning : "";
 }
 
 /** Put the texts into the elements that name their keys, and offer the languages. @param select where. */

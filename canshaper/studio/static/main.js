@@ -76,7 +76,7 @@ function show(message) {
   if (message.difference) numbers.ask(message.difference);
   fresh();
   byId("hint").hidden = !mine || message.enable;
-  byId("language").disabled = mine && message.enable; // another one begins the page anew
+  byId("language").disabled = mine && message.enable; // another one loads the page again
   if (!hello.drives) return;
   byId("seat").hidden = false;
   if (mine) pill("seat", text(message.enable ? "seat.drive" : "seat.enable"), message.enable ? "ok" : "warn");

@@ -9,7 +9,7 @@ const LONGEST_WAIT_MS = 3000;
 const PAGE_STOOD_MS = 300; // the page reads the joysticks every 20 ms
 
 let socket;
-let heard = 0;
+let receivedAt = 0;
 let wait = FIRST_WAIT_MS;
 let openAt = 0; // when the next socket is opened
 let joysticks = null; // positions, as the page has read them; null where it does not drive
@@ -37,10 +37,10 @@ function send(message) {
 function open() {
   const one = new WebSocket(`ws://${location.host}/ws`);
   socket = one;
-  heard = performance.now();
-  one.onopen = () => { heard = performance.now(); }; // its first message has all its time
+  receivedAt = performance.now();
+  one.onopen = () => { receivedAt = performance.now(); }; // its first message has all its time
   one.onmessage = (event) => {
-    heard = performance.now();
+    receivedAt = performance.now();
     wait = FIRST_WAIT_MS;
     postMessage({ text: event.data });
   };
@@ -60,7 +60,7 @@ function giveUp(reason) {
 function watch(now) {
   if (!socket) {
     if (now >= openAt) open();
-  } else if (now - heard > (up() ? SILENT_MS : CONNECT_MS + wait)) {
+  } else if (now - receivedAt > (up() ? SILENT_MS : CONNECT_MS + wait)) {
     giveUp("");
   }
 }

@@ -29,7 +29,7 @@ pytestmark = pytest.mark.processes
 
 
 class Hand:
-    """A person who is told, and whose operator moves the joysticks from then on.
+    """A person who is asked, and whose operator moves the joysticks from then on.
 
     Args:
         also: called at every step of the progress.
@@ -38,17 +38,17 @@ class Hand:
     def __init__(self, also: Any = None) -> None:
         self._also = also
         self._operator: subprocess.Popen[bytes] | None = None
-        self.told: list[str] = []
+        self.prompts: list[str] = []
 
     def ready(self, words: str) -> None:
-        self.told.append(words)
+        self.prompts.append(words)
         words_of = ["operator", "machine.yaml", *BUS, "--script", "random-3"]
         self._operator = subprocess.Popen(
             [sys.executable, "-m", "canshaper", *words_of], stdout=subprocess.DEVNULL
         )
 
     def answer(self, question: str, default: str) -> str:
-        self.told.append(question)
+        self.prompts.append(question)
         return default
 
     @contextmanager
@@ -81,7 +81,7 @@ def test_a_drive_is_recorded_and_its_daemon_ended(
 ) -> None:
     hand = Hand()
     Machine(hand, []).drive(deployment, Path("drive.log"), task(mode))
-    assert hand.told == ["Move it."]
+    assert hand.prompts == ["Move it."]
     traffic = read_traffic(Path("drive.log"), deployment)
     assert any(axis.joystick.value for axis in traffic.axes.values())
     assert {bool(axis.valve.value) for axis in traffic.axes.values()} == {sends}
@@ -165,11 +165,11 @@ def test_a_bus_that_cannot_be_opened(machine: Path) -> None:
 def test_who_moves_the_valves_before_the_first_motion(machine: Path) -> None:
     class Says(Hand):
         def answer(self, question: str, default: str) -> str:
-            return super().answer(question, default) if self.told else "canshaper"
+            return super().answer(question, default) if self.prompts else "canshaper"
 
     hand = Hand()
     assert Machine(hand, []).raw_mode("swing") is Mode.LISTEN
-    assert "swing: who moves the valves" in hand.told[0]
+    assert "swing: who moves the valves" in hand.prompts[0]
     assert Machine(Says(), []).raw_mode("swing") is Mode.RAW
 
     class Nonsense(Hand):
