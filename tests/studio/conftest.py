@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -80,7 +80,8 @@ class Studio:
         path = f"/proc/{self.process.pid}/task"
         found = []
         for task in Path(path).iterdir():
-            found += [int(pid) for pid in (task / "children").read_text().split()]
+            with suppress(FileNotFoundError):  # a thread that has just ended
+                found += [int(pid) for pid in (task / "children").read_text().split()]
         return sorted(pid for pid in found if verb is None or verb in command_of(pid))
 
     @contextmanager
