@@ -292,8 +292,8 @@ class Axis:
         Returns:
             The range that both have (low, high), and what they are together before the rates.
         """
-        if not abs(self._added) <= 1.0:
-            raise ValueError(f"added velocity is {self._added}")
+        if not abs(self._path) <= 1.0:
+            raise ValueError(f"added velocity is {self._path}")
         limits, recent, maximum = self._limits, self._recent, self._limits.maximum
         self._own = rate_limited(target, self._own, self._rise, self._fall)
         largest = self._largest_added if self._added else 0.0

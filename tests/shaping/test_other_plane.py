@@ -123,3 +123,16 @@ def test_the_path_of_the_other_axis_is_run_besides() -> None:
         rig.real.step(rig.axis.applied)
     assert rig.axis.sent == pytest.approx(0.1, abs=0.03)
     assert rig.axis.applied == pytest.approx(rig.axis.sent - 0.1)
+
+
+def test_with_a_path_at_full_speed_it_is_no_error() -> None:
+    rig = swinging(Rig())
+    for sign in [1.0] * 30 + [-1.0] * 30:
+        rig.sensed.measure(rig.angle, SCALE, commanded=False, damps=True)
+        rig.axis.act(CommandInput(enabled=True), sign, damps=True)
+        rig.axis.advance()
+        rig.real.step(rig.axis.applied)
+        assert rig.axis.state is State.ACTIVE
+        assert abs(rig.axis.sent) <= LARGEST
+    rig.axis.act(CommandInput(enabled=True), -1.1, damps=True)
+    assert rig.axis.state is State.TRIPPED
