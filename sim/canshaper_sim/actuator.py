@@ -46,6 +46,11 @@ class Actuator:
         self._low = low
         self._high = high
 
+    @property
+    def room_s(self) -> float:
+        """How long it moves at full speed until its upper end."""
+        return (self._high - self.position) / self._full_speed
+
     def advance(self, step_s: float) -> None:
         """Move on by step_s seconds."""
         full_speed = self._full_speed

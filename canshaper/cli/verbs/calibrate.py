@@ -29,7 +29,7 @@ def calibrate(
     speed: str | None = typer.Option(
         None, "--speed", metavar="MESSAGE.SIGNAL", help="Feedback of its speed in the DBC files."
     ),
-    rate_pct_s: float = typer.Option(3.0, "--rate", min=0.5, max=10.0, help="Ramp, % per s."),
+    rate_pct_s: float = typer.Option(10.0, "--rate", min=0.5, max=20.0, help="Ramp, % per s."),
     top_pct: float = typer.Option(40.0, "--top", min=10.0, max=100.0, help="Largest command, %."),
     live: bool = typer.Option(False, "--live", help="On the machine, not on the simulated crane."),
     yes: bool = typer.Option(False, "--yes", help="With --live: do not ask."),
@@ -49,7 +49,8 @@ def calibrate(
     leave the joystick in neutral. Releasing the enable, moving the joystick, Ctrl-C and every fault
     that stops the daemon end it with neutral valves.
 
-    Beyond the top of the ramp the curve is a straight line, and says so.
+    The simulated axis is brought to where it has room for its ramp. Beyond the top of the ramp the
+    curve is a straight line, and says so.
 
     Examples:
 
@@ -77,8 +78,9 @@ def calibrate(
     if live and not yes:
         typer.confirm(
             f"Axis {axis} will move by itself for {ramp.duration_s:.0f} s, up to"
-            f" {top_pct:.0f} % of its command in both directions. Is everybody away, and the"
-            " enable switch held?",
+            f" {top_pct:.0f} % of its command: in positive direction, at most as far as in"
+            f" {ramp.travel_s:.1f} s at full deflection, and as far back. Has it that room, is"
+            " everybody away, and the enable switch held?",
             abort=True,
         )
     with progress_bar(axis) as on_progress:

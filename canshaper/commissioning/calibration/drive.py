@@ -8,6 +8,7 @@ import statistics
 from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame
+from canshaper.commissioning.calibration.at_end import EndWatch
 from canshaper.commissioning.calibration.fit import Calibration, Sample, fit
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.speed import SpeedFeedback
@@ -68,6 +69,8 @@ class CalibrationDrive:
         ramp: the command.
 
     Attributes:
+        axis: as above.
+        ramp: as above.
         ended: why it is over; empty while it goes on.
         progress: how much of the ramp is done, 0 to 1.
 
@@ -98,11 +101,12 @@ class CalibrationDrive:
             one.isolate(joystick, measured if one is runner else None)
             self._joysticks[name] = joystick
         self._joystick = self._joysticks.pop(axis)
-        self._ramp = ramp
+        self.axis, self.ramp = axis, ramp
         self._begun_ns: int | None = None
         self._samples: dict[str, list[Sample]] = {}
         self.ended = ""
         self.progress = 0.0
+        self._end = EndWatch()
 
     @property
     def waiting_for(self) -> str:
@@ -140,10 +144,10 @@ class CalibrationDrive:
             self._begun_ns = now_ns
         if self._begun_ns is not None and not self.ended:
             time_s = (now_ns - self._begun_ns) / 1e9
-            self.progress = min(1.0, time_s / self._ramp.duration_s)
-            self._joystick.deflection = self._ramp.command(time_s)
+            self.progress = min(1.0, time_s / self.ramp.duration_s)
+            self._joystick.deflection = self.ramp.command(time_s)
             self._sample(time_s)
-            if time_s >= self._ramp.duration_s:
+            if time_s >= self.ramp.duration_s:
                 self.ended = "done"
             elif state not in MOVING and state is not State.READY:
                 self.ended = f"stopped: {axis.reason.name}"
@@ -151,6 +155,10 @@ class CalibrationDrive:
                 self.ended = f"stopped: the joystick of {self._moved} was moved"
             elif not valid:
                 self.ended = "stopped: the feedback fell silent, or reports an error"
+            elif self._is_at_end(time_s):
+                text = f"at {abs(self.ramp.command(time_s)):.0%} of the command it moves no more"
+                room = f"give it room for {self.ramp.travel_s:.1f} s at full deflection"
+                self.ended = f"stopped: {text}: its end? {room}"
             if self.ended:
                 self._joystick.deflection = 0.0
         yield from self._controller.tick(now_ns, missed)
@@ -170,8 +178,12 @@ class CalibrationDrive:
 
     def _sample(self, time_s: float) -> None:
         sent = self._runner.axis.raw / self._runner.bound.valve.steps
-        part = self._ramp.part(time_s)
+        part = self.ramp.part(time_s)
         self._samples.setdefault(part, []).append(Sample(sent, self._speed.value))
+
+    def _is_at_end(self, time_s: float) -> bool:
+        part, command = self.ramp.part(time_s), self.ramp.command(time_s)
+        return self._end.reached(part, time_s, command, self._speed.value)
 
     def neutral_frames(self) -> list[Frame]:
         """A neutral frame for every valve."""

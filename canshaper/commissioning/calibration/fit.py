@@ -100,7 +100,8 @@ def fit(
     if largest < 2.0 * moving:
         raise CalibrationError(
             f"the axis did not move up to {top:.0%} of the command, or its feedback trembles as"
-            f" much: largest speed {largest:g}, noise {noise:g}; try a higher top"
+            f" much: largest speed {largest:g}, noise {noise:g}; is it at its end? Else try a"
+            " higher top"
         )
     for way in (rising, falling):
         _moves_steadily(way, moving)

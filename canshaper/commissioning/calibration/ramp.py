@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass
 
+# Slow enough for a lag of 0.3 s, quick enough for a joint that has room for 2 s of full speed.
+RATE_PER_S, TOP = 0.1, 0.4
+
 
 @dataclass(frozen=True, slots=True)
 class Ramp:
@@ -33,6 +36,11 @@ class Ramp:
     def duration_s(self) -> float:
         """Time of all of it."""
         return 2.0 * self.half_s + self.rest_s
+
+    @property
+    def travel_s(self) -> float:
+        """How far it goes in one direction, in seconds of full speed; with a dead band less."""
+        return self.top * (self.up_s + self.hold_s)
 
     def command(self, time_s: float) -> float:
         """Command at a time; 0 before the beginning and after the end."""

@@ -5,7 +5,7 @@ from functools import partial
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.fit import Calibration
 from canshaper.commissioning.calibration.plot import figure
-from canshaper.commissioning.calibration.ramp import Ramp
+from canshaper.commissioning.calibration.ramp import RATE_PER_S, TOP, Ramp
 from canshaper.commissioning.calibration.write import (
     SIMULATED,
     curve_lines,
@@ -18,8 +18,6 @@ from canshaper.commissioning.procedure.steps.swing import swinging, swings
 from canshaper.errors import CalibrationError
 from canshaper.machine.deployment import Deployment
 
-# As `canshaper calibrate` has them.
-RATE_PER_S, TOP = 0.03, 0.4
 NONE = "-"
 
 
@@ -38,8 +36,10 @@ def run(context: Context) -> Outcome:
         drive = CalibrationDrive(deployment, name, speed_signal(deployment, name, speed), ramp)
         words = (
             f"{name} moves BY ITSELF for {ramp.duration_s:.0f} s, up to {100 * TOP:.0f} % of its"
-            " command in both directions. No other controller sends to its valve. Everybody away;"
-            " hold the enable switch all the time, joystick in neutral: letting go ends it."
+            f" command: in positive direction, at most as far as in {ramp.travel_s:.1f} s at full"
+            " deflection, and as far back. Bring it first to where it has that room. No other"
+            " controller sends to its valve. Everybody away; hold the enable switch all the time,"
+            " joystick in neutral: letting go ends it."
         )
         try:
             bench.calibrate(deployment, drive, words)
