@@ -126,7 +126,8 @@ def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
         return _given.answer(text, parse, default)
     while True:
         try:
-            return parse(str(typer.prompt(text, default=default)).strip())
+            shown = typer.prompt(text, default=default, show_default=bool(default))
+            return parse(str(shown).strip())
         except ValueError as error:
             echo(f"  {error}", err=True)
 

@@ -67,11 +67,6 @@ def test_overlapping_strokes_stay_within_the_joystick_travel() -> None:
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        (
-            ("bucket", 0.0, 1.0, 1.0),
-            "axis: expected one of slew, near_far, lift, lift_cylinder, knuckle, extension, got"
-            " 'bucket'",
-        ),
         (("slew", -0.1, 1.0, 1.0), "start_s: expected 0.0 .. inf, got -0.1"),
         (("slew", 0.0, 1.0, 1.01), r"level: expected -1.0 .. 1.0, got 1.01"),
         (("slew", 0.0, math.inf, 1.0), "duration_s: expected 0.0 .. inf, got inf"),
@@ -81,6 +76,13 @@ def test_overlapping_strokes_stay_within_the_joystick_travel() -> None:
 def test_impossible_strokes_are_refused(values: tuple[str, float], message: str) -> None:
     with pytest.raises(ValueError, match=message):
         Stroke(*values)
+
+
+def test_any_name_can_be_that_of_an_axis() -> None:
+    names = ("bucket", "front_slew", "lift", "slew", "bucket")
+    script = Script("any", tuple(Stroke(n, float(k), 0.5, 0.4) for k, n in enumerate(names)), 6.0)
+    assert script.axes == ("slew", "lift", "bucket", "front_slew")
+    assert [script.command("bucket", time_s) for time_s in (0.3, 1.3, 4.3)] == [0.4, 0.0, 0.4]
 
 
 def test_a_script_lasts_to_the_end_of_its_strokes() -> None:

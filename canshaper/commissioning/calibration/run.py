@@ -7,6 +7,7 @@ from contextlib import ExitStack
 from types import FrameType
 from typing import Any
 
+from canshaper.bus.clock import boottime_ns
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import FrameFault
 from canshaper.commissioning.calibration.drive import CalibrationDrive
@@ -17,6 +18,8 @@ from canshaper.machine.deployment import Deployment
 
 # How often neutral is sent to every valve at the end: a frame may be lost.
 LAST_FRAMES = 3
+# So long the enable, the joystick in neutral and the feedback of the speed are waited for.
+WAIT_LIMIT_S = 60.0
 # All that can end or hold a program from its terminal: a valve must not stay open behind it.
 _STOPS = ("SIGINT", "SIGTERM", "SIGHUP", "SIGQUIT", "SIGTSTP")
 STOPS = [getattr(signal, name) for name in _STOPS if hasattr(signal, name)]
@@ -27,7 +30,8 @@ def run_live(
 ) -> None:
     """Drive the axis of the machine until the ramp is over, something stops it, or Ctrl-C.
 
-    However it ends, neutral is the last that is sent to every valve.
+    It ends too where the ramp cannot begin within ``WAIT_LIMIT_S``. However it ends, neutral is the
+    last that is sent to every valve.
 
     Args:
         drive: the measurement.
@@ -49,6 +53,7 @@ def run_live(
 
     before = {number: signal.signal(number, stop) for number in STOPS}
     told_ns = 0
+    limit_ns = boottime_ns() + round(1e9 * WAIT_LIMIT_S)
     standstill = Standstill(deployment)
 
     def body(now_ns: int, missed: int, _late_ns: int) -> bool:
@@ -59,6 +64,10 @@ def run_live(
             on_progress(drive)
         if stopped and not drive.ended:
             drive.ended = f"stopped: {stopped}"
+        if (waiting := drive.waiting_for) and now_ns >= limit_ns and not drive.ended:
+            drive.ended = (
+                f"stopped: it did not begin within {WAIT_LIMIT_S:g} s, it waits for {waiting}"
+            )
         return not drive.ended
 
     with ExitStack() as open_ports:

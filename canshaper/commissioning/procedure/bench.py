@@ -17,6 +17,12 @@ from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.strokes import Script
 
+STILL_MOVES = (
+    "WARNING: we send nothing to the valves, but the controller of before moves the crane wherever"
+    " it is connected. Everybody away, a hand on the emergency stop."
+)
+"""For the person who moves joysticks in ``Mode.LISTEN`` or ``Mode.DRY``."""
+
 
 class Mode(Enum):
     """Who moves the valves while a step listens."""

@@ -1,5 +1,6 @@
 """Hands that do something else than they were told: what is missing, and what to do."""
 
+import shutil
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,7 @@ from canshaper.commissioning.procedure.procedure import Procedure, Proposal
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
+from tests.commissioning.procedure.conftest import ROOT
 
 
 class Otherwise(Simulated):
@@ -111,3 +113,101 @@ def test_a_bus_on_which_nothing_comes(machine: Path) -> None:
     one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
     found = one.run(one.step("buses"))
     assert any("bus crane: no frame was received: is the machine on" in f for f in found.poor)
+
+
+class Renamed(Simulated):
+    """The simulated crane of ``machine.yaml``, for a file with other names of its axes."""
+
+    def __init__(self, names: dict[str, str]) -> None:
+        super().__init__(Terminal(), [])
+        self._names = names
+        self.tasks: list[Task] = []
+
+    def drive(self, _deployment: Any, log: Path, task: Task) -> None:
+        self.tasks.append(task)
+        moved = [replace(one, axis=self._names[one.axis]) for one in task.script.strokes]
+        script = Script(task.script.name, tuple(moved), task.script.duration_s)
+        super().drive(load_deployment(Path("machine.yaml")), log, replace(task, script=script))
+
+
+@pytest.mark.parametrize("step", ["joysticks", "dry", "motion"])
+def test_an_axis_has_whatever_name_the_file_gives_it(machine: Path, step: str) -> None:
+    names = {"boom": "slew", "front_slew": "near_far", "hoist": "lift"}
+    other = renamed(machine, names)
+    bench = Renamed(names)
+    one = Procedure(Files(other), bench, load_deployment, STEPS, origin=other)
+    proposal = one.run(one.step(step))
+    assert proposal.poor == []
+    assert {*names} <= proposal.numbers.keys()
+
+
+def renamed(machine: Path, names: dict[str, str]) -> Path:
+    """A copy of a file with these names of its axes."""
+    text = machine.read_text()
+    for name, known in names.items():
+        for old in (f"\n  {known}:", f": {known}\n", f"axes.{known}."):
+            assert old in text or known == "lift"
+            text = text.replace(old, old.replace(known, name))
+    other = machine.with_name("other.yaml")
+    other.write_text(text)
+    return other
+
+
+@pytest.mark.parametrize("step", ["joysticks", "dry", "motion"])
+def test_a_rotator_with_a_rocker_of_two_signals(machine: Path, step: str) -> None:
+    add_rotator(machine)
+    proposal = run(machine, step, lambda task: task)
+    assert proposal.poor == []
+    assert not proposal.diff
+    assert "rotator" in proposal.numbers
+
+
+def add_rotator(machine: Path) -> None:
+    """As that of a crane of two-cranes.yaml: a rocker with a signal for each direction."""
+    shutil.copy(ROOT / "dbc" / "rotator.dbc", ".")
+    text = machine.read_text().replace("[machine.dbc]", "[machine.dbc, rotator.dbc]")
+    joystick = """  rocker:
+    bus: crane
+    message: RotatorRocker
+    timeout_ms: 100
+    enable: Enable
+    reset: Reset
+    alive_counter: AliveCounter
+
+axes:
+  rotator:
+    command: { joystick: rocker, signal: RotateLeft, negative: RotateRight, neutral_pct: 2 }
+    valve: { bus: crane, message: RotatorCommand, signal: Velocity, timeout_ms: 200 }
+    filter: { kind: off }
+    limits: { max_pct: 40, rise_per_s: 5, fall_per_s: 5, tail_s: 0.5, stop_s: 0.5 }
+"""
+    machine.write_text(text.replace("\naxes:\n", joystick))
+
+
+class Listening(Renamed):
+    """Keeps what the person is asked to do."""
+
+    def __init__(self) -> None:
+        super().__init__({"slew": "slew", "near_far": "near_far", "lift": "lift"})
+
+
+@pytest.mark.parametrize("step", ["buses", "joysticks", "swing", "dry", "motion", "drive"])
+def test_each_step_says_how_long_it_records(machine: Path, step: str) -> None:
+    bench = Listening()
+    one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
+    one.run(one.step(step))
+    assert bench.tasks
+    for task in bench.tasks:
+        assert f" {task.script.duration_s:.0f} s" in task.words
+
+
+@pytest.mark.parametrize("step", ["joysticks", "dry"])
+def test_where_the_old_controller_may_move_the_crane_the_person_is_warned(
+    machine: Path, step: str
+) -> None:
+    bench = Listening()
+    one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
+    one.run(one.step(step))
+    for task in bench.tasks:
+        assert "the controller of before moves the crane wherever it is connected" in task.words
+        assert "Nothing has to move" not in task.words

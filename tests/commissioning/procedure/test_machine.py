@@ -1,5 +1,6 @@
 """The machine bench: a real daemon on a real bus, which is ended with neutral valves."""
 
+import io
 import os
 import signal
 import subprocess
@@ -11,13 +12,15 @@ from typing import Any
 
 import pytest
 
+from canshaper.cli.person import Terminal
+from canshaper.commissioning.calibration import run
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.ramp import Ramp
 from canshaper.commissioning.calibration.write import speed_signal
 from canshaper.commissioning.procedure.bench import Mode, Task
 from canshaper.commissioning.procedure.machine import Machine
 from canshaper.commissioning.procedure.traffic import read_traffic
-from canshaper.errors import BusError, UsageError
+from canshaper.errors import BusError, CalibrationError, UsageError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.strokes import Script
@@ -154,6 +157,34 @@ def test_ctrl_c_ends_a_measurement_and_is_ctrl_c_again(deployment: Deployment) -
         Machine(Hand(interrupted), []).calibrate(deployment, drive, "It moves.")
     assert drive.ended == "stopped: Ctrl-C"
     assert signal.getsignal(signal.SIGINT) is before
+
+
+def test_a_measurement_that_cannot_begin_ends_by_itself(
+    deployment: Deployment, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """No one holds the enable: there is nobody at all."""
+    monkeypatch.setattr(run, "WAIT_LIMIT_S", 0.2)
+    speed = speed_signal(deployment, "slew", None)
+    drive = CalibrationDrive(deployment, "slew", speed, Ramp(0.03, 0.4))
+    Machine(Alone(), []).calibrate(deployment, drive, "It moves.")
+    assert drive.ended.startswith("stopped: it did not begin within 0.2 s, it waits for ")
+    with pytest.raises(CalibrationError, match=r"not taken to its end: stopped: it did not begin"):
+        drive.result()
+
+
+def test_the_prompt_of_enter_is_clean(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("\n"))
+    Terminal().ready("Move it.")
+    assert capsys.readouterr().out == "\n  Move it.\nEnter begins: "
+
+
+class Alone(Hand):
+    """Says that it begins, and does nothing."""
+
+    def ready(self, words: str) -> None:
+        self.prompts.append(words)
 
 
 def test_a_bus_that_cannot_be_opened(machine: Path) -> None:

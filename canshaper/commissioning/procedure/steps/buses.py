@@ -34,7 +34,7 @@ def run(context: Context) -> Outcome:
     """Listen, and look at every message that the deployment needs."""
     deployment = context.deployment
     log = context.folder / "buses.log"
-    words = "Switch the machine on; touch nothing."
+    words = f"Switch the machine on; touch nothing while it listens, {LISTEN_S:.0f} s."
     context.bench.drive(deployment, log, Task(words, Script("rest", (), LISTEN_S)))
     traffic = read_traffic(log, deployment)
     outcome = Outcome(files=[log])

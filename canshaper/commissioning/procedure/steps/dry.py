@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.procedure.bench import Mode, Task
+from canshaper.commissioning.procedure.bench import STILL_MOVES, Mode, Task
 from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
 from canshaper.commissioning.procedure.steps.joysticks import LEAST
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
@@ -51,8 +51,8 @@ def run(context: Context) -> Outcome:
     strokes = ends([*deployment.axes], 1.0)
     script = Script("dry", strokes, strokes[-1].end_s + PAUSE_S)
     words = (
-        "No valve receives anything from us. Enable held, move each joystick to both ends, one"
-        f" after the other: {', '.join(deployment.axes)}. {script.duration_s:.0f} s."
+        "Enable held, move each joystick to both ends, one after the other:"
+        f" {', '.join(deployment.axes)}. {script.duration_s:.0f} s. {STILL_MOVES}"
     )
     context.bench.drive(deployment, log, Task(words, script, Mode.DRY))
     traffic = read_traffic(log, deployment)

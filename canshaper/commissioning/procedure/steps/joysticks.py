@@ -4,7 +4,7 @@ from functools import partial
 
 from matplotlib.figure import Figure
 
-from canshaper.commissioning.procedure.bench import Task
+from canshaper.commissioning.procedure.bench import STILL_MOVES, Task
 from canshaper.commissioning.procedure.step import Context, Outcome, Step
 from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
 from canshaper.config.edit import set_values
@@ -42,7 +42,7 @@ def run(context: Context) -> Outcome:
         log = context.folder / f"joystick-{name}.log"
         words = (
             f"Enable held, move the joystick of {name} to its end in positive direction, then to"
-            " the other end, and let go. Nothing has to move; touch no other joystick."
+            f" the other end, and let go; touch no other joystick. {MOVE_S:.0f} s. {STILL_MOVES}"
         )
         strokes = (Stroke(name, 1.0, 2.0, 1.0), Stroke(name, 4.0, 2.0, -1.0))
         context.bench.drive(deployment, log, Task(words, Script("ends", strokes, MOVE_S)))
