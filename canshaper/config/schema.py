@@ -202,6 +202,11 @@ class AxisConfig(Section):
     limits: Limits = Limits()
     """Output limits of the axis."""
 
+    @property
+    def damps(self) -> bool:
+        """Whether a sway sensor damps its swing."""
+        return self.sway_sensor is not None and self.sway_sensor.use == "damp"
+
     @model_validator(mode="after")
     def _filter_has_sway(self) -> Self:
         if KINDS[self.filter.kind].needs_sway and self.sway is None:

@@ -4,7 +4,7 @@ from canshaper.config.motion import Motion
 from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.value import ValueInput
-from canshaper.shaping.motion import MovingAxis, TwoAxisMotion
+from canshaper.shaping.motion import MovingAxis, TwoAxisMotion, farthest_m
 from canshaper.shaping.states import State
 
 # An axis at rest in READY may be moved by the other one.
@@ -22,6 +22,13 @@ class _Member:
         self.runner = runner
         self.moving = MovingAxis(full_speed, runner.period_s, runner.axis.sway)
 
+    def bound(self, config: Motion) -> None:
+        """Let this axis be moved no farther and no faster than the motion says."""
+        moving, axis = self.moving, self.runner.bound.config
+        moving.farthest = farthest_m(config.max_path_m, damps=axis.damps)
+        moving.largest = config.max_pct / 100.0
+        moving.fall_per_s = axis.limits.fall_per_s
+
     def take(self, tick_s: float, last: int, now: int) -> None:
         """Take the state of the axis; see ``MotionRunner.step``."""
         moving, runner = self.moving, self.runner
@@ -36,7 +43,7 @@ class _Member:
         if axis.sway is not moving.sway:  # changed while it runs
             assert axis.sway is not None
             moving.follow(axis.sway)
-        moving.applied = axis.applied
+        moving.applied, moving.sent = axis.applied, axis.sent
         moving.commanded, moving.able = axis.commanded, axis.state in ABLE
 
 
@@ -72,6 +79,8 @@ class MotionRunner:
         self._apart = slew.bound.name  # what keeps the axes apart: at the start that they wait
         for member in self._members:
             member.runner.axis.allow_added(config.max_pct / 100.0, config.max_s)
+        if self._near_far:
+            self._near_far.bound(config)
         self._motion = TwoAxisMotion(
             turning.moving,
             self._near_far.moving if self._near_far else None,
@@ -79,9 +88,11 @@ class MotionRunner:
         )
 
     def adjust(self) -> None:
-        """Take the full speed of near-far as it is now."""
+        """Take full speed and fall of near-far as they are now."""
         if self._near_far:
-            self._near_far.moving.full_speed = _full_speed_m_s(self._near_far.runner)
+            moving, runner = self._near_far.moving, self._near_far.runner
+            moving.full_speed = _full_speed_m_s(runner)
+            moving.fall_per_s = runner.bound.config.limits.fall_per_s
 
     def step(self, now_ns: int, last: int, now: int) -> MotionEvent | None:
         """Give both axes what they add in this tick.

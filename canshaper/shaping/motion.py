@@ -38,6 +38,16 @@ _LEAST = 0.5
 _LEAST_RADIUS_M = 0.5
 
 
+def farthest_m(path_m: float, *, damps: bool) -> float:
+    """How far near-far is moved at most while its operator leaves it alone.
+
+    Args:
+        path_m: for what slewing adds, m.
+        damps: a sway sensor of near-far damps; it may move it as far again.
+    """
+    return 2.0 * path_m if damps else path_m
+
+
 @dataclass(slots=True)
 class MovingAxis:
     """One of the two axes, as the motion sees it.
@@ -52,8 +62,14 @@ class MovingAxis:
         commanded: the operator asked for motion within the tail.
         able: it may carry out what is added.
         added: velocity to add now, [-1, 1]; the result.
+        sent: velocity that its valve was given last, [-1, 1].
+        farthest: how far this axis may be moved from where its operator left it, rad or m; see
+            ``farthest_m``.
+        largest: fastest velocity that it has there, [0, 1].
+        fall_per_s: fastest fall of its velocity, full speeds per second.
         damps: the other axis makes this one swing, which may be damped; a result.
         damped: how far the tip was moved for that, m.
+        way: how far it was moved since its operator left it, rad or m.
         reached: position that the added velocities reach at the end of the period, rad or m.
         stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
         lag_s: 2 zeta / w.
@@ -66,9 +82,14 @@ class MovingAxis:
     ahead_s: float = 0.0
     commanded: bool = False
     able: bool = False
+    sent: float = 0.0
+    farthest: float = math.inf
+    largest: float = 1.0
+    fall_per_s: float = 5.0
     added: float = 0.0
     damps: bool = False
     damped: float = 0.0
+    way: float = 0.0
     reached: float = 0.0
     stiffness: float = field(init=False)
     damping: float = field(init=False)
@@ -101,6 +122,15 @@ class MovingAxis:
         pull = stiffness * angle + damping * rate
         return full * angle, full * rate, full * (applied - rate), full * pull
 
+    def room(self, sign: float) -> float:
+        """Fastest velocity in a direction from which it still stops before ``farthest``."""
+        way = (self.farthest - sign * self.way) / self.full_speed
+        if not way > 0.0:
+            return 0.0
+        # It falls by a step in each period: (v + (v - step) + ...) * period_s <= way.
+        step = self.fall_per_s * self.period_s
+        return 0.5 * (math.sqrt(step * step + 8.0 * self.fall_per_s * way) - step)
+
     def add(self, target: float, weight: float) -> None:
         """Run to a position of the added part within the period.
 
@@ -115,6 +145,8 @@ class MovingAxis:
             velocity = last + MOST_STEP
         elif velocity < last - MOST_STEP:
             velocity = last - MOST_STEP
+        if self.farthest < math.inf and not self.commanded:
+            velocity = min(max(velocity, -self.room(-1.0)), self.room(1.0))
         if not _NOTHING <= abs(velocity) <= 1.0:
             if not abs(velocity) > 1.0:  # next to nothing, or not a number
                 self.added = 0.0
@@ -131,7 +163,7 @@ class TwoAxisMotion:
     Args:
         slew: the axis that turns.
         near_far: the axis that moves the tip in and out, or None.
-        path_m: farthest that near-far is moved from where its own filter has it.
+        path_m: farthest that near-far is moved for slew, and as far again to damp its swing.
     """
 
     __slots__ = ("_near_far", "_path_m", "_radius_m", "_slew", "_weight")
@@ -159,10 +191,10 @@ class TwoAxisMotion:
             fade = elapsed_s / FADE_S if able else -elapsed_s / FADE_S
             weight = self._weight = min(max(weight + fade, 0.0), 1.0)
         if not commanded or not weight:
-            self._rest()
+            self._rest(over=not commanded)
             return
         if near_far is not None:
-            self._damp(near_far, elapsed_s)
+            self._moved(near_far, elapsed_s)
         if near_far is None:
             radius_m = None
         elif circle_m is None:
@@ -192,20 +224,28 @@ class TwoAxisMotion:
         self._weight = 0.0
         self._rest()
 
-    def _rest(self) -> None:
+    def _rest(self, *, over: bool = False) -> None:
         self._radius_m = None
         for axis in (self._slew, self._near_far):
             if axis is not None:
                 axis.added = axis.reached = axis.damped = 0.0
                 axis.damps = False
+                if over:
+                    axis.way = 0.0
 
-    def _damp(self, near_far: MovingAxis, elapsed_s: float) -> None:
-        """Let near-far damp what slewing makes it swing, no farther than it may be moved."""
+    def _moved(self, near_far: MovingAxis, elapsed_s: float) -> None:
+        """Count how far near-far was moved; it damps no farther than it may be moved."""
         if near_far.commanded:
-            near_far.damps, near_far.damped = False, 0.0
+            near_far.damps, near_far.damped, near_far.way = False, 0.0, 0.0
             return
-        near_far.damped += near_far.applied * near_far.full_speed * elapsed_s
-        near_far.damps = self._weight == 1.0 and abs(near_far.damped) < self._path_m
+        passed = near_far.full_speed * elapsed_s
+        near_far.damped += near_far.applied * passed
+        near_far.way += near_far.sent * passed
+        near_far.damps = (
+            self._weight == 1.0
+            and abs(near_far.damped) < self._path_m
+            and near_far.largest <= near_far.room(math.copysign(1.0, near_far.way))
+        )
 
     def _carried_m(
         self, near_far: MovingAxis, elapsed_s: float, tip_m: float | None

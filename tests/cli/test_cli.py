@@ -106,6 +106,20 @@ def test_check_says_which_axis_moves_without_its_joystick() -> None:
     assert "without its joystick" not in invoke("check", str(SHIPPED)).stdout
 
 
+@pytest.mark.parametrize("name", ["forwarder-sensor", "j1939-sensor", "canopen-sensor"])
+def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: str) -> None:
+    way = " m/s, 0.6 m in or out (0.3 for slewing, as much to damp by its sway sensor), 6 s"
+    note = "near_far moves too without its joystick"
+    shipped = ROOT / "config" / f"{name}.yaml"
+    text = shipped.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    [row] = [row for row in invoke("check", str(shipped)).stdout.splitlines() if note in row]
+    assert row.endswith(way)
+    watched = tmp_path / "watched.yaml"
+    watched.write_text(text.replace("use: damp", "use: watch"))
+    [row] = [row for row in invoke("check", str(watched)).stdout.splitlines() if note in row]
+    assert row.endswith(" m/s, 0.3 m in or out, 6 s")
+
+
 def test_check_says_where_a_filter_no_longer_fits(
     tmp_path: Path,
 ) -> None:

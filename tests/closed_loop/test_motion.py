@@ -2,12 +2,16 @@
 
 import dataclasses
 import math
+import random
+import re
 import statistics
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
-from canshaper.design.lockstep import drive
+from canshaper.cli.app import app
+from canshaper.design.lockstep import Simulation, drive
 from canshaper.design.tuning.robust import least_residual
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -129,3 +133,61 @@ def test_a_reversal_brakes_along_the_filter(
     print(f"{max(tilt[-150:]):.2f} degrees left, peak {max(tilt):.1f}")
     assert max(tilt[-150:]) < residual_deg
     assert max(tilt) < peak_deg
+
+
+def test_slew_moves_itself_back_a_little_with_its_joystick_in_neutral() -> None:
+    """The added part outlives the run-on of a short press; the figure of docs/safety.md."""
+    deployment = load_deployment(FILE.with_name("forwarder-sensor.yaml"))
+    back = 0.0
+    for tenths in range(3, 13):
+        press = Script("press", (Stroke("slew", 0.5, tenths / 10, 1.0),), 7.0)
+        back = min(back, *drive(deployment, press).axes["slew"].sent)
+    print(f"back by {-back:.1%} of full speed")
+    assert -0.05 <= back < -0.02
+
+
+# -- how far near-far is moved without its joystick ------------------------------------------------
+
+
+def restless_slewing(seed: int) -> Script:
+    """A stroke of near-far, which proves a sensor; then slew to and fro in any rhythm."""
+    chance = random.Random(seed)
+    strokes = [Stroke("near_far", 0.5, 1.5, 0.6)]
+    start_s = 6.0
+    while start_s < 25.0:
+        length_s = chance.choice([0.3, 0.7, 1.2, 2.0, 4.0])
+        level = chance.choice([1.0, -1.0]) * chance.choice([0.3, 0.6, 1.0])
+        strokes.append(Stroke("slew", start_s, length_s, level))
+        start_s += length_s + chance.choice([0.0, 0.0, 0.3, 1.0, 1.9, 3.0])
+    return Script("restless", tuple(strokes), 30.0)
+
+
+@pytest.mark.parametrize("path_m", [0.02, 0.05])
+@pytest.mark.parametrize("name", ["forwarder-sensor", "forwarder-robust"])
+def test_near_far_is_moved_no_farther_than_check_says(
+    tmp_path: Path, name: str, path_m: float
+) -> None:
+    """The bound is small here, so that it holds the tip back all the time."""
+    text = FILE.with_name(f"{name}.yaml").read_text()
+    file = tmp_path / "machine.yaml"
+    text = text.replace("../dbc", str(FILE.parent.parent / "dbc"))
+    file.write_text(
+        re.sub("(?m)^(    )(near_far: near_far)$", rf"\1\2\n\1max_path_m: {path_m}", text)
+    )
+    printed = CliRunner().invoke(app, ["check", str(file)]).stdout
+    [bound_m] = [float(m) for m in re.findall("by up to .* m/s, (.*?) m in or out", printed)]
+    farthest_m = 0.0
+    for seed in range(3):
+        simulation = Simulation(load_deployment(file), restless_slewing(seed))
+        near_far = simulation.controller.axes["near_far"].axis
+        way_m, moves = 0.0, []
+        for time_ms in simulation.ticks():
+            if time_ms > 5500:  # its own stroke is over
+                way_m += near_far.sent * 0.02  # at 1 m/s full speed
+                farthest_m = max(farthest_m, abs(way_m))
+                moves.append(near_far.raw or simulation.controller.axes["slew"].axis.commanded)
+            if not any(moves[-1:]):
+                way_m = 0.0
+    print(f"{farthest_m:.4f} m of {bound_m:g} m")
+    step_m = 0.02 / 125 / 0.95
+    assert 0.9 * bound_m < farthest_m < bound_m + 8 * step_m

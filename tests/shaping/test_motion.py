@@ -296,6 +296,57 @@ def test_near_far_may_damp_what_slewing_makes_it_swing() -> None:
     assert not near_far.damps
 
 
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+@pytest.mark.parametrize("fall_per_s", [1.0, 5.0])
+def test_what_is_added_stops_before_the_bound_of_the_way(sign: float, fall_per_s: float) -> None:
+    """However far the path leads, and though the axis is slower than what was added."""
+    motion, _, axis = slewing()
+    axis.farthest, axis.fall_per_s, axis.largest = 0.2, fall_per_s, 0.25
+    ways = []
+    for _ in range(200):
+        motion.step(TICK_S, 3.0)
+        axis.add(sign, 1.0)
+        fall = axis.sent - sign * fall_per_s * TICK_S
+        axis.sent = sign * max(sign * fall, min(sign * axis.added, 0.25))
+        ways.append(sign * axis.way)
+    assert max(ways) == pytest.approx(0.2, abs=1e-3)
+    assert max(ways) <= 0.2 + 1e-9
+    assert not axis.damps  # it could only go farther
+    axis.add(-sign, 1.0)
+    assert sign * axis.added < 0.0
+    # Where the operator moves it himself, the way begins again.
+    axis.commanded = True
+    motion.step(TICK_S, 3.0)
+    assert axis.way == 0.0
+    axis.add(5.0 * sign, 1.0)
+    assert sign * axis.added > 0.0
+
+
+def test_beyond_the_bound_nothing_is_added_outwards() -> None:
+    _, _, axis = slewing()
+    axis.farthest, axis.way = 0.2, 0.21
+    assert axis.room(1.0) == 0.0
+    axis.add(1.0, 1.0)
+    assert axis.added == 0.0
+    axis.add(-1.0, 1.0)
+    assert axis.added < 0.0
+
+
+def test_the_way_begins_again_with_the_next_motion() -> None:
+    motion, slew, near_far = slewing()
+    near_far.sent = -0.25
+    motion.step(TICK_S, 3.0)
+    assert near_far.way == pytest.approx(-0.25 * TICK_S * OUT_M_S)
+    slew.able = False
+    for _ in range(30):  # what was added has faded; slew is still commanded
+        near_far.sent = 0.0
+        motion.step(TICK_S, 3.0)
+    assert near_far.way < 0.0
+    slew.commanded = False
+    motion.step(TICK_S, 3.0)
+    assert near_far.way == 0.0
+
+
 def test_no_farther_than_it_may_be_moved() -> None:
     motion, _, near_far = slewing(path_m=0.1)
     near_far.applied = -0.25

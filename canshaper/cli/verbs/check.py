@@ -160,12 +160,17 @@ def _motion(deployment: "Deployment", motion: "Motion") -> str:
     """How far an axis moves without its joystick, in words."""
     if motion.near_far is None:
         return f"  motion of {motion.slew} alone: nothing is known of near-far"
-    sway = deployment.axes[motion.near_far].config.sway
-    assert sway is not None  # checked with the deployment
-    speed_m_s = motion.max_pct / 100.0 * sway.full_speed_m_s
+    from canshaper.shaping.motion import farthest_m
+
+    axis = deployment.axes[motion.near_far].config
+    assert axis.sway is not None  # checked with the deployment
+    speed_m_s = motion.max_pct / 100.0 * axis.sway.full_speed_m_s
+    path_m = motion.max_path_m
+    most_m = farthest_m(path_m, damps=axis.damps)
+    sources = f" ({path_m:g} for slewing, as much to damp by its sway sensor)" if axis.damps else ""
     return (
         f"  NOTE: while {motion.slew} moves, {motion.near_far} moves too without its joystick: by"
-        f" up to {speed_m_s:.2g} m/s, {motion.max_path_m:g} m in or out, {motion.max_s:g} s"
+        f" up to {speed_m_s:.2g} m/s, {most_m:g} m in or out{sources}, {motion.max_s:g} s"
     )
 
 
