@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 from canshaper.errors import CutOffError, LogError
-from canshaper.recording import asc, binary, candump, tables, trc
+from canshaper.recording import asc, binary, blf, candump, tables, trc
 from canshaper.recording.frames import LATEST_S, Place, TimedFrame
 
 __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
@@ -20,7 +20,7 @@ __all__ = ["CutOffError", "LogError", "LogFile", "TimedFrame", "read_log"]
 READERS: dict[str, Callable[[BinaryIO, Place], Iterator[TimedFrame]]] = {
     ".log": candump.candump,
     ".asc": asc.asc,
-    ".blf": binary.blf,
+    ".blf": blf.blf,
     ".csv": tables.csv,
     ".db": binary.database,
     ".mf4": binary.mf4,

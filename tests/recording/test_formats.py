@@ -1,14 +1,11 @@
 """Formats of other tools, as those write them; ``tests/recording/test_log.py`` has the common."""
 
-import sqlite3
 from pathlib import Path
 
-import can
 import pytest
 
 from canshaper.errors import LogError
 from canshaper.recording.log import LogFile, TimedFrame, read_log
-from tests.recording.writing import written
 
 DAY_NS = 86_400 * 10**9
 
@@ -199,7 +196,7 @@ def test_a_wrong_row_of_gvret(tmp_path: Path, row: str, text: str) -> None:
     assert text in error_of(kept(tmp_path, "a.csv", f"{GVRET}{row}\n"))
 
 
-# -- Vector's ASC and BLF --------------------------------------------------------------------------
+# -- Vector's ASC ----------------------------------------------------------------------------------
 
 
 def test_asc_with_times_from_line_to_line(tmp_path: Path) -> None:
@@ -222,38 +219,3 @@ def test_a_remote_frame_on_a_channel_of_fd(tmp_path: Path) -> None:
     file = LogFile(kept(tmp_path, "a.asc", content))
     assert list(file) == [TimedFrame(10**9, "3", 0x110, False, b"")]
     assert file.left_out == {"remote": 1}
-
-
-def test_an_id_that_none_can_be_does_not_stop_a_blf(tmp_path: Path) -> None:
-    frames = [
-        can.Message(timestamp=1.0, arbitration_id=n, is_extended_id=False, data=[n % 256])
-        for n in (1, 0x4444444, 2)
-    ]
-    file = LogFile(written(tmp_path / "a.blf", frames))
-    assert [f.can_id for f in file] == [1, 2]
-    assert file.left_out == {"impossible": 1}
-
-
-# -- python-can's database -------------------------------------------------------------------------
-
-
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ("DROP TABLE messages", "expected a database of python-can's logger, got OperationalError"),
-        ("ALTER TABLE messages ADD COLUMN more", "expected a database of python-can's logger, got"),
-    ],
-)
-def test_another_database(tmp_path: Path, change: str, text: str) -> None:
-    message = can.Message(timestamp=1.0, arbitration_id=1, is_extended_id=False, data=[1])
-    path = written(tmp_path / "a.db", [message])
-    connection = sqlite3.connect(path)
-    connection.execute(change)
-    connection.commit()
-    connection.close()
-    assert text in error_of(path)
-
-
-def test_what_is_no_database(tmp_path: Path) -> None:
-    assert "file is not a database" in error_of(kept(tmp_path, "a.db", "x" * 1000))
-    assert "each also with .gz behind" in error_of(kept(tmp_path, "a.db.gz", ""))

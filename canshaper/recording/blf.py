@@ -1,0 +1,151 @@
+"""Vector's BLF: packed containers of objects, of which those that are frames are read."""
+
+import struct
+from collections.abc import Iterable, Iterator
+from typing import Any, BinaryIO
+
+import can
+
+from canshaper.codec.layout import CLASSICAL_BYTES
+from canshaper.recording.frames import MOST_BYTES, Place, TimedFrame
+
+_new = tuple.__new__  # TimedFrame(...) in half the time
+# The start of every object, containers too: LOBJ, size of the header, its version, length, kind.
+_OBJECT = struct.Struct("<4sHHLL")
+# What follows it in both versions, the unit of the time and the time; and where a frame begins.
+_TIME = struct.Struct("<L4xQ")
+_FRAME_AT = {1: 32, 2: 40}
+_CAN_KINDS = _CAN, _CAN_2 = 1, 86
+_ERROR, _FD, _FD_64 = 73, 100, 101
+_CAN_FRAME = struct.Struct("<HBBL8s")  # channel, flags, length, id, data
+_FD_FRAME = struct.Struct("<HBxL5xBB5x")  # channel, flags, id, flags of FD, length; data
+_FD_64_FRAME = struct.Struct("<BxBxL4xL19xB4x")  # channel, length, id, flags, end of data; data
+_BYTES = {
+    _CAN: _CAN_FRAME.size,
+    _CAN_2: _CAN_FRAME.size,
+    _ERROR: 0,
+    _FD: _FD_FRAME.size,
+    _FD_64: _FD_64_FRAME.size,
+}
+_REMOTE, _IS_FD = 0x80, 0x01
+_REMOTE_64, _IS_FD_64 = 0x10, 0x1000
+_EXTENDED = 0x80000000
+_TEN_MICROSECONDS = 1
+# How far from the end of an object the next one may begin, because of its padding.
+_PADDING = 8
+
+
+def blf(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
+    """Vector's BLF; times to the nanosecond or ten microseconds, as the logger had them."""
+    wrong = cut_off(file)  # which python-can passes over in silence
+    file.seek(0)
+    try:
+        frames: Iterable[Any] = _Reader(file, place)
+        yield from frames
+    except Exception as error:  # of many kinds, where the file is damaged
+        if not wrong:
+            got = f"{type(error).__name__} {error}".rstrip()
+            raise place.error(got, "a BLF log that is whole") from error
+    if wrong:
+        raise place.cut_off(wrong)
+
+
+class _Reader(can.BLFReader):
+    """python-can's, which opens and unpacks; the objects are read here, as frames.
+
+    Its own takes twice as long, and never ends where an object of a damaged file has no length.
+    """
+
+    def __init__(self, file: BinaryIO, place: Place) -> None:
+        super().__init__(file)
+        self._place = place
+        self._start_ns = round(self.start_timestamp * 1000) * 1_000_000
+
+    def _parse_data(self, data: bytes) -> Iterator[Any]:
+        """Frames of one container; ``_pos`` is where its first object that is not read begins."""
+        find, start, frame_of = data.find, _OBJECT.unpack_from, self._frame
+        at, end, last = 0, len(data), len(data) - _OBJECT.size
+        while True:
+            self._pos = at
+            begin = find(b"LOBJ", at, at + _PADDING)
+            if begin < 0 and at + _PADDING <= end:
+                raise ValueError("no object where the next one should be")
+            if not 0 <= begin <= last:
+                return
+            _, _, version, length, kind = start(data, begin)
+            if length < _OBJECT.size:
+                raise ValueError(f"an object of {length} bytes")
+            at = begin + length
+            if at > end:  # the rest of it is in the next container
+                return
+            if kind in _BYTES and version in _FRAME_AT:
+                frame = frame_of(data, kind, begin, begin + _FRAME_AT[version], at)
+                if frame is not None:
+                    yield frame
+
+    def _frame(self, data: bytes, kind: int, begin: int, body: int, end: int) -> TimedFrame | None:
+        """The data frame of an object from ``begin`` to ``end``; None where it is none."""
+        place = self._place
+        place.number += 1
+        if body + _BYTES[kind] > end:
+            raise ValueError(f"a frame of {end - begin} bytes")
+        if kind in _CAN_KINDS:
+            channel, flags, count, number, content = _CAN_FRAME.unpack_from(data, body)
+            remote, most, content = flags & _REMOTE, CLASSICAL_BYTES, content[:count]
+        elif kind == _ERROR:
+            place.left_out["error"] += 1
+            return None
+        else:
+            channel, remote, most, number, content = _fd(data, kind, begin, body, end)
+        can_id, extended = number & 0x1FFFFFFF, number >= _EXTENDED
+        if remote:
+            place.left_out["remote"] += 1
+            return None
+        if (can_id > 0x7FF and not extended) or len(content) > most:
+            place.left_out["impossible"] += 1
+            return None
+        unit, ticks = _TIME.unpack_from(data, begin + _OBJECT.size)
+        ns = self._start_ns + (ticks * 10_000 if unit == _TEN_MICROSECONDS else ticks)
+        frame: TimedFrame = _new(TimedFrame, (ns, str(channel), can_id, extended, content))
+        return frame
+
+
+def _fd(
+    data: bytes, kind: int, begin: int, body: int, end: int
+) -> tuple[int, int, int, int, bytes]:
+    """Channel, whether it is remote, most bytes, id and data of a frame on a channel of CAN FD."""
+    if kind == _FD:
+        channel, flags, number, fd_flags, count = _FD_FRAME.unpack_from(data, body)
+        remote, is_fd = flags & _REMOTE, fd_flags & _IS_FD
+        at = body + _FD_FRAME.size
+    else:
+        channel, count, number, flags, more_at = _FD_64_FRAME.unpack_from(data, body)
+        remote, is_fd = flags & _REMOTE_64, flags & _IS_FD_64
+        at = body + _FD_64_FRAME.size
+        end = begin + more_at if more_at else end
+    # It may have less than its length says: the loggers leave out zeros.
+    content = data[at : min(at + count, end)].ljust(count, b"\0")
+    return channel, remote, MOST_BYTES if is_fd else CLASSICAL_BYTES, number, content
+
+
+def cut_off(file: BinaryIO) -> str:
+    """Where a BLF file ends within an object; empty where it does not."""
+    file.seek(0)
+    head = file.read(8)
+    if len(head) < 8 or head[:4] != b"LOGG":
+        return ""
+    at = int.from_bytes(head[4:], "little")
+    while True:
+        file.seek(at)
+        header = file.read(_OBJECT.size)
+        if not header:
+            return ""
+        if len(header) == _OBJECT.size:
+            signature, _, _, length, _ = _OBJECT.unpack(header)
+            if signature != b"LOBJ" or length < _OBJECT.size:
+                return ""  # damaged in another way
+            file.seek(at + length - 1)
+            if file.read(1):
+                at += length + length % 4
+                continue
+        return f"it ends within the part that begins at byte {at}"
