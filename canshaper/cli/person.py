@@ -1,9 +1,9 @@
 """The person at the terminal, led through the steps of ``canshaper commission``."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from canshaper.cli.answers import asked
+from canshaper.cli.answers import asked, one
 from canshaper.cli.common import echo
 from canshaper.report.console import OnProgress, progress_bar
 
@@ -16,9 +16,9 @@ class Terminal:
         echo(f"\n  {words}")
         asked("Enter begins", str, "")
 
-    def answer(self, question: str, default: str) -> str:
-        """Ask for a word."""
-        return asked(question, str, default)
+    def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
+        """Ask for a word, until it is one that is allowed."""
+        return asked(question, one(allowed) if allowed else str, default)
 
     @contextmanager
     def progress(self, what: str) -> Iterator[OnProgress]:

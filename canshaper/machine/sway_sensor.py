@@ -70,6 +70,11 @@ class BoundSwaySensor:
     cycle_s: float
 
     @property
+    def name(self) -> str:
+        """MESSAGE.SIGNAL."""
+        return f"{self.message.message.name}.{self.signal.name}"
+
+    @property
     def limits(self) -> SensorLimits:
         """What it may show."""
         config = self.config

@@ -49,7 +49,9 @@ def crane_metrics(recording: Recording, crane: CraneTrace) -> CraneMetrics:
         rms_deg=rms(t_s, sway),
         residual_deg=max((sway[k] for window in windows for k in window), default=None),
         run_on_s=max((run_on_s(t_s, speed, rest) for rest in still), default=None),
-        run_on_m=max((_farthest_m(crane.tip_m, rest) for rest in still), default=None),
+        run_on_m=max(
+            (_farthest_m(crane.tip_m, rest) for rest in still if crane.tip_m), default=None
+        ),
     )
 
 

@@ -67,7 +67,9 @@ def figure(raw: Recording, shaped: Recording, report: Mapping[str, Any]) -> Figu
     names = [name for name, trace in raw.axes.items() if trace.sway_deg is not None]
     if not names:
         raise ValueError("no axis of the drives has sway: there is nothing to draw")
-    views = [(drive.crane, rests(drive)) for drive in (raw, shaped) if drive.crane]
+    views = [
+        (drive.crane, rests(drive)) for drive in (raw, shaped) if drive.crane and drive.crane.tip_m
+    ]
     blocks = max(len(names), 2 if views else 1)
     height = _HEAD_PX + blocks * _BLOCK_PX + _FOOT_PX
     fig = new_figure(WIDTH_PX, height, dpi=PRINT_DPI)

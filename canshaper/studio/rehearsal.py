@@ -7,7 +7,7 @@ import json
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -33,7 +33,7 @@ class Reader:
     def ready(self, words: str) -> None:
         """Nothing is waited for at the desk."""
 
-    def answer(self, _question: str, default: str) -> str:
+    def answer(self, _question: str, default: str, _allowed: Sequence[str] = ()) -> str:
         """The default."""
         return default
 

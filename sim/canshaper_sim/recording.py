@@ -25,11 +25,12 @@ class AxisTrace:
 
 @dataclass(frozen=True)
 class CraneTrace:
-    """Tip and grapple over a drive; every list is as long as the recording's ``t_s``.
+    """Tip and grapple over a drive; every list with values is as long as the recording's ``t_s``.
 
     Attributes:
-        tip_m: tip of the boom from above, m; x points along the boom that has not slewed.
-        grapple_m: grapple from above, m.
+        tip_m: tip of the boom from above, m; x points along the boom that has not slewed. Empty
+            where nothing measures it.
+        grapple_m: grapple from above, m; empty where nothing measures it.
         sway_deg: total swing: both planes together, root of the sum of squares, degrees.
     """
 
@@ -42,7 +43,7 @@ class CraneTrace:
 class Recording:
     """A drive on a common time base (seconds from its start, increasing).
 
-    ``crane`` is None where nothing says where the tip is.
+    ``crane`` is None where nothing says where the tip is and how the grapple swings.
     """
 
     t_s: list[float]

@@ -161,11 +161,7 @@ def read_can(
 def _merits(deployment: Deployment | None) -> dict[str, str]:
     """Figure of merit of each "Message.Signal" that a sway sensor of the deployment measures."""
     sensors = [s for a in deployment.axes.values() if (s := a.sway_sensor)] if deployment else []
-    return {
-        f"{one.message.message.name}.{one.signal.name}": one.config.merit
-        for one in sensors
-        if one.config.merit
-    }
+    return {one.name: one.config.merit for one in sensors if one.config.merit}
 
 
 def _read(

@@ -1,5 +1,6 @@
 """Where a step drives and measures: on the machine, or on the simulated crane."""
 
+from collections.abc import Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from enum import Enum
@@ -60,8 +61,8 @@ class Person(Protocol):
     def ready(self, words: str) -> None:
         """Say what to do, and wait until they are about to do it."""
 
-    def answer(self, question: str, default: str) -> str:
-        """Ask for a word; the default where they say nothing else."""
+    def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
+        """Ask for a word, one of those that are allowed; the default where they say no other."""
 
     def progress(self, what: str) -> AbstractContextManager[OnProgress]:
         """A bar, from 0 to 1."""

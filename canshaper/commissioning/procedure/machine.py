@@ -67,9 +67,7 @@ class Machine:
     def raw_mode(self, step: str) -> Mode:
         """See ``Bench``."""
         question = f"{step}: who moves the valves: {OTHER} (the controller of before) or {OURS}"
-        answer = self.person.answer(question, OTHER)
-        if answer not in (OTHER, OURS):
-            raise UsageError(f"{step}: expected {OTHER} or {OURS}, got {answer!r}")
+        answer = self.person.answer(question, OTHER, (OTHER, OURS))
         return Mode.RAW if answer == OURS else Mode.LISTEN
 
     def calibrate(self, deployment: Deployment, drive: CalibrationDrive, words: str) -> None:

@@ -35,6 +35,7 @@ class Proposal:
         poor: what is missing, with what to do; then nothing can be accepted.
         pictures: files of its picture.
         files: its logs.
+        note: what is said of the step once it is done.
         diff: what would be written into the deployment file; empty for nothing.
         before: SHA-256 of the deployment file that it was computed from.
         text: that file with what it would write.
@@ -47,6 +48,7 @@ class Proposal:
     poor: list[str] = field(default_factory=list)
     pictures: list[Path] = field(default_factory=list)
     files: list[Path] = field(default_factory=list)
+    note: str = ""
     diff: str = ""
     text: bytes = b""
 
@@ -141,6 +143,7 @@ class Procedure:
             outcome = step.run(context)
             proposal.parts, proposal.numbers = outcome.sheet.parts, outcome.numbers
             proposal.poor, proposal.files = outcome.poor, outcome.files
+            proposal.note = outcome.note
             for part, figure in outcome.figures.items():
                 name = f"{step.name}-{part}" if part else step.name
                 proposal.pictures += draw(figure, self.files.folder / name, deployment)
@@ -170,7 +173,7 @@ class Procedure:
         if proposal.diff:
             self._replace(proposal.text)
             self.state.left = hash_of(path)
-        self._keep(proposal, Status.DONE)
+        self._keep(proposal, Status.DONE, why=proposal.note)
         if proposal.diff:
             name = proposal.step
             self._reopen({name, FILE}, f"{name} has changed the file")

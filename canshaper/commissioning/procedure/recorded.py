@@ -15,7 +15,9 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.log import LogFile
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.recorder import Recorder
-from canshaper_sim.recording import AxisTrace, Recording
+from canshaper_sim.recording import AxisTrace, CraneTrace, Recording
+
+MOST_SILENT_S = 0.5  # a fifth of the swing of most grapples
 
 
 def simulated_recording(
@@ -39,29 +41,52 @@ def machine_recording(log: Path, deployment: Deployment, signals: Mapping[str, s
     """A drive of a machine, with the signals that show its swing.
 
     The speed of an axis is taken to be what was sent to its valve. A rate is an angle by the period
-    of the swing.
+    of the swing. The total swing is that of all signals together; where the tip is, no one says.
 
     Args:
         log: of the drive.
         deployment: the machine.
-        signals: MESSAGE.SIGNAL of the swing by axis; at least one.
+        signals: MESSAGE.SIGNAL of the swing by axis; at least one. Axes may share one.
 
     Raises:
-        IdentificationError: a signal is not in the log, or shows no angle and no rate.
+        IdentificationError: a signal is not in the log, shows no angle and no rate, or was silent.
         LogError: the log cannot be read.
     """
-    swings = read_can(log, "", signals, deployment.messages, deployment=deployment)
+    sensors = {name: s for name in signals if (s := deployment.axes[name].sway_sensor)}
+    sources = {n: one.config.source for n, one in sensors.items() if one.name == signals[n]}
+    swings = read_can(log, "", signals, deployment.messages, deployment=deployment, sources=sources)
     traffic = read_traffic(log, deployment)
     time_s = next(iter(swings.values())).time_s
+    planes: dict[str, list[float]] = {}
     axes = {}
     for name, axis in traffic.axes.items():
         sent = swings[name].command if name in swings else None
         sent_s, speed = (sent.time_s, sent.speed) if sent else axis.valve.arrays()
         velocity = _held(time_s, sent_s, speed)
-        sway = _angle_deg(deployment, name, swings[name], time_s) if name in swings else None
+        sway = None
+        if name in swings:
+            _check_complete(name, swings[name], traffic.duration_s)
+            sway = planes[signals[name]] = _angle_deg(deployment, name, swings[name], time_s)
         axes[name] = AxisTrace(_held(time_s, *axis.joystick.arrays()), velocity, velocity, sway)
     begin_s = float(time_s[0])
-    return Recording([float(value) - begin_s for value in time_s], axes)
+    total = [math.hypot(*angles) for angles in zip(*planes.values(), strict=True)]
+    crane = CraneTrace([], [], total)
+    return Recording([float(value) - begin_s for value in time_s], axes, crane)
+
+
+def _check_complete(name: str, series: Series, duration_s: float) -> None:
+    """A sensor that falls silent would show no swing.
+
+    Raises:
+        IdentificationError: it has a gap.
+    """
+    edges = np.concatenate(([0.0], series.time_s, [duration_s]))
+    number = int(np.argmax(np.diff(edges)))
+    gap_s = float(edges[number + 1] - edges[number])
+    if gap_s > MOST_SILENT_S:
+        text = f"{series.source}: no value for {gap_s:.1f} s from {edges[number]:.1f} s on"
+        remedy = "is the sensor on, and the swing within its range? Do it again"
+        raise IdentificationError(f"{name}: {text}: {remedy}")
 
 
 def _held(at_s: Array, time_s: Array, value: Array) -> list[float]:

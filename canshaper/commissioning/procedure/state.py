@@ -30,7 +30,7 @@ class Record:
     Attributes:
         status: of the step.
         at: when it was last run, accepted or skipped, in ISO 8601; empty before.
-        why: what is said of it: why it is open again.
+        why: what is said of it: why it is open again, how it was judged.
         parts: what it has shown.
         numbers: what it measured.
         poor: what was missing.

@@ -50,6 +50,7 @@ class Outcome:
         poor: what is missing, each with what to do; a step with one stays open.
         figures: draw its pictures, by the end of their names; empty for a single one.
         files: logs it has written.
+        note: what is said of the step once it is done; empty for nothing.
         edit: writes what it proposes into the file of a deployment, and says what a person has to
             know of that; None for nothing.
     """
@@ -59,6 +60,7 @@ class Outcome:
     poor: list[str] = field(default_factory=list)
     figures: "dict[str, Callable[[], Figure]]" = field(default_factory=dict)
     files: list[Path] = field(default_factory=list)
+    note: str = ""
     edit: Callable[[Deployment], Sequence[str]] | None = None
 
 

@@ -19,7 +19,7 @@ def read_sensors(path: Path, deployment: Deployment, axes: Sequence[str]) -> dic
     return read_can(
         path,
         "",
-        {name: f"{one.message.message.name}.{one.signal.name}" for name, one in sensors.items()},
+        {name: one.name for name, one in sensors.items()},
         deployment.messages,
         deployment=deployment,
         sources={name: one.config.source for name, one in sensors.items()},

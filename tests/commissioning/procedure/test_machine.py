@@ -5,7 +5,7 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -50,7 +50,7 @@ class Hand:
             [sys.executable, "-m", "canshaper", *words_of], stdout=subprocess.DEVNULL
         )
 
-    def answer(self, question: str, default: str) -> str:
+    def answer(self, question: str, default: str, _allowed: Sequence[str] = ()) -> str:
         self.prompts.append(question)
         return default
 
@@ -195,17 +195,19 @@ def test_a_bus_that_cannot_be_opened(machine: Path) -> None:
 
 def test_who_moves_the_valves_before_the_first_motion(machine: Path) -> None:
     class Says(Hand):
-        def answer(self, question: str, default: str) -> str:
-            return super().answer(question, default) if self.prompts else "canshaper"
+        def answer(self, _question: str, _default: str, allowed: Sequence[str] = ()) -> str:
+            assert allowed == ("other", "canshaper")
+            return "canshaper"
 
     hand = Hand()
     assert Machine(hand, []).raw_mode("swing") is Mode.LISTEN
     assert "swing: who moves the valves" in hand.prompts[0]
     assert Machine(Says(), []).raw_mode("swing") is Mode.RAW
 
-    class Nonsense(Hand):
-        def answer(self, question: str, default: str) -> str:
-            return "me"
 
-    with pytest.raises(UsageError, match="expected other or canshaper, got 'me'"):
-        Machine(Nonsense(), []).raw_mode("swing")
+def test_an_answer_that_is_none_of_those_allowed(
+    machine: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("me\ncanshaper\n"))
+    assert Machine(Terminal(), []).raw_mode("swing") is Mode.RAW
+    assert "expected one of other, canshaper, got 'me'" in capsys.readouterr().err

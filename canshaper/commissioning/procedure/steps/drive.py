@@ -4,12 +4,19 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from canshaper.commissioning.identification.canlog import bind
+from canshaper.commissioning.identification.series import Kind
 from canshaper.commissioning.procedure.bench import Mode, Simulated, Task
 from canshaper.commissioning.procedure.recorded import machine_recording, simulated_recording
 from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
-from canshaper.errors import IdentificationError
-from canshaper.report.metrics import report_dict
+from canshaper.commissioning.procedure.steps.dry import figure as joysticks_figure
+from canshaper.commissioning.procedure.steps.motion import LEAST_MOVED
+from canshaper.commissioning.procedure.steps.swing import swinging
+from canshaper.commissioning.procedure.traffic import AxisTraffic, Traffic, read_traffic
+from canshaper.report.console import new_table
+from canshaper.report.metrics import MIN_RAW_DEG, report_dict
 from canshaper.report.plot import figure
+from canshaper.report.strokes import RESIDUAL_DWELL_S, RESIDUAL_WINDOW_MIN_S
 from canshaper.report.table import print_report
 from canshaper_sim.axes import ALL_AXES
 from canshaper_sim.operator import script_named
@@ -17,67 +24,164 @@ from canshaper_sim.recording import Recording
 
 # A tenth of the swing: with more, the filter is for another swing than this one.
 LEAST_REDUCTION_PCT = 90.0
+LEAST_SWING_DEG = 1.0  # of which a tenth is still above the noise of a sensor
+LEAST_DRIVEN_S = 0.5  # of full deflection, all strokes together
+MOST_UNLIKE = 2.0  # times as much driven before as after, or the other way round
 DRIVES = {"before": ("off", Mode.RAW), "after": ("on", Mode.SHAPED)}
+BY_EYE = "judged by eye"
+LESS, SAME, UNSEEN = "less", "same", "-"
 
 
 def run(context: Context) -> Outcome:
-    """Let the same be driven twice, and compare."""
+    """Let the same be driven twice, and compare what was measured, or what the person has seen."""
     deployment = context.deployment
-    script = script_named("demo", [axis for axis in ALL_AXES if axis in deployment.axes])
-    outcome = Outcome()
+    axes = swinging(deployment) or [*deployment.axes]
+    outcome = Outcome(files=_driven(context, axes))
+    before, after = (read_traffic(log, deployment) for log in outcome.files)
+    _compare_work(outcome, axes, before, after)
+    if outcome.poor:
+        for name, traffic in (("before", before), ("after", after)):
+            title = f"Filters {DRIVES[name][0]}: what was driven"
+            outcome.figures[name] = partial(joysticks_figure, traffic, title)
+        return outcome
+    fastest = ", ".join(f"{n} {a.limits.max_pct:g} %" for n, a in deployment.config.axes.items())
+    outcome.sheet.print(f"max_pct in both drives: {fastest}")
+    if isinstance(context.bench, Simulated):
+        crane = context.bench.parameters
+        raw, shaped = (simulated_recording(log, deployment, crane) for log in outcome.files)
+        _measured(context, outcome, raw, shaped)
+        return outcome
+    signals = _signals(context)
+    if signals:
+        text = ", ".join(f"{name} by {signal}" for name, signal in signals.items())
+        outcome.sheet.print(f"Swing measured: {text}")
+        raw, shaped = (machine_recording(log, deployment, signals) for log in outcome.files)
+        _measured(context, outcome, raw, shaped)
+    if left := [name for name in axes if name not in signals]:
+        _by_eye(context, outcome, left)
+    return outcome
+
+
+def _driven(context: Context, axes: list[str]) -> list[Path]:
+    """Logs of both drives."""
+    script = script_named("demo", [axis for axis in ALL_AXES if axis in context.deployment.axes])
+    logs = []
     for name, (filters, mode) in DRIVES.items():
-        log = context.folder / f"drive-{name}.log"
         words = (
-            f"Filters {filters}. Slew and reach out together for two seconds, let go of both, wait"
-            " six seconds; then the same back. The same both times, before and after."
-            f" {script.duration_s:.0f} s."
+            f"Filters {filters}. {' and '.join(axes)} together for two seconds, let go of all, wait"
+            " six seconds; then the same back, and wait again. The same both times, before and"
+            f" after. Watch the swing after letting go. {script.duration_s:.0f} s."
         )
-        context.bench.drive(deployment, log, Task(words, script, mode))
-        outcome.files.append(log)
-    raw, shaped = (_recording(context, log) for log in outcome.files)
+        logs.append(context.folder / f"drive-{name}.log")
+        context.bench.drive(context.deployment, logs[-1], Task(words, script, mode))
+    return logs
+
+
+def _signals(context: Context) -> dict[str, str]:
+    """MESSAGE.SIGNAL of the angle or rate of each swing: of the step swing, else of its sensor.
+
+    Raises:
+        IdentificationError: it is not in the DBC files.
+    """
+    deployment, swings = context.deployment, context.numbers.get("swing", {})
+    signals = {}
+    for name, axis in deployment.axes.items():
+        sensor = axis.sway_sensor
+        signal = swings.get(name, {}).get("signal") or (sensor.name if sensor else None)
+        if signal and bind(signal, deployment.messages)[2].kind is not Kind.OTHER:
+            signals[name] = signal
+    return signals
+
+
+def _compare_work(outcome: Outcome, axes: list[str], before: Traffic, after: Traffic) -> None:
+    """Were the axes driven, and in both drives about as much?"""
+    table = new_table("axis", "driven before, s of full deflection", "after")
+    for name in axes:
+        both = [_driven_s(one.axes[name]) for one in (before, after)]
+        table.add_row(name, *(f"{value:.1f}" for value in both))
+        for when, one, driven_s in zip(DRIVES, (before, after), both, strict=True):
+            moved = max(map(abs, one.axes[name].valve.value), default=0.0) > LEAST_MOVED
+            if driven_s < LEAST_DRIVEN_S:
+                text = f"{name}: its joystick was moved for {driven_s:.1f} s of full deflection"
+                outcome.poor.append(f"{text} in the drive {when}: drive it as it says")
+            elif not moved:
+                text = f"{name}: its valve received no motion in the drive {when}"
+                outcome.poor.append(f"{text}: hold the enable; see docs/states.md for the reason")
+        if min(both) > LEAST_DRIVEN_S and max(both) > MOST_UNLIKE * min(both):
+            text = f"driven for {both[0]:.1f} s of full deflection before, {both[1]:.1f} s after"
+            outcome.poor.append(f"{name}: {text}: drive the same both times")
+    outcome.sheet.print(table)
+
+
+def _driven_s(axis: AxisTraffic) -> float:
+    """Area under the deflection of its joystick."""
+    times, values = axis.joystick.arrays()
+    return float((abs(values[:-1]) * (times[1:] - times[:-1])).sum())
+
+
+def _measured(context: Context, outcome: Outcome, raw: Recording, shaped: Recording) -> None:
+    """Compare the total swing of both drives."""
     measures = report_dict(
         raw,
         shaped,
         transport="lock-step, no bus" if context.bench.simulated else "the machine",
         missed_deadlines=None,
-        facts={"script": script.name, "deployment": deployment.path.name},
+        facts={"script": "demo", "deployment": context.deployment.path.name},
     )
     print_report(measures, outcome.sheet)
-    fastest = ", ".join(f"{n} {a.limits.max_pct:g} %" for n, a in deployment.config.axes.items())
-    outcome.sheet.print(f"max_pct in both drives: {fastest}")
-    parts = {"crane": measures["crane"]} if measures["crane"] else measures["axes"]
-    for name, one in parts.items():
-        _judge(outcome, name, one)
+    _judge(outcome, measures["crane"])
     outcome.figures[""] = partial(figure, raw, shaped, measures)
-    return outcome
 
 
-def _recording(context: Context, log: Path) -> Recording:
-    if isinstance(context.bench, Simulated):
-        return simulated_recording(log, context.deployment, context.bench.parameters)
-    swings = context.numbers.get("swing", {})
-    signals = {name: one["signal"] for name, one in swings.items() if one.get("signal")}
-    if not signals:
-        text = "no signal on a bus shows the swing: judge before and after by eye, then skip it"
-        raise IdentificationError(text)
-    return machine_recording(log, context.deployment, signals)
-
-
-def _judge(outcome: Outcome, name: str, measures: dict[str, Any]) -> None:
-    """Keep the residual, and say where too much of it is left."""
-    reduction = measures["residual_reduction_pct"]
-    raw, shaped = (measures[one]["residual_deg"] for one in ("raw", "shaped"))
-    if reduction is None:
+def _judge(outcome: Outcome, measures: dict[str, Any]) -> None:
+    """Keep the residual, and say where too much of it is left, or what is missing."""
+    before, after = (measures[one]["residual_deg"] for one in ("raw", "shaped"))
+    if before is None or after is None:
+        rest_s = RESIDUAL_DWELL_S + RESIDUAL_WINDOW_MIN_S
+        text = f"no rest of {rest_s:g} s after all joysticks were let go"
+        outcome.poor.append(f"{text}, so no swing is left to compare: let go, and wait six seconds")
         return
-    outcome.numbers[name] = {
-        "residual_before_deg": raw,
-        "residual_after_deg": shaped,
-        "residual_left_pct": round(100.0 - reduction, 1),
+    if before < LEAST_SWING_DEG or measures["shaped"]["peak_deg"] < MIN_RAW_DEG:
+        peak = measures["shaped"]["peak_deg"]
+        text = f"a swing of {before} degrees was left without filters, at most {peak} with them"
+        remedy = "nothing to compare: push harder; is it the right signal, and the sensor on?"
+        outcome.poor.append(f"{text}: {remedy}")
+        return
+    left_pct = 100.0 * after / before
+    outcome.numbers["crane"] = {
+        "residual_before_deg": before,
+        "residual_after_deg": after,
+        "residual_left_pct": round(left_pct, 1),
     }
-    if reduction < LEAST_REDUCTION_PCT:
-        text = f"{100.0 - reduction:.0f} % of the swing is left ({raw} to {shaped} degrees)"
+    if left_pct > 100.0 - LEAST_REDUCTION_PCT:
+        text = f"{left_pct:.0f} % of the swing is left ({before} to {after} degrees)"
         remedy = "do swing, valve and filter again with what hangs on the crane now"
-        outcome.poor.append(f"{name}: {text}, expected less than a tenth: {remedy}")
+        outcome.poor.append(f"{text}, expected less than a tenth: {remedy}")
+
+
+def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
+    """Ask for what the person has seen of axes whose swing nothing measures."""
+    names = ", ".join(axes)
+    outcome.sheet.print(f"NOTHING MEASURED the swing of {names}: judge it by eye")
+    question = (
+        f"drive: by eye: {names}: I drove both times, and saw the swing after letting go:"
+        f" {LESS} = hardly any with the filters, {SAME} = as without them, {UNSEEN} = not looked"
+    )
+    saw = context.bench.person.answer(question, UNSEEN, (LESS, SAME, UNSEEN))
+    if saw == LESS:
+        outcome.note = f"{names} {BY_EYE}"
+        outcome.sheet.print(
+            f"{names}: {BY_EYE}, not measured: drove both times, and saw less swing"
+        )
+        outcome.numbers.update({name: {"judged": "by eye", "saw": saw} for name in axes})
+    elif saw == SAME:
+        text = f"{names}: by eye the filters take no swing away"
+        outcome.poor.append(f"{text}: do swing, valve and filter again")
+    else:
+        text = f"{names}: nothing measured the swing, and no one has judged it by eye"
+        outcome.poor.append(
+            f"{text}: watch the grapple in both drives, then answer {LESS} or {SAME}"
+        )
 
 
 DRIVE = Step("drive", "Before and after", run, needs=(FILE,))

@@ -44,16 +44,22 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     facts = [*crane, *html.facts(deployment, datetime.now().astimezone())]
     summary = new_table("step", "is", "at", "canshaper", title="Steps")
     for name, one in steps.items():
-        summary.add_row(name, one.status.value, one.at, one.version)
+        done = one.status is Status.DONE
+        summary.add_row(name, _standing(one) if done else one.status.value, one.at, one.version)
     parts = [html.table(summary)]
     for name, one in steps.items():
         parts += _step(name, one, folder)
     return html.document(title, facts, parts)
 
 
+def _standing(one: Record) -> str:
+    """Status of a step, and what is said of it."""
+    return f"{one.status.value}, {one.why}" if one.why else one.status.value
+
+
 def _step(name: str, one: Record, folder: Path) -> list[str]:
     """A step: what it has shown, its pictures, and what it has changed."""
-    parts = [html.heading(f"{name}: {one.status.value}{f', {one.why}' if one.why else ''}")]
+    parts = [html.heading(f"{name}: {_standing(one)}")]
     for part in one.parts:
         again = shown(part)
         parts.append(html.text(again) if isinstance(again, str) else html.table(again))

@@ -97,7 +97,7 @@ def _asked(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Source
     sources = _Sources()
     for name in axes:
         sensor = deployment.axes[name].sway_sensor
-        default = f"{sensor.message.message.name}.{sensor.signal.name}" if sensor else NONE
+        default = sensor.name if sensor else NONE
         if name in SIMULATED and not isinstance(deployment.messages.find("GrappleSway"), str):
             default = SIMULATED[name]
         question = (
