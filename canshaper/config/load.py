@@ -97,7 +97,7 @@ def _problem(source: Source, error: ErrorDetails, schema: type[Section]) -> Prob
     elif kind in ("union_tag_invalid", "union_tag_not_found"):
         place.path += ("kind",)
         got = got.get("kind") if isinstance(got, dict) else got
-        text = f"expected one of {context.get('expected_tags', place.kinds)}, got {got!r}"
+        text = f"expected one of {context.get('expected_tags', place.kinds)}, got {_short(got)}"
     elif kind in ("too_short", "too_long"):
         number = context["min_length" if kind == "too_short" else "max_length"]
         most = "or more entries" if kind == "too_short" else "entries at most"
@@ -197,7 +197,8 @@ def _kinds(section: type[BaseModel]) -> tuple[Any, ...]:
 
 
 def _short(value: Any) -> str:
-    text = repr(value)
+    """What stands there, not at length; of a key without a value nothing does."""
+    text = "nothing" if value is None else repr(value)
     return text if len(text) <= 60 else text[:57] + "..."
 
 

@@ -32,14 +32,25 @@ _CONTROL = re.compile(r"[\x00-\x1f\x7f-\x9f\ud800-\udfff]")
 class _Loader(yaml.SafeLoader):
     """Gives up early: where the file nests without end each token takes longer than the last."""
 
-    _nodes = 0
+    _nodes = _depth = 0
 
     def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
         """The next node of the file."""
         self._nodes += 1
         if self._nodes > MOST_NODES:
             raise yaml.MarkedYAMLError(None, None, "too large", self.get_mark())
-        return super().compose_node(parent, index)
+        event = self.peek_event()
+        if self._depth > MOST_NESTED:
+            raise yaml.MarkedYAMLError(None, None, "nested too deeply", event.start_mark)
+        if isinstance(event, yaml.AliasEvent):
+            whole = self.anchors.get(event.anchor)
+            if whole is not None and whole.end_mark is None:  # it is being composed
+                text = f"the anchor {event.anchor} contains itself"
+                raise yaml.MarkedYAMLError(None, None, text, event.start_mark)
+        self._depth += 1
+        node = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
 
     def fetch_flow_collection_start(self, token: type[yaml.Token]) -> None:
         """An opening bracket."""
@@ -69,12 +80,11 @@ class Source:
             self.sha256 = sha256(data).hexdigest()
             content = data.decode("utf-8")
             node = yaml.compose(content, Loader=_Loader)
+            if node is None:  # an empty file, which has a first line all the same
+                self._lines[()] = 1
             self.data: Any = {} if node is None else self._build(node, ())
         except OSError as error:
             raise ConfigError([self.problem((), error.strerror or str(error))]) from None
-        except RecursionError:
-            text = "nested too deeply, or an anchor that contains itself"
-            raise ConfigError([self.problem((), text)]) from None
         # ValueError: not UTF-8; ValueError and OverflowError: an escape that is no character
         except (yaml.YAMLError, ValueError, OverflowError) as error:
             text = getattr(error, "problem", None) or str(error).splitlines()[0]

@@ -11,8 +11,8 @@ from cantools.database.can import Message
 from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.layout import is_j1939, layout_fault
 from canshaper.config.bounded import read_bounded
-from canshaper.config.similar import did_you_mean
-from canshaper.errors import MOST_LETTERS, MOST_PROBLEMS, Problem
+from canshaper.config.similar import there_are
+from canshaper.errors import MOST_PROBLEMS, Problem
 from canshaper.machine.dbc_parse import MOST_PARSED, SYNTAX, UNUSABLE, letters, parsed_messages
 from canshaper.machine.dbc_text import (
     MOST_MESSAGES,
@@ -239,9 +239,8 @@ class Messages:
         """The message and its file, or why there is none; one that is not loaded is read now."""
         found = self._files.get(name, [])
         if not found:
-            names = ", ".join(sorted(self._files)) or "none"
-            names, similar = names[:MOST_LETTERS], did_you_mean(name, self._files)
-            return f"expected a message of the DBC files, got {name!r}; there are {names}{similar}"
+            text = f"expected a message of the DBC files, got {name!r}"
+            return text + there_are(name, sorted(self._files))
         if len(found) > 1:
             files = ", ".join(str(file.path) for file in found)
             return f"{name!r} stands more than once in the DBC files: {files}"

@@ -7,7 +7,7 @@ from cantools.database.can import Message, Signal
 from canshaper.codec.canopen import STATE_BITS
 from canshaper.codec.codecs import Chosen
 from canshaper.codec.signals import find_signal
-from canshaper.config.similar import did_you_mean
+from canshaper.config.similar import there_are
 from canshaper.config.source import Place
 from canshaper.machine.database import DbcFile
 from canshaper.machine.diagnostics import Diagnostics
@@ -54,9 +54,8 @@ class UsedMessage:
         signal = find_signal(self.message, name)
         if signal is None:
             names = [s.name for s in self.message.signals]
-            there = f"there are {', '.join(names)}{did_you_mean(name, names)}"
-            text = f"expected a signal of {self.message.name}, got {name!r}; {there}"
-            self.diagnostics.add(place, text)
+            text = f"expected a signal of {self.message.name}, got {name!r}"
+            self.diagnostics.add(place, text + there_are(name, names))
         return signal
 
     def integer(

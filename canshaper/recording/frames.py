@@ -60,6 +60,8 @@ class Place:
         return CutOffError(f"{self}: the log is cut off: {found}")
 
     def __str__(self) -> str:
+        if not self.number:  # nothing is read yet: it is about the whole file
+            return str(self.path)
         if self.unit == "line":
             return f"{self.path}:{self.number}"
         return f"{self.path}: {self.unit} {self.number}"

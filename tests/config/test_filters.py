@@ -136,7 +136,7 @@ BAD = [
     (
         "taps: [1]",
         "filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei',"
-        " 'two_mode', 'robust', got None",
+        " 'two_mode', 'robust', got nothing",
     ),
 ]
 

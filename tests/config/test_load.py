@@ -70,7 +70,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
         ("tick_ms: 20", "tick_ms: '20'", "expected a whole number, 1 to 50 ms, got '20'"),
         ("tick_ms: 20", "tick_ms: true", "expected a whole number, 1 to 50 ms, got True"),
         ("tick_ms: 20", "tick_ms: 024", "expected a whole number, 1 to 50 ms, got 24.0"),
-        ("tick_ms: 20", "tick_ms:", "expected a whole number, 1 to 50 ms, got None"),
+        ("tick_ms: 20", "tick_ms:", "expected a whole number, 1 to 50 ms, got nothing"),
         (
             "timeout_ms: 100",
             "timeout_ms: 1:40",
@@ -134,7 +134,7 @@ def changed(text: str, old: str, new: str) -> tuple[str, int]:
             "kind: off",
             "",
             "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
-            " 'zvd', 'ei', 'two_mode', 'robust', got None",
+            " 'zvd', 'ei', 'two_mode', 'robust', got nothing",
         ),
         (
             "kind: off",
@@ -258,7 +258,8 @@ def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "found"), [("- a\n", "['a']"), ("~\n", "None"), ("3\n", "3"), ("hello\n", "'hello'")]
+    ("text", "found"),
+    [("- a\n", "['a']"), ("~\n", "nothing"), ("3\n", "3"), ("hello\n", "'hello'")],
 )
 def test_a_file_that_is_no_mapping(problems: Problems, text: str, found: str) -> None:
     says = f"machine.yaml:1: expected a section with the keys {TOP}, got {found}"
@@ -305,3 +306,10 @@ def test_the_shipped_file_is_read_as_it_stands(shipped: str, load: Load) -> None
     assert (slew.limits.deadband_pct, slew.limits.rise_per_s) == (5, 5)
     assert slew.sway
     assert slew.sway.mode().damping_ratio == 0.038
+
+
+@pytest.mark.parametrize("text", ["", "# only a comment\n", "\n\n"])
+def test_an_empty_file_is_wrong_in_its_first_line(problems: Problems, text: str) -> None:
+    said = problems(text)
+    assert said[0].split(":")[:3][1:] == ["1", " axes"], said
+    assert all(": missing: " in one for one in said)

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.config.similar import did_you_mean
+from canshaper.config.similar import did_you_mean, there_are
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 
@@ -22,6 +22,19 @@ ROOT = Path(__file__).parents[2]
 )
 def test_a_name_like_it_is_named(name: str, end: str) -> None:
     assert did_you_mean(name, ("joystick", "JoystickLeft", "NearFarCommand")) == end
+
+
+def test_of_many_names_only_the_nearest_are_listed() -> None:
+    few = [f"Valve{i:02}" for i in range(20)]
+    assert there_are("Valve", few) == f"; there are {', '.join(few)}; did you mean Valve19?"
+    assert there_are("Valve", []) == "; there are none"
+    many = [*few, *(f"Pump{i:03}" for i in range(140)), "JoystickLeft", "JoystickRight"]
+    said = there_are("JoystikLeft", many)
+    assert said.startswith("; there are 162, such as JoystickLeft, JoystickRight")
+    assert said.endswith("; did you mean JoystickLeft?")
+    assert len(said) < 120
+    nothing_like_it = "; there are 162, such as Valve00, Valve01, Valve02, Valve03, Valve04"
+    assert there_are("###", many) == nothing_like_it
 
 
 @pytest.mark.parametrize(

@@ -45,9 +45,10 @@ def unreadable(path: Path) -> str:
         (b"a: 1\r\n\n\xff", ":3: not YAML: 'utf-8' codec can't decode byte 0xff in position 7"),
         ('a: "\\UFFFFFFFF"\n', ": not YAML: "),
         ("[" * 3000, ":1: not YAML: nested too deeply"),
-        ("- " * 3000, ": nested too deeply"),
-        ("a: &a [*a]\n", ":1: nested too deeply, or an anchor that contains itself"),
-        ("a: &a {b: *a}\n", ":1: nested too deeply, or an anchor that contains itself"),
+        ("- " * 3000, ":1: not YAML: nested too deeply"),
+        ("a: &a [*a]\n", ":1: not YAML: the anchor a contains itself"),
+        ("a: &a {b: *a}\n", ":1: not YAML: the anchor a contains itself"),
+        ("a: 1\nb: &b\n  c: 2\n  d:\n    - *b\n", ":5: not YAML: the anchor b contains itself"),
     ],
 )
 def test_what_is_no_yaml_is_one_problem(file: Path, text: str | bytes, says: str) -> None:

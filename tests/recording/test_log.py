@@ -346,7 +346,9 @@ def test_a_wrong_row_of_a_table(tmp_path: Path, row: str, text: str) -> None:
 
 def test_a_file_that_is_not_there(tmp_path: Path) -> None:
     says = "expected a log that can be read, got "
-    assert f"{says}No such file or directory" in error_of(tmp_path / "no.log")
+    for name in ("no.log", "no.asc", "no.blf", "no.log.gz"):
+        path = tmp_path / name
+        assert error_of(path) == f"{path}: {says}No such file or directory"
     (tmp_path / "x.log").mkdir()
     assert f"{says}Is a directory" in error_of(tmp_path / "x.log")
 
@@ -383,7 +385,7 @@ def test_a_time_that_no_clock_can_have(
         (
             8,
             bytes(4),
-            "frame 0: expected a BLF log that is whole, got ValueError an object of 0 bytes",
+            "expected a BLF log that is whole, got ValueError an object of 0 bytes",
         ),  # its length
         (
             24,

@@ -474,6 +474,9 @@ def test_of_two_cranes_the_named_one_is_driven(own: Callable[..., Studio]) -> No
         (("--crane", "middle"), "crane: expected one of front, rear, got 'middle'"),
         (("--interface", "udp_multicast"), "expected a deployment with one bus and crane"),
         (("--crane", "rear", "--shadow"), "--crane: expected without --shadow"),
+        (("--seed", "5", "--shadow"), "--shadow, --adjust, --control: expected with a machine's"),
+        (("--campaign", "out", "--shadow"), "--shadow, --adjust, --control: expected with a"),
+        (("--seed", "5", "--control", "x"), "--shadow, --adjust, --control: expected with a"),
     ],
 )
 def test_a_wrong_wish_for_two_cranes_is_told(options: tuple[str, ...], says: str) -> None:

@@ -123,6 +123,9 @@ def studio(
         file = sensed(file, DEFAULT, sensor)
         drawn = [] if seeds is None else seeds
         if is_drive(file) or drawn or folder:
+            if shadow or adjust or control:
+                text = "expected with a machine's deployment, got a drive of the past"
+                raise UsageError(f"--shadow, --adjust, --control: {text}")
             choices = opened_drives(
                 file, others or [], drawn, folder,
                 channels=channel or [], window=(begin_s, end_s), changes=changes or [],
