@@ -14,7 +14,7 @@ import can
 import j1939
 import pytest
 
-from tests.hil.j1939_drive import FILE, as_wireshark_sees, drive, not_decoded
+from tests.hil.j1939_drive import FILE, as_wireshark_sees, drive, not_decoded, set_points
 from tests.hil.machine import ANSWER_S, Service, candump, logged, open_bus, service
 from tests.protocols.j1939.test_dm1 import codes
 from tests.rigs.j1939 import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
@@ -26,8 +26,18 @@ FIRST_SPN = 520192
 DM1 = 0xFECA
 # Address claim, request, transport: the kernel keeps them for itself, or their destination varies.
 TRANSPORT = {0xEEFF, 0xEAFF, 0xECFF, 0xEBFF}
-SHIPPED = ("j1939-forwarder", "j1939-rollers", "js6000-forwarder", "remote-forwarder")
-OTHER_VALVES = ("remote-forwarder",)  # of 11 bits
+SHIPPED = (
+    "j1939-forwarder",
+    "j1939-profiles",
+    "j1939-rollers",
+    "j1939-sensor",
+    "js6000-forwarder",
+    "pvedcc-forwarder",
+    "remote-forwarder",
+)
+OTHER_VALVES = ("pvedcc-forwarder", "remote-forwarder")  # of 11 bits
+# Set points on the way to full speed and back: a filter makes tens of them, a step makes two.
+SHAPED = 20
 
 
 class Joysticks(threading.Thread):
@@ -342,9 +352,14 @@ def test_a_drive_is_read_by_cantools_by_tshark_and_by_the_kernel(tmp_path: Path,
     kernel = Kernel()
     kernel.start()
     try:
-        log = drive(tmp_path, file=file)
+        logs = drive(tmp_path, file=file)
     finally:
         kernel.end()
+    points = set_points(logs, file, "near_far")
+    assert len(set(points)) > SHAPED, sorted(set(points))
+    assert points[0] == points[-1] == 0
+    assert not any(set_points(logs, file, "slew"))
+    log = logs["vcan0"]
     assert not_decoded(log, file) == []
     sent = {m.arbitration_id >> 8 & 0x3FFFF for m in ours(log)} - TRANSPORT
     valves = {0xFE30, 0xFE31, 0xFE32}
