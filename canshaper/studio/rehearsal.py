@@ -12,7 +12,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from canshaper.commissioning.procedure.bench import Simulated
+from canshaper.commissioning.procedure.bench import Simulated, check_rehearsal
 from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
 from canshaper.commissioning.procedure.procedure import Procedure, Proposal
 from canshaper.commissioning.procedure.state import State, read_state
@@ -78,7 +78,7 @@ def work(what: str, path: Path, changes: list[str], step: str, *, machine: bool)
 @contextmanager
 def _procedure(path: Path, changes: list[str]) -> Iterator[Procedure]:
     """The rehearsal of a file, while no other process works on it."""
-    load_deployment(path)  # what is wrong in it is named by its own name
+    check_rehearsal(load_deployment(path))  # what is wrong in it is named by its own name
     files = Files(copy_for_rehearsal(path))
     with files.locked():
         state = read_state(files.state)

@@ -70,6 +70,7 @@ def commission(
 
       canshaper commission machine.yaml --list
     """
+    from canshaper.commissioning.procedure.bench import check_rehearsal
     from canshaper.commissioning.procedure.files import Files, copy_for_rehearsal, rehearsal_of
 
     refuse_shipped(file)
@@ -78,7 +79,7 @@ def commission(
         raise UsageError("--set: expected --simulated too, got none")
     work = path
     if simulated:
-        loader(file)()  # what is wrong in it is named by its own name
+        check_rehearsal(loader(file)())  # what is wrong in it is named by its own name
         work = rehearsal_of(path) if listed else copy_for_rehearsal(path)
     files = Files(work)
 

@@ -16,6 +16,7 @@ from canshaper.report.console import OnProgress
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.cranes import cranes
 from canshaper_sim.parameters import changed_parameters
+from canshaper_sim.plant import PlantNode
 from canshaper_sim.strokes import Script
 
 STILL_MOVES = (
@@ -105,6 +106,19 @@ class Bench(Protocol):
         """
 
 
+def check_rehearsal(deployment: Deployment) -> None:
+    """Refuse what the simulated crane cannot stand for.
+
+    Raises:
+        UsageError: several cranes.
+        ConfigError: an axis that it does not have, or no messages for what it measures.
+    """
+    if names := cranes(deployment):
+        text = f"expected one crane to rehearse with, got {len(names)}: {', '.join(names)}"
+        raise UsageError(f"{deployment.path}: {text}; take a file with the axes of one of them")
+    PlantNode(deployment)
+
+
 class Simulated:
     """The simulated crane, in lock-step: no bus is opened.
 
@@ -125,11 +139,6 @@ class Simulated:
 
     def drive(self, deployment: Deployment, log: Path, task: Task) -> None:
         """See ``Bench``."""
-        if cranes(deployment):
-            raise UsageError(
-                f"{deployment.path}: expected one crane to rehearse with, got several; take a"
-                " deployment of one of them"
-            )
         with self.person.progress("driving") as on_progress:
             log_simulated(
                 log,

@@ -16,6 +16,7 @@ from canshaper.commissioning.procedure.state import Status, read_state
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.errors import UsageError
 from canshaper.machine.binding import load_deployment
+from tests.commissioning.procedure.conftest import ROOT
 
 COPY = Path("machine.rehearsal.yaml")
 STATE = Path("machine.rehearsal.commission.json")
@@ -231,3 +232,19 @@ def test_a_wrong_option_is_one_line(machine: Path, words: tuple[str, ...], text:
     result = CliRunner().invoke(app, ["commission", *words])
     assert result.exit_code == 2, result.output
     assert text in result.output
+
+
+@pytest.mark.parametrize(
+    ("several", "text"),
+    [(False, "axes.boom: the crane has slew"), (True, "got 2: front, rear; take a file with")],
+)
+def test_what_the_simulated_crane_cannot_stand_for_is_refused_at_once(
+    machine: Path, several: bool, text: str
+) -> None:
+    new = machine.read_text().replace("\n  slew:", "\n  boom:").replace("slew: slew", "slew: boom")
+    new = new.replace("axes.slew.", "axes.boom.")
+    if several:
+        new = (ROOT / "config" / "two-cranes.yaml").read_text().replace("../dbc", f"{ROOT}/dbc")
+    machine.write_text(new)
+    assert text in commission("--yes", code=2)
+    assert not COPY.exists()
