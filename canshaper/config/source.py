@@ -39,14 +39,15 @@ class _Loader(yaml.SafeLoader):
         self._nodes += 1
         if self._nodes > MOST_NODES:
             raise yaml.MarkedYAMLError(None, None, "too large", self.get_mark())
-        event = self.peek_event()
+        event: yaml.Event = self.peek_event()  # type: ignore[no-untyped-call]
+        mark: Any = event.start_mark
         if self._depth > MOST_NESTED:
-            raise yaml.MarkedYAMLError(None, None, "nested too deeply", event.start_mark)
+            raise yaml.MarkedYAMLError(None, None, "nested too deeply", mark)
         if isinstance(event, yaml.AliasEvent):
             whole = self.anchors.get(event.anchor)
             if whole is not None and whole.end_mark is None:  # it is being composed
                 text = f"the anchor {event.anchor} contains itself"
-                raise yaml.MarkedYAMLError(None, None, text, event.start_mark)
+                raise yaml.MarkedYAMLError(None, None, text, mark)
         self._depth += 1
         node = super().compose_node(parent, index)
         self._depth -= 1

@@ -118,6 +118,29 @@ def test_the_lag_of_the_valve_may_be_wrong(lag_s: float) -> None:
     assert max(residuals(replace(ENCODER, lag_s=lag_s), (-30, 0, 30)).values()) < 1.5
 
 
+# Lag of the real valve, where the observer has 0.1 s: most that is left with the right length, and
+# with one that is 15 % wrong.
+LAGS = {0.05: (0.45, 0.95), 0.075: (0.25, 0.7), 0.1: (0.2, 0.6), 0.125: (0.55, 0.95)}
+LAGS |= {0.15: (1.05, 1.4), 0.2: (1.9, 2.4)}
+
+
+@pytest.mark.study
+@pytest.mark.long
+@pytest.mark.parametrize("lag_s", LAGS)
+def test_what_a_wrong_lag_costs_by_length(lag_s: float) -> None:
+    """With the right length a valve 25 ms slower is worse than no sensor: docs/sensor.md."""
+    right, wrong = LAGS[lag_s]
+    row = []
+    for errors, bound in (((0,), right), ((-15, 15), wrong)):
+        left = max(residuals(replace(ENCODER, lag_s=lag_s), errors).values())
+        without = max(residuals(replace(PLAIN, lag_s=lag_s), errors).values())
+        assert left < bound
+        row.append(f"{left:.1f} (no sensor {without:.1f})")
+        if errors == (0,):
+            assert (left > without) == (lag_s not in (0.075, 0.1))
+    print(f"valve {1000 * lag_s:.0f} ms: right length {row[0]}, 15 % wrong {row[1]}")
+
+
 @KINDS
 @pytest.mark.parametrize("length_m", [0.84, LENGTH_M, 1.56])
 @pytest.mark.parametrize("swing_deg", [0.0, 10.0])
