@@ -1,24 +1,31 @@
 """Write what is declared in the program into the files that repeat it: ``make generate``.
 
 Value tables of the DBC files and the tables of docs/states.md come from the enumerations of states,
-reasons, faults and trust, from their texts and from the transitions.
+reasons, faults and trust, from their texts and from the transitions. Lists of keys (``keys CLASS``)
+come from the schema of the deployment file, other tables from what declares their rows.
 """
 
 import re
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from enum import IntEnum
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import canshaper.config.schema  # noqa: F401  (its classes are the sections)
+from canshaper.checksums import checksum_table
+from canshaper.cli.verbs.config_schema import filter_table
 from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
+from canshaper.config.section import Section
 from canshaper.controller.counters import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
+from canshaper.shaping.registry import KINDS
 from canshaper.shaping.states import REACTION_OF, TRANSITIONS, Reaction, Reason, State
 from canshaper.shaping.trust import Trust
 
 Key = TypeVar("Key", bound=IntEnum)
 ROOT = Path(__file__).parents[1]
+MARK = re.compile(r"^<!-- generated: (.*?) -->$", re.MULTILINE)
 TABLES: Mapping[str, type[IntEnum]] = {
     "State": State,
     "Reason": Reason,
@@ -100,20 +107,111 @@ def _names(reasons: frozenset[Reason]) -> str:
     return ", ".join([*words, *(reason.name for reason in sorted(reasons))])
 
 
+def key_rows(section: type[Section], links: Mapping[str, str]) -> Iterator[str]:
+    """List of the keys that a section has by itself: default, range, unit, what each is.
+
+    Args:
+        section: of the schema.
+        links: where sections have a list of their own, by name; a key that holds one leads there.
+    """
+    schema = section.model_json_schema()
+    required = schema.get("required", ())
+    here = links.get(section.__name__)
+    for key, node in schema["properties"].items():
+        if key not in section.__annotations__:
+            continue
+        number = next(_parts(node, "minimum"), {})
+        unit = number.get("unit", "")
+        words = [_default(node.get("default"))] if key not in required else []
+        words += [", ".join(str(one) for part in _parts(node, "enum") for one in part["enum"])]
+        words += [f"{_range(number)} {unit}"] if number else []
+        limits = ", ".join(word.strip() for word in words if word)
+        below = [part["$ref"].rpartition("/")[2] for part in _parts(node, "$ref")]
+        at = next((links[one] for one in below if links.get(one, here) != here), None)
+        text = node["description"].removesuffix(f" ({unit})").rstrip(".").replace("``", "`")
+        if text[1].islower() or text[1] == " ":
+            text = text[0].lower() + text[1:]
+        yield f"- {f'[`{key}`]({at})' if at else f'`{key}`'}{limits and f' ({limits})'}: {text}"
+
+
+def _parts(node: Any, key: str) -> Iterator[dict[str, Any]]:
+    """Parts of a JSON schema with a key."""
+    if isinstance(node, dict):
+        if key in node:
+            yield node
+        node = [below for name, below in node.items() if name != "discriminator"]
+    if isinstance(node, list):
+        for below in node:
+            yield from _parts(below, key)
+
+
+def _range(number: Mapping[str, float]) -> str:
+    low, high = (f"{number[end]:.10g}" for end in ("minimum", "maximum"))
+    return low if low == high else f"{low} to {high}"
+
+
+def _default(value: Any) -> str:
+    """Default of an optional key, in words of YAML."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return f"{value}".removesuffix(".0") if isinstance(value, int | float | str) else "optional"
+
+
+def section_names(kind: type[Section] = Section) -> dict[str, type[Section]]:
+    """All sections of the schema by name."""
+    below = [section_names(one) for one in kind.__subclasses__()]
+    return {kind.__name__: kind} | {name: one for names in below for name, one in names.items()}
+
+
+def list_places(pages: Mapping[Path, str]) -> dict[str, tuple[Path, str]]:
+    """Page and anchor of each list of keys, by the name of its section."""
+    places = {}
+    for page, text in pages.items():
+        anchor = ""
+        for line in text.splitlines():
+            if line.startswith("#"):
+                anchor = re.sub(r"[^\w\- ]", "", line.strip("# ").lower()).replace(" ", "-")
+            elif mark := re.match(r"<!-- generated: keys (\w+) -->", line):
+                places[mark[1]] = page, anchor
+    return places
+
+
+def section_rows(name: str, links: Mapping[str, str]) -> Iterable[str]:
+    """Lines of a generated section of a page, by its name."""
+    if name.startswith("keys "):
+        return key_rows(section_names()[name.removeprefix("keys ")], links)
+    return TABLES_OF_PAGES[name]()
+
+
+TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
+    "states": state_rows,
+    "diagram": diagram,
+    "reasons": lambda: reason_rows(Reason, REASON_TEXTS),
+    "faults": fault_rows,
+    "filters": lambda: filter_table(KINDS.values()),
+    "checksums": checksum_table,
+}
+
+
 def generated(root: Path) -> dict[Path, str]:
     """Texts of all files with generated parts, as they should be."""
     files = {
         path: with_value_tables(path.read_text(encoding="utf-8"), TABLES)
         for path in sorted((root / "dbc").glob("*.dbc"))
     }
-    page = root / "docs" / "states.md"
-    sections = {
-        "states": state_rows(),
-        "diagram": diagram(),
-        "reasons": reason_rows(Reason, REASON_TEXTS),
-        "faults": fault_rows(),
+    pages = {
+        path: path.read_text(encoding="utf-8") for path in sorted((root / "docs").glob("*.md"))
     }
-    return {**files, page: with_sections(page.read_text(encoding="utf-8"), sections)}
+    places = list_places(pages)
+    for page, text in pages.items():
+        links = {
+            name: f"{'' if one == page else one.name}#{anchor}"
+            for name, (one, anchor) in places.items()
+        }
+        if names := MARK.findall(text):
+            sections = {name: section_rows(name, links) for name in names}
+            files[page] = with_sections(text, sections)
+    return files
 
 
 if __name__ == "__main__":

@@ -14,10 +14,11 @@ LAST_SPN = 524287
 class J1939Name(Section):
     """NAME of our node (SAE J1939-81): what distinguishes two nodes, and which of them wins."""
 
-    identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of this PC")]
+    identity_number: Annotated[int, number(0, 2_097_151, "", "serial number of the PC")]
     manufacturer_code: Annotated[int, number(0, 2047, "", "code that SAE gave to the maker")]
     function: Annotated[int, number(0, 255, "", "function code")] = 129
-    """129 in industry group 2, vehicle system 0: operator controls, machine specific."""
+    """Function code; 129 in industry group 2, vehicle system 0: operator controls, machine
+    specific."""
     ecu_instance: Annotated[int, number(0, 7, "", "instance of the ECU")] = 0
     function_instance: Annotated[int, number(0, 31, "", "instance of the function")] = 0
     vehicle_system: Annotated[int, number(0, 127, "", "vehicle system, or device class")] = 0
@@ -28,12 +29,15 @@ class J1939Name(Section):
 class J1939(Section):
     """Our node on a bus of J1939 or ISO 11783."""
 
-    address: Annotated[int, number(0, 253, "", "source address of what we send")]
-    name: J1939Name = Field(description="NAME of our node")
+    address: Annotated[int, number(0, 253, "", "source address of all that we send")]
+    name: J1939Name
+    """NAME of our node (SAE J1939-81), unique among all PCs and buses of the machine; the lower
+    NAME wins an address."""
     first_spn: Annotated[
         int, number(1, LAST_SPN - 1, "", "suspect parameter number of the first axis in DM1")
     ] = 520192
-    """By default the first of the range that is free to every maker."""
+    """Suspect parameter number of the first axis in DM1, by default the first of the range that is
+    free to every maker."""
 
 
 class CanopenNode(Section):
@@ -41,15 +45,18 @@ class CanopenNode(Section):
 
     id: Annotated[int, number(1, 127, "", "its node id")]
     heartbeat_ms: Annotated[int, number(20, 10_000, "ms", "longest time between its heartbeats")]
+    """Silence after which the node is lost: two or three of its heartbeats (1017h, which some
+    makers deliver as off)."""
 
 
 class Canopen(Section):
     """Our node on a bus of CANopen."""
 
-    node: Annotated[int, number(1, 127, "", "our node id")]
+    node: Annotated[int, number(1, 127, "", "our node id, unique on the bus")]
     heartbeat_ms: Annotated[int, number(20, 10_000, "ms", "time between our heartbeats")] = 200
-    master: bool = Field(False, description="we start the other nodes; else another master does")
-    nodes: dict[str, CanopenNode] = Field({}, description="other nodes by name")
+    master: bool = False
+    """We start every supervised node that is not operational; else we never send NMT."""
+    nodes: dict[str, CanopenNode] = Field({}, description="other nodes, by a name of your choice")
 
     def __hash__(self) -> int:
         """Of all but the names: a bus is a key where it is asked for what is open."""
@@ -59,16 +66,18 @@ class Canopen(Section):
 class Match(Section):
     """The device that a bus of SocketCAN is; all that stands here has to be so."""
 
-    serial: str | None = Field(None, min_length=1, description="serial number of the USB adapter")
-    path: str | None = Field(
-        None, min_length=1, description="where the device is plugged in, as ID_PATH of udev"
-    )
+    serial: str | None = Field(None, min_length=1)
+    """Serial number of the USB adapter, in quotes."""
+    path: str | None = Field(None, min_length=1)
+    """Where the device is plugged in: udev's ID_PATH, such as pci-0000:00:14.0-usb-0:3:1.0."""
     port: Annotated[int, number(0, 63, "", "channel of an adapter with several")] | None = None
-    """Channel of an adapter with several, from 0: dev_port of the interface, or dev_id."""
-    driver: str | None = Field(
-        None, min_length=1, description="driver of the kernel, such as peak_usb; vcan"
-    )
+    """Channel of an adapter with several, from 0: dev_port of the interface, in older drivers
+    dev_id."""
+    driver: str | None = Field(None, min_length=1)
+    """Driver of the kernel, such as peak_usb or vcan."""
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
+    """Bit rate that the interface must have; by default the bit rate of the bus, for an interface
+    that has one, and its data bit rate."""
 
     @model_validator(mode="after")
     def _says_something(self) -> Self:
@@ -102,15 +111,18 @@ class Bus(Section):
     interface: str = Field(description="python-can interface, such as socketcan")
     channel: str = Field(description="channel of the interface, such as can0")
     bitrate: Annotated[int, number(10_000, 1_000_000, "bit/s", "bit rate")] | None = None
-    """Bit rate (bit/s), with which the load is computed; SocketCAN itself is set by the system."""
-    fd: bool = Field(False, description="CAN FD: messages of up to 64 bytes")
+    """Bit rate, by which check computes the bus load; the system sets SocketCAN itself."""
+    fd: bool = False
+    """CAN FD: messages of up to 64 bytes, classical frames share the bus. Without it check refuses
+    messages of CAN FD."""
     data_bitrate: (
         Annotated[int, number(10_000, 10_000_000, "bit/s", "bit rate of the data of CAN FD")] | None
     ) = None
-    """Bit rate (bit/s) of their data; with it they are sent with bit rate switch (BRS)."""
-    options: dict[str, Scalar] = Field(
-        {}, description="what else python-can opens the interface with, such as host and port"
-    )
+    """Bit rate of their data: with it they are sent with bit rate switch (BRS), without it at one
+    bit rate; received ones count with and without."""
+    options: dict[str, Scalar] = Field({})
+    """What else python-can opens the interface with, such as { host: 10.0.0.5, port: 29536 } for
+    socketcand."""
     match: Match | None = Field(
         None, description="the device behind the channel; without it the name alone counts"
     )

@@ -16,13 +16,16 @@ class Control(Section):
     """The control socket of the daemon, and the numbers that ``canshaper set`` may change."""
 
     socket: str | None = Field(None, description="path of the socket")
-    """By default ``control.sock`` in the service's directory, /run/canshaper/NAME."""
-    mode: str = Field(
-        "0600", pattern="^0[0-7]{3}$", description="file mode of the socket, octal, in quotes"
-    )
+    """Where the daemon listens, by default /run/canshaper/NAME/control.sock, NAME of the file; the
+    option --control PATH of run and set is another place."""
+    mode: str = Field("0600", pattern="^0[0-7]{3}$")
+    """File mode of the socket, octal, in quotes: who may write to it may change the numbers."""
     adjustable: dict[str, Annotated[list[End], Field(min_length=2, max_length=2)]] = Field(
-        min_length=1, description="least and most of each number, by its keys with dots between"
+        min_length=1
     )
+    """Least and most of each number of sway and filter in the file, and of max_pct, rise_per_s,
+    fall_per_s of limits, by its keys with dots between. Not on axes with gain_schedule or
+    profiles."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -11,16 +11,14 @@ class Gateway(Section):
     """Two buses with us between them: the joystick's frames leave with our velocity in them."""
 
     between: Annotated[list[str], Field(min_length=2, max_length=2, description="the two buses")]
-    forwarding: Literal["kernel", "daemon"] = Field(
-        "kernel",
-        description="who passes on all other frames: can-gw of the kernel, or the daemon itself",
-    )
-    fallback: Literal["stop", "neutral", "pass"] = Field(
-        "stop",
-        description="while the daemon is away the joystick's frames do not pass, pass with neutral"
-        " velocities, or pass as they are",
-    )
-    blocked: list[str] = Field([], description="messages that are not passed on")
+    forwarding: Literal["kernel", "daemon"] = "kernel"
+    """Who forwards all other frames: the kernel, by rules of can-gw, also while the daemon is away;
+    or the daemon, where the kernel has no can-gw: then nothing passes without the daemon."""
+    fallback: Literal["stop", "neutral", "pass"] = "stop"
+    """Joysticks while the daemon is away. With stop their frames do not pass; with neutral they
+    pass with all rewritten axes in neutral; with pass they pass as they are: **the raw joystick
+    moves the machine**."""
+    blocked: list[str] = Field([], description="messages that are not forwarded, by name")
 
     @model_validator(mode="after")
     def _possible(self) -> Self:

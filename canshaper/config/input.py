@@ -12,15 +12,16 @@ class Input(Protected):
     source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
         None
     )
-    """Source address of the sender, in J1939; by default that of the DBC, where 254 is any."""
+    """J1939: address of the sender; by default that of the DBC, where FE (254) is any."""
     timeout_ms: Annotated[int, number(10, 1000, "ms", "age at which the message counts as lost")]
+    """Age at which it is lost; of a joystick at least two cycles and two ticks."""
     alive_max_step: (
         Annotated[
             int, number(1, 255, "", "largest step of the alive counter that is still the next one")
         ]
         | None
     ) = None
-    """Largest step of the counter that is still the next one; by default 3, or half its range."""
-    qualify: Annotated[
-        int, number(1, 20, "messages", "good ones in a row that are needed after a wrong one")
-    ] = 1
+    """Largest step that still counts as the next message, at most half of the counter's range; by
+    default 3, 1 and 2 for counters of one and two bits."""
+    qualify: Annotated[int, number(1, 20, "messages", "good ones in a row that are needed")] = 1
+    """Good messages in a row that are needed at the start, after a wrong one and after silence."""

@@ -13,9 +13,7 @@ from canshaper.shaping.valve_curve import ValveCurve
 class Slewing(Section):
     """What full speed of a slewing axis is in angle, and how far out the tip may be meanwhile."""
 
-    full_speed_rad_s: Annotated[
-        float, number(0.05, 3, "rad/s", "angular speed at full slew command")
-    ]
+    full_speed_rad_s: Annotated[float, number(0.05, 3, "rad/s", "angular speed at full command")]
     largest_radius_m: Annotated[
         float, number(0.5, 40, "m", "radius of the tip when the boom is all out")
     ]
@@ -25,13 +23,16 @@ class Limits(Section):
     """Output limits of an axis; see ``OutputLimits``."""
 
     max_pct: Annotated[float, number(1, 100, "% of full speed", "fastest output")] = 100.0
+    """Fastest output; the filter works at reduced speed too."""
     min_pct: Annotated[float, number(0, 50, "% of full speed", "outputs below this are zero")] = 0.0
     rise_per_s: Annotated[
         float, number(0.2, 100, "full speeds per s", "fastest growth of the output")
     ] = 5.0
+    """Fastest growth of the output: what the valve can follow."""
     fall_per_s: Annotated[
         float, number(1, 100, "full speeds per s", "fastest fall of the output to zero")
     ] = 5.0
+    """Fastest fall of the output: what the valve can follow."""
     deadband_pct: Annotated[
         float, number(0, 50, "% of full command", "deadband of the valve, jumped over")
     ] = 0.0
@@ -47,20 +48,23 @@ class Limits(Section):
     tail_s: Annotated[
         float, number(0, 5, "s", "how long the output may stay as fast as was asked before")
     ] = 2.0
+    """How long the output may stay as fast as was commanded before, which bounds the run-on after
+    release; then it falls to zero by fall_per_s. A shorter tail stops the crane sooner and leaves
+    more swing."""
     stop_s: Annotated[
-        float, number(0.1, 5, "s", "longest shaped stop after the input was lost")
+        float, number(0.1, 5, "s", "longest shaped stop after the input was lost, then neutral")
     ] = 2.0
     stop_distance_m: (
         Annotated[float, number(0.05, 200, "m", "farthest that the tip may travel when it stops")]
         | None
     ) = None
-    allow_faster: bool = Field(False, description="the output may exceed what the operator asks")
+    allow_faster: bool = False
+    """The output may exceed what the operator commands."""
     allow_reverse: bool = Field(False, description="the output may go against the joystick")
-    reversal: Literal["stop", "brake_shaped"] = Field(
-        "stop",
-        description="after a reversal of the joystick: stop at the rate limit, or run on along the"
-        " filter within the tail",
-    )
+    reversal: Literal["stop", "brake_shaped"] = "stop"
+    """The output after the joystick was pulled the other way. With stop it falls by fall_per_s;
+    with brake_shaped it runs on along the filter within tail_s, never faster than was commanded in
+    that direction: a third less swing, a second longer to turn round."""
 
     @model_validator(mode="after")
     def _ordered(self) -> Self:

@@ -16,7 +16,9 @@ def _kinds(schema: dict[str, Any]) -> None:
 class Checksum(Section):
     """Checksum of a message, over all its bits but its own."""
 
-    signal: str = Field(description="signal that holds it: half a byte, a byte, or two bytes")
+    signal: str
+    """Signal that holds it, unsigned: half a byte, a byte, or two bytes in the byte order of the
+    DBC."""
     kind: Annotated[str, BeforeValidator(known_checksum)] | None = Field(
         None,
         description="how it is computed",
@@ -24,9 +26,10 @@ class Checksum(Section):
         json_schema_extra=_kinds,
     )
     polynomial: Annotated[int, number(1, 0xFFFF, "", "polynomial")] | None = None
-    """Instead of a kind: polynomial of a CRC of as many bits as its signal has, 8 or 16."""
+    """Instead of a kind: polynomial, without its highest bit, of a CRC of as many bits as its
+    signal has, 8 or 16."""
     start: Annotated[int, number(0, 0xFFFF, "", "register before the first byte")] = 0
-    end: Annotated[int, number(0, 0xFFFF, "", "what is changed in the register at the end")] = 0
+    end: Annotated[int, number(0, 0xFFFF, "", "what changes the register after the last byte")] = 0
     reflected: bool = Field(False, description="the lowest bit of each byte comes first")
 
     @model_validator(mode="after")
@@ -61,7 +64,10 @@ class E2e(Section):
     data_id: Annotated[int, number(0, 0xFFFF_FFFF, "", "data ID of the message")] | None = None
     """Data ID of the message: of 32 bits in profiles 4 and 7, else of 16."""
     data_id_mode: Literal["both", "low", "alternating", "nibble"] | None = None
-    """Which bytes of the data ID enter the CRC, profiles 1 and 11."""
+    """Which bytes of the data ID enter the CRC, profiles 1 and 11: both, the low byte, then the
+    high byte; low, the low byte; alternating, the low byte with even counters, the high byte with
+    odd ones; nibble, the low byte, then zero, of 12 bits, whose upper four are sent in the upper
+    half of byte 1. Profile 11 has both and nibble only."""
     data_ids: (
         Annotated[
             list[Annotated[int, number(0, 0xFF, "", "data ID")]],
@@ -69,6 +75,7 @@ class E2e(Section):
         ]
         | None
     ) = None
+    """Profiles 2 and 22: 16 data IDs, of which the counter chooses one."""
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
@@ -94,14 +101,17 @@ class Protected(Section):
 
     bus: str = Field(description="name of the bus of the message")
     message: str = Field(description="message in the DBC files")
-    alive_counter: str | None = Field(None, description="signal counted up with every message")
+    alive_counter: str | None = None
+    """Unsigned signal that counts up with every message and begins again at 0."""
     checksum: Checksum | None = None
     """Checksum of the message."""
     e2e: E2e | None = None
-    """Instead of both a profile of AUTOSAR E2E."""
+    """Instead of both: a profile of AUTOSAR E2E."""
     cycle_ms: (
         Annotated[int, number(1, 60_000, "ms", "its period, instead of GenMsgCycleTime")] | None
     ) = None
-    """Its period (ms), where the DBC has none or a wrong one."""
+    """Its period instead of GenMsgCycleTime, where the DBC has none or a wrong one."""
     multiplexor: Annotated[int, number(0, 2**32, "", "value of the multiplexor")] | None = None
-    """Of a multiplexed message: the value of its multiplexor with which it is meant."""
+    """Of a message with one multiplexor, the value with which it is meant; what we send carries it.
+    Of frames with another value only checksum and counter are looked at, where they have them
+    too."""

@@ -25,23 +25,25 @@ from canshaper.shaping.registry import KINDS
 class Joystick(Input):
     """A joystick message and the switches in it."""
 
-    enable: SwitchNames | None = Field(
-        None,
-        description="signal of the enable switch: 1 on, 0 off, all else invalid; or several"
-        " switches, all needed, that to press first: SIGNAL, JOYSTICK.SIGNAL, or one of switches",
-    )
-    enable_of: str | None = Field(None, description="the joystick whose switches enable this one")
+    enable: SwitchNames | None = None
+    """Signal of the enable switch: 1 on, 0 off, everything else is invalid. Or several switches,
+    all needed, the one to press first: signals of the joystick's own message, JOYSTICK.SIGNAL of
+    another one's, names of switches."""
+    enable_of: str | None = None
+    """Instead of enable: a joystick whose switches enable this one too, such as the grip rollers of
+    one."""
     reset: str | None = Field(None, description="signal whose rising edge resets a trip")
     anti_sway_off: str | None = Field(
-        None, description="signal that asks for the unshaped joystick"
+        None, description="signal that asks for the unshaped command while it is 1"
     )
     next_profile: str | None = Field(
         None, description="signal whose rising edge chooses the next profile"
     )
-    node: str | None = Field(None, description="name of its node on a bus of CANopen")
-    stuck_s: Annotated[
-        float, number(1, 3600, "s", "a joystick deflected for so long without change is broken")
-    ] = 20.0
+    node: str | None = Field(
+        None, description="its CANopen node, whose heartbeats and emergencies then count"
+    )
+    stuck_s: Annotated[float, number(1, 3600, "s", "longest deflection without change")] = 20.0
+    """A deflection that does not change at all for longer is stuck-at, at the end stop too."""
 
     @model_validator(mode="after")
     def _enabled(self) -> Self:
@@ -68,7 +70,7 @@ class Cia408(Section):
 class EmergencyStop(Input):
     """An emergency stop that comes on the bus. It is no replacement for the one that is wired."""
 
-    signal: str = Field(description="signal of the stop: 0 free, all else stops")
+    signal: str = Field(description="signal of the stop: raw 0 is free, every other value stops")
 
 
 class DirectionFlags(Section):
@@ -83,10 +85,13 @@ class Scaling(Section):
     """What the signal of a velocity means, where the DBC does not say it or says it wrong."""
 
     full: Annotated[float, number(1e-6, 1e9, "", "from zero to full command")] | None = None
-    """From zero to full command in the unit of the signal; by default the end of its DBC range."""
+    """From zero to full command, in the unit of the signal; by default the end of its DBC range,
+    which is symmetrical but for one step of two's complement ([-128|127]: both ends are full)."""
     zero: Annotated[float, number(-1e9, 1e9, "", "value at zero command")] | None = None
-    """Value of the signal at zero command; by default 0."""
-    invert: bool = Field(False, description="positive is negative")
+    """Value of the signal at zero command, by default 0; of a joystick without a sign such as
+    full: 1023, zero: 1024."""
+    invert: bool = False
+    """Positive is negative, where no flag, second signal, direction code or also has the sign."""
 
     @property
     def corrects(self) -> bool:
@@ -102,7 +107,7 @@ class Command(Scaling):
     flags: DirectionFlags | None = None
     """Signals of the direction, only where the velocity has no sign of its own."""
     negative: str | None = Field(
-        None, description="rocker of two signals: that of the negative direction"
+        None, description="of a rocker with a signal for each direction, that of the negative one"
     )
     neutral_pct: Annotated[
         float, number(0.1, 20, "% of full deflection", "deflection that still counts as neutral")
@@ -140,9 +145,11 @@ class Valve(Scaling, Protected):
     signal: str = Field(description="signal with the command; its DBC range is full command")
     direction: DirectionCodes | None = None
     """Codes of the direction, only where the command has no sign of its own."""
-    also: list[str] = Field([], description="signals that carry the same in another resolution")
+    also: list[str] = Field([])
+    """Signals that carry the same in another resolution; their DBC ranges begin at 0."""
     timeout_ms: Annotated[
-        int, number(10, 5000, "ms", "silence after which the valve closes by itself")
+        int,
+        number(10, 5000, "ms", "silence after which the valve closes by itself (see its manual)"),
     ]
     cia408: Cia408 | None = None
     """State machine of a valve of CANopen."""
@@ -187,13 +194,15 @@ class AxisConfig(Section):
     feedback: Feedback | None = None
     """What the valve says of itself: it is compared with what was commanded."""
     status: Status | None = None
-    """Message with the status of the axis."""
+    """Message with the status of the axis: signals State, Reason, RawCommand, ShapedCommand,
+    PredictedSway and optionally ActiveSet, SwaySensor, SwingLength. Sent every GenMsgCycleTime and
+    at every transition; no one else may use its id."""
     sway: Sway | None = None
     """Swing of the tool on this axis."""
     sway_sensor: SwaySensor | None = None
     """What measures that swing."""
     slewing: Slewing | None = None
-    """Of an axis that turns: what its full speed is in angle."""
+    """Of an axis that slews: its full speed in angle, and its radius."""
     filter: Filter = Field(description="filter of the axis")
     gain_schedule: list[Breakpoint] = Field([], description="sway and filter by the load state")
     profiles: dict[str, Profile] = Field(
@@ -228,7 +237,7 @@ class DeploymentConfig(Section):
     version: Annotated[int, number(VERSION, VERSION, "", "version of the file's format")]
     tick_ms: Annotated[int, number(1, 50, "ms", "period of the control loop")] = 20
     tick: Tick | None = None
-    """Where the ticks are; without it where the daemon began."""
+    """Joystick that the ticks follow."""
     buses: dict[str, Bus] = Field(min_length=1, description="CAN buses by name")
     dbc: list[str] = Field(min_length=1, description="DBC files, relative to this file")
     joysticks: dict[str, Joystick] = Field(min_length=1, description="joystick messages by name")
@@ -250,7 +259,7 @@ class DeploymentConfig(Section):
     status: Status | None = None
     """Message with the state and the counters of the service."""
     identity: Status | None = Field(
-        None, description="message, once a second, with the digest of what runs"
+        None, description="message with a 16-bit signal Digest of what runs, sent once a second"
     )
     control: Control | None = None
     """What may be changed while the machine works."""

@@ -32,9 +32,14 @@ class Section(BaseModel):
 
     @classmethod
     def description(cls, key: str) -> str | None:
-        """What a key is for: of its field, or the docstring that stands behind it."""
+        """What a key is for, shortly: of its field, or the docstring that stands behind it."""
         field = cls.model_fields.get(key)
         return (field and field.description) or _docstrings(cls).get(key)
+
+    @classmethod
+    def documentation(cls, key: str) -> str | None:
+        """All that is said of a key: the docstring that stands behind it, or of its field."""
+        return _docstrings(cls).get(key) or cls.description(key)
 
     @classmethod
     def __get_pydantic_json_schema__(
@@ -44,8 +49,8 @@ class Section(BaseModel):
         found = handler(schema)
         for name, key in handler.resolve_ref_schema(found).get("properties", {}).items():
             texts = [one["description"] for one in key.get("anyOf", ()) if "description" in one]
-            if text := cls.description(name) or next(iter(texts), None):
-                key.setdefault("description", text)
+            if text := cls.documentation(name) or next(iter(texts), None):
+                key["description"] = text
         return found
 
 
@@ -64,11 +69,14 @@ def _docstrings(section: type[Section]) -> dict[str, str]:
         except OSError:  # it is made while the program runs
             continue
         assert isinstance(tree, ast.ClassDef)
-        for key, text in pairwise(tree.body):
-            if isinstance(key, ast.AnnAssign) and isinstance(text, ast.Expr):
-                assert isinstance(key.target, ast.Name)
+        for key, text in pairwise([*tree.body, ast.Pass()]):
+            if not isinstance(key, ast.AnnAssign):
+                continue
+            assert isinstance(key.target, ast.Name)
+            texts.pop(key.target.id, None)  # that of the key it takes the place of
+            if isinstance(text, ast.Expr):
                 assert isinstance(text.value, ast.Constant)
-                texts[key.target.id] = inspect.cleandoc(str(text.value.value))
+                texts[key.target.id] = " ".join(str(text.value.value).split())
     return texts
 
 

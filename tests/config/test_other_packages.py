@@ -165,5 +165,5 @@ def test_a_package_with_a_fault_is_named_in_one_line(
 def test_the_page_shows_the_table_as_it_is_printed() -> None:
     page = (ROOT / "docs" / "deployment.md").read_text(encoding="utf-8")
     table = canshaper(ROOT, "config-schema", "--filters").stdout
-    assert f"<!-- canshaper config-schema --filters -->\n{table}<!-- end of filters -->" in page
+    assert f"<!-- generated: filters -->\n\n{table}\n<!-- end: filters -->" in page
     assert "(../examples/own_filter/moving_average.py)" in page

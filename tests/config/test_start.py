@@ -3,7 +3,9 @@
 import subprocess
 import sys
 
-from canshaper.config.schema import AxisConfig, DeploymentConfig
+from canshaper.config.input import Input
+from canshaper.config.limits import Limits
+from canshaper.config.schema import AxisConfig, DeploymentConfig, Feedback
 from canshaper.config.uncertainty import Accept
 
 START = """
@@ -21,12 +23,22 @@ def test_a_start_does_not_read_its_own_source() -> None:
 
 
 def test_a_key_says_what_it_is_for() -> None:
-    assert DeploymentConfig.description("tick") == (
-        "Where the ticks are; without it where the daemon began."
-    )
+    assert DeploymentConfig.description("tick") == ("Joystick that the ticks follow.")
     assert DeploymentConfig.description("dbc") == "DBC files, relative to this file"
-    assert AxisConfig.description("status") == "Message with the status of the axis."
+    assert AxisConfig.description("slewing") == (
+        "Of an axis that slews: its full speed in angle, and its radius."
+    )
     assert Accept.description("residual_deg_p99") == (
         "most of the p99 quantile: largest swing that is left, deg"
     )
     assert AxisConfig.description("wrong") is None
+
+
+def test_all_that_is_said_of_a_key_is_its_own() -> None:
+    assert Limits.description("max_pct") == "fastest output (% of full speed)"
+    assert Limits.documentation("max_pct") == (
+        "Fastest output; the filter works at reduced speed too."
+    )
+    joystick, valve = Input.documentation("timeout_ms"), Feedback.documentation("timeout_ms")
+    assert joystick == "Age at which it is lost; of a joystick at least two cycles and two ticks."
+    assert valve == "age at which it counts as lost (ms)"

@@ -80,3 +80,17 @@ def test_the_page_names_every_transition() -> None:
     text = GENERATED[ROOT / "docs" / "states.md"]
     for old, new in TRANSITIONS:
         assert f"    {old.name} --> {new.name}: " in text
+
+
+def test_a_list_of_keys_has_default_range_unit_and_the_place_of_what_is_below() -> None:
+    links = {"Match": "#the-device", "Limits": "#limits"}
+    rows = list(generate["key_rows"](generate["section_names"]()["Limits"], links))
+    assert "- `allow_reverse` (false): the output may go against the joystick" in rows
+    assert "- `min_pct` (0, 0 to 50 % of full speed): outputs below this are zero" in rows
+    rows = list(generate["key_rows"](generate["section_names"]()["Bus"], links))
+    assert rows[6].startswith("- [`match`](#the-device) (optional): the device behind")
+
+
+def test_a_list_of_keys_has_those_of_the_section_itself() -> None:
+    rows = list(generate["key_rows"](generate["section_names"]()["EmergencyStop"], {}))
+    assert [row.partition("`")[2].partition("`")[0] for row in rows] == ["signal"]
