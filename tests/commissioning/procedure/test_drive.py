@@ -15,6 +15,7 @@ from canshaper.commissioning.procedure.state import Record, Status
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.machine.binding import load_deployment
 from canshaper_sim.strokes import Script, Stroke
+from tests.commissioning.procedure.conftest import ROOT
 
 SIGNALS = {"slew": "GrappleSway.SwayPerpendicular", "near_far": "GrappleSway.SwayParallel"}
 BEFORE, AFTER = "drive-before.log", "drive-after.log"
@@ -206,3 +207,22 @@ def test_a_sensor_that_falls_silent_is_no_grapple_that_hangs_still(machine: Path
     _, proposal = drive(machine, Driver(), SIGNALS, without=without)
     assert "slew: drive-" in proposal.poor[0]
     assert "SwayPerpendicular: no value for 13." in proposal.poor[0]
+
+
+def test_a_speed_is_no_swing(machine: Path) -> None:
+    driver = Driver("less")
+    _, proposal = drive(machine, driver, dict.fromkeys(SIGNALS, "TipVelocity.RadialSpeed"))
+    assert "crane" not in proposal.numbers
+    assert len(driver.questions) == 1
+
+
+def test_without_the_step_swing_the_sway_sensor_measures(machine: Path) -> None:
+    text = (ROOT / "config" / "forwarder-sensor.yaml").read_text()
+    text = text.replace("../dbc", f"{ROOT}/dbc").replace("limits: {", "limits: { max_pct: 40,")
+    machine.write_text(text)
+    driver = Driver()
+    _, proposal = drive(machine, driver, {})
+    assert proposal.poor == []
+    assert driver.questions == []
+    shown = "\n".join(part["text"] for part in proposal.parts if "text" in part)
+    assert "Swing measured: slew by SwayAngle.Across, near_far by SwayAngle.Along" in shown
