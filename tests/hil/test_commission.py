@@ -68,9 +68,8 @@ class Valves(can.Listener):
         self.commands: dict[int, int] = {}
 
     def on_message_received(self, message: can.Message) -> None:
-        if message.arbitration_id in VALVE_IDS:
-            self.frames += 1
-            self.commands[message.arbitration_id] = message.data[0]
+        self.frames += 1
+        self.commands[message.arbitration_id] = message.data[0]
 
 
 class Person:
@@ -133,6 +132,7 @@ def test_from_the_buses_to_the_report(file: Path, tmp_path: Path) -> None:
         joysticks_on("vcan0") as joysticks,
         open_bus("vcan0") as bus,
     ):
+        bus.set_filters([{"can_id": one, "can_mask": 0x7FF} for one in VALVE_IDS])
         valves = Valves()
         notifier = can.Notifier(bus, [valves])
         person = Person(Files(file).folder, joysticks, valves)
