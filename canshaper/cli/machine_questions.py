@@ -1,7 +1,7 @@
 """Questions of ``canshaper init`` on a machine: its bus, joysticks, switches, axes and valves."""
 
 import re
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -153,11 +153,11 @@ def _joystick(
 
     cycle = message.cycle_time or _cycle(message.name)
     enable: str | None
-    of = other = None
+    of = other = code = None
     if left:
         enable = switch("enable switch", suggest.ENABLE, needed=True)
     else:
-        of, enable, other = _switch_elsewhere(message, messages, before)
+        of, enable, other, code = _switch_elsewhere(message, messages, before)
     least, most = limits(Joystick, "timeout_ms")
     reset = switch("switch that resets a trip", suggest.RESET)
     off = switch("switch for anti-sway off", suggest.ANTI_SWAY_OFF)
@@ -175,35 +175,54 @@ def _joystick(
         nodes.supervised(message.name),
         other,
         page,
+        code,
     )
     return joystick, message
 
 
 def _switch_elsewhere(
     message: "Message", messages: "list[Message]", before: "Sequence[FirstJoystick]"
-) -> tuple[str | None, str | None, str | None]:
+) -> tuple[str | None, str | None, str | None, int | None]:
     """Of a joystick without a switch in its own message that enables it.
 
     Returns:
-        message and signal of its enable switch, or None and None and the joystick that shares its.
+        message and signal of its enable switch, or None and None and the joystick that shares its;
+        of a signal of more than two bits the value that enables.
     """
     from canshaper.machine import suggest
 
     others = [one for one in messages if one.name != message.name]
     joysticks = [joystick.name for joystick in before]
     switches = [f"{m.name}.{s.name}" for m in others for s in suggest.switches(m)]
-    names = [*joysticks, *switches]
+    modes = {f"{m.name}.{s.name}": s for m in others for s in suggest.modes(m)}
+    names = [*joysticks, *switches, *modes]
     if not names:
-        text = "no message has a signal of one or two bits, which could be its enable switch"
+        text = (
+            "no message has a signal of one or two bits, or with named values (VAL_), which could"
+        )
+        text += " be its enable switch"
         raise UsageError(f"{message.name}: {text}")
     enabling = (name for name in names if suggest.ENABLE.search(name))
     likely = names[0] if joysticks else next(enabling, names[0])
     offered = ", ".join(names[:MOST_OFFERED])
     answer = asked(f"{message.name}: enable switch, such as {offered}", one(names), likely)
     if answer in joysticks:
-        return None, None, answer
+        return None, None, answer, None
     of, _, signal = answer.partition(".")
-    return of, signal, None
+    return of, signal, None, _code(modes[answer]) if answer in modes else None
+
+
+def _code(signal: "Signal") -> int:
+    """Ask for the value of a signal that enables."""
+    from canshaper.machine import suggest
+
+    choices: Mapping[int, object] = signal.choices or {}
+    text = f"{signal.name}: value that enables, of "
+    text += ", ".join(f"{code} {name}" for code, name in choices.items())
+    likely = suggest.enabling_code(signal)
+    return int(
+        asked(text, one([str(code) for code in choices]), "" if likely is None else str(likely))
+    )
 
 
 def _cycle(message: str) -> int:

@@ -26,9 +26,9 @@ PERIOD_RANGE = (0.7, 1.4)
 class FirstJoystick:
     """A joystick: its name, message, switches and alive counter; its cycle, where the DBC has none.
 
-    ``switch`` is the message of its enable switch, where that is another one, ``enable_of`` the
-    joystick whose switch enables it; ``node`` the name of its node on CANopen; ``multiplexor`` the
-    value with which a multiplexed message is meant.
+    ``switch`` is the message of its enable switch, where that is another one, ``code`` the value
+    of that signal that enables, ``enable_of`` the joystick whose switch enables it; ``node`` is the
+    name of its node on CANopen, ``multiplexor`` the value with which a multiplexed message counts.
     """
 
     name: str
@@ -43,6 +43,7 @@ class FirstJoystick:
     node: str | None = None
     enable_of: str | None = None
     multiplexor: int | None = None
+    code: int | None = None
 
 
 @dataclass(frozen=True)

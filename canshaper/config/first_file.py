@@ -125,6 +125,8 @@ def _switches(machine: FirstMachine) -> Iterator[str]:
         yield "    bus: crane"
         yield f"    message: {joystick.switch}"
         yield f"    signal: {joystick.enable}"
+        if joystick.code is not None:
+            yield f"    code: {joystick.code} # the only value that enables"
         yield f"    timeout_ms: {joystick.timeout_ms}"
         if joystick.cycle_ms:
             yield f"    cycle_ms: {joystick.cycle_ms}"

@@ -13,6 +13,7 @@ from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, requir
 from canshaper.machine.sway_sensor import LEAST_SAMPLES, UNITS
 
 ENABLE = re.compile(r"enable|dead.?man|release|active", re.IGNORECASE)
+ENABLING = re.compile(r"(?<!in)(?<!not )(active|enable|operat|ready)|^on$", re.IGNORECASE)
 RESET = re.compile(r"reset|acknowledge", re.IGNORECASE)
 ANTI_SWAY_OFF = re.compile(r"anti.?sway|bypass|sway.?off", re.IGNORECASE)
 SWAY = re.compile(r"sway|swing|slope|tilt|incl", re.IGNORECASE)
@@ -97,6 +98,22 @@ def likely_full(signal: Signal, zero: float = 0.0) -> float:
 def switches(message: Message) -> list[Signal]:
     """Signals of a message that can be a switch."""
     return [s for s in message.signals if not s.is_signed and s.length <= _SWITCH_BITS]
+
+
+def modes(message: Message) -> list[Signal]:
+    """Signals of more bits whose values the DBC names: one of these may be what enables."""
+    return [
+        s
+        for s in message.signals
+        if s.choices and s.length > _SWITCH_BITS and not (s.is_signed or s.is_float)
+        if not s.is_multiplexer
+    ]
+
+
+def enabling_code(signal: Signal) -> int | None:
+    """The one value of such a signal whose name says that it enables."""
+    codes = [code for code, name in (signal.choices or {}).items() if ENABLING.search(str(name))]
+    return codes[0] if len(codes) == 1 else None
 
 
 def named(signals: Sequence[Signal], pattern: re.Pattern[str]) -> str | None:

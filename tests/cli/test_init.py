@@ -479,7 +479,35 @@ def test_without_any_switch_there_is_no_joystick(tmp_path: Path) -> None:
         app, ["init", str(tmp_path / "machine.yaml"), "--dbc", str(dbc)], input="\n" * 10
     )
     assert result.exit_code == 2
-    assert "no message has a signal of one or two bits, which could be its enable" in result.output
+    says = "no message has a signal of one or two bits, or with named values (VAL_), which could be"
+    assert says in result.output
+
+
+MODES = {
+    "Inactive": 'VAL_ 257 Mode 0 "Off" 2 "Inactive" 3 "Crane active" 15 "Error" ;\n',
+    "several": 'VAL_ 257 Mode 0 "Off" 3 "Active" 4 "Ready" ;\n',
+}
+
+
+@pytest.mark.parametrize(("names", "reply", "code"), [("Inactive", "", 3), ("several", "4", 4)])
+def test_a_state_of_another_ecu_may_enable_by_one_of_its_named_values(
+    tmp_path: Path, names: str, reply: str, code: int
+) -> None:
+    """The one that says so is offered; where several do there is no default."""
+    dbc, file = tmp_path / "bare.dbc", tmp_path / "machine.yaml"
+    text = BARE.replace("Enable : 0|1", "Mode : 0|4") + MODES[names]
+    dbc.write_text(text, encoding="cp1252")
+    replies = ["", "", "", "Stick", "10", "Panel.Mode", reply, "", ""]
+    replies += ["boom", "Boom.Flow", "20", "100", "y", "1000", "", "", "n", "-"]
+    if names == "several":
+        replies.insert(6, "")  # no answer is none
+    result = CliRunner().invoke(
+        app, ["init", str(file), "--dbc", str(dbc)], input="\n".join(replies) + "\n" * 20
+    )
+    assert result.exit_code == 0, result.output
+    assert "Mode: value that enables, of 0 Off, " in result.output
+    switch = load_deployment(file).config.switches["stick_enable"]
+    assert (switch.message, switch.signal, switch.code) == ("Panel", "Mode", code)
 
 
 def of_dbc(folder: Path, dbc: Sequence[Path], answers: str) -> Result:
