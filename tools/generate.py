@@ -16,7 +16,11 @@ from canshaper.checksums import checksum_table
 from canshaper.cli.verbs.config_schema import filter_table
 from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
+from canshaper.commissioning.procedure.step import FILE
+from canshaper.commissioning.procedure.steps import STEPS
+from canshaper.config.protection import PROFILES
 from canshaper.config.section import Section
+from canshaper.config.uncertainty import MEASURES
 from canshaper.controller.counters import Counters
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS, ReasonText
 from canshaper.shaping.registry import KINDS
@@ -183,6 +187,32 @@ def section_rows(name: str, links: Mapping[str, str]) -> Iterable[str]:
     return TABLES_OF_PAGES[name]()
 
 
+def measure_rows() -> Iterator[str]:
+    """Table of what a campaign measures of a drive."""
+    yield "| column | what |"
+    yield "|---|---|"
+    for measure, text in MEASURES.items():
+        yield f"| `{measure}` | {text} |"
+
+
+def profile_rows() -> Iterator[str]:
+    """Table of the profiles of AUTOSAR E2E."""
+    yield "| `profile` | needs | header | counter | CRC |"
+    yield "|---|---|---|---|---|"
+    for name, one in PROFILES.items():
+        needs = ", ".join(f"`{key}`" for key in one.needs)
+        yield f"| `{name}` | {needs} | {one.header} | {one.counter} | {one.crc} |"
+
+
+def step_rows() -> Iterator[str]:
+    """Table of the steps of a commissioning."""
+    yield "| step | what it does | writes | open again after |"
+    yield "|---|---|---|---|"
+    for step in STEPS:
+        after = ", ".join("any change of the file" if n == FILE else f"`{n}`" for n in step.needs)
+        yield f"| `{step.name}` | {step.does} | {step.writes} | {after} |"
+
+
 TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "states": state_rows,
     "diagram": diagram,
@@ -190,6 +220,9 @@ TABLES_OF_PAGES: Mapping[str, Callable[[], Iterable[str]]] = {
     "faults": fault_rows,
     "filters": lambda: filter_table(KINDS.values()),
     "checksums": checksum_table,
+    "e2e profiles": profile_rows,
+    "measures": measure_rows,
+    "steps": step_rows,
 }
 
 

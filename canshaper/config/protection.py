@@ -1,6 +1,6 @@
 """How a message is protected, taken or sent: counter and checksum, or a profile of AUTOSAR E2E."""
 
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
@@ -42,17 +42,57 @@ class Checksum(Section):
         return self
 
 
-# What says which message it is, by profile.
-_NEEDS = {
-    "p01": ["data_id", "data_id_mode"],
-    "p02": ["data_ids"],
-    "p04": ["data_id"],
-    "p05": ["data_id"],
-    "p06": ["data_id"],
-    "p07": ["data_id"],
-    "p11": ["data_id", "data_id_mode"],
-    "p22": ["data_ids"],
+class Profile(NamedTuple):
+    """A profile of AUTOSAR E2E.
+
+    Attributes:
+        needs: keys that say which message it is.
+        header: where CRC, counter and all else stand.
+        counter: its values.
+        crc: how it is computed.
+    """
+
+    needs: tuple[str, ...]
+    header: str
+    counter: str
+    crc: str
+
+
+_MODE = ("data_id", "data_id_mode")
+_HEADER = "CRC in byte 0, counter in the lower half of byte 1"
+_CRC_1 = "SAE J1850, polynomial 0x1D, starts with 0, not inverted; data ID by its mode first"
+_CRC_2 = "polynomial 0x2F, starts with 0xFF, inverted; the data ID of the counter last"
+PROFILES = {
+    "p01": Profile(_MODE, _HEADER, "0 to 14 (15 is invalid)", _CRC_1),
+    "p02": Profile(("data_ids",), _HEADER, "0 to 15", _CRC_2),
+    "p04": Profile(
+        ("data_id",),
+        "of CAN FD: 12 bytes, high bytes first: length, counter, data ID of 32 bits, CRC-32",
+        "0 to 65535",
+        "polynomial 0xF4ACFB13",
+    ),
+    "p05": Profile(
+        ("data_id",),
+        "CRC-16 in bytes 0 and 1, low byte first, counter in byte 2",
+        "0 to 255",
+        "polynomial 0x1021, starts with 0xFFFF; data ID of 16 bits last, low byte first",
+    ),
+    "p06": Profile(
+        ("data_id",),
+        "as p05 with high bytes first; bytes 2 and 3 are the length, byte 4 the counter",
+        "0 to 255",
+        "as p05 with high bytes first",
+    ),
+    "p07": Profile(
+        ("data_id",),
+        "of CAN FD: 20 bytes: CRC-64, then length, counter and data ID of 32 bits each",
+        "of 32 bits",
+        "polynomial 0x42F0E1EBA9EA3693",
+    ),
+    "p11": Profile(_MODE, "as p01", "0 to 14 (15 is invalid)", "as p01, both or nibble"),
+    "p22": Profile(("data_ids",), "as p02", "0 to 15", "as p02"),
 }
+"""Profiles by their names in the file; docs/deployment.md has them as a table."""
 
 
 class E2e(Section):
@@ -79,7 +119,7 @@ class E2e(Section):
 
     @model_validator(mode="after")
     def _complete(self) -> Self:
-        needs = _NEEDS[self.profile]
+        needs = [*PROFILES[self.profile].needs]
         given = [k for k in ("data_id", "data_id_mode", "data_ids") if getattr(self, k) is not None]
         if given != needs:
             got = " and ".join(given) or "no data ID"

@@ -8,11 +8,11 @@ from canshaper.config.section import Section, number
 
 # Of each drive, with what it is and its unit.
 MEASURES = {
-    "residual_deg": "largest swing that is left, deg",
-    "peak_deg": "largest swing, deg",
+    "residual_deg": "largest swing that is left later than 2.5 s after the last release, deg",
+    "peak_deg": "largest swing of the drive, deg",
     "run_on_s": "from the last release until the tip stands, s",
     "run_on_m": "how far the tip gets meanwhile, m",
-    "travel_error_s": "way of an axis less what was asked, s of full speed",
+    "travel_error_s": "way of an axis less the commanded one, s of full speed",
     "dip_pct": "largest fall of a command while the joystick is held, % of full command",
 }
 QUANTILES = {"p50": 0.5, "p90": 0.9, "p95": 0.95, "p99": 0.99, "p999": 0.999}

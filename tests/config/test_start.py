@@ -29,7 +29,8 @@ def test_a_key_says_what_it_is_for() -> None:
         "Of an axis that slews: its full speed in angle, and its radius."
     )
     assert Accept.description("residual_deg_p99") == (
-        "most of the p99 quantile: largest swing that is left, deg"
+        "most of the p99 quantile: largest swing that is left later than 2.5 s after the last"
+        " release, deg"
     )
     assert AxisConfig.description("wrong") is None
 

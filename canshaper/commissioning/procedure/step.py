@@ -75,6 +75,8 @@ class Step:
     Attributes:
         name: one word, as ``--step`` takes it.
         title: what it does, in a few words.
+        does: the same in a sentence, for the table of docs/commission.md.
+        writes: keys of the file that it may change.
         run: does it.
         needs: steps whose results it uses, or ``FILE``: it is open again when these change.
         applies: whether a deployment has what it is about.
@@ -82,6 +84,8 @@ class Step:
 
     name: str
     title: str
+    does: str
     run: Callable[[Context], Outcome]
+    writes: str = ""
     needs: tuple[str, ...] = ()
     applies: Callable[[Deployment], bool] = _always

@@ -90,4 +90,10 @@ def figure(traffic: Traffic, deployment: Deployment) -> Figure:
     return fig
 
 
-BUSES = Step("buses", "Are the buses alive?", run)
+BUSES = Step(
+    "buses",
+    "Are the buses alive?",
+    "listens for 10 s: is every message there that the file names, and regular? On "
+    "the machine the interfaces too",
+    run,
+)

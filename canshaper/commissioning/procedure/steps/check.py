@@ -97,4 +97,11 @@ def figure(axes: list[Stopping]) -> Figure:
     return fig
 
 
-CHECK = Step("check", "Check", run, needs=(FILE,))
+CHECK = Step(
+    "check",
+    "Check",
+    "as `canshaper check`: stopping distances, bus load, what does not fit",
+    run,
+    writes="`max_pct: 40`, for the first motion",
+    needs=(FILE,),
+)

@@ -184,4 +184,10 @@ def _by_eye(context: Context, outcome: Outcome, axes: list[str]) -> None:
         )
 
 
-DRIVE = Step("drive", "Before and after", run, needs=(FILE,))
+DRIVE = Step(
+    "drive",
+    "Before and after",
+    "the same work without and with the filters: the swing that is left",
+    run,
+    needs=(FILE,),
+)

@@ -144,4 +144,10 @@ def _percent(values: Sequence[float]) -> list[float]:
     return [100.0 * value for value in values]
 
 
-DRY = Step("dry", "Dry drive", run, needs=(FILE,))
+DRY = Step(
+    "dry",
+    "Dry drive",
+    "the daemon computes and sends no valve frame: does every axis become ACTIVE?",
+    run,
+    needs=(FILE,),
+)

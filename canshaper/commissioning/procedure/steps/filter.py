@@ -37,4 +37,12 @@ def _write(deployment: Deployment, designs: list[RobustDesign]) -> list[str]:
     return [line for line in lines if line.startswith(("NOTE", "WARNING"))]
 
 
-FILTER = Step("filter", "Filter, designed", run, needs=("swing", "valve"), applies=swings)
+FILTER = Step(
+    "filter",
+    "Filter, designed",
+    "designs the robust shaper for that swing and valve; says so where it replaces another kind",
+    run,
+    writes="`filter`, `tail_s`",
+    needs=("swing", "valve"),
+    applies=swings,
+)

@@ -163,4 +163,11 @@ def figure(axes: dict[str, AxisTraffic]) -> Figure:
     return fig
 
 
-JOYSTICKS = Step("joysticks", "Joysticks, found by moving them", run)
+JOYSTICKS = Step(
+    "joysticks",
+    "Joysticks, found by moving them",
+    "each joystick moved to both ends: which signal moves, its range and direction, "
+    "the enable switch",
+    run,
+    writes="`command`, where another joystick of the file moves",
+)

@@ -117,4 +117,11 @@ def _releases(axis: AxisTraffic) -> list[float]:
 
 
 # Not the file: it gets faster afterwards.
-FIRST_MOTION = Step(MOTION, "First motion, at reduced speed", run, needs=("valve", "filter"))
+FIRST_MOTION = Step(
+    MOTION,
+    "First motion, at reduced speed",
+    "first motion at reduced speed: each valve follows its joystick, and is neutral when the"
+    " enable is let go",
+    run,
+    needs=("valve", "filter"),
+)

@@ -74,4 +74,10 @@ def _step(name: str, one: Record, folder: Path) -> list[str]:
     return parts
 
 
-REPORT = Step(NAME, "Report, to sign", run, needs=(FILE,))
+REPORT = Step(
+    NAME,
+    "Report, to sign",
+    "everything into one HTML file, with hashes, version, date and a place to sign",
+    run,
+    needs=(FILE,),
+)

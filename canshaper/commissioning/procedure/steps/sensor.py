@@ -51,4 +51,12 @@ def _has_one(deployment: Deployment) -> bool:
     return any(axis.sway_sensor for axis in deployment.axes.values())
 
 
-SENSOR = Step("sensor", "Sway sensor, found", run, needs=("swing", "valve"), applies=_has_one)
+SENSOR = Step(
+    "sensor",
+    "Sway sensor, found",
+    "only with a sway sensor: its sign, delay, offset and noise",
+    run,
+    writes="`sway_sensor`",
+    needs=("swing", "valve"),
+    applies=_has_one,
+)

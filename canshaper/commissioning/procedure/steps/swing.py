@@ -199,4 +199,12 @@ def swings(deployment: Deployment) -> bool:
     return bool(swinging(deployment))
 
 
-SWING = Step("swing", "Swing, recorded and identified", run, needs=("joysticks",), applies=swings)
+SWING = Step(
+    "swing",
+    "Swing, recorded and identified",
+    "a push of each axis that swings, without filters, and rest; identifies it",
+    run,
+    writes="`sway`",
+    needs=("joysticks",),
+    applies=swings,
+)

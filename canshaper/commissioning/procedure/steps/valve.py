@@ -86,4 +86,12 @@ def _write(deployment: Deployment, results: dict[str, Calibration], simulated: b
     return []
 
 
-VALVE = Step("valve", "Valves, calibrated", run, needs=("joysticks",), applies=swings)
+VALVE = Step(
+    "valve",
+    "Valves, calibrated",
+    "a slow ramp of each of these axes measures its valve",
+    run,
+    writes="`limits.curve_*`",
+    needs=("joysticks",),
+    applies=swings,
+)
