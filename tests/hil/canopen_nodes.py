@@ -1,12 +1,14 @@
-"""Nodes of another maker: joysticks of CiA 401 and valves of CiA 408 on the library ``canopen``.
+"""Nodes of another maker, on the library ``canopen``: joysticks, valves, a drive, an inclinometer.
 
-Object dictionary, states, emergency codes and PDOs of the valve are those of the public description
-of a PVED-CC Series 5; its state machine is that of the VDMA profile.
+Object dictionary, states and emergency codes of the valve of CiA 408 are those of the public
+description of a PVED-CC Series 5; its state machine is that of the VDMA profile. Which object is in
+which PDO is each machine's own, by ``Parts``.
 """
 
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 
 import canopen
@@ -17,17 +19,70 @@ VALVES = {"slew": 0x20, "near_far": 0x21, "lift": 0x22}
 INIT, DISABLED, HOLD, ACTIVE, FAULT_HOLD = 0x8, 0x9, 0xB, 0xF, 0x3
 UP = {INIT: DISABLED, DISABLED: HOLD, HOLD: ACTIVE}
 FLOW_COMMAND_LATE = 0x8003
-U8, I16, U16, U32 = 0x05, 0x03, 0x06, 0x07
+I8, I16, I32, U8, U16, U32 = 0x02, 0x03, 0x04, 0x05, 0x06, 0x07
+CONTROL_WORD, STATUS_WORD, DEVICE_MODE = (0x6040, 0, 16), (0x6041, 0, 16), (0x6042, 0, 8)
+SET_POINT, POSITION, PRESSURE = (0x6300, 1, 16), (0x6301, 1, 16), (0x6380, 1, 16)
+TARGET_VELOCITY, ACTUAL_VELOCITY = (0x60FF, 0, 32), (0x606C, 0, 32)
+SLOPE_LONG, SLOPE_LATERAL = (0x6010, 0, 16), (0x6020, 0, 16)
+OVER_CAN = 1  # the device mode in which the set point of the PDO counts
+Object = tuple[int, int, int]  # index, subindex, bits
+Pdos = dict[str, tuple[int, list[Object]]]
+"""COB-ID without the node's number, and mapped objects, of r1 to r4 and t1 to t4."""
+OBJECTS = {
+    CONTROL_WORD: ("Device control word", U16),
+    STATUS_WORD: ("Device status word", U16),
+    DEVICE_MODE: ("Device mode", I8),
+    SET_POINT: ("Vpoc set point", I16),
+    POSITION: ("Vpoc actual value", I16),
+    PRESSURE: ("Vprc set point", I16),
+    TARGET_VELOCITY: ("Target velocity", I32),
+    ACTUAL_VELOCITY: ("Velocity actual value", I32),
+    SLOPE_LONG: ("Slope long16", I16),
+    SLOPE_LATERAL: ("Slope lateral16", I16),
+    (0x6401, 1, 16): ("Read analogue input", I16),
+    (0x6401, 2, 16): ("Read analogue input", I16),
+    (0x6000, 1, 8): ("Read input", U8),
+}
+JOYSTICK: Pdos = {"t1": (0x180, [(0x6401, 1, 16), (0x6401, 2, 16), (0x6000, 1, 8)])}
+INCLINOMETER: Pdos = {"t1": (0x180, [SLOPE_LONG, SLOPE_LATERAL])}
+DRIVE: Pdos = {"r1": (0x200, [TARGET_VELOCITY]), "t2": (0x280, [ACTUAL_VELOCITY])}
+VALVE: Pdos = {
+    "r1": (0x200, [CONTROL_WORD, SET_POINT]),
+    "t1": (0x180, [STATUS_WORD]),
+    "t2": (0x280, [POSITION]),
+}
+VALVE_WITH_MODE: Pdos = {**VALVE, "r1": (0x200, [CONTROL_WORD, SET_POINT, DEVICE_MODE])}
+SERVO_VALVE: Pdos = {
+    "r4": (0x500, [CONTROL_WORD, SET_POINT, PRESSURE]),
+    "t1": (0x180, [STATUS_WORD, POSITION]),
+}
+
+
+@dataclass(frozen=True)
+class Parts:
+    """What is on the bus of a machine.
+
+    Attributes:
+        valves: PDOs of each valve of CiA 408.
+        joysticks: whether they are of CiA 401.
+        drive: node number of a drive of CiA 402 that slews in place of a valve.
+        inclinometer: node number of one of CiA 410.
+    """
+
+    valves: Pdos
+    joysticks: bool = True
+    drive: int | None = None
+    inclinometer: int | None = None
+
+
 JOYSTICK_CYCLE_S, STATUS_CYCLE_S = 0.02, 0.1
 STATES = {name: number for number, name in NMT_STATES.items()}
 
 
-def write_eds(
-    path: Path, pdos: dict[str, tuple[int, list[tuple[int, int, int]]]], objects: dict
-) -> str:
-    """A description with these PDOs (COB-ID, mapped objects) and objects (name, type)."""
+def write_eds(path: Path, pdos: Pdos) -> str:
+    """A description with these PDOs and the objects in them."""
     sections = {
-        "DeviceInfo": {"NrOfRXPDO": 1, "NrOfTXPDO": 2},
+        "DeviceInfo": {"NrOfRXPDO": 4, "NrOfTXPDO": 4},
         "1017": entry("Producer heartbeat time", U16, 0),  # by hand: no BCM in every kernel
     }
     optional = [0x1017]
@@ -40,7 +95,8 @@ def write_eds(
         for index, values in records.items():
             add_record(sections, index, f"PDO {index:04X}", values)
             optional.append(index)
-    for (index, sub), (name, kind) in objects.items():
+    objects = {one: OBJECTS[one] for _, mapped in pdos.values() for one in mapped}
+    for (index, sub, _), (name, kind) in objects.items():
         if sub:
             add_record(sections, index, name, [(kind, 0)] * sub)
         else:
@@ -78,52 +134,85 @@ def add_record(sections: dict, index: int, name: str, values: list[tuple[int, ob
         sections[f"{index:04X}sub{sub}"] = entry(f"{name} {sub}", kind, value)
 
 
-class Joystick:
-    """CiA 401: two analogue inputs and a byte of switches in one PDO, sent by its event timer."""
+class Unit:
+    """A node with its PDOs; what it sends it has in ``values``, by index and subindex."""
 
-    def __init__(self, network: canopen.Network, number: int, eds: str) -> None:
-        self.node = network.create_node(canopen.LocalNode(number, eds))
-        self.node.tpdo.read(from_od=True)
-        self._pdo = self.node.tpdo[1]
-        self.x = self.y = 0
-        self.switches = 1
-        self.dead = False
-
-    def cycle(self) -> None:
-        if self.node.nmt.state == "OPERATIONAL":
-            for variable, value in zip(self._pdo, (self.x, self.y, self.switches), strict=False):
-                variable.raw = value
-            self._pdo.transmit()
-
-
-class Valve:
-    """CiA 408: follows its set point in the state ACTIVE, which it is told to step by step."""
-
-    def __init__(self, network: canopen.Network, number: int, eds: str) -> None:
+    def __init__(self, network: canopen.Network, number: int, folder: Path, pdos: Pdos) -> None:
+        eds = write_eds(folder / f"{number:02x}.eds", pdos)
         self.node = network.create_node(canopen.LocalNode(number, eds))
         self.node.tpdo.read(from_od=True)
         self.node.rpdo.read(from_od=True)
-        self.node.rpdo[1].add_callback(self._told)
-        self.silent = self.stuck = self.dead = False
-        self.boot()
+        self._sent = [self.node.tpdo[int(key[1])] for key in pdos if key[0] == "t"]
+        for key in pdos:
+            if key[0] == "r":
+                self.node.rpdo[int(key[1])].add_callback(self._received)
+        self.values: dict[tuple[int, int], int] = {}
+        self.silent = self.dead = False
 
     def boot(self) -> None:
         """Power on, or a reset of the node."""
-        self.state, self.spool, self._word = INIT, 0, 0
-        self.words: list[int] = []
         self.node.nmt.state = "INITIALISING"  # which sends the boot-up message
         self.node.nmt.state = "PRE-OPERATIONAL"
+
+    def fall_silent(self) -> None:
+        """No PDO from it any more, and no heartbeat; it still receives."""
+        self.silent = self.dead = True
+
+    def send(self) -> None:
+        """Its PDOs, as its event timers and every change have it."""
+        if self.node.nmt.state == "OPERATIONAL" and not self.silent:
+            for pdo in self._sent:
+                for variable in pdo:
+                    variable.raw = self.values.get((variable.index, variable.subindex), 0)
+                pdo.transmit()
+
+    def _received(self, pdo: canopen.pdo.base.PdoMap) -> None:
+        if self.node.nmt.state == "OPERATIONAL":
+            self.apply({(variable.index, variable.subindex): variable.raw for variable in pdo})
+
+    def apply(self, received: dict[tuple[int, int], int]) -> None:
+        """What it does with a PDO."""
+
+
+class Joystick(Unit):
+    """CiA 401: two analogue inputs and a byte of switches in one PDO, sent by its event timer."""
+
+    x = y = 0
+    switches = 1
+
+    def send(self) -> None:
+        self.values = {(0x6401, 1): self.x, (0x6401, 2): self.y, (0x6000, 1): self.switches}
+        super().send()
+
+
+class Drive(Unit):
+    """CiA 402 in profile velocity mode, brought to "operation enabled" by its own master."""
+
+    spool = 0
+
+    def apply(self, received: dict[tuple[int, int], int]) -> None:
+        self.spool = received[TARGET_VELOCITY[:2]]
+        self.values[ACTUAL_VELOCITY[:2]] = self.spool
+
+
+class Valve(Unit):
+    """CiA 408: follows its set point in the state ACTIVE, which it is told to step by step."""
+
+    stuck = False
+
+    def boot(self) -> None:
+        self.state, self.spool, self._word = INIT, 0, 0
+        self.words: list[int] = []
+        super().boot()
 
     def fault(self, code: int) -> None:
         """The spool goes to neutral, the ready bit away, and it is told."""
         self.state, self.spool = FAULT_HOLD, 0
         self.node.emcy.send(code, 0x81)
-        self.report()
+        self.send()
 
-    def _told(self, pdo: canopen.pdo.base.PdoMap) -> None:
-        if self.node.nmt.state != "OPERATIONAL":
-            return
-        word, set_point = (variable.raw for variable in pdo)
+    def apply(self, received: dict[tuple[int, int], int]) -> None:
+        word, set_point = received[CONTROL_WORD[:2]], received[SET_POINT[:2]]
         if not self.words or word != self.words[-1]:
             self.words.append(word)
         before = self.state
@@ -134,63 +223,54 @@ class Valve:
         elif UP.get(before) == word or (word in (INIT, *UP) and word < before):
             self.state = word
         self._word = word
-        self.spool = set_point if self.state == ACTIVE else 0
+        over_can = received.get(DEVICE_MODE[:2], OVER_CAN) == OVER_CAN
+        self.spool = set_point if self.state == ACTIVE and over_can else 0
         if self.state != before:
-            self.report()
+            self.send()
 
-    def report(self) -> None:
-        """Status word and spool, as its event timer and every change have it."""
-        if self.node.nmt.state == "OPERATIONAL" and not self.silent:
-            for number, value in ((1, self.state), (2, self.spool)):
-                self.node.tpdo[number][0].raw = value
-                self.node.tpdo[number].transmit()
+    def send(self) -> None:
+        self.values = {STATUS_WORD[:2]: self.state, POSITION[:2]: self.spool}
+        super().send()
 
 
 class Machine(threading.Thread):
-    """Two joysticks and three valves on one bus, at their cycles."""
+    """Nodes of one bus, at their cycles: by default two joysticks and three valves."""
 
-    def __init__(self, folder: Path, **bus: object) -> None:
+    def __init__(self, folder: Path, parts: Parts | None = None, **bus: object) -> None:
         super().__init__(daemon=True)
         self.network = canopen.Network()
         self.network.connect(**bus)
-        eds = write_eds(
-            folder / "joystick.eds",
-            {"t1": (0x180, [(0x6401, 1, 16), (0x6401, 2, 16), (0x6000, 1, 8)])},
-            {(0x6401, 2): ("Read analogue input", I16), (0x6000, 1): ("Read input", U8)},
-        )
-        valve = write_eds(
-            folder / "valve.eds",
-            {
-                "r1": (0x200, [(0x6040, 0, 16), (0x6300, 1, 16)]),
-                "t1": (0x180, [(0x6041, 0, 16)]),
-                "t2": (0x280, [(0x6301, 1, 16)]),
-            },
-            {
-                (0x6040, 0): ("Device control word", U16),
-                (0x6041, 0): ("Device status word", U16),
-                (0x6042, 0): ("Device mode", U8),
-                (0x6300, 1): ("Vpoc set point", I16),
-                (0x6301, 1): ("Vpoc actual value", I16),
-            },
-        )
-        self.joysticks = {n: Joystick(self.network, i, eds) for n, i in JOYSTICKS.items()}
-        for joystick in self.joysticks.values():
-            joystick.node.nmt.state = "INITIALISING"
-            joystick.node.nmt.state = "PRE-OPERATIONAL"
-        self.valves = {n: Valve(self.network, i, valve) for n, i in VALVES.items()}
+        parts = parts or Parts(VALVE)
+        numbers = JOYSTICKS if parts.joysticks else {}
+        self.joysticks = {
+            n: Joystick(self.network, i, folder, JOYSTICK) for n, i in numbers.items()
+        }
+        valves = {n: i for n, i in VALVES.items() if parts.drive is None or n != "slew"}
+        self.valves = {n: Valve(self.network, i, folder, parts.valves) for n, i in valves.items()}
+        self.drive: Drive | None = None
+        self.inclinometer: Unit | None = None
+        if parts.drive is not None:
+            self.drive = Drive(self.network, parts.drive, folder, DRIVE)
+        if parts.inclinometer is not None:
+            self.inclinometer = Unit(self.network, parts.inclinometer, folder, INCLINOMETER)
+        self._quick = [u for u in (*self.joysticks.values(), self.inclinometer) if u]
+        self._slow = [u for u in (*self.valves.values(), self.drive) if u]
+        self.units = [*self._quick, *self._slow]
+        for unit in self.units:
+            unit.boot()
         self._ended = threading.Event()
 
     def run(self) -> None:
         passed = 0.0
         while not self._ended.wait(JOYSTICK_CYCLE_S):
-            for joystick in self.joysticks.values():
-                joystick.cycle()
+            for unit in self._quick:
+                unit.send()
             passed += JOYSTICK_CYCLE_S
             if passed >= STATUS_CYCLE_S:
                 passed = 0.0
-                for valve in self.valves.values():
-                    valve.report()
-                for unit in (*self.joysticks.values(), *self.valves.values()):
+                for unit in self._slow:
+                    unit.send()
+                for unit in self.units:
                     if not unit.dead:
                         nmt = unit.node.nmt
                         self.network.send_message(0x700 + nmt.id, [STATES[nmt.state]])
@@ -202,8 +282,8 @@ class Machine(threading.Thread):
 
 
 @contextmanager
-def machine_on(folder: Path, **bus: object) -> Iterator[Machine]:
-    machine = Machine(folder, **bus)
+def machine_on(folder: Path, parts: Parts | None = None, **bus: object) -> Iterator[Machine]:
+    machine = Machine(folder, parts, **bus)
     machine.start()
     try:
         yield machine

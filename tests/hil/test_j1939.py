@@ -36,7 +36,7 @@ SHIPPED = (
     "remote-forwarder",
 )
 OTHER_VALVES = ("pvedcc-forwarder", "remote-forwarder")  # of 11 bits
-# Set points on the way to full speed and back: a filter makes tens of them, a step makes two.
+# Set points on the way to full speed and back: a filter makes tens of them, its limits alone ten.
 SHAPED = 20
 
 
