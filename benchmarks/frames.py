@@ -100,7 +100,7 @@ class Answering:
 
 
 class Ticking:
-    """The daemon. Its deadlines are found by which frames just miss them."""
+    """The daemon. Its deadlines are measured by which frames just miss them."""
 
     def __init__(self, title: str, wire: Wire, pid: int, count: int, tick_ms: int) -> None:
         self.title, self.wire, self.pid, self.count = title, wire, pid, count
@@ -164,8 +164,7 @@ class Ticking:
 
     def _sweep(self, start: int, width_ns: int, count: int) -> list[Exchange]:
         """One frame in every tick, each a step later in it."""
-        at = start
-        soonest = self._at
+        at, soonest = start, self._at
         seen, slack = [], []
         for _ in range(count):
             soonest = max(soonest, time.monotonic_ns() + AHEAD_NS)
@@ -186,7 +185,7 @@ class Following:
         self._at = time.monotonic_ns()
 
     def find_phase(self) -> None:
-        """Wait until it has found the joystick's."""
+        """Wait until it follows the joystick's."""
         for _ in range(200):
             self._move(0.0)
 
@@ -241,8 +240,7 @@ def each_gateway(
             wait_for_frames(wire, process, log)
             yield Ticking(title, wire, process.pid, count, tick_ms)
     file = shipped(directory, near)
-    text = file.read_text(encoding="utf-8")
-    file.write_text(f"tick: {{ follow: left }}\n{text}", encoding="utf-8")
+    file.write_text("tick: { follow: left }\n" + file.read_text("utf-8"), "utf-8")
     with running(daemon(file), log) as process:
         wait_for_frames(wire, process, log)
         yield Following("ticks that follow, 3 axes, 20 ms", wire, process.pid, count)

@@ -28,7 +28,8 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from canshaper import errors
     from canshaper.api import AxisState, Controller, load_machine
-    from canshaper.checksums import Checksum, ChecksumKind, Crc8, Xor
+    from canshaper.checksums.algorithms import Crc8, Xor
+    from canshaper.checksums.kinds import Checksum, ChecksumKind
     from canshaper.codec.frame import Frame
     from canshaper.controller.events import (
         FeedbackEvent,
@@ -79,7 +80,8 @@ __all__ = [
 
 _HOMES = {
     "api": ("AxisState", "Controller", "load_machine"),
-    "checksums": ("Checksum", "ChecksumKind", "Crc8", "Xor"),
+    "checksums.algorithms": ("Crc8", "Xor"),
+    "checksums.kinds": ("Checksum", "ChecksumKind"),
     "codec.frame": ("Frame",),
     "controller.events": (
         "FeedbackEvent",

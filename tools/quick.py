@@ -50,7 +50,7 @@ def tests_of(file: Path) -> list[str]:
         for depth in range(len(rest) - 1, 0, -1):
             if (ROOT / "tests").joinpath(*rest[:depth]).is_dir():
                 return ["/".join(rest[:depth])]
-        return ["codec"] if rest == ["checksums.py"] else []
+        return ["codec"] if rest[0] == "checksums" else []
     return TESTS.get(first, ["docs"] if file.suffix == ".md" else [])
 
 

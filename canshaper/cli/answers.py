@@ -212,3 +212,8 @@ def whole(low: float, high: float) -> Callable[[str], int]:
         return int(text)
 
     return parse
+
+
+def period_ms(message: str) -> int:
+    """Ask for the period of a message, in ms."""
+    return asked(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")

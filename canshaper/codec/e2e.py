@@ -15,7 +15,7 @@ from typing import Literal
 
 from crccheck.crc import Crc32Autosar, Crc64Xz
 
-from canshaper.checksums import AUTOSAR, SAE_J1850, ReflectedCrc
+from canshaper.checksums.algorithms import AUTOSAR, SAE_J1850, ReflectedCrc
 
 COUNTER = 0x0F
 """Bits of byte 1 that hold the counter in profiles 1 and 2."""

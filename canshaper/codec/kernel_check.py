@@ -2,7 +2,8 @@
 
 import struct
 
-from canshaper.checksums import AUTOSAR, CHECKSUMS, SAE_J1850, Checksum, Crc8, Xor
+from canshaper.checksums.algorithms import AUTOSAR, SAE_J1850, Crc8, Xor
+from canshaper.checksums.kinds import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2, Profile4, Profile5
 from canshaper.codec.protection import Protection
 

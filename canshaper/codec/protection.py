@@ -7,7 +7,7 @@ is a repetition and no news, a larger one is a wrong sequence.
 from dataclasses import dataclass
 from typing import Any, Self
 
-from canshaper.checksums import Checksum
+from canshaper.checksums.kinds import Checksum
 from canshaper.codec.e2e import E2e
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.layout import Layout

@@ -4,7 +4,7 @@ from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import BeforeValidator, Field, model_validator
 
-from canshaper.checksums import checksum_names, known_checksum
+from canshaper.checksums.kinds import checksum_names, known_checksum
 from canshaper.config.section import Section, number
 
 

@@ -40,15 +40,8 @@ from canshaper.machine.identity import program_sha256
 log = logging.getLogger("canshaper")
 
 # No one receives our frames there, or we no one's.
-OFF_BUS = frozenset(
-    {
-        BusState.BUS_OFF,
-        BusState.NOT_CONFIRMED,
-        BusState.DOWN,
-        BusState.GONE,
-        BusState.WRONG_DEVICE,
-    }
-)
+_AWAY = (BusState.DOWN, BusState.GONE, BusState.WRONG_DEVICE)
+OFF_BUS = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, *_AWAY))
 
 
 class Daemon:

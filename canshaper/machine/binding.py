@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from pathlib import Path
 
-from canshaper.checksums import package_line
+from canshaper.checksums.kinds import package_line
 from canshaper.codec.signals import find_signal, special_name
 from canshaper.codec.status import IDENTITY, SERVICE_STATUS
 from canshaper.config.load import load_config

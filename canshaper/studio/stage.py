@@ -275,23 +275,17 @@ class Stage:
         frames: list[Frame] = []
         for port in seen.ports.values():
             frames += port.frames()
-        asked = held if seen.shaped else replace(held, anti_sway=False)
+        switched = held if seen.shaped else replace(held, anti_sway=False)
         if seen.here:
-            frames = seen.here.frames(asked, passed_ms)
-        if seen.hand:
-            for frame in seen.hand.frames(self._time_ms, asked):
-                seen.ports[frame.bus].send(frame)
-                frames.append(frame)
-        for frame in frames:
+            frames = seen.here.frames(switched, passed_ms)
+        for frame in frames + seen.move_joysticks(self._time_ms, switched):
             seen.view.receive(frame, now_s)
         seen.view.check(now_s)
 
     def _rest(self) -> None:
         """The last thing on the buses: joysticks in neutral, enable off."""
         for seen in self.cranes.values():
-            if seen.hand:
-                for frame in seen.hand.frames(0, Held()):
-                    seen.ports[frame.bus].send(frame)
+            seen.move_joysticks(0, Held())
 
     # -- parts ---------------------------------------------------------------------------------
 

@@ -15,7 +15,7 @@ import canshaper
 
 ROOT = Path(__file__).parents[2]
 # Modules whose docstrings have examples.
-DOCTESTS = ("__init__", "api", "checksums", "shaping.registry", "shaping.shapers.kind")
+DOCTESTS = ("__init__", "api", "checksums.kinds", "shaping.registry", "shaping.shapers.kind")
 
 
 def type_checked() -> set[str]:

@@ -10,13 +10,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper import checksums as module
-from canshaper.checksums import (
-    AUTOSAR,
+from canshaper.checksums import kinds as module
+from canshaper.checksums.algorithms import AUTOSAR, KernelSum
+from canshaper.checksums.kinds import (
     CHECKSUMS,
     Checksum,
     ChecksumKind,
-    KernelSum,
     checksum_names,
     checksum_table,
     known_checksum,

@@ -5,7 +5,8 @@ from collections.abc import Iterator
 
 import pytest
 
-from canshaper.checksums import CHECKSUMS, Checksum, Crc8, checksum_names, crc_kind
+from canshaper.checksums.algorithms import Crc8
+from canshaper.checksums.kinds import CHECKSUMS, Checksum, checksum_names, crc_kind
 from tests.rigs.files import Machine
 
 DIGITS = b"123456789"

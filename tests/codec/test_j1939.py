@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.bus.socketcan import MOST_FILTERS, set_filters
-from canshaper.checksums import Checksum
+from canshaper.checksums.kinds import Checksum
 from canshaper.codec.frame import BusState, Frame
 from canshaper.codec.identifier import (
     group_mask,

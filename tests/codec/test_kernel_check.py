@@ -6,7 +6,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.checksums import CHECKSUMS, Checksum, ChecksumKind, Xor
+from canshaper.checksums.algorithms import Xor
+from canshaper.checksums.kinds import CHECKSUMS, Checksum, ChecksumKind
 from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2
 from canshaper.codec.kernel_check import kernel_check, neutral_fault
 from canshaper.codec.protection import Protection

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.checksums import CHECKSUMS, Checksum
+from canshaper.checksums.kinds import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.protection import Protection, Protector, SequenceChecker

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.checksums import SAE_J1850
+from canshaper.checksums.algorithms import SAE_J1850
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded

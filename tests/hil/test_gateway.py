@@ -14,7 +14,7 @@ from pathlib import Path
 import can
 import pytest
 
-from canshaper.checksums import CHECKSUMS
+from canshaper.checksums.kinds import CHECKSUMS
 from tests.codec.checksum_reference import REFERENCE
 from tests.hil.machine import ANSWER_S, DBC, FILE, Service, joysticks_on, open_bus, service
 from tests.hil.machine import wait_for as wait

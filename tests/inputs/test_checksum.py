@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.checksums import CHECKSUMS
+from canshaper.checksums.kinds import CHECKSUMS
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.shaping.states import State
 from tests.codec.checksum_reference import PLACES, with_checksum

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.checksums import Checksum
+from canshaper.checksums.kinds import Checksum
 from canshaper.codec.e2e import E2e, Profile1, Profile2, Profile5
 from canshaper.codec.protection import Protection
 from tests.machine.protected_machine import (

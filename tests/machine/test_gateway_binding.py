@@ -5,7 +5,7 @@ from pathlib import Path
 import cantools
 import pytest
 
-from canshaper.checksums import Checksum
+from canshaper.checksums.kinds import Checksum
 from canshaper.codec.can_id import EFF_FLAG
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.protection import Protection

@@ -2,7 +2,7 @@
 
 import pytest
 
-from canshaper.checksums import CHECKSUMS, Checksum, ChecksumKind
+from canshaper.checksums.kinds import CHECKSUMS, Checksum, ChecksumKind
 from canshaper.codec.frame import FrameFault
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.controller.controller import Controller

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from crccheck.crc import Crc8Autosar
 
-from canshaper.checksums import CHECKSUMS
+from canshaper.checksums.kinds import CHECKSUMS
 from canshaper.controller.controller import Controller
 from canshaper.design.lockstep import drive
 from canshaper.machine.binding import load_deployment

@@ -37,7 +37,7 @@ def config_schema(
 
       canshaper config-schema --checksums
     """
-    from canshaper.checksums import checksum_table
+    from canshaper.checksums.kinds import checksum_table
     from canshaper.config.load import check_packages
     from canshaper.config.schema import DeploymentConfig
     from canshaper.config.version import VERSION

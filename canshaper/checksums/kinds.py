@@ -9,14 +9,15 @@ import binascii
 import sys
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
-from functools import cache, reduce
+from functools import cache
 from hashlib import sha256
 from importlib.metadata import EntryPoint, entry_points
-from operator import xor
 from pathlib import Path
 from typing import Literal
 
-from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, Crc16Arc, Crc16Base, CrcBase
+from crccheck.crc import Crc8Base, Crc16Arc, Crc16Base, CrcBase
+
+from canshaper.checksums.algorithms import AUTOSAR, SAE_J1850, Crc8, Crc16, ReflectedCrc, Xor
 
 GROUP = "canshaper.checksums"
 """Entry points of packages: the name of a kind, and the ``ChecksumKind`` that it is."""
@@ -73,68 +74,6 @@ tick: it waits for nothing, keeps nothing and raises nothing.
 """
 
 
-class KernelSum:
-    """Computed here and, from the same numbers, by the kernel: see ``codec.kernel_check``."""
-
-    def of(self, data: bytes) -> int:
-        """Checksum of these bytes."""
-        raise NotImplementedError
-
-    def __call__(self, _can_id: int, place: Checksum, data: bytes) -> int:
-        """That of a frame: over the bytes but the one that it lies in."""
-        at = place.byte
-        return self.of(data[:at] + data[at + 1 :])
-
-
-class Xor(KernelSum):
-    """Exclusive or of all bytes.
-
-    Attributes:
-        start: what it begins with.
-    """
-
-    def __init__(self, start: int = 0) -> None:
-        self.start = start
-
-    def of(self, data: bytes) -> int:
-        """Exclusive or of ``data`` and the start."""
-        return reduce(xor, data, self.start)
-
-
-class Crc8(KernelSum):
-    """The CRC of a class of crccheck that reflects bytes and result, or neither.
-
-    The library works bit by bit.
-
-    Attributes:
-        start: the register before the first byte.
-        end: what the register is changed by after the last.
-        table: the register after one byte, by what both are together.
-    """
-
-    def __init__(self, library: type[Crc8Base]) -> None:
-        self.end: int = library.calc(b"", initvalue=0)
-        self.start: int = library.calc(b"") ^ self.end
-        self.table = bytes(library.calc(bytes((i,)), initvalue=0) ^ self.end for i in range(256))
-
-    def run(self, value: int, data: bytes) -> int:
-        """The register after ``data``, where it was ``value`` before."""
-        table = self.table
-        for byte in data:
-            value = table[value ^ byte]
-        return value
-
-    def of(self, data: bytes) -> int:
-        """CRC of ``data`` with the start value and the final inversion of the algorithm."""
-        return self.run(self.start, data) ^ self.end
-
-
-SAE_J1850 = Crc8(Crc8SaeJ1850)
-"""Polynomial 0x1D, start and end 0xFF."""
-AUTOSAR = Crc8(Crc8Autosar)
-"""Polynomial 0x2F, start and end 0xFF."""
-
-
 @dataclass(frozen=True, slots=True)
 class ChecksumKind:
     """How a checksum is computed.
@@ -177,30 +116,6 @@ class ChecksumKind:
         return algorithm if isinstance(algorithm, Xor | Crc8) else None
 
 
-class ReflectedCrc:
-    """The CRC of a class of crccheck that reflects bytes and result, of 16 bits or more.
-
-    By a table, a byte at a time; the library works bit by bit.
-    """
-
-    def __init__(self, library: type[CrcBase]) -> None:
-        self._end: int = library.calc(b"", initvalue=0)
-        self._start: int = library.calc(b"") ^ self._end
-        self._table = _table(library, self._end)
-
-    def of(self, data: bytes) -> int:
-        """CRC of ``data``."""
-        value, table = self._start, self._table
-        for byte in data:
-            value = value >> 8 ^ table[(value ^ byte) & 0xFF]
-        return value ^ self._end
-
-
-def _table(library: type[CrcBase], end: int) -> tuple[int, ...]:
-    """The register after one byte, by what the lowest byte of both is together."""
-    return tuple(library.calc(bytes((i,)), initvalue=0) ^ end for i in range(256))
-
-
 CRC_WIDTHS: Mapping[int, type[CrcBase]] = {8: Crc8Base, 16: Crc16Base}
 """Bits that a CRC by its polynomial may have."""
 
@@ -225,8 +140,11 @@ def crc_kind(bits: int, polynomial: int, start: int, end: int, *, reflected: boo
             "_reflect_output": reflected,
         }
         library = type("Crc", (CRC_WIDTHS[bits],), numbers)
-        narrow = issubclass(library, Crc8Base)
-        algorithm = Crc8(library) if narrow else _by_table(library, reflected=reflected)
+        algorithm: Algorithm
+        if issubclass(library, Crc8Base):
+            algorithm = Crc8(library)
+        else:
+            algorithm = _of_others(ReflectedCrc(library) if reflected else Crc16(library))
         CHECKSUMS[name] = ChecksumKind(name, bits, algorithm)
         _NUMBERS[name] = bits, polynomial, start, end, reflected
     return name
@@ -244,22 +162,9 @@ def _handed_over(
     return Checksum(*bound)
 
 
-def _by_table(library: type[CrcBase], *, reflected: bool) -> Algorithm:
-    """A CRC of 16 bits, a byte at a time; the library works bit by bit."""
-    if reflected:
-        crc = ReflectedCrc(library)
-        return lambda _can_id, place, data: crc.of(place.others(data))
-    end: int = library.calc(b"", initvalue=0)
-    start: int = library.calc(b"") ^ end
-    table = _table(library, end)
-
-    def left(_can_id: int, place: Checksum, data: bytes) -> int:
-        value = start
-        for byte in place.others(data):
-            value = (value & 0xFF) << 8 ^ table[value >> 8 ^ byte]
-        return value ^ end
-
-    return left
+def _of_others(crc: ReflectedCrc | Crc16) -> Algorithm:
+    """A CRC over the bytes in which no bit of the checksum lies."""
+    return lambda _can_id, place, data: crc.of(place.others(data))
 
 
 def _nibbles(_can_id: int, _place: Checksum, data: bytes) -> int:
@@ -288,7 +193,7 @@ CHECKSUMS: dict[str, ChecksumKind] = {
     "sum4": ChecksumKind("sum of the half bytes", 4, _nibbles),
     "crc16_ccitt_false": ChecksumKind("CRC 0x1021, start 0xFFFF (IBM 3740)", 16, _ccitt_false),
     "crc16_arc": ChecksumKind(
-        "CRC 0x8005, reflected, start 0", 16, _by_table(Crc16Arc, reflected=True)
+        "CRC 0x8005, reflected, start 0", 16, _of_others(ReflectedCrc(Crc16Arc))
     ),
 }
 """Every kind by its name, over all bytes of a frame but its own. Those of packages join it when a

@@ -1,0 +1,1 @@
+"""Checksums of messages: every kind that a deployment may name, and how each is computed."""
