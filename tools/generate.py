@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any, TypeVar
 
 import canshaper.config.schema  # noqa: F401  (its classes are the sections)
-from canshaper.checksums import checksum_table
+from canshaper.checksums.kinds import checksum_table
 from canshaper.cli.verbs.config_schema import filter_table
 from canshaper.codec.faults import FAULT_TEXTS
 from canshaper.codec.frame import FrameFault
