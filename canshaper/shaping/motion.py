@@ -71,6 +71,7 @@ class MovingAxis:
         damped: how far the tip was moved for that, m.
         way: how far it was moved since its operator left it, rad or m.
         reached: position that the added velocities reach at the end of the period, rad or m.
+        joins: the other axis moves already; what was not added before is not made up for.
         stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
         lag_s: 2 zeta / w.
     """
@@ -91,6 +92,7 @@ class MovingAxis:
     damped: float = 0.0
     way: float = 0.0
     reached: float = 0.0
+    joins: bool = False
     stiffness: float = field(init=False)
     damping: float = field(init=False)
     lag_s: float = field(init=False)
@@ -138,6 +140,8 @@ class MovingAxis:
             target: the position, rad or m.
             weight: 1, or less where the added part ends.
         """
+        if self.joins:
+            self.joins, self.reached = False, target
         way = self.period_s * self.full_speed
         velocity = weight * (target - self.reached) / way
         last = self.added
@@ -230,6 +234,7 @@ class TwoAxisMotion:
             if axis is not None:
                 axis.added = axis.reached = axis.damped = 0.0
                 axis.damps = False
+                axis.joins = not over
                 if over:
                     axis.way = 0.0
 

@@ -1,5 +1,6 @@
 """Two-axis motion on real frames: near-far moves for slew, and only while it may."""
 
+import itertools
 import math
 from collections.abc import Callable
 from dataclasses import replace
@@ -251,6 +252,27 @@ def test_a_lost_joystick_of_slew_ends_it_in_the_fade(changed_rig: Make) -> None:
     assert rig.state() is State.STOPPING
     assert not any(after[5 + 15 :])
     assert rig.state("near_far") is State.READY
+
+
+@pytest.mark.parametrize("slew_ticks", [20, 30, 60, 100])
+def test_near_far_that_becomes_ready_while_slew_moves_does_not_twitch(
+    changed_rig: Make, slew_ticks: int
+) -> None:
+    """What it has missed of the path is not made up for: it begins with what is still to come."""
+    rig, sent = by_two_joysticks(changed_rig), []
+    for tick in range(slew_ticks + 150):
+        moves = 1000 if 3 <= tick < slew_ticks + 40 else 0
+        rig.receive(rig.joystick(Slew=moves))
+        if tick >= slew_ticks:
+            rig.receive(rig.joystick("JoystickRight"))
+        rig.tick()
+        sent.append(rig.controller.axes["near_far"].axis.sent)
+    assert not any(sent[: slew_ticks + 1])
+    assert max(map(abs, sent)) > 0.03  # it does take part
+    begin = sent[slew_ticks : slew_ticks + 12]
+    assert max(abs(b - a) for a, b in itertools.pairwise(begin)) < 0.05
+    signs = [s > 0 for s in begin if s]
+    assert sum(a != b for a, b in itertools.pairwise(signs)) <= 1
 
 
 @pytest.mark.parametrize("sign", [1, -1])

@@ -347,6 +347,25 @@ def test_the_way_begins_again_with_the_next_motion() -> None:
     assert near_far.way == 0.0
 
 
+def test_what_was_not_added_while_an_axis_could_not_is_not_made_up_for() -> None:
+    drive = Drive()
+    drive.slew.moving.able = drive.near_far.moving.able = True
+    drive.run(stroke(0.2, 3.0), stroke(0.2, 3.0), until_s=1.0, motion=True)
+    slew, near_far = drive.slew.moving, drive.near_far.moving
+    near_far.able = False
+    for _ in range(11):
+        drive.motion.step(TICK_S, 3.0)
+    assert near_far.joins
+    near_far.able = True
+    drive.motion.step(TICK_S, 3.0)
+    assert (slew.added, near_far.added, near_far.joins) == (0.0, 0.0, False)
+    assert near_far.reached != 0.0
+    for axis in (slew, near_far):
+        axis.commanded = False
+    drive.motion.step(TICK_S, 3.0)
+    assert (near_far.reached, near_far.joins) == (0.0, False)
+
+
 def test_no_farther_than_it_may_be_moved() -> None:
     motion, _, near_far = slewing(path_m=0.1)
     near_far.applied = -0.25
