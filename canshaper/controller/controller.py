@@ -7,18 +7,14 @@ from collections.abc import Iterator
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
-from canshaper.controller.events import (
-    FeedbackEvent,
-    StateEvent,
-    SwaySensorEvent,
-    SwingLengthEvent,
-)
+from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.inputs import MachineInputs, received_by
 from canshaper.controller.motion import MotionRunner
 from canshaper.controller.outputs import ValveOutputs
 from canshaper.controller.overrun import OverrunDetector
 from canshaper.controller.parts import parts
 from canshaper.controller.runner import AxisRunner
+from canshaper.controller.sensor_report import SensorReport
 from canshaper.controller.status import status_frames
 from canshaper.inputs.carry_over import Key, Part, carry_over
 from canshaper.inputs.input import EnableGate
@@ -54,6 +50,7 @@ class Controller:
             for name, bound in deployment.axes.items()
         }
         self.motions: list[MotionRunner] = []
+        self._sensors: dict[str, SensorReport] = {}
         self._connect(inputs, tick_s)
         bound = inputs.bound + [
             (runner.bound.feedback, runner.feedback)
@@ -237,6 +234,7 @@ class Controller:
                 runner.add_chooser(inputs.load_state, inputs.profile)
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
+            self._sensors[name] = SensorReport(name, self.axes[name])
         for name, bound in self.deployment.motions.items():
             motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None
@@ -253,12 +251,8 @@ class Controller:
             self.events.append(event)
             if event.fault:
                 self.counters.add(event.fault)
-        if (trust := runner.changed_trust()) is not None:
-            self.events.append(SwaySensorEvent(name, trust))
-        if (seen := runner.changed_length()) is not None:
-            sway = runner.bound.config.sway
-            assert sway is not None  # checked with the deployment
-            self.events.append(SwingLengthEvent(name, seen, sway))
+        if sensor := self._sensors.get(name):
+            self.events += sensor.events()
 
     def _overruns(self, missed: int) -> bool:
         if missed:

@@ -17,9 +17,9 @@ from canshaper.protocols.interface import Interlock
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.registry import build_shaper
 from canshaper.shaping.sensed import SensedSway
+from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.states import REACTION_OF, CommandInput, Reaction, Reason, State, Transition
-from canshaper.shaping.sway import GRAVITY_M_S2, SwayModel
-from canshaper.shaping.swing_length import SwingLength
+from canshaper.shaping.sway import SwayModel
 from canshaper.shaping.trust import Trust
 
 # How long another sender must be silent before a trip for it can be reset: ten periods of a slow
@@ -27,8 +27,6 @@ from canshaper.shaping.trust import Trust
 FOREIGN_NS = 1_000_000_000
 # Least radius for the speed of a tip: at the pillar it has none, and shows no swing.
 LEAST_RADIUS_M = 0.5
-# A length that differs by this factor from the one that was reported last is reported.
-LENGTH_NEWS = 1.1
 
 
 class CommandSource(Protocol):
@@ -73,13 +71,7 @@ class AxisRunner:
             period_s,
             config.limits.output_limits(),
             sway=sway,
-            shaper=build_shaper(
-                config.filter.kind,
-                period_s,
-                sway,
-                valve_rate_per_s=config.limits.slowest_per_s,
-                **config.filter.parameters(),
-            ),
+            shaper=_shaper(config, period_s, sway),
             neutral_band=self._neutral_band,
             stop_s=config.limits.stop_s,
             grid_steps=bound.valve.steps,
@@ -95,9 +87,6 @@ class AxisRunner:
         self.chooser: SetChooser | None = None
         self.radius: ValueInput | None = None
         self._sway_signal: SwaySignal | None = None
-        self._reported_trust = Trust.NO_DATA
-        self._seen_length: SwingLength | None = None
-        self._reported_m = 0.0
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
     @property
@@ -160,8 +149,7 @@ class AxisRunner:
         """
         self._joystick = joystick
         self.alone = True
-        self.added = 0.0
-        self.damps = False
+        self.added, self.damps = 0.0, False
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -191,16 +179,8 @@ class AxisRunner:
         if limits != self.bound.config.limits:
             self.axis.limit(limits.output_limits())
         if config.sway is not None:
-            self.axis.retune(
-                config.sway.mode(),
-                lambda sway: build_shaper(
-                    config.filter.kind,
-                    self.period_s,
-                    sway,
-                    valve_rate_per_s=limits.slowest_per_s,
-                    **config.filter.parameters(),
-                ),
-            )
+            mode, period_s = config.sway.mode(), self.period_s
+            self.axis.retune(mode, lambda sway: _shaper(config, period_s, sway))
             self._full_speed_m_s = config.sway.full_speed_m_s
         self.bound = replace(self.bound, config=config)
 
@@ -301,43 +281,20 @@ class AxisRunner:
         """What is thought of the sway sensor."""
         return self.axis.sensed.state if self.axis.sensed else Trust.NO_DATA
 
-    def changed_trust(self) -> Trust | None:
-        """What is thought of the sway sensor, where that has changed since the last call."""
-        trust = self.trust
-        if trust is self._reported_trust:
-            return None
-        self._reported_trust = trust
-        return trust
-
     @property
     def swing_length_m(self) -> float:
         """Length of the pendulum as the sway sensor has shown it last; 0 before it has."""
         seen = self.axis.sensed.length.result if self.axis.sensed else None
         return seen.length_m if seen else 0.0
 
-    def changed_length(self) -> SwingLength | None:
-        """How the grapple swings, where that is another length than was reported last.
-
-        Of the load of a breakpoint nothing is: the key that is reported is not that in force.
-        """
-        sensed = self.axis.sensed
-        if sensed is None or (seen := sensed.length.result) is self._seen_length:
-            return None
-        self._seen_length = seen
-        assert seen is not None
-        assert self.bound.config.sway is not None  # checked with the deployment
-        mode = self.bound.config.sway.mode()
-        assert self.axis.sway is not None
-        if self.axis.sway.mode != mode:
-            return None
-        file_m = GRAVITY_M_S2 / mode.omega_rad_s**2
-        other = seen.length_m / (self._reported_m or file_m)
-        if 1.0 / LENGTH_NEWS <= other <= LENGTH_NEWS:
-            return None
-        self._reported_m = seen.length_m
-        return seen
-
     @property
     def active_set(self) -> int:
         """Number of the parameter set that is chosen; 0 where there is no choice."""
         return self.chooser.number if self.chooser else 0
+
+
+def _shaper(config: AxisConfig, period_s: float, sway: SwayModel | None) -> Shaper:
+    """The filter of an axis, for the rate that its valve has."""
+    rate = config.limits.slowest_per_s
+    parameters = config.filter.parameters()
+    return build_shaper(config.filter.kind, period_s, sway, valve_rate_per_s=rate, **parameters)

@@ -9,6 +9,8 @@ import pytest
 
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
+from canshaper.controller.events import SwingLengthEvent
+from canshaper.controller.sensor_report import SensorReport
 from canshaper.design.lockstep import LockStep, drive
 from canshaper.inputs.sway_sensor import SwaySensorInput, SwaySignal
 from canshaper.machine.binding import load_deployment
@@ -124,17 +126,20 @@ def test_of_a_period_it_is_reported_as_one() -> None:
 def test_the_length_of_a_breakpoint_is_no_other_one_than_that_of_the_file() -> None:
     """A load that hangs deeper: to set the key of the empty grapple to it would be wrong."""
     runner = Controller(load_deployment(FILE)).axes["near_far"]
-    axis, seen = runner.axis, SwingLength(2.0, 0.04, 3.0)
+    report = SensorReport("near_far", runner)
+    axis, loaded_length = runner.axis, SwingLength(2.0, 0.04, 3.0)
     assert axis.sensed is not None
     assert axis.sway is not None
     of_file, loaded = axis.sway.mode, SwayMode.from_grapple(2.0, 120.0, 900.0)
     axis.retune(loaded, lambda _sway: Off())
-    axis.sensed.length.result = seen
-    assert runner.changed_length() is None
+    axis.sensed.length.result = loaded_length
+    assert not list(report.events())
     axis.retune(of_file, lambda _sway: Off())
-    assert runner.changed_length() is None  # seen before, with the other load
-    axis.sensed.length.result = again = SwingLength(2.0, 0.04, 3.0)
-    assert runner.changed_length() is again
+    assert not list(report.events())  # measured with the other load
+    axis.sensed.length.result = empty_length = SwingLength(2.0, 0.04, 3.0)
+    (event,) = report.events()
+    assert isinstance(event, SwingLengthEvent)
+    assert event.seen is empty_length
 
 
 def test_the_length_of_the_file_is_no_news_and_its_return_is() -> None:
