@@ -15,8 +15,9 @@ from canshaper.config.schema import DeploymentConfig
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.shaping.registry import KINDS, build_shaper
-from canshaper.shaping.shapers.fir import Fir, residual_left
+from canshaper.shaping.shapers.fir import Fir
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.residual import residual_left
 
 Load = Callable[[str], DeploymentConfig]
 Problems = Callable[[str], list[str]]

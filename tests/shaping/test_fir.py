@@ -5,8 +5,9 @@ import tracemalloc
 import numpy as np
 import pytest
 
-from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, residual_left, stretched, zv_taps
+from canshaper.shaping.shapers.fir import Fir, convolved, ei_taps, stretched, zv_taps
 from canshaper.shaping.sway import SwayMode, SwayModel
+from tests.rigs.residual import residual_left
 
 MODES = [SwayMode.from_period(2.2, zeta) for zeta in (0.0, 0.05, 0.3)]
 TICKS_S = (0.001, 0.01, 0.02, 0.05)

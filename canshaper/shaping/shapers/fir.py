@@ -121,12 +121,6 @@ def ei_taps(mode: SwayMode, tick_s: float, residual: float) -> list[float]:
     return taps
 
 
-def residual_left(taps: Sequence[float], mode: SwayMode, tick_s: float) -> float:
-    """Fraction of the swing that a bare shaper leaves in a mode."""
-    step = cmath.exp(-mode.pole * tick_s)
-    return abs(sum(tap * step**k for k, tap in enumerate(taps)))
-
-
 def _zv(sway: SwayModel) -> Shaper:
     return Fir(zv_taps(sway.mode, sway.tick_s))
 

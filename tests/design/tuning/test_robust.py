@@ -10,8 +10,8 @@ from canshaper.design.tuning.robust import (
     shortest,
     time_optimal_s,
 )
-from canshaper.shaping.shapers.fir import residual_left
 from canshaper.shaping.sway import SwayMode
+from tests.rigs.residual import residual_left
 
 MODE = SwayMode.from_grapple(1.2, 120.0, 300.0)
 VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}
