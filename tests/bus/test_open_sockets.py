@@ -1,22 +1,20 @@
-"""The sockets of an interface as they are opened, and a port that only listens: without CAN."""
+"""The sockets of an interface as they are opened: without CAN."""
 
 import errno
 import socket
 import sys
-from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import can
 import pytest
 
 from canshaper.bus import port as bus_module
 from canshaper.bus import python_can, socketcan
 from canshaper.bus.device import check_mtu
-from canshaper.bus.port import ListeningPort, open_port
+from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets, set_filters
-from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError, WrongBusError, WrongDeviceError
 from canshaper.machine.routing import BusRoutes
@@ -320,193 +318,3 @@ def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(python_can, "open_python_can", none)
     with pytest.raises(BusError, match="cannot open slcan channel ttyS0: ValueError"):
         open_port("crane", Bus(interface="slcan", channel="ttyS0"), lambda _: None)
-
-
-# -- a port that only listens ----------------------------------------------------------------------
-
-
-class Below:
-    """The port below it."""
-
-    name, state, arrived_ns = "crane", BusState.PASSIVE, 17
-
-    def __init__(self) -> None:
-        self.sent: list[Frame] = []
-        self.watched: list[tuple[str, BusRoutes]] = []
-        self.closed = False
-
-    def frames(self) -> Iterator[Frame]:
-        yield Frame("crane", 1, False, b"")
-
-    def background(self) -> Iterator[Frame]:
-        yield Frame("crane", 2, False, b"")
-
-    def send(self, frame: Frame) -> bool:
-        self.sent.append(frame)
-        return frame.data != b"full"
-
-    def watch(self, name: str, ids: BusRoutes) -> None:
-        self.watched.append((name, ids))
-
-    def fileno(self) -> int:
-        return 5
-
-    def close(self) -> None:
-        self.closed = True
-
-
-LISTENS = BusRoutes(frozenset(), frozenset({(0x300, False)}), frozenset(), frozenset())
-
-
-def test_a_port_that_listens_is_the_port_below_it() -> None:
-    below = Below()
-    port = ListeningPort(below, LISTENS)
-    assert (port.name, port.state, port.arrived_ns, port.fileno()) == (
-        "crane",
-        BusState.PASSIVE,
-        17,
-        5,
-    )
-    assert [f.can_id for f in port.frames()] == [1]
-    assert [f.can_id for f in port.background()] == [2]
-    port.close()
-    assert below.closed
-
-
-def test_a_port_that_listens_sends_only_what_it_may() -> None:
-    below = Below()
-    claims = BusRoutes(
-        frozenset(), frozenset(), frozenset(), frozenset(), claims=frozenset({(0x18EEFF9C, True)})
-    )
-    port = ListeningPort(below, LISTENS)
-    status, valve = Frame("crane", 0x300, False, b"x"), Frame("crane", 0x200, False, b"x")
-    claim = Frame("crane", 0x18EEFF9C, True, bytes(8))
-    assert port.send(status)
-    assert port.send(valve)  # as if it were sent: nothing may stop for that
-    assert not port.send(status._replace(data=b"full"))
-    assert [f.can_id for f in below.sent] == [0x300, 0x300]
-    port.watch("second", claims)
-    assert port.name == "second"
-    assert below.watched == [("second", claims)]
-    below.sent.clear()
-    assert port.send(status)
-    assert port.send(claim)
-    assert below.sent == [claim]
-
-
-# -- python-can ------------------------------------------------------------------------------------
-
-
-class Adapter:
-    """An interface of python-can that hands out these messages."""
-
-    def __init__(self, messages: list[can.Message]) -> None:
-        self.messages = messages
-        self.sent: list[can.Message] = []
-
-    def recv(self, _timeout: float) -> can.Message | None:
-        return self.messages.pop(0) if self.messages else None
-
-    def send(self, message: can.Message) -> None:
-        self.sent.append(message)
-
-    def fileno(self) -> int:
-        return 9
-
-
-def test_what_is_no_data_frame_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
-    messages = [
-        can.Message(is_error_frame=True),
-        can.Message(is_remote_frame=True),
-        can.Message(is_fd=True, data=bytes(12)),
-    ]
-    monkeypatch.setattr(can, "Bus", lambda **_: Adapter(messages))
-    faults: list[FrameFault] = []
-    port = open_port("crane", Bus(interface="virtual", channel="ttyS0"), faults.append)
-    assert list(port.frames()) == []
-    wrong = FrameFault.WRONG_LENGTH
-    assert faults == [FrameFault.ERROR_FRAME, wrong, wrong]
-    assert list(port.background()) == []
-    port.watch("second", IDS)
-    assert (port.name, port.fileno()) == ("second", 9)
-
-
-def test_a_bus_of_can_fd_takes_and_sends_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The interface is asked for it, with its bit rate; which message is one says the id."""
-    adapter = Adapter(
-        [can.Message(arbitration_id=0x110, is_extended_id=False, is_fd=True, data=bytes(12))]
-    )
-    opened: list[dict[str, Any]] = []
-
-    def bus(**options: Any) -> Adapter:
-        opened.append(options)
-        return adapter
-
-    monkeypatch.setattr(can, "Bus", bus)
-    faults: list[FrameFault] = []
-    config = Bus(interface="virtual", channel="x", fd=True, data_bitrate=2_000_000)
-    ids = replace(IDS, fd=frozenset({(0x200, False)}))
-    port = open_port("crane", config, faults.append, ids)
-    assert list(port.frames()) == [Frame("crane", 0x110, False, bytes(12))]
-    assert port.send(Frame("crane", 0x200, False, bytes(8)))
-    assert port.send(Frame("crane", 0x300, False, bytes(8)))
-    assert [(m.is_fd, m.bitrate_switch) for m in adapter.sent] == [(True, True), (False, False)]
-    port.watch("crane", IDS)
-    assert port.send(Frame("crane", 0x200, False, bytes(8)))
-    assert adapter.sent[-1].is_fd is False
-    port = open_port("crane", config.model_copy(update={"data_bitrate": None}), faults.append, ids)
-    assert port.send(Frame("crane", 0x200, False, bytes(64)))
-    assert (adapter.sent[-1].is_fd, adapter.sent[-1].bitrate_switch) == (True, False)
-    assert faults == []
-    asked = [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened]
-    assert asked == [{}, {}]  # virtual always has it
-
-
-@pytest.mark.parametrize(
-    ("fd", "data_bitrate", "asked"),
-    [
-        (False, None, {}),
-        (True, None, {"fd": True}),
-        (True, 2_000_000, {"fd": True, "data_bitrate": 2_000_000}),
-    ],
-)
-def test_other_interfaces_are_asked_for_can_fd(
-    monkeypatch: pytest.MonkeyPatch, fd: bool, data_bitrate: int | None, asked: dict[str, Any]
-) -> None:
-    opened: list[dict[str, Any]] = []
-    monkeypatch.setattr(can, "Bus", lambda **options: opened.append(options))
-    config = Bus(interface="kvaser", channel="0", fd=fd, data_bitrate=data_bitrate)
-    python_can.open_python_can(config)
-    assert [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened] == [asked]
-
-
-def test_multicast_beyond_this_machine_hears_one_group_and_nothing_old(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    """What another group sent before does not count; what we send comes back and is ours."""
-    old = can.Message(arbitration_id=1, is_extended_id=False)
-    adapter = Adapter([old, old])
-    opened: list[dict[str, Any]] = []
-    groups: list[int] = []
-
-    def bus(**options: Any) -> Adapter:
-        opened.append(options)
-        return adapter
-
-    monkeypatch.setattr(can, "Bus", bus)
-    monkeypatch.setattr(python_can, "receive_one_group", groups.append)
-    config = Bus(interface="udp_multicast", channel="239.1.2.3", network=True)
-    port = open_port("crane", config, lambda _: None)
-    assert groups == [9]
-    assert opened == [
-        {
-            "interface": "udp_multicast",
-            "channel": "239.1.2.3",
-            "ignore_config": True,
-            "receive_own_messages": False,
-        }
-    ]
-    ours = Frame("crane", 0x200, False, b"\1")
-    assert port.send(ours)
-    adapter.messages += [adapter.sent[0], can.Message(arbitration_id=5, is_extended_id=False)]
-    assert [f.can_id for f in port.frames()] == [5]

@@ -1,12 +1,8 @@
-"""The daemon around its loop: buses that fail, the control socket, reads, a gateway, its end."""
+"""The daemon around its loop: buses that fail, the last frames, reads of its file, its end."""
 
-import json
-import logging
 import signal
-import socket
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -15,26 +11,10 @@ from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.daemon import daemon as module
 from canshaper.daemon import reloads
 from canshaper.daemon.daemon import Daemon
-from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
-from canshaper.daemon.standstill import Standstill
 from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from tests.daemon.test_reload import BUS, Bench, FakePort, Read
-from tests.rigs.forwarder import ROOT
-
-RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return Bench(tmp_path, monkeypatch)
-
-
-@pytest.fixture
-def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
-    caplog.set_level(logging.INFO, "canshaper")
-    return lambda: [f"{r.levelname} {r.getMessage()}" for r in caplog.records]
 
 
 def at(bench: Bench, acts: dict[int, Callable[[], Any]], last: int = 20) -> None:
@@ -158,108 +138,6 @@ def test_neutral_is_sent_as_soon_as_the_queue_has_room(
     assert [f.can_id for f in bench.sent[-3:]] == [0x200, 0x201, 0x202]
 
 
-# -- the control socket ----------------------------------------------------------------------------
-
-
-def control(bench: Bench, path: Path) -> None:
-    bench.text += f"control:\n  socket: {path}\n  adjustable:\n    {RANGE}\n"
-    bench.file.write_text(bench.text, encoding="utf-8")
-
-
-def ask(path: Path, request: object) -> Callable[[], socket.socket]:
-    def asks() -> socket.socket:
-        client = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        client.settimeout(5)
-        client.connect(str(path))
-        client.send(json.dumps(request).encode())
-        clients.append(client)
-        return client
-
-    clients.clear()
-    return asks
-
-
-clients: list[socket.socket] = []
-
-
-def answered(bench: Bench, path: Path, request: object) -> dict[str, Any]:
-    found: list[bytes] = []
-    asks = ask(path, request)
-    at(bench, {3: asks, 15: lambda: found.append(clients[0].recv(65536))})
-    clients[0].close()
-    answer: dict[str, Any] = json.loads(found[0])
-    return answer
-
-
-def test_a_number_is_set_and_the_log_has_it(
-    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
-) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 0.75}})
-    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.75
-    assert next(line for line in log() if " set " in line).startswith(
-        "INFO set axes.slew.filter.a1=0.75 was=0.708 "
-    )
-    assert not path.exists()  # at the end it is closed
-
-
-def test_the_table_is_asked_for_and_nothing_is_set(
-    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
-) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    answer = answered(bench, path, {})
-    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.708
-    assert not [line for line in log() if " set " in line or "set=" in line]
-
-
-def test_a_number_that_is_refused_is_in_the_log(
-    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
-) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 2}})
-    assert "0.5 to 1" in answer["error"]
-    refused = [line for line in log() if "set=refused" in line]
-    assert len(refused) == 1
-    assert refused[0].startswith("WARNING set=refused uid=")
-    assert refused[0].endswith(answer["error"])
-
-
-@pytest.mark.parametrize("request_", [{"get": 1}, {"set": 1}, {"set": {}, "more": 1}])
-def test_a_request_that_is_none(bench: Bench, tmp_path: Path, request_: object) -> None:
-    path = tmp_path / "c.sock"
-    control(bench, path)
-    assert "expected {} or" in answered(bench, path, request_)["error"]
-
-
-def test_without_a_place_for_the_socket_the_machine_works(
-    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
-) -> None:
-    path = tmp_path / "nowhere" / "c.sock"
-    control(bench, path)
-    at(bench, {})
-    assert [line for line in log() if "control=none" in line] == [
-        f"WARNING control=none socket={path} No such file or directory"
-    ]
-    assert log()[-1] == "INFO stopped valves=neutral"
-
-
-def test_a_reload_opens_the_control_socket_of_the_new_file(bench: Bench, tmp_path: Path) -> None:
-    first, second = tmp_path / "1.sock", tmp_path / "2.sock"
-    control(bench, first)
-    there: list[tuple[bool, bool]] = []
-    at(
-        bench,
-        {
-            5: lambda: bench.reload(str(first), str(second)),
-            15: lambda: there.append((first.exists(), second.exists())),
-        },
-    )
-    assert there == [(False, True)]
-
-
 # -- reading the file again ------------------------------------------------------------------------
 
 
@@ -331,121 +209,6 @@ def test_a_reload_in_motion_waits_and_the_log_says_so_once(
     lines = [line for line in log() if "reload=" in line]
     assert lines[0] == "INFO reload=waiting until every axis is neutral"
     assert [line.split()[1] for line in lines[1:]] == ["reload=applied"]
-
-
-# -- in the line -----------------------------------------------------------------------------------
-
-
-class Beside:
-    """What a gateway does between its ticks, counted; it has taken joystick frames by then."""
-
-    def __init__(
-        self, bench: Bench, deployment: Deployment, on_fault: Callable[[FrameFault], None]
-    ) -> None:
-        assert deployment.config.gateway
-        self.waits = self.passes = self.checks = 0
-        self.closed = 0
-        self.on_fault = on_fault
-        self._bench = bench
-
-    def wait(
-        self,
-        seconds: float,
-        processor: FrameProcessor,
-        ports: Mapping[str, FramePort],
-        standstill: Standstill,
-    ) -> None:
-        self.waits += 1
-        self._bench.sleep(seconds / 2)
-        assert not standstill.over(self._bench.now_ns)
-        receive_waiting(processor, ports, self._bench.now_ns, standstill)
-        self._bench.sleep(seconds / 2)
-
-    def pass_others(self) -> int:
-        self.passes += 1
-        return 0
-
-    def check(self, now_ns: int, *, neutral: bool) -> None:
-        assert (now_ns, neutral) == (self._bench.now_ns, True)
-        self.checks += 1
-
-    def close(self) -> None:
-        self.closed += 1
-
-
-@pytest.fixture
-def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Beside]:
-    """The bench's machine has a gateway; what stands in its line, one after the other."""
-    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text(encoding="utf-8")
-    bench.text = text.replace("../dbc", str(ROOT / "dbc"))
-    bench.file.write_text(bench.text, encoding="utf-8")
-    lines: list[Beside] = []
-
-    def in_line(*arguments: Any) -> Beside:
-        lines.append(Beside(bench, *arguments))
-        return lines[-1]
-
-    monkeypatch.setattr(module, "InlineGateway", in_line)
-    return lines
-
-
-def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
-    bench: Bench, lines: list[Beside]
-) -> None:
-    at(bench, {5: bench.reload})
-    assert [one.closed for one in lines] == [1, 1]  # the old one, and the last one at the end
-    assert sum(one.passes for one in lines) == sum(one.checks for one in lines) == 21
-    assert sum(one.waits for one in lines) == 19  # a reload begins with a tick
-
-
-def test_a_joystick_frame_leaves_a_gateway_before_the_next_tick(
-    bench: Bench, lines: list[Beside]
-) -> None:
-    """Half a tick after the one before; it has waited on the first bus until then."""
-    left: list[int] = []
-
-    def comes_later() -> None:
-        frame = bench.rig.joystick("JoystickLeft")
-        before = len(bench.sent)
-        bench.ports[0].waiting.append((bench.now_ns + 9_000_000, frame))
-        left.append(before)
-
-    def counts() -> None:
-        left.append(sum(f.can_id == frame_id for f in bench.sent[left[0] :]))
-
-    frame_id = bench.rig.messages["JoystickLeft"].frame_id
-    bench.script = lambda number: None
-    acts = {5: comes_later, 6: counts, 8: bench.stop}
-    bench.run(lambda number: acts.get(number, lambda: None)())
-    assert len(lines) == 1
-    assert left[1] == 1
-
-
-def test_a_fault_of_a_gateway_is_counted(
-    bench: Bench, lines: list[Beside], log: Callable[[], list[str]]
-) -> None:
-    at(bench, {5: lambda: lines[0].on_fault(FrameFault.SEND_FAILED)})
-    assert any("fault=SEND_FAILED" in line for line in log())
-
-
-def test_a_line_that_cannot_be_opened_leaves_the_one_before(
-    bench: Bench, lines: list[Beside], monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
-) -> None:
-    """A port that was opened for it is closed again; those from before are not."""
-
-    def cannot(*_: object) -> None:
-        raise BusError("gateway: cannot open vcan0 and vcan9: no such device")
-
-    def reloads() -> None:
-        monkeypatch.setattr(module, "InlineGateway", cannot)
-        bench.reload("channel: vcan1", "channel: vcan9")
-
-    closed: list[tuple[str, bool]] = []
-    ends = lambda: closed.extend((p.channel, p.closed) for p in bench.ports)  # noqa: E731
-    at(bench, {5: reloads, 19: ends})
-    assert [line for line in log() if "refused" in line]
-    assert closed == [("vcan0", False), ("vcan1", False), ("vcan9", True)]
-    assert [one.closed for one in lines] == [1]
 
 
 def test_signals_are_those_of_a_service(bench: Bench) -> None:

@@ -194,11 +194,6 @@ class Uncollected:
     def pause(self, now_ns: int) -> None: ...
 
 
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return Bench(tmp_path, monkeypatch)
-
-
 # -- a bus that takes its time ---------------------------------------------------------------------
 
 

@@ -1,7 +1,6 @@
 """What is old after a reload: frames from before it, on whatever bus, and the time it took."""
 
 from collections.abc import Callable
-from pathlib import Path
 
 import pytest
 
@@ -10,11 +9,6 @@ from canshaper.daemon import ports as service_ports
 from tests.daemon.test_reload import Bench
 
 READY = ("READY", "JOYSTICK_NEUTRAL")
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return Bench(tmp_path, monkeypatch)
 
 
 def told(bench: Bench, last: int) -> Callable[[int], tuple[str, str]]:

@@ -3,7 +3,6 @@
 import logging
 from collections.abc import Callable, Iterable
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import pytest
@@ -113,11 +112,6 @@ class Diary:
 
     def statuses(self) -> list[tuple[int, str]]:
         return [(tick, line[8:]) for tick, line in self.lines if line.startswith("status: ")]
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return Bench(tmp_path, monkeypatch)
 
 
 @pytest.fixture

@@ -1,0 +1,113 @@
+"""The control socket of a daemon: what is set, asked for and refused."""
+
+import json
+import socket
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.daemon.test_daemon import at
+from tests.daemon.test_reload import Bench
+
+RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
+
+
+def control(bench: Bench, path: Path) -> None:
+    bench.text += f"control:\n  socket: {path}\n  adjustable:\n    {RANGE}\n"
+    bench.file.write_text(bench.text, encoding="utf-8")
+
+
+def ask(path: Path, request: object) -> Callable[[], socket.socket]:
+    def asks() -> socket.socket:
+        client = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        client.settimeout(5)
+        client.connect(str(path))
+        client.send(json.dumps(request).encode())
+        clients.append(client)
+        return client
+
+    clients.clear()
+    return asks
+
+
+clients: list[socket.socket] = []
+
+
+def answered(bench: Bench, path: Path, request: object) -> dict[str, Any]:
+    found: list[bytes] = []
+    asks = ask(path, request)
+    at(bench, {3: asks, 15: lambda: found.append(clients[0].recv(65536))})
+    clients[0].close()
+    answer: dict[str, Any] = json.loads(found[0])
+    return answer
+
+
+def test_a_number_is_set_and_the_log_has_it(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 0.75}})
+    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.75
+    assert next(line for line in log() if " set " in line).startswith(
+        "INFO set axes.slew.filter.a1=0.75 was=0.708 "
+    )
+    assert not path.exists()  # at the end it is closed
+
+
+def test_the_table_is_asked_for_and_nothing_is_set(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {})
+    assert answer["adjustable"]["axes.slew.filter.a1"]["now"] == 0.708
+    assert not [line for line in log() if " set " in line or "set=" in line]
+
+
+def test_a_number_that_is_refused_is_in_the_log(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    answer = answered(bench, path, {"set": {"axes.slew.filter.a1": 2}})
+    assert "0.5 to 1" in answer["error"]
+    refused = [line for line in log() if "set=refused" in line]
+    assert len(refused) == 1
+    assert refused[0].startswith("WARNING set=refused uid=")
+    assert refused[0].endswith(answer["error"])
+
+
+@pytest.mark.parametrize("request_", [{"get": 1}, {"set": 1}, {"set": {}, "more": 1}])
+def test_a_request_that_is_none(bench: Bench, tmp_path: Path, request_: object) -> None:
+    path = tmp_path / "c.sock"
+    control(bench, path)
+    assert "expected {} or" in answered(bench, path, request_)["error"]
+
+
+def test_without_a_place_for_the_socket_the_machine_works(
+    bench: Bench, tmp_path: Path, log: Callable[[], list[str]]
+) -> None:
+    path = tmp_path / "nowhere" / "c.sock"
+    control(bench, path)
+    at(bench, {})
+    assert [line for line in log() if "control=none" in line] == [
+        f"WARNING control=none socket={path} No such file or directory"
+    ]
+    assert log()[-1] == "INFO stopped valves=neutral"
+
+
+def test_a_reload_opens_the_control_socket_of_the_new_file(bench: Bench, tmp_path: Path) -> None:
+    first, second = tmp_path / "1.sock", tmp_path / "2.sock"
+    control(bench, first)
+    there: list[tuple[bool, bool]] = []
+    at(
+        bench,
+        {
+            5: lambda: bench.reload(str(first), str(second)),
+            15: lambda: there.append((first.exists(), second.exists())),
+        },
+    )
+    assert there == [(False, True)]
