@@ -2,6 +2,7 @@
 
 import multiprocessing
 import signal
+import sys
 from collections import deque
 from collections.abc import Callable, Generator, Iterable, Iterator
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
@@ -11,6 +12,7 @@ from dataclasses import dataclass
 from threading import current_thread, main_thread
 from typing import Generic, TypeVar
 
+from canshaper.design.children import end_with_parent
 from canshaper.errors import CampaignError
 
 # A piece whose process dies so often is what kills it.
@@ -70,7 +72,7 @@ class Processes:
         queue, ends = _Queue(jobs), False
         with _interrupt_seen() as interrupted:
             while not ends:
-                with ProcessPoolExecutor(self.count, initializer=_ignore_interrupts) as pool:
+                with ProcessPoolExecutor(self.count, initializer=_begin) as pool:
                     try:
                         ends = yield from self._drain(pool, work, queue, interrupted)
                     except BaseException:
@@ -130,5 +132,10 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _ignore_interrupts() -> None:
+def _begin() -> None:
+    """What a process of the pool does first."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
+    end_with_parent(signal.SIGKILL)  # which may have no time for it
+    parent = multiprocessing.parent_process()
+    if parent is None or not parent.is_alive():
+        sys.exit(1)

@@ -3,7 +3,6 @@
 import os
 import select
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -11,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from canshaper.bus.port import Port
+from canshaper.design.children import canshaper_command
 from canshaper.errors import BusError, DriveError
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.cranes import cranes
@@ -164,7 +164,7 @@ class Crew:
 
     def start(self, verb: str, *options: str) -> None:
         """Start ``canshaper VERB FILE`` on the transport."""
-        command = [sys.executable, "-m", "canshaper", verb, self._file, *self._options, *options]
+        command = canshaper_command(verb, self._file, *self._options, *options)
         with (self._logs / verb).open("wb") as log:
             self._processes[verb] = subprocess.Popen(
                 command, stdin=subprocess.DEVNULL, stdout=log, stderr=log

@@ -6,13 +6,13 @@ import os
 import re
 import socket
 import subprocess
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from canshaper.commissioning.doctor.processes import JOYSTICKS_PRIORITY, LOOP_PRIORITY
 from canshaper.config.load import load_config
+from canshaper.design.children import canshaper_command
 from canshaper.design.processes import Transport, end
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -22,15 +22,7 @@ from canshaper.studio.view import Report
 # From the end of a process to its next start: long enough that a Ctrl-C, which all get, is over.
 RESTART_S = 1.0
 _LATE = re.compile(r"\blate (\d+) us")
-# A child ends with its parent (prctl(2), PR_SET_PDEATHSIG): the daemon leaves the valves neutral.
-_CODE = (
-    "import ctypes, os, signal, sys;"
-    "ctypes.CDLL(None).prctl(1, signal.SIGTERM);"
-    "sys.exit(1) if os.getppid() != int(sys.argv.pop(1)) else None;"
-    "from canshaper.cli.app import main; main()"
-)
-CANSHAPER = (sys.executable, "-c", _CODE, str(os.getpid()))
-"""How ``canshaper`` is started, tied to this process."""
+CANSHAPER = tuple(canshaper_command())
 
 
 def copied(path: Path, directory: Path) -> tuple[Path, Deployment]:

@@ -382,7 +382,7 @@ def test_the_processes_end_with_a_studio_that_is_killed(own: Callable[..., Studi
     studio.process.kill()
     studio.process.communicate(timeout=WAIT_S)
     limit = time.monotonic() + WAIT_S
-    while any("canshaper.cli.app" in " ".join(command_of(pid)) for pid in children):
+    while any("canshaper.__main__" in " ".join(command_of(pid)) for pid in children):
         assert time.monotonic() < limit
 
 

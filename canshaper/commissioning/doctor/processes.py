@@ -1,6 +1,5 @@
 """Processes of a measurement: started, and ended whatever happens."""
 
-import ctypes
 import json
 import os
 import signal
@@ -12,10 +11,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
+from canshaper.design.children import end_with_parent
 from canshaper.errors import MeasurementError
 
-# linux/prctl.h
-PR_SET_PDEATHSIG = 1
 # The loop has the priority that the service's unit gives it; the joysticks come after it, so that
 # they never delay it.
 LOOP_PRIORITY = 40
@@ -109,7 +107,7 @@ def output(process: "subprocess.Popen[str]", limit_s: float | None) -> str:
 def be() -> None:
     """What a child does: tie itself to its parent, however that ends; then its ``main``."""
     options: dict[str, Any] = json.loads(sys.argv[1])
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    end_with_parent(signal.SIGKILL)
     if os.getppid() != options["parent"]:  # it ended before that call
         sys.exit(1)
     import_module(f"canshaper.commissioning.doctor.{options['module']}").main(options)

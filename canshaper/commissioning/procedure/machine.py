@@ -1,8 +1,6 @@
 """The machine itself: a person drives, the daemon runs as a process, its buses are recorded."""
 
-import os
 import subprocess
-import sys
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -10,9 +8,9 @@ from pathlib import Path
 
 from canshaper.commissioning.calibration.drive import CalibrationDrive
 from canshaper.commissioning.calibration.run import run_live
-from canshaper.commissioning.doctor.processes import PR_SET_PDEATHSIG
 from canshaper.commissioning.procedure.bench import Mode, Person, Task
 from canshaper.commissioning.procedure.raw_file import write_without_filters
+from canshaper.design.children import canshaper_command
 from canshaper.design.processes import end
 from canshaper.errors import BusError, UsageError
 from canshaper.machine.deployment import Deployment
@@ -22,15 +20,6 @@ START_LIMIT_S = 30.0
 LOOK_S = 0.1
 EXIT_BUS = 3  # of `canshaper run`, where a bus cannot be opened
 OTHER, OURS = "other", "canshaper"
-# In the child: SIGTERM, which leaves valves neutral, should we end without ending it.
-_CODE = f"""
-import ctypes, os, signal, sys
-ctypes.CDLL(None).prctl({PR_SET_PDEATHSIG}, signal.SIGTERM)
-if os.getppid() != {{parent}}:
-    sys.exit(1)
-from canshaper.__main__ import main
-main()
-"""
 
 
 class Machine:
@@ -101,7 +90,7 @@ class Machine:
         try:
             with said.open("wb") as output:
                 daemon = subprocess.Popen(
-                    [sys.executable, "-c", _CODE.format(parent=os.getpid()), "run", *words],
+                    canshaper_command("run", *words),
                     stdin=subprocess.DEVNULL,
                     stdout=output,
                     stderr=output,
