@@ -4,6 +4,7 @@ Every piece is done once, and its result handed out once, whatever becomes of th
 it: one that dies costs time, no result.
 """
 
+import signal
 import subprocess
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
@@ -119,12 +120,15 @@ class Slurm:
     def run(self, work: Callable[[J], R], jobs: Iterable[J]) -> Iterator[tuple[J, R]]:
         """Do every job; see ``Engine``. It waits until Slurm has begun one of its own."""
         import dask  # noqa: PLC0415  (an extra)
+
+        ctrl_c = signal.getsignal(signal.SIGINT)
         from dask_jobqueue import SLURMCluster  # noqa: PLC0415  (the same)
 
+        signal.signal(signal.SIGINT, ctrl_c)  # the import makes it an exit with status 0
         given = dask.config.get("jobqueue.slurm")
         defaults = {"cores": 1, "memory": "1 GB", "log_directory": "out/slurm"}
         options = {name: given[name.replace("_", "-")] or one for name, one in defaults.items()}
-        page = given["scheduler-options"] | {"dashboard": False}
+        page = given["scheduler-options"] | {"dashboard": False, "dashboard_address": ":0"}
         with SLURMCluster(**options, scheduler_options=page) as slurm:
             _try_job(slurm.job_script())
             # Unlike `scale` it replaces a job that ends, at its time limit or otherwise.

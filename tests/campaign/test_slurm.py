@@ -2,10 +2,13 @@
 
 import getpass
 import shutil
+import signal
 import socket
 import subprocess
+import sys
 import time
 from collections.abc import Iterator
+from importlib.util import find_spec
 from pathlib import Path
 
 import pytest
@@ -18,7 +21,8 @@ from canshaper.cli.app import app
 from canshaper.design.parallel import Processes
 from canshaper.machine.binding import load_deployment
 
-pytest.importorskip("dask_jobqueue", reason="not installed: pip install 'canshaper[cluster]'")
+if find_spec("dask_jobqueue") is None:
+    pytest.skip("not installed: pip install 'canshaper[cluster]'", allow_module_level=True)
 
 ROBUST = Path(__file__).resolve().parents[2] / "config" / "forwarder-robust.yaml"
 LIMIT_S = 30.0
@@ -135,11 +139,15 @@ def test_a_machine_without_slurm_is_told_in_one_line(
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.chdir(tmp_path)
+    for name in [name for name in sys.modules if name.startswith("dask_jobqueue")]:
+        monkeypatch.delitem(sys.modules, name)
+    ctrl_c = signal.getsignal(signal.SIGINT)
     arguments = ["campaign", str(ROBUST), "-n", "16", "--cluster", "slurm", "--processes", "2"]
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 2
     assert done.output.startswith("slurm: expected the command sbatch on this machine: ")
     assert len(done.output.splitlines()) == 1
+    assert signal.getsignal(signal.SIGINT) is ctrl_c  # that dask_jobqueue replaces at its import
 
 
 @pytest.mark.parametrize("more", [[], ["--processes", "2", "--scheduler", "tcp://10.0.0.1:8786"]])
