@@ -102,11 +102,9 @@ _HOMES = {
 
 
 def __getattr__(name: str) -> object:
-    """Load what is asked for when it is (PEP 562); the version by the tags of git."""
+    """Load what is used when it is (PEP 562)."""
     if name == "__version__":
-        from importlib.metadata import version  # noqa: PLC0415  costs every start 10 ms
-
-        return version("canshaper")
+        return import_module("canshaper.shipped").version()
     if name == "errors":
         return import_module("canshaper.errors")
     for home, names in _HOMES.items():

@@ -1,13 +1,21 @@
-"""Files that come with canshaper: deployments of example machines, and their DBC files."""
+"""What is installed: the version, and the files that come with it (deployments, DBC files)."""
 
+from importlib.metadata import version as _version_of
 from pathlib import Path
+
+PACKAGE = Path(__file__).resolve().parent
+"""Directory of the modules."""
+
+
+def version() -> str:
+    """Version by the tags of git, as it was installed."""
+    return _version_of("canshaper")
 
 
 def data_directory() -> Path:
     """Directory that holds ``config`` and ``dbc``: in the installed package, or the checkout."""
-    package = Path(__file__).resolve().parent
-    inside = package / "data"
-    return inside if inside.is_dir() else package.parent
+    inside = PACKAGE / "data"
+    return inside if inside.is_dir() else PACKAGE.parent
 
 
 def deployment_path(name: str | Path) -> Path:

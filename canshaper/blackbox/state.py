@@ -23,7 +23,6 @@ from typing import Any
 from cantools.database.can import Message
 from pydantic import BaseModel
 
-import canshaper
 from canshaper.codec.flags import FlaggedVelocity
 from canshaper.codec.layout import Layout
 from canshaper.codec.signals import FieldSet
@@ -94,7 +93,7 @@ class States:
         self.save()
         self._numbering = False
         packages = {kind.__module__.rpartition(".")[0] for kind in self._classes}
-        self._packages = {name for name in packages if name.startswith(f"{canshaper.__name__}.")}
+        self._packages = {name for name in packages if name.startswith("canshaper.")}
 
     def save(self) -> bytes:
         """What the controller knows now.

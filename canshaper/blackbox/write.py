@@ -11,7 +11,6 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
-from canshaper import __version__
 from canshaper.blackbox.file import SUFFIX, chunks
 from canshaper.blackbox.ring import Segment
 from canshaper.bus.clock import boottime_ns
@@ -126,7 +125,7 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """What ran here: program, interpreter, packages, kernel."""
-    found = {"canshaper": __version__, "python": platform.python_version()}
+    found = {"canshaper": version("canshaper"), "python": platform.python_version()}
     for name in PACKAGES:
         try:
             found[name] = version(name)

@@ -2,12 +2,17 @@
 
 from functools import reduce
 from operator import xor
-from typing import TYPE_CHECKING
+from typing import Protocol
 
 from crccheck.crc import Crc8Autosar, Crc8Base, Crc8SaeJ1850, CrcBase
 
-if TYPE_CHECKING:
-    from canshaper.checksums.kinds import Checksum
+
+class Place(Protocol):
+    """Where the checksum of a message lies."""
+
+    @property
+    def byte(self) -> int:
+        """Where it begins."""
 
 
 def _numbers(library: type[CrcBase]) -> tuple[int, int, tuple[int, ...]]:
@@ -27,7 +32,7 @@ class KernelSum:
         """Checksum of these bytes."""
         raise NotImplementedError
 
-    def __call__(self, _can_id: int, place: "Checksum", data: bytes) -> int:
+    def __call__(self, _can_id: int, place: Place, data: bytes) -> int:
         """That of a frame: over the bytes but the one that it lies in."""
         at = place.byte
         return self.of(data[:at] + data[at + 1 :])

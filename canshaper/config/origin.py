@@ -6,10 +6,10 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-import canshaper
 from canshaper.config.printable import printable
 from canshaper.config.section import Section, sections
 from canshaper.config.source import Place
+from canshaper.shipped import version
 
 
 class Origin(Section):
@@ -46,7 +46,7 @@ def written_by(verb: str, *, simulated: bool | None, log: str | None = None) -> 
     values: dict[str, Any] = {"date": f"{datetime.now(UTC).date()}"}
     if log is not None:
         values["log"] = printable(log)
-    values["by"] = f"canshaper {verb} {canshaper.__version__}"
+    values["by"] = f"canshaper {verb} {version()}"
     if simulated is not None:
         values["source"] = "simulated" if simulated else "machine"
     return values

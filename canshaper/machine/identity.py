@@ -10,9 +10,9 @@ from functools import cache
 from hashlib import sha256
 from pathlib import Path
 
-import canshaper
 from canshaper.codec.status import DIGEST_BITS
 from canshaper.shaping.registry import ADDED
+from canshaper.shipped import PACKAGE, version
 
 
 @dataclass(frozen=True)
@@ -43,7 +43,7 @@ class Identity:
         """For people and logs: the digest, then every hash in full."""
         return [
             f"digest={self.digest:#06x}",
-            f"program=sha256:{program_sha256()} version={canshaper.__version__}",
+            f"program=sha256:{program_sha256()} version={version()}",
             f"deployment=sha256:{self.deployment}",
             *(f"dbc=sha256:{value} file={name}" for name, value in self.dbc.items()),
             *self.packages,
@@ -62,9 +62,8 @@ def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
 @cache
 def program_sha256() -> str:
     """Of the modules of canshaper as they lie on the disk, by path: the same however installed."""
-    root = Path(canshaper.__file__).parent
     total = sha256()
-    for path in sorted(root.rglob("*.py")):
-        total.update(f"{path.relative_to(root).as_posix()}\n".encode())
+    for path in sorted(PACKAGE.rglob("*.py")):
+        total.update(f"{path.relative_to(PACKAGE).as_posix()}\n".encode())
         total.update(sha256(path.read_bytes()).digest())
     return total.hexdigest()

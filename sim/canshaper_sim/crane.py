@@ -11,6 +11,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from typing import Final, NamedTuple
 
+from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT, LIFT_CYLINDER, NEAR_FAR, SLEW
 from canshaper_sim.axes import TIP_AXES as AXES
 from canshaper_sim.bend import Bend, BendParameters
@@ -104,6 +105,17 @@ class CraneParameters:
             EXTENSION: self.joints.extension_full_speed_m_s,
         }
 
+    def tip_boom(self) -> TipBoom:
+        """The boom whose tip is moved directly, in the start pose."""
+        reach_m = self.radius_min_m, self.radius_max_m
+        height_m = self.height_min_m, self.height_max_m
+        slew_rad_s, near_far_m_s = self.slew_full_speed_rad_s, self.near_far_full_speed_m_s
+        return TipBoom(
+            Actuator(self.slew, slew_rad_s, self.start_theta1_rad, -math.inf, math.inf),
+            Actuator(self.near_far, near_far_m_s, self.start_radius_m, *reach_m),
+            Actuator(self.lift, self.lift_full_speed_m_s, self.start_height_m, *height_m),
+        )
+
 
 class CraneState(NamedTuple):
     """Pose, tip speeds and sway at one instant; angles in rad, lengths in m, per second."""
@@ -150,7 +162,7 @@ class Crane:
             boom: what carries the grapple (default: a `TipBoom` of the parameters).
         """
         p = self.parameters = parameters or CraneParameters()
-        self.boom = boom or TipBoom(p)
+        self.boom = boom or p.tip_boom()
         self._axes = self.boom.axes
         self._bend = Bend(p.boom) if p.boom.frequency_hz else None
         grounded = p.contact.ground_m > -math.inf

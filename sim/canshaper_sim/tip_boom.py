@@ -1,14 +1,10 @@
 """What carries the grapple, and the boom whose tip is moved directly, coordinate by coordinate."""
 
-import math
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 from canshaper_sim.actuator import Actuator
 from canshaper_sim.axes import LIFT, NEAR_FAR, SLEW
 from canshaper_sim.grapple import TipMotion, new_tuple
-
-if TYPE_CHECKING:
-    from canshaper_sim.crane import CraneParameters
 
 
 class CraneBoom(Protocol):
@@ -29,22 +25,9 @@ class TipBoom:
 
     __slots__ = ("_lift", "_near_far", "_slew", "axes")
 
-    def __init__(self, parameters: "CraneParameters") -> None:
-        p = parameters
-        self._slew = Actuator(
-            p.slew, p.slew_full_speed_rad_s, p.start_theta1_rad, -math.inf, math.inf
-        )
-        self._near_far = Actuator(
-            p.near_far,
-            p.near_far_full_speed_m_s,
-            p.start_radius_m,
-            p.radius_min_m,
-            p.radius_max_m,
-        )
-        self._lift = Actuator(
-            p.lift, p.lift_full_speed_m_s, p.start_height_m, p.height_min_m, p.height_max_m
-        )
-        self.axes = {SLEW: self._slew, NEAR_FAR: self._near_far, LIFT: self._lift}
+    def __init__(self, slew: Actuator, near_far: Actuator, lift: Actuator) -> None:
+        self._slew, self._near_far, self._lift = slew, near_far, lift
+        self.axes = {SLEW: slew, NEAR_FAR: near_far, LIFT: lift}
 
     @property
     def pose(self) -> tuple[float, float, float, float, float, float]:

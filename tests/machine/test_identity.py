@@ -65,7 +65,7 @@ def test_the_program_is_what_lies_in_its_modules(
     (tmp_path / "part").mkdir()
     (tmp_path / "part" / "a.py").write_text("x = 1\n", encoding="utf-8")
     (tmp_path / "b.py").write_text("", encoding="utf-8")
-    monkeypatch.setattr(module.canshaper, "__file__", str(tmp_path / "__init__.py"))
+    monkeypatch.setattr(module, "PACKAGE", tmp_path)
     hashed = module.program_sha256.__wrapped__
     first = hashed()
     (tmp_path / "notes.txt").write_text("no module", encoding="utf-8")

@@ -8,11 +8,11 @@ from typing import Any
 from canshaper.commissioning.identification.canlog import read_can
 from canshaper.commissioning.identification.phone import series_of
 from canshaper.commissioning.identification.series import Series
+from canshaper.commissioning.identification.simulated_log import is_simulated
 from canshaper.commissioning.identification.stopwatch import stopwatch
 from canshaper.commissioning.identification.table import is_table, read_table
 from canshaper.commissioning.identification.verdict import Finding
 from canshaper.commissioning.identification.verdict import identify as identified
-from canshaper.commissioning.rehearsal import is_simulated
 from canshaper.config.origin import written_by
 from canshaper.errors import ConfigError, UsageError
 from canshaper.machine.database import Messages, load_dbc
