@@ -1,7 +1,11 @@
 """What a socket of SocketCAN carries: the structures can_frame and canfd_frame of linux/can.h."""
 
 import struct
+from collections.abc import Iterable
 from typing import NamedTuple, Self
+
+from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
+from canshaper.codec.frame import Frame, new_frame
 
 CAN_FRAME = struct.Struct("=IB3x8s")
 SIZE = CAN_FRAME.size
@@ -44,3 +48,28 @@ class Packet(NamedTuple):
         if self.flags is None:
             return CAN_FRAME.pack(self.word, len(self.data), self.data)
         return FD_FRAME.pack(self.word, len(self.data), self.flags, self.data)
+
+
+def frame_of(bus: str, packet: bytes) -> Frame | None:
+    """The data frame in the bytes of a socket; None where there is none in them.
+
+    Args:
+        bus: name of the bus in the deployment file.
+        packet: the bytes.
+    """
+    if len(packet) == SIZE:
+        word, length, payload = CAN_FRAME.unpack(packet)
+        if word <= SFF_MASK and length <= 8:  # the most frequent kind first
+            return new_frame(Frame, (bus, word, False, payload[:length]))
+    elif len(packet) == FD_SIZE:
+        word, length, _flags, payload = FD_FRAME.unpack(packet)
+    else:
+        return None
+    if word & (ERR_FLAG | RTR_FLAG) or length > len(payload):
+        return None
+    return Frame(bus, word & EFF_MASK, word & EFF_FLAG != 0, payload[:length])
+
+
+def kernel_ids(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
+    """The kernel's ids of messages: id, and whether it has 29 bits."""
+    return frozenset(i | EFF_FLAG if extended else i for i, extended in messages)

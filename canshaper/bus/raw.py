@@ -5,18 +5,28 @@ and no more are queued behind them; an interface that comes back is used again b
 """
 
 import errno
-import select
 import socket
 import time
-from collections import deque
 from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, Arrivals
-from canshaper.bus.packet import BRS, CAN_FRAME, FD_FRAME, FD_SIZE, FDF, SIZE, WORD
-from canshaper.bus.socketcan import dropped_frames, set_filters
-from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
-from canshaper.codec.frame import BusState, Frame, FrameFault, new_frame
+from canshaper.bus.error_frame import read_error
+from canshaper.bus.packet import (
+    BRS,
+    CAN_FRAME,
+    FD_FRAME,
+    FD_SIZE,
+    FDF,
+    SIZE,
+    WORD,
+    frame_of,
+    kernel_ids,
+)
+from canshaper.bus.socketcan import dropped_frames, readable, set_filters
+from canshaper.bus.under_way import UnderWay
+from canshaper.codec.can_id import EFF_FLAG, ERR_FLAG
+from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
@@ -25,20 +35,10 @@ from canshaper.machine.routing import BusRoutes
 MOST_FRAMES = 2000
 # Of ids that no one knows; the rest is dropped, their count is "at least".
 MOST_UNKNOWN = 20
-# Frames of one id under way for so long without one of them getting onto the bus: one waits, one is
-# being sent, one more for a confirmation that comes just after the tick. A slow bus with a fast
-# loop is no fault, so time has to pass as well: 30 frames of 250 kbit/s.
-MOST_UNCONFIRMED = 3
-UNCONFIRMED_NS = 20_000_000
 # How often a bus that took no frames is tried again, with one frame, neutral by then.
 PROBE_NS = 500_000_000
 # How often an interface that has gone is looked for; it shall work again within a second.
 REOPEN_NS = 200_000_000
-# Claims of ours under way: on a bus that takes none, one every PROBE_NS until its queue is full.
-MOST_CLAIMS = 32
-# linux/can/error.h: classes in the id, controller state in data[1].
-CLASS_CONTROLLER, CLASS_BUS_OFF, CLASS_RESTARTED = 0x4, 0x40, 0x100
-OVERFLOW, WARNING, PASSIVE, ACTIVE = 0x01, 0x0C, 0x30, 0x40
 # States in which a frame of ours that gets onto the bus is news.
 SILENT = frozenset((BusState.BUS_OFF, BusState.NOT_CONFIRMED, BusState.DOWN, BusState.FAILED))
 # The device is no more; the socket would have to be bound to a new one.
@@ -95,16 +95,16 @@ class RawPort:
         self._on_fault = on_fault
         self._confirms = confirms
         self._matched = matched
-        self._unconfirmed: dict[int, int] = {}
-        self._since_ns: dict[int, int] = {}
+        self._under_way = UnderWay()
+        self._unconfirmed = self._under_way.counts
         self._dropped = 0
         self._ids = ids
         self._size = SIZE if fd is None else FD_SIZE
-        self._fd = _words(fd or ())
+        self._fd = kernel_ids(fd or ())
         self._fd_flags = FDF | BRS if brs else FDF
-        self._valves = _words(ids.valves if ids else ())
-        self._claims = _words(ids.claims if ids else ())
-        self._claimed: deque[Any] = deque(maxlen=MOST_CLAIMS)  # and not seen back yet
+        self._valves = kernel_ids(ids.valves if ids else ())
+        self._claims = kernel_ids(ids.claims if ids else ())
+        self._claimed = self._under_way.claims
         self._use()
 
     # -- receiving -----------------------------------------------------------------------------
@@ -114,7 +114,7 @@ class RawPort:
         if not self._sockets and not self._reopened():
             return
         waiting, receive, arrivals = self._waiting[0], self._receive, self._arrivals
-        size = self._size
+        name, size = self.name, self._size
         arrivals.begin()
         for _ in _EACH_FRAME:
             if not waiting(0):  # cheaper than the exception of a socket with nothing to read
@@ -127,12 +127,14 @@ class RawPort:
                 return
             if self._claimed and len(data) == SIZE and self._seen_back(CAN_FRAME.unpack(data)):
                 continue
-            frame = self._frame(data)
-            if frame is not None:
-                if self.state is not UP and self.state in LOST:
-                    self._up()
-                self.arrived_ns = arrivals.of(ancillary)
-                yield frame
+            frame = frame_of(name, data)
+            if frame is None:
+                self._no_frame(data)
+                continue
+            if self.state is not UP and self.state in LOST:
+                self._up()
+            self.arrived_ns = arrivals.of(ancillary)
+            yield frame
 
     def background(self) -> Iterator[Frame]:
         """What can wait until the valves have their frames: our own, seen back, are taken in.
@@ -143,7 +145,7 @@ class RawPort:
             yield from self._background(number, most)
         if self._sockets and (dropped := dropped_frames(self._sockets[:2])) != self._dropped:
             self._dropped = dropped
-            self._invalidate()  # confirmations may be among them
+            self._under_way.clear()  # confirmations may be among them
             self._on_fault(FrameFault.FRAMES_LOST)
 
     def _background(self, number: int, most: int) -> Iterator[Frame]:
@@ -160,48 +162,24 @@ class RawPort:
                 return
             if flags & socket.MSG_CONFIRM and len(data) in (SIZE, FD_SIZE):
                 self._confirmed(WORD.unpack_from(data)[0])
-            elif (frame := self._frame(data)) is not None:
+            elif (frame := frame_of(self.name, data)) is not None:
                 yield frame
+            else:
+                self._no_frame(data)
 
-    def _frame(self, data: bytes) -> Frame | None:
-        """The frame, where it is one that can be taken."""
-        if len(data) != SIZE:
-            return self._fd_frame(data)
-        word, length, payload = CAN_FRAME.unpack(data)
-        if word <= SFF_MASK and length <= 8:  # the most frequent kind first
-            return new_frame(Frame, (self.name, word, False, payload[:length]))
-        if word & ERR_FLAG:  # first: its id is an error class, and could match
-            self._error_frame(word, payload)
-            return None
-        if word & RTR_FLAG or length > 8:
+    def _no_frame(self, data: bytes) -> None:
+        """An error frame says how the bus is; anything else is none of a message."""
+        word, _length, payload = CAN_FRAME.unpack(data) if len(data) == SIZE else (0, 0, b"")
+        if not word & ERR_FLAG:
             self._on_fault(FrameFault.WRONG_LENGTH)
-            return None
-        return Frame(self.name, word & EFF_MASK, True, payload[:length])
-
-    def _fd_frame(self, data: bytes) -> Frame | None:
-        """The same of one of CAN FD; a socket has them where it was asked to."""
-        if len(data) == FD_SIZE == self._size:
-            word, length, _flags, payload = FD_FRAME.unpack(data)
-            if length <= len(payload) and not word & (ERR_FLAG | RTR_FLAG):
-                extended = word & EFF_FLAG != 0
-                return Frame(self.name, word & EFF_MASK, extended, payload[:length])
-        self._on_fault(FrameFault.WRONG_LENGTH)
-        return None
-
-    def _error_frame(self, word: int, payload: bytes) -> None:
-        fault = FrameFault.ERROR_FRAME
-        controller = payload[1] if word & CLASS_CONTROLLER else 0
-        if word & CLASS_BUS_OFF:
-            fault = FrameFault.BUS_OFF
-            self._block(BusState.BUS_OFF)
-        elif controller & PASSIVE:
-            fault = FrameFault.BUS_PASSIVE
-            if self.state is UP:
-                self.state = BusState.PASSIVE
-        elif word & CLASS_RESTARTED or controller & (ACTIVE | WARNING):  # less than passive
+            return
+        fault, state = read_error(word, payload)
+        if state is BusState.BUS_OFF:
+            self._block(state)
+        elif state is UP:
             self._up()
-        elif controller & OVERFLOW:
-            fault = FrameFault.FRAMES_LOST
+        elif state is not None and self.state is UP:
+            self.state = state
         self._on_fault(fault)
 
     # -- sending -------------------------------------------------------------------------------
@@ -214,7 +192,7 @@ class RawPort:
         if extended:
             word |= EFF_FLAG
         under_way = self._unconfirmed.get(word, 0)
-        if under_way and self._stuck(word, under_way):
+        if under_way and self._stuck(word):
             return False
         if word in self._fd:
             packed = FD_FRAME.pack(word, len(data), self._fd_flags, data)
@@ -232,38 +210,34 @@ class RawPort:
         return True
 
     def _confirmed(self, word: int) -> None:
-        self._unconfirmed[word] = max(0, self._unconfirmed.get(word, 0) - 1)
-        self._since_ns.pop(word, None)
+        self._under_way.confirmed(word)
         if self.state in SILENT:
             self._up()
 
     def _seen_back(self, content: Any) -> bool:
         """Whether this is a claim of ours; no other kind of ours comes to the first socket."""
-        if content not in self._claimed:
+        if not self._under_way.is_claim(content):
             return False
-        self._claimed.remove(content)
         self._confirmed(content[0])
         return True
 
-    def _stuck(self, word: int, under_way: int) -> bool:
+    def _stuck(self, word: int) -> bool:
         """Whether frames of this id have been under way for too long to queue another one."""
-        now_ns = time.monotonic_ns()
-        since_ns = self._since_ns.setdefault(word, now_ns)
-        if under_way < MOST_UNCONFIRMED or now_ns - since_ns < UNCONFIRMED_NS:
+        waited_ns = self._under_way.waited_ns(word, time.monotonic_ns())
+        if not waited_ns:
             return False
         self._on_fault(FrameFault.NOT_CONFIRMED)
         if word in self._valves:
             self._block(BusState.NOT_CONFIRMED)
-        elif now_ns - since_ns > PROBE_NS:  # a status message may starve where valves get through
-            self._unconfirmed[word] = 0
-            del self._since_ns[word]
+        elif waited_ns > PROBE_NS:  # a status message may starve where valves get through
+            self._under_way.restart(word)
         return True
 
     def _block(self, state: BusState) -> None:
         """Queue nothing more for a while."""
         self.state = state
         self._not_before_ns = time.monotonic_ns() + PROBE_NS
-        self._invalidate()
+        self._under_way.clear()
 
     def _blocked(self) -> bool:
         """Whether this frame must wait; one at a time may try whether it gets through."""
@@ -271,12 +245,8 @@ class RawPort:
         if now_ns < self._not_before_ns:
             return True
         self._not_before_ns = now_ns + PROBE_NS
-        self._invalidate()
+        self._under_way.clear()
         return False
-
-    def _invalidate(self) -> None:
-        self._unconfirmed.clear()
-        self._since_ns.clear()
 
     # -- the interface -------------------------------------------------------------------------
 
@@ -294,7 +264,7 @@ class RawPort:
             if self.state is not BusState.DOWN:
                 self._on_fault(FrameFault.BUS_DOWN)
             self.state = BusState.DOWN
-            self._invalidate()  # the queue is emptied with the interface
+            self._under_way.clear()  # the queue is emptied with the interface
             self._claimed.clear()
         elif error.errno not in (errno.ENOBUFS, errno.EAGAIN):  # full queues: the send has failed
             self.state = BusState.FAILED
@@ -314,10 +284,10 @@ class RawPort:
         self._sockets = sockets = self._open(self._ids)
         self._arrivals = arrivals
         sockets[0].setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
-        self._waiting = [_poll(one) for one in sockets]
+        self._waiting = [readable(one) for one in sockets]
         self._receive = sockets[0].recvmsg
         self._send = sockets[1].send if len(sockets) > 1 else sockets[0].send
-        self._invalidate()
+        self._under_way.clear()
         self._claimed.clear()
         self._dropped = 0
         self._not_before_ns = 0
@@ -343,9 +313,9 @@ class RawPort:
     def watch(self, name: str, ids: BusRoutes) -> None:
         """Serve another deployment: its name of the bus, its messages."""
         self.name, self._ids = name, ids
-        self._valves, self._claims = _words(ids.valves), _words(ids.claims)
-        self._fd = _words(ids.fd)
-        self._invalidate()
+        self._valves, self._claims = kernel_ids(ids.valves), kernel_ids(ids.claims)
+        self._fd = kernel_ids(ids.fd)
+        self._under_way.clear()
         if self._sockets:
             try:
                 set_filters(self._sockets, ids)
@@ -361,15 +331,3 @@ class RawPort:
         for one in self._sockets:
             one.close()
         self._sockets = []
-
-
-def _poll(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
-    """Whether a socket has something to read, asked within so many ms."""
-    poll = select.poll()
-    poll.register(one, select.POLLIN)
-    return poll.poll
-
-
-def _words(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:
-    """The kernel's ids of messages."""
-    return frozenset(i | EFF_FLAG if extended else i for i, extended in messages)

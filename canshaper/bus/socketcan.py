@@ -3,9 +3,10 @@
 Why not python-can: docs/decisions/0006-raw-sockets.md.
 """
 
+import select
 import socket
 import struct
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 
 from canshaper.bus.device import check_device, check_mtu
 from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, SFF_MASK
@@ -102,6 +103,13 @@ def dropped_frames(sockets: list[socket.socket]) -> int:
         _MEMINFO.unpack(one.getsockopt(socket.SOL_SOCKET, SO_MEMINFO, _MEMINFO.size))[8]
         for one in sockets
     )
+
+
+def readable(one: socket.socket) -> Callable[[int], list[tuple[int, int]]]:
+    """What says whether a socket has something to read, asked within so many ms."""
+    poll = select.poll()
+    poll.register(one, select.POLLIN)
+    return poll.poll
 
 
 def _word_and_mask(message: tuple[int, bool]) -> tuple[int, int]:

@@ -7,6 +7,8 @@ import can
 import pytest
 
 from canshaper.bus import raw
+from canshaper.bus.error_frame import CLASS_BUS_OFF
+from canshaper.bus.under_way import MOST_CLAIMS
 from canshaper.codec.frame import BusState, Frame
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import IDS, TAKEN, Line, message
@@ -68,7 +70,7 @@ def test_of_claims_that_do_not_come_back_no_more_than_a_few_are_kept(
     make_line: Callable[..., Line],
 ) -> None:
     line = make_line(NODE)
-    first, *others = [CLAIM._replace(data=bytes([n] * 8)) for n in range(raw.MOST_CLAIMS + 1)]
+    first, *others = [CLAIM._replace(data=bytes([n] * 8)) for n in range(MOST_CLAIMS + 1)]
     for claim in (first, *others):
         assert line.port.send(claim)
     for claim in (first, *others):
@@ -80,7 +82,7 @@ def test_a_claim_that_comes_back_shows_that_the_bus_takes_frames(
     make_line: Callable[..., Line],
 ) -> None:
     line = make_line(NODE)
-    line.error(raw.CLASS_BUS_OFF)
+    line.error(CLASS_BUS_OFF)
     line.heard()
     assert line.port.state is BusState.BUS_OFF
     line.now_ns += raw.PROBE_NS

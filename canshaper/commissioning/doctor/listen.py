@@ -7,9 +7,8 @@ from collections.abc import Callable
 from itertools import pairwise
 
 from canshaper.bus.arrival import ANCILLARY_BYTES, SO_TIMESTAMPNS, stamp_ns
-from canshaper.bus.packet import FD_SIZE, Packet
+from canshaper.bus.packet import FD_SIZE, frame_of
 from canshaper.bus.socketcan import open_sockets
-from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG
 from canshaper.codec.frame import Frame
 from canshaper.commissioning.doctor.figures import summary
 from canshaper.commissioning.doctor.finding import Finding, Level
@@ -22,10 +21,10 @@ LOOK_S = 0.2
 
 def inputs_of(deployment: Deployment) -> dict[str, BoundInput]:
     """Messages that the deployment needs all the time, by a name for people."""
-    found: dict[str, BoundInput] = {f"joystick {n}": lv for n, lv in deployment.joysticks.items()}
+    inputs: dict[str, BoundInput] = {f"joystick {n}": lv for n, lv in deployment.joysticks.items()}
     if deployment.emergency_stop:
-        found["emergency stop"] = deployment.emergency_stop
-    return found
+        inputs["emergency stop"] = deployment.emergency_stop
+    return inputs
 
 
 def listen(
@@ -68,13 +67,8 @@ def listen(
 def _next(one: socket.socket, bus: str) -> tuple[Frame, int] | None:
     """The next data frame of a socket and when the kernel received it, ns; None for another one."""
     packet, ancillary, _, _ = one.recvmsg(FD_SIZE, ANCILLARY_BYTES)
-    word, data, _ = Packet.unpack(packet)
-    if word & (ERR_FLAG | RTR_FLAG):
-        return None
-    extended = bool(word & EFF_FLAG)
-    frame = Frame(bus, word & EFF_MASK, extended, data)
-    time_ns = stamp_ns(ancillary)
-    return None if time_ns is None else (frame, time_ns)
+    frame, time_ns = frame_of(bus, packet), stamp_ns(ancillary)
+    return None if frame is None or time_ns is None else (frame, time_ns)
 
 
 def arrival_findings(deployment: Deployment, arrivals_ns: dict[str, list[int]]) -> list[Finding]:
@@ -91,21 +85,21 @@ def arrival_findings(deployment: Deployment, arrivals_ns: dict[str, list[int]]) 
 
 def _regular(name: str, times_ns: list[int], cycle_ms: int, timeout_ms: int) -> Finding:
     gaps_ns = [after - before for before, after in pairwise(times_ns)]
-    found = summary(gaps_ns)
-    if found is None:
+    gaps = summary(gaps_ns)
+    if gaps is None:
         remedy = "switch the machine on; look at bit rate, wiring and the id in the DBC file"
         return Finding(name, Level.BAD, f"{len(times_ns)} frames heard", remedy)
     text = (
-        f"{found.count + 1} frames, a period of {found.p50 / 1000:.1f} ms (DBC: {cycle_ms} ms),"
-        f" the longest {found.max / 1000:.1f} ms"
+        f"{gaps.count + 1} frames, a period of {gaps.p50 / 1000:.1f} ms (DBC: {cycle_ms} ms),"
+        f" the longest {gaps.max / 1000:.1f} ms"
     )
-    if found.max >= timeout_ms * 1000:
+    if gaps.max >= timeout_ms * 1000:
         remedy = "joystick or bus are disturbed, or timeout_ms is too short for it"
         return Finding(name, Level.BAD, f"{text}: lost by timeout_ms {timeout_ms}", remedy)
-    if not 0.5 * cycle_ms <= found.p50 / 1000 <= 1.5 * cycle_ms:
+    if not 0.5 * cycle_ms <= gaps.p50 / 1000 <= 1.5 * cycle_ms:
         remedy = "give the message the GenMsgCycleTime that it really has"
         return Finding(name, Level.WARNING, text, remedy)
-    if found.max >= timeout_ms * 500:
+    if gaps.max >= timeout_ms * 500:
         remedy = f"more than half of timeout_ms {timeout_ms}: how busy is the bus?"
         return Finding(name, Level.WARNING, text, remedy)
     return Finding(name, Level.OK, text)
