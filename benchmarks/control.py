@@ -85,7 +85,7 @@ def main() -> None:
 def _serve_us(
     server: ControlServer, path: Path, answer: Any, data: bytes, times: int
 ) -> list[float]:
-    found = []
+    times_us = []
     with socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET) as one:
         one.connect(str(path))
         for _ in range(times + 1):
@@ -93,12 +93,12 @@ def _serve_us(
             now_ns = next(TIMES_NS)
             begin = time.perf_counter()
             server.serve(answer, now_ns)
-            found.append(1e6 * (time.perf_counter() - begin))
-            if len(found) == 1:  # this one has taken the connection
+            times_us.append(1e6 * (time.perf_counter() - begin))
+            if len(times_us) == 1:  # this one has taken the connection
                 server.serve(answer, next(TIMES_NS))
             one.recv(MOST_BYTES)
     server.serve(answer, next(TIMES_NS))  # it has gone
-    return found[1:]
+    return times_us[1:]
 
 
 if __name__ == "__main__":

@@ -100,10 +100,10 @@ class Line:
             self._hand.send(FRAME.pack(FOREIGN, 8, bytes(8)))
             sleep_until(at + step * 3 // 4)  # all have passed; nothing of this delays a gateway
             at += step
-            for can_id, found in times.items():
+            for can_id, delays_us in times.items():
                 _, in_ns, _ = receive_stamped(self._in[can_id])
                 _, out_ns, _ = receive_stamped(self._out[can_id])
-                found.append((out_ns - in_ns) / 1e3)
+                delays_us.append((out_ns - in_ns) / 1e3)
         return times
 
     def measure(self, at_work: Callable[[], bool]) -> dict[int, list[float]]:
@@ -165,10 +165,14 @@ def print_results(results: dict[str, tuple[dict[int, list[float]], float | None]
     rows = []
     for title, (times, cpu) in results.items():
         for can_id, of in ((JOYSTICK_LEFT, "joystick"), (FOREIGN, "others")):
-            found = times[can_id]
-            figures = [statistics.median(found), quantile(found, 0.99), quantile(found, 0.999)]
-            cells = [f"{f:.1f}" for f in (*figures, max(found))]
-            share = quantile(found, 0.999) / FRAME_TIME_US
+            delays_us = times[can_id]
+            figures = [
+                statistics.median(delays_us),
+                quantile(delays_us, 0.99),
+                quantile(delays_us, 0.999),
+            ]
+            cells = [f"{f:.1f}" for f in (*figures, max(delays_us))]
+            share = quantile(delays_us, 0.999) / FRAME_TIME_US
             cells += [f"{share:.2f}", "" if cpu is None else f"{cpu:.1f}"]
             rows.append(Row(f"{title}: {of}", cells))
     print_table(["median", "p99", "p99.9", "max", "p99.9 / frame time", "CPU %"], rows)

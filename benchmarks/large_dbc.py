@@ -47,15 +47,15 @@ def main() -> None:
     parser.add_argument("--runs", type=int, default=3)
     given = parser.parse_args()
     text = large(given.messages)
-    found: dict[str, list[tuple[float, int]]] = {"canshaper check": [], "cantools.load_file": []}
+    runs: dict[str, list[tuple[float, int]]] = {"canshaper check": [], "cantools.load_file": []}
     for _ in range(given.runs):
         ran = run(with_dbc("a.dbc", text))
         if ran.code:
             raise SystemExit(ran.text)
-        found["canshaper check"].append((ran.seconds, ran.peak_mb))
-        found["cantools.load_file"].append(peer(text))
-    medians = [statistics.median(s for s, _ in rows) for rows in found.values()]
-    for (what, rows), seconds in zip(found.items(), medians, strict=True):
+        runs["canshaper check"].append((ran.seconds, ran.peak_mb))
+        runs["cantools.load_file"].append(peer(text))
+    medians = [statistics.median(s for s, _ in rows) for rows in runs.values()]
+    for (what, rows), seconds in zip(runs.items(), medians, strict=True):
         print(f"{what:20} median {seconds:6.2f} s   most {max(mb for _, mb in rows):4} MB")
     print(f"canshaper check / cantools.load_file: {medians[0] / medians[1]:.2f}")
 

@@ -56,14 +56,14 @@ WAVE = """() => {
 }"""
 REST = "() => { navigator.getGamepads = () => []; }"
 INTERVALS = """(ms) => new Promise((done) => {
-  const found = [];
+  const gaps_ms = [];
   let last = null;
   const end = performance.now() + ms;
   const picture = (now) => {
-    if (last !== null) found.push(now - last);
+    if (last !== null) gaps_ms.push(now - last);
     last = now;
     if (now < end) requestAnimationFrame(picture);
-    else done(found);
+    else done(gaps_ms);
   };
   requestAnimationFrame(picture);
 })"""

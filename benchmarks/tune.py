@@ -80,10 +80,10 @@ def main() -> None:
     print(f"median of {runs} runs, s; three starts, ranges of the poles included in the solve")
     print(f"{'':34}{'build':>9}{'solve':>9}   a1, a2")
     for title, task in TASKS.items():
-        found: list[Tuning] = [tune(task) for _ in range(runs)]
-        build = statistics.median(t.build_s for t in found)
-        solve = statistics.median(t.solve_s for t in found)
-        print(f"{title:34}{build:9.3f}{solve:9.3f}   {found[0].a1:.4f}, {found[0].a2:.4f}")
+        tunings: list[Tuning] = [tune(task) for _ in range(runs)]
+        build = statistics.median(t.build_s for t in tunings)
+        solve = statistics.median(t.solve_s for t in tunings)
+        print(f"{title:34}{build:9.3f}{solve:9.3f}   {tunings[0].a1:.4f}, {tunings[0].a2:.4f}")
     print(f"{'Nelder-Mead on numpy, one start':34}{'':9}{timed(peer, runs):9.3f}   (Eq. 14-15)")
     with tempfile.TemporaryDirectory() as directory:
         command = [sys.executable, "-m", "canshaper", "tune", "forwarder.yaml", "--out", directory]

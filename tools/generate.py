@@ -49,7 +49,7 @@ def with_value_tables(dbc: str, tables: Mapping[str, type[IntEnum]]) -> str:
     for signal, kind in tables.items():
         (first, *_), rows = kind, " ".join(f'{int(m)} "{m.name}"' for m in kind)
         table = re.compile(rf'^(VAL_ \d+ {signal}) {int(first)} "{first.name}" .*;$', re.MULTILINE)
-        dbc = table.sub(lambda found, rows=rows: f"{found[1]} {rows} ;", dbc)  # type: ignore[misc]
+        dbc = table.sub(lambda match, rows=rows: f"{match[1]} {rows} ;", dbc)  # type: ignore[misc]
     return dbc
 
 

@@ -85,8 +85,8 @@ def run(group: str, patterns: list[str], processes: str) -> int:
     work = ROOT / "out/mutation" / group
     start = time.monotonic()
     if group == "core":
-        found = [path for name in CORE_TESTS for path in (ROOT / "tests/shaping").glob(name)]
-        prepare(work, CORE, sorted(str(path.relative_to(ROOT)) for path in found))
+        paths = [path for name in CORE_TESTS for path in (ROOT / "tests/shaping").glob(name)]
+        prepare(work, CORE, sorted(str(path.relative_to(ROOT)) for path in paths))
     else:
         prepare(work, modules(group), TESTS[group])
     mutants = [sys.executable, str(ROOT / "tools/mutants.py")]

@@ -140,14 +140,14 @@ class States:
         """What a state may name."""
         if name == _fixed.__name__ and module == __name__:
             return self._fixed.__getitem__
-        found = getattr(sys.modules.get(module), name, None)
-        if found in (_method, restored_filter) or found in self._classes:
-            return found
+        value = getattr(sys.modules.get(module), name, None)
+        if value in (_method, restored_filter) or value in self._classes:
+            return value
         # A filter or an event of another kind than at the start.
         package = module.rpartition(".")[0]
-        ours = isinstance(found, type) and found.__module__ == module
+        ours = isinstance(value, type) and value.__module__ == module
         if ours and package in self._packages:
-            return found
+            return value
         raise StateError(f"expected a class of ours, got {module}.{name}")
 
 

@@ -125,12 +125,12 @@ def about_of(deployment: Deployment, inside: str, log: str) -> dict[str, Any]:
 
 def versions() -> dict[str, str]:
     """What ran here: program, interpreter, packages, kernel."""
-    found = {"canshaper": version("canshaper"), "python": platform.python_version()}
+    installed = {"canshaper": version("canshaper"), "python": platform.python_version()}
     for name in PACKAGES:
         try:
-            found[name] = version(name)
+            installed[name] = version(name)
         except PackageNotFoundError:
-            found[name] = "not installed"
-    found["kernel"] = f"{platform.system()} {platform.release()} {platform.version()}"
-    found["machine"] = platform.machine()
-    return found
+            installed[name] = "not installed"
+    installed["kernel"] = f"{platform.system()} {platform.release()} {platform.version()}"
+    installed["machine"] = platform.machine()
+    return installed

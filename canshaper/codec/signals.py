@@ -182,11 +182,11 @@ class VelocitySignal:
 
     def read(self, raw: dict[str, Any]) -> float | Reason:
         """Part of full scale in [-1, 1] from the raw values of a frame, or why there is none."""
-        found: float = raw[self.name]
-        fault = self.special.get(found)
+        code: float = raw[self.name]
+        fault = self.special.get(code)
         if fault is not None:
             return fault
-        value: float = (found * self.scale + self.offset) / self.full
+        value: float = (code * self.scale + self.offset) / self.full
         if -1.0 <= value <= 1.0:
             return value
         if not math.isfinite(value):

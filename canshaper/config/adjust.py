@@ -38,8 +38,8 @@ class Key(NamedTuple):
 def value(config: AxisConfig, key: Key) -> float | None:
     """The number at a key; None where none stands."""
     section = getattr(config, key.section, None) if key.section in _SECTIONS else None
-    found = getattr(section, key.name, None)
-    return found if isinstance(found, float) else None
+    number = getattr(section, key.name, None)
+    return number if isinstance(number, float) else None
 
 
 def adjusted(config: AxisConfig, values: Mapping[Key, float], file: AxisConfig) -> AxisConfig:

@@ -10,4 +10,4 @@ _CONTROL = re.compile(
 
 def printable(text: str) -> str:
     """The text with control characters as Python would write them, such as ``\\x1b``."""
-    return _CONTROL.sub(lambda found: ascii(found[0])[1:-1], text)
+    return _CONTROL.sub(lambda match: ascii(match[0])[1:-1], text)

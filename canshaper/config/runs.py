@@ -12,21 +12,21 @@ _MOST = 10_000  # far above any list's own limit: what a few runs could make is 
 
 def shortened(numbers: Sequence[float]) -> list[float | str]:
     """The list as it is written; ``expanded`` gives the same numbers back, to the last bit."""
-    found: list[float | str] = []
+    runs: list[float | str] = []
     for number, equal in groupby(numbers):
         count = len([*equal])
-        found.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
-    return found
+        runs.append(number if count == 1 else f"{count} x {number!r}".removesuffix(".0"))
+    return runs
 
 
 def expanded(entries: Any) -> Any:
     """The list as it is meant; what is no run of a number stays for others to judge."""
     if not isinstance(entries, list):
         return entries
-    found: list[Any] = []
+    numbers: list[Any] = []
     for entry in entries:
         run = _RUN.fullmatch(entry) if isinstance(entry, str) else None
-        found += [float(run[2])] * int(run[1]) if run else [entry]
-        if len(found) > _MOST:
+        numbers += [float(run[2])] * int(run[1]) if run else [entry]
+        if len(numbers) > _MOST:
             break
-    return found
+    return numbers

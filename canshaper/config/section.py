@@ -46,12 +46,12 @@ class Section(BaseModel):
         cls, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> JsonSchemaValue:
         """JSON schema; an optional key without a description has that of what may stand there."""
-        found = handler(schema)
-        for name, key in handler.resolve_ref_schema(found).get("properties", {}).items():
+        built = handler(schema)
+        for name, key in handler.resolve_ref_schema(built).get("properties", {}).items():
             texts = [one["description"] for one in key.get("anyOf", ()) if "description" in one]
             if text := cls.documentation(name) or next(iter(texts), None):
                 key["description"] = text
-        return found
+        return built
 
 
 @cache

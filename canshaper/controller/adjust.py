@@ -67,9 +67,9 @@ class Adjuster:
 
     def _now(self, text: str) -> float:
         key = _key(text)
-        found = value(self._axes[key.axis].bound.config, key)
-        assert found is not None  # checked with the deployment
-        return found
+        number = value(self._axes[key.axis].bound.config, key)
+        assert number is not None  # checked with the deployment
+        return number
 
     def _checked(self, values: Mapping[str, object]) -> Iterable[tuple[Key, float]]:
         if not values:

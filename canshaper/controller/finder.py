@@ -26,7 +26,7 @@ class InputFinder(Generic[_Input]):
     def __init__(self, buses: Mapping[str, Bus], inputs: Iterable[_Input]) -> None:
         self._by_key: dict[tuple[str, int, bool], _Input] = {}
         self._by_group: dict[tuple[str, int], ReceivedGroup] = {}
-        self._found: _Input | None = None
+        self._input: _Input | None = None
         for bound in inputs:
             if not bound.by_group:
                 self._by_key |= dict.fromkeys(bound.keys, bound)
@@ -46,25 +46,25 @@ class InputFinder(Generic[_Input]):
         """The input that a frame is of, or None; ``now_ns`` is when it came, of any clock."""
         if (bound := self._by_key.get(frame[:3])) is not None:
             return bound
-        self._found = None
+        self._input = None
         if frame.extended and (group := self._by_group.get((frame.bus, group_of(frame.can_id)))):
             group.receive(frame, now_ns)
-        return self._found
+        return self._input
 
     def note(self, bound: _Input) -> None:
         """The frame that is looked at is of this one."""
-        self._found = bound
+        self._input = bound
 
 
 class _Noted(Generic[_Input]):
-    """An input that takes nothing, but tells that the frame is its own."""
+    """An input that takes nothing, but notes that the frame is its own."""
 
     def __init__(self, finder: InputFinder[_Input], bound: _Input) -> None:
         self._finder = finder
         self._bound = bound
 
     def receive(self, _data: bytes, _arrived_ns: int, /) -> FrameFault:
-        """Tell it."""
+        """Note it."""
         self._finder.note(self._bound)
         return FrameFault.NONE
 

@@ -27,7 +27,7 @@ def parts(
     """
     places = {n: (bus.interface, bus.channel) for n, bus in deployment.config.buses.items()}
 
-    def found() -> Iterator[tuple[Key, Part]]:
+    def by_key() -> Iterator[tuple[Key, Part]]:
         for (bus, *message), entry in inputs.items():
             yield ("input", *places[bus], *message), entry
         for sender in deployment.senders():
@@ -41,4 +41,4 @@ def parts(
         for protocol in protocols:
             yield from protocol.parts(places)
 
-    return dict(found())
+    return dict(by_key())

@@ -239,11 +239,11 @@ class AxisRunner:
                 self._foreign_ns = None
         neutral, fault = self.axis.neutral, None
         for interlock in self._interlocks:
-            found = interlock(neutral, now_ns)
-            if found is not None and REACTION_OF[found] is Reaction.NEUTRAL:
-                trip = trip or found
+            objection = interlock(neutral, now_ns)
+            if objection is not None and REACTION_OF[objection] is Reaction.NEUTRAL:
+                trip = trip or objection
             else:
-                fault = fault or found
+                fault = fault or objection
         if emergency is not None:
             stop = emergency.stop(now_ns, self._presses)
             self._presses = emergency.presses

@@ -111,9 +111,9 @@ def programs(bound: BoundAxis) -> Mapping[str, tuple[ParameterSet, Sequence[Para
     config = bound.config
     assert config.sway is not None  # checked with the deployment
     mode = config.sway.mode()
-    found: dict[str, tuple[ParameterSet, Sequence[ParameterSet]]] = {}
+    sets: dict[str, tuple[ParameterSet, Sequence[ParameterSet]]] = {}
     parts: dict[str, AxisConfig | Profile] = {"": config, **config.profiles}
     for name, part in parts.items():
         base = ParameterSet(0.0, mode, part.filter.kind, part.filter.parameters())
-        found[name] = (base, parameter_sets(part.gain_schedule))
-    return found
+        sets[name] = (base, parameter_sets(part.gain_schedule))
+    return sets

@@ -60,9 +60,9 @@ class ConfigReload:
             return f"its reader took more than {MOST_CPU_S} s of a processor"
         if status:
             return f"its reader ended with status {os.waitstatus_to_exitcode(status)}"
-        found = pickle.loads(data)
-        assert isinstance(found, Deployment | str)
-        return found
+        result = pickle.loads(data)
+        assert isinstance(result, Deployment | str)
+        return result
 
     def end(self) -> None:
         """Give it up; not after a result."""

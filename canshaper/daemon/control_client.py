@@ -19,9 +19,9 @@ def table(path: Path) -> dict[str, dict[str, float]]:
     Raises:
         ControlError: no daemon answers.
     """
-    found = _ask(path, {})
-    assert isinstance(found["adjustable"], dict)
-    return found["adjustable"]
+    answer = _ask(path, {})
+    assert isinstance(answer["adjustable"], dict)
+    return answer["adjustable"]
 
 
 def change(path: Path, values: Mapping[str, float]) -> None:
@@ -77,7 +77,7 @@ def _ask(path: Path, request: Mapping[str, Any]) -> dict[str, Any]:
             raise ControlError(f"{path}: {text}: no daemon with a control section?") from None
     if not data:
         raise ControlError(f"{path}: the daemon takes no more connections now")
-    found: dict[str, Any] = json.loads(data)
-    if "error" in found:
-        raise ControlError(str(found["error"]))
-    return found
+    answer: dict[str, Any] = json.loads(data)
+    if "error" in answer:
+        raise ControlError(str(answer["error"]))
+    return answer

@@ -140,10 +140,10 @@ class DbcText:
         """Tables and types of values that have no signal, but for types of these messages."""
         return [i for i in self._leftover if self._is_table(i) or self._numbers[i] not in numbers]
 
-    def leftover_faults(self, found: Iterable[int]) -> Iterator[tuple[int, str]]:
+    def leftover_faults(self, places: Iterable[int]) -> Iterator[tuple[int, str]]:
         """Line and fault of what ``leftover`` has found."""
         line = at = 0
-        for i in found:
+        for i in places:
             start = self._starts[i]
             line, at = line + self.data.count(b"\n", at, start), start
             match = _OF_SIGNAL.match(self.data, start)
@@ -174,7 +174,7 @@ def dbc_text(data: bytes) -> DbcText:
     """
     data = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n")
     starts, ends, numbers, tables = (array("q") for _ in range(4))
-    found: list[tuple[bytes, int, int, str | None]] = []
+    statements: list[tuple[bytes, int, int, str | None]] = []
     signals: dict[int, set[bytes]] = {}
     long: dict[int, str] = {}
     line = at = 0
@@ -191,19 +191,19 @@ def dbc_text(data: bytes) -> DbcText:
             line, at = line + data.count(b"\n", at, start), start
             names, fault = signals_fault(match["signals"], int(match["length"]))
             signals.setdefault(number, set()).update(names)
-            found.append((match["name"], number, line + 1, fault))
+            statements.append((match["name"], number, line + 1, fault))
         elif kind == "long":
             long[number] = match["symbol"].decode("cp1252", errors="replace")
         elif kind in ("table", "type"):
             tables.append(len(starts))
-        if len(found) > MOST_MESSAGES or len(starts) >= MOST_STATEMENTS:
+        if len(statements) > MOST_MESSAGES or len(starts) >= MOST_STATEMENTS:
             raise ValueError(f"more than {MOST_MESSAGES} messages or {MOST_STATEMENTS} statements")
         starts.append(start)
         ends.append(match.end())
         numbers.append(number)
     entries = [
         Entry(long.get(number, name.decode()), number, line, _id_fault(number) or fault)
-        for name, number, line, fault in found
+        for name, number, line, fault in statements
         if name != _NO_MESSAGE
     ]
     leftover = array("q")

@@ -69,12 +69,12 @@ def _parts(place: Place, axis: AxisConfig) -> list[tuple[Place, AxisConfig | Pro
 
 def _filters(place: Place, axis: AxisConfig) -> list[tuple[Place, Filter, Sway | None]]:
     """Every filter that the axis may get, by its place, with the sway data that it runs with."""
-    found: list[tuple[Place, Filter, Sway | None]] = []
+    filters: list[tuple[Place, Filter, Sway | None]] = []
     for at, part in _parts(place, axis):
-        found.append(((*at, "filter"), part.filter, axis.sway))
+        filters.append(((*at, "filter"), part.filter, axis.sway))
         for i, one in enumerate(part.gain_schedule):
-            found.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
-    return found
+            filters.append(((*at, "gain_schedule", i, "filter"), one.filter, one.sway))
+    return filters
 
 
 def unfit(config: DeploymentConfig) -> Iterator[tuple[Place, str]]:

@@ -14,12 +14,12 @@ from canshaper_sim.axes import ALL_AXES, ROTATOR
 
 def cranes(deployment: Deployment) -> list[str]:
     """Names of the cranes of a deployment; none where its axes are those of one."""
-    found: dict[str, None] = {}
+    names: dict[str, None] = {}
     for name in deployment.axes:
         for axis in (*ALL_AXES, ROTATOR):
             if name.endswith(f"_{axis}") and name not in ALL_AXES:
-                found[name.removesuffix(f"_{axis}")] = None
-    return list(found)
+                names[name.removesuffix(f"_{axis}")] = None
+    return list(names)
 
 
 def one_crane(deployment: Deployment, crane: str) -> Deployment:

@@ -141,14 +141,14 @@ class PlantNode:
         measured = [motion.radius for motion in deployment.motions.values()]
         radii = {radius.message.name: radius.protection for radius in measured if radius}
         for message, signals in self._feedback.items():
-            found = deployment.messages.find(message)
-            if isinstance(found, str):
-                problems.append(Problem(str(deployment.path), None, "dbc", found))
-            elif missing := [s for s in signals if not find_signal(found[1], s)]:
-                problems.append(found[0].problem(found[1], f"lacks {', '.join(missing)}"))
+            entry = deployment.messages.find(message)
+            if isinstance(entry, str):
+                problems.append(Problem(str(deployment.path), None, "dbc", entry))
+            elif missing := [s for s in signals if not find_signal(entry[1], s)]:
+                problems.append(entry[0].problem(entry[1], f"lacks {', '.join(missing)}"))
             else:
                 protection = radii.get(message, UNPROTECTED)
-                self._senders[message] = Sender(bus, found[1], protection=protection)
+                self._senders[message] = Sender(bus, entry[1], protection=protection)
         if problems:
             raise ConfigError(problems)
         if not listeners:

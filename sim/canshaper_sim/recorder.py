@@ -68,9 +68,9 @@ class Recorder:
             ("GrappleSway", self._sway),
             ("ShaperStatus", self._status),
         ):
-            found = deployment.messages.find(name)
-            if not isinstance(found, str):
-                message = found[1]
+            entry = deployment.messages.find(name)
+            if not isinstance(entry, str):
+                message = entry[1]
                 handler = feedback(FieldSet(message))
                 for bus in deployment.config.buses:
                     key = (bus, message.frame_id, message.is_extended_frame)

@@ -49,10 +49,10 @@ def gateway(
     rules_of = {"running": passing, "away": passing + fallback, "down": []}
     ends = channels(deployment)
     if state == "show":
-        found = between(ends, rules())
-        states = [name for name, those in rules_of.items() if sorted(found) == sorted(those)]
-        echo(f"{' '.join(ends)}: {len(found)} rules, {' or '.join(states) or 'others'}")
-        for rule in found:
+        present = between(ends, rules())
+        states = [name for name, those in rules_of.items() if sorted(present) == sorted(those)]
+        echo(f"{' '.join(ends)}: {len(present)} rules, {' or '.join(states) or 'others'}")
+        for rule in present:
             echo(f"  {rule}")
         if not {"running", "away"} & {*states}:
             raise typer.Exit(EXIT_OTHER_RULES)

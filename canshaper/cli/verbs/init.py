@@ -156,16 +156,16 @@ def _designed(file: Path, axis: str) -> bool:
 def _messages(files: Sequence[Path]) -> "list[Message]":
     from canshaper.machine.database import load_dbc
 
-    found, problems = [], []
+    messages, problems = [], []
     for path in files:
         file, wrong = load_dbc(path)
         problems += wrong
         if file:
-            found += file.messages
+            messages += file.messages
             print_warnings(file.count, file.warnings, "left out")
     if problems:
         raise ConfigError(problems)
-    return found
+    return messages
 
 
 def _write(file: Path, draft: Path, text: str) -> None:

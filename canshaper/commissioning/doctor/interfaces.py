@@ -111,12 +111,12 @@ def read_link(name: str, root: Path = Path("/")) -> Link | None:
 def parse_ip(text: str) -> Link | None:
     """An interface from the output of ``ip -details -statistics -json link show``."""
     try:
-        found = [entry for entry in json.loads(text) if entry.get("ifname")]
+        entries = [entry for entry in json.loads(text) if entry.get("ifname")]
     except ValueError:  # an ip without -json
         return None
-    if not found:
+    if not entries:
         return None
-    entry = found[0]
+    entry = entries[0]
     info = entry.get("linkinfo", {})
     return Link(
         name=entry["ifname"],
@@ -163,8 +163,8 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
         return [Finding(name, Level.BAD, "is no CAN interface", remedy)]
     if link.kind in ("vcan", "vxcan"):
         if link.up:
-            found = "up; a virtual bus, nothing else to check"
-            return [Finding(name, Level.NOTE, found), *fd(link, bus)]
+            text = "up; a virtual bus, nothing else to check"
+            return [Finding(name, Level.NOTE, text), *fd(link, bus)]
         return [Finding(name, Level.BAD, "is down", f"sudo ip link set {name} up"), *fd(link, bus)]
     if not link.data:
         text = "no tool that shows bit rate, state and restart: not checked"
@@ -191,10 +191,10 @@ def bitrate(link: Link, bus: Bus) -> Finding | None:
     subject = f"{link.name} bit rate"
     if link.bitrate is None:
         return None
-    found = f"{link.bitrate} bit/s"
+    rate = f"{link.bitrate} bit/s"
     if bus.bitrate is None or bus.bitrate == link.bitrate:
-        return Finding(subject, Level.OK, found)
-    return Finding(subject, Level.BAD, f"{found}, in the file {bus.bitrate} bit/s", WRONG_RATE)
+        return Finding(subject, Level.OK, rate)
+    return Finding(subject, Level.BAD, f"{rate}, in the file {bus.bitrate} bit/s", WRONG_RATE)
 
 
 def fd(link: Link, bus: Bus) -> list[Finding]:
@@ -225,14 +225,14 @@ def queue(link: Link) -> Finding:
     """Its transmit queue: short enough that no old command goes out."""
     subject = f"{link.name} queue"
     remedy = f"sudo ip link set {link.name} txqueuelen 16"
-    found = f"{link.queue} frames"
+    queue = f"{link.queue} frames"
     if link.queue > LONGEST_QUEUE:
-        text = f"{found}: commands long out of date could go out after a blocked bus"
+        text = f"{queue}: commands long out of date could go out after a blocked bus"
         return Finding(subject, Level.WARNING, text, remedy)
     if link.queue < SHORTEST_QUEUE:
-        text = f"{found}: the frames of a tick may not fit"
+        text = f"{queue}: the frames of a tick may not fit"
         return Finding(subject, Level.WARNING, text, remedy)
-    return Finding(subject, Level.OK, found)
+    return Finding(subject, Level.OK, queue)
 
 
 def state(link: Link) -> Finding | None:
@@ -288,12 +288,12 @@ def modes(link: Link) -> Finding:
     low = f"with {link.name} down: sudo ip link set {link.name} type can"
     if mute := on & {"LISTEN-ONLY", "LOOPBACK"}:
         options = " ".join(f"{mode.lower()} off" for mode in sorted(mute))
-        found = ", ".join(sorted(mode.lower() for mode in mute))
-        return Finding(subject, Level.BAD, f"{found}: no frame gets out", f"{low} {options}")
+        text = ", ".join(sorted(mode.lower() for mode in mute))
+        return Finding(subject, Level.BAD, f"{text}: no frame gets out", f"{low} {options}")
     if "ONE-SHOT" in on:
-        found = "one-shot: a frame that loses the bus to another one is not sent again"
-        return Finding(subject, Level.WARNING, found, f"{low} one-shot off")
+        text = "one-shot: a frame that loses the bus to another one is not sent again"
+        return Finding(subject, Level.WARNING, text, f"{low} one-shot off")
     if "BERR-REPORTING" in on:
-        found = "berr-reporting: a disturbed bus makes thousands of error frames a second"
-        return Finding(subject, Level.WARNING, found, f"{low} berr-reporting off")
+        text = "berr-reporting: a disturbed bus makes thousands of error frames a second"
+        return Finding(subject, Level.WARNING, text, f"{low} berr-reporting off")
     return Finding(subject, Level.OK, "ordinary")

@@ -64,20 +64,20 @@ def preemption(root: Path, version: str) -> Finding:
     if "PREEMPT_DYNAMIC" not in version:
         if re.search(r"\bPREEMPT\b", version):
             return Finding("kernel", Level.OK, "preemptible (PREEMPT)")
-        found = "does not let a real-time process interrupt it"
-        return Finding("kernel", Level.WARNING, found, f"install a PREEMPT_RT kernel ({real_time})")
+        text = "does not let a real-time process interrupt it"
+        return Finding("kernel", Level.WARNING, text, f"install a PREEMPT_RT kernel ({real_time})")
     modes = _read(root / "sys/kernel/debug/sched/preempt") or ""
     mode = re.search(r"\((\w+)\)", modes) or re.search(
         r"\bpreempt=(\w+)", _read(root / "proc/cmdline") or ""
     )
     if mode is None:
-        found = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt tells root which mode it is in"
-        return Finding("kernel", Level.NOTE, found, "boot with preempt=full to be sure")
-    found = f"PREEMPT_DYNAMIC in mode {mode[1]}"
+        text = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt tells root which mode it is in"
+        return Finding("kernel", Level.NOTE, text, "boot with preempt=full to be sure")
+    text = f"PREEMPT_DYNAMIC in mode {mode[1]}"
     if mode[1] in ("full", "lazy"):
-        return Finding("kernel", Level.OK, found)
+        return Finding("kernel", Level.OK, text)
     remedy = f"boot with preempt=full, or install a PREEMPT_RT kernel ({real_time})"
-    return Finding("kernel", Level.WARNING, found, remedy)
+    return Finding("kernel", Level.WARNING, text, remedy)
 
 
 def throttling(root: Path) -> Finding:
@@ -89,13 +89,13 @@ def throttling(root: Path) -> Finding:
     if runtime == "-1":
         return Finding("real-time share", Level.OK, "not limited")
     share = int(runtime) / int(period)
-    found = f"{100 * share:.0f} % of the time"
+    text = f"{100 * share:.0f} % of the time"
     if share >= 0.5:
-        return Finding("real-time share", Level.OK, found)
+        return Finding("real-time share", Level.OK, text)
     return Finding(
         "real-time share",
         Level.BAD if share == 0 else Level.WARNING,
-        found,
+        text,
         "sudo sysctl kernel.sched_rt_runtime_us=950000",
     )
 
@@ -127,9 +127,9 @@ def huge_pages(root: Path) -> Finding:
         return Finding("huge pages", Level.OK, "none")
     if mode[1] != "always":
         return Finding("huge pages", Level.OK, mode[1])
-    found = "always: the kernel may hold up the loop for 1 ms when it makes one for any program"
+    text = "always: the kernel may hold up the loop for 1 ms when it makes one for any program"
     remedy = "boot with transparent_hugepage=madvise"
-    return Finding("huge pages", Level.NOTE, found, remedy)
+    return Finding("huge pages", Level.NOTE, text, remedy)
 
 
 def governor(root: Path) -> Finding:
@@ -137,15 +137,15 @@ def governor(root: Path) -> Finding:
     files = sorted((root / "sys/devices/system/cpu").glob("cpu[0-9]*/cpufreq/scaling_governor"))
     names = {text for file in files if (text := _read(file))}
     if not names:
-        found = "no frequency scaling is to be seen (fixed, or set from outside of this system)"
-        return Finding("governor", Level.NOTE, found)
-    found = ", ".join(sorted(names))
+        text = "no frequency scaling is to be seen (fixed, or set from outside of this system)"
+        return Finding("governor", Level.NOTE, text)
+    text = ", ".join(sorted(names))
     if names == {"performance"}:
-        return Finding("governor", Level.OK, found)
+        return Finding("governor", Level.OK, text)
     return Finding(
         "governor",
         Level.WARNING,
-        f"{found}: the processor is slow when the loop wakes up",
+        f"{text}: the processor is slow when the loop wakes up",
         "sudo cpupower frequency-set -g performance, at every boot",
     )
 
@@ -159,11 +159,11 @@ def idle_states(root: Path, tick_ms: int) -> Finding:
             deepest_us, name = int(latency), _read(state / "name") or state.name
     if not name:
         return Finding("idle states", Level.OK, "none that takes time to wake up from")
-    found = f"the deepest is {name}, {deepest_us} us to wake up"
+    text = f"the deepest is {name}, {deepest_us} us to wake up"
     if deepest_us <= WAKE_SHARE * tick_ms * 1000:
-        return Finding("idle states", Level.OK, found)
+        return Finding("idle states", Level.OK, text)
     remedy = "sudo cpupower idle-set -D 100, or boot with intel_idle.max_cstate=1"
-    return Finding("idle states", Level.WARNING, found, remedy)
+    return Finding("idle states", Level.WARNING, text, remedy)
 
 
 def clock_source(root: Path) -> Finding:
@@ -232,8 +232,8 @@ def _virtualisation() -> str | None:
 def processors(root: Path, number: int) -> Finding:
     """How many processors there are, and which of them are kept free."""
     isolated = _read(root / "sys/devices/system/cpu/isolated")
-    found = f"{number}, isolated: {isolated or 'none'}"
-    return Finding("processors", Level.NOTE, found)
+    text = f"{number}, isolated: {isolated or 'none'}"
+    return Finding("processors", Level.NOTE, text)
 
 
 def others(load: float, number: int) -> Finding:
@@ -243,17 +243,17 @@ def others(load: float, number: int) -> Finding:
         load: processes that ran or waited for a processor, mean of a minute.
         number: of processors.
     """
-    found = f"{load:.1f} processes ran or waited on {number} processors"
+    text = f"{load:.1f} processes ran or waited on {number} processors"
     if load <= number:
-        return Finding("other programs", Level.NOTE, found)
+        return Finding("other programs", Level.NOTE, text)
     remedy = "top shows which; end those that the machine does not need"
-    return Finding("other programs", Level.WARNING, f"{found}: idle was not idle", remedy)
+    return Finding("other programs", Level.WARNING, f"{text}: idle was not idle", remedy)
 
 
 def interpreter() -> Finding:
     """The Python that runs the loop, and whether it is one for searching errors."""
-    found = f"{platform.python_implementation()} {platform.python_version()}"
+    text = f"{platform.python_implementation()} {platform.python_version()}"
     if hasattr(sys, "gettotalrefcount"):
         remedy = "take the ordinary build"
-        return Finding("Python", Level.WARNING, f"{found}, a debug build", remedy)
-    return Finding("Python", Level.NOTE, f"{found}; garbage collector frozen while the loop runs")
+        return Finding("Python", Level.WARNING, f"{text}, a debug build", remedy)
+    return Finding("Python", Level.NOTE, f"{text}; garbage collector frozen while the loop runs")

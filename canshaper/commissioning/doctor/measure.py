@@ -101,8 +101,8 @@ def _result(
         if hand.poll():  # it fails before the loop can know
             output(hand, PATIENCE_S)
         with suppress(subprocess.TimeoutExpired):
-            found: dict[str, Any] = json.loads(output(loop, LOOK_S))
-            return found
+            result: dict[str, Any] = json.loads(output(loop, LOOK_S))
+            return result
     raise MeasurementError(f"the loop did not end within {seconds + PATIENCE_S:.0f} s")
 
 
@@ -147,7 +147,7 @@ def _joystick_ns(
     """
     buses = list(deployment.config.buses)
     joysticks = list(deployment.config.joysticks)
-    found: list[int] = []
+    delays_ns: list[int] = []
     for number, axis in enumerate(deployment.axes.values()):
         joystick = axis.config.command.joystick
         bus = deployment.config.joysticks[joystick].bus
@@ -160,5 +160,5 @@ def _joystick_ns(
             if i == len(answers):
                 break
             if which == joysticks.index(joystick) and place >= counts[0]:
-                found.append(answers[i][1] - at_ns)
-    return found
+                delays_ns.append(answers[i][1] - at_ns)
+    return delays_ns

@@ -45,9 +45,9 @@ def as_dict(
 def _run_dict(run: Run) -> dict[str, Any]:
     times: dict[str, Any] = {}
     for field in TIMES:
-        found: list[int] = getattr(run, field)
-        figures = summary(found)
-        bins = [{"up_to": end, "count": count} for end, count in histogram(found).items()]
+        samples: list[int] = getattr(run, field)
+        figures = summary(samples)
+        bins = [{"up_to": end, "count": count} for end, count in histogram(samples).items()]
         key = field.replace("_ns", "_us")
         times[key] = (asdict(figures) if figures else {}) | {"histogram": bins}
     return times | {

@@ -79,10 +79,10 @@ def bind(name: str, messages: Messages) -> tuple[Message, Signal, Unit]:
     message_name, dot, signal_name = name.partition(".")
     if not (message_name and dot and signal_name):
         raise IdentificationError(f"--signal: expected AXIS=MESSAGE.SIGNAL, got {name!r}")
-    found = messages.find(message_name)
-    if isinstance(found, str):
-        raise IdentificationError(f"--signal {name}: {found}")
-    message = found[1]
+    entry = messages.find(message_name)
+    if isinstance(entry, str):
+        raise IdentificationError(f"--signal {name}: {entry}")
+    message = entry[1]
     signal = find_signal(message, signal_name)
     if signal is None:
         names = ", ".join(s.name for s in message.signals)
@@ -212,10 +212,12 @@ def _checked(
             f" got {frames} of {there}. Is it the right log, and the right DBC file?"
         )
     if len(reader.senders) > 1:
-        found = ", ".join(f"{i:#x}" + (f" on {c}" if c else "") for c, i in sorted(reader.senders))
+        senders = ", ".join(
+            f"{i:#x}" + (f" on {c}" if c else "") for c, i in sorted(reader.senders)
+        )
         raise IdentificationError(
-            f"{path}: {reader.message.name} comes from more than one sender: {found}; choose a bus"
-            " with --channel, or give the DBC message the address of one"
+            f"{path}: {reader.message.name} comes from more than one sender: {senders};"
+            " choose a bus with --channel, or give the DBC message the address of one"
         )
     notes = []
     for count, what in (

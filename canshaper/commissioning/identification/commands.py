@@ -162,13 +162,13 @@ def _common(
     one: list[tuple[float, float]], other: list[tuple[float, float]]
 ) -> list[tuple[float, float]]:
     """What two lists of stretches, each in order, have in common."""
-    found, i, j = [], 0, 0
+    common, i, j = [], 0, 0
     while i < len(one) and j < len(other):
         start, end = max(one[i][0], other[j][0]), min(one[i][1], other[j][1])
         if end > start:
-            found.append((start, end))
+            common.append((start, end))
         if one[i][1] < other[j][1]:
             i += 1
         else:
             j += 1
-    return found
+    return common

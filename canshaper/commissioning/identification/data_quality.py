@@ -58,10 +58,10 @@ def mixed(fit: DecayFit) -> str | None:
     low = [0.7 * omega, 0.0, 0.7 * omega, 0.0]
     high = [1.4 * omega, 0.5 * omega, 1.4 * omega, 0.5 * omega]
     starts = [[omega * a, max(sigma, 1e-3), omega * b, max(sigma, 1e-3)] for a, b in _PAIRS]
-    found = [
+    fits = [
         least_squares(lambda x: linear(x)[1], s, bounds=(low, high), max_nfev=60) for s in starts
     ]
-    x = min(found, key=lambda f: float(f.cost)).x
+    x = min(fits, key=lambda f: float(f.cost)).x
     best, residual = linear(x)
     first, second = sorted((math.hypot(*best[2:4]), math.hypot(*best[4:6])), reverse=True)
     better = float(np.sum(residual**2)) < 0.6 * float(np.sum((segment.value - longest.fitted) ** 2))

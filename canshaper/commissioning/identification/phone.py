@@ -5,7 +5,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from canshaper.commissioning.identification.segments import Found, find_free
+from canshaper.commissioning.identification.segments import FreeSwings, find_free
 from canshaper.commissioning.identification.series import Array, Series, ordered
 from canshaper.commissioning.identification.table import Table
 from canshaper.errors import IdentificationError
@@ -79,11 +79,11 @@ def _direction(table: Table, names: Sequence[str], about_s: float | None) -> tup
     """Unit vector of the axis it swings about, and how round the swing is, 0 to 1."""
     each = {n: _series(table, "", n, table.columns[n], notes=[]) for n in names}
     widest = max(float(np.std(one.value)) for one in each.values())
-    best: Found | None = None
+    best: FreeSwings | None = None
     for one in each.values():
-        found = find_free(one, about_s) if float(np.std(one.value)) > 0.3 * widest else None
-        if found and (best is None or found.worth > best.worth):
-            best = found
+        swings = find_free(one, about_s) if float(np.std(one.value)) > 0.3 * widest else None
+        if swings and (best is None or swings.worth > best.worth):
+            best = swings
     if best is None:
         spreads = np.array([float(np.std(one.value)) for one in each.values()])
         return np.asarray(spreads == spreads.max(), dtype=np.float64), 0.0
@@ -94,7 +94,7 @@ def _direction(table: Table, names: Sequence[str], about_s: float | None) -> tup
 def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[Array, float]:
     """Direction of a swing at its start, and the roundest that it gets: an ellipse turns."""
     omega = 2.0 * math.pi / period
-    found: list[tuple[float, float, Array]] = []  # length, width, direction
+    ellipses: list[tuple[float, float, Array]] = []  # length, width, direction
     for k in range(-2, 2 * SWINGS):
         at = start_s + 0.5 * period * (k + np.linspace(0.0, 3.0, 90))
         if at[0] < columns[0].time_s[0] or at[-1] > columns[0].time_s[-1]:
@@ -104,9 +104,11 @@ def _ellipse(columns: Sequence[Series], start_s: float, period: float) -> tuple[
         values = np.stack([np.interp(at, c.time_s, c.value) for c in columns], axis=1)
         fitted, *_ = np.linalg.lstsq(basis, values, rcond=None)
         directions, sizes, _ = np.linalg.svd(fitted[:2].T)
-        found.append((float(sizes[0]), float(sizes[1]), directions[:, 0]))
-    if not found:
+        ellipses.append((float(sizes[0]), float(sizes[1]), directions[:, 0]))
+    if not ellipses:
         return np.eye(len(columns))[0], 0.0
-    longest = max(found, key=lambda f: f[0])
-    widths = [width / max(length, 1e-12) for length, width, _ in found if length > longest[0] / 3.0]
+    longest = max(ellipses, key=lambda f: f[0])
+    widths = [
+        width / max(length, 1e-12) for length, width, _ in ellipses if length > longest[0] / 3.0
+    ]
     return longest[2], max(widths)

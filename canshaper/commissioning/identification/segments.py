@@ -38,7 +38,7 @@ SETTLING_S = 0.5
 
 
 @dataclass(frozen=True, slots=True)
-class Found:
+class FreeSwings:
     """Free swings of a signal.
 
     Attributes:
@@ -54,7 +54,7 @@ class Found:
     worth: float
 
 
-def find_free(series: Series, about_s: float | None = None) -> Found | None:
+def find_free(series: Series, about_s: float | None = None) -> FreeSwings | None:
     """The free swings of a series, or None where there is none.
 
     Args:
@@ -64,22 +64,22 @@ def find_free(series: Series, about_s: float | None = None) -> Found | None:
     time, value = binned(series.time_s, series.value)
     if about_s:
         time, value = smoothed(time, value, about_s)
-    best: Found | None = None
+    best: FreeSwings | None = None
     for period in candidates(time, value, about_s):
         # What swings far less than the best so far need not be looked at.
         least = LEAST_WORTH * best.worth if best else 0.0
-        found = _with_period(series, time, value, period, least)
+        swings = _with_period(series, time, value, period, least)
         # The period of the windows may be some percent off at first.
-        if found:
-            found = _with_period(series, time, value, found.period_s, least) or found
-        if found and (best is None or found.worth > best.worth):
-            best = found
+        if swings:
+            swings = _with_period(series, time, value, swings.period_s, least) or swings
+        if swings and (best is None or swings.worth > best.worth):
+            best = swings
     return best
 
 
 def _with_period(
     series: Series, time: Array, value: Array, period: float, least: float
-) -> Found | None:
+) -> FreeSwings | None:
     """Free swings of about that period, and at least of such a worth."""
     runs: list[tuple[Segment, Run]] = []
     for piece in pieces(time, period / 3.0):
@@ -115,7 +115,7 @@ def _with_period(
     sigma = float(np.average([s.sigma for s in kept], weights=weights))
     ratio = max(sigma / omega, 1e-3)
     worth = sum(s.worth for s in kept)
-    return Found([s.segment for s in kept], 2.0 * math.pi / omega, ratio, worth)
+    return FreeSwings([s.segment for s in kept], 2.0 * math.pi / omega, ratio, worth)
 
 
 def _alike(swing: Swing, best: Swing) -> bool:

@@ -230,8 +230,8 @@ def _table(
 
 def _named(header: str) -> tuple[str, str]:
     """Name and unit of "Gyroscope x (rad/s)"."""
-    found = _HEADER.match(header)
-    return (found[1], found[2]) if found else (header, "")
+    match = _HEADER.match(header)
+    return (match[1], match[2]) if match else (header, "")
 
 
 def _time(path: Path, columns: dict[str, Array]) -> tuple[str, float]:

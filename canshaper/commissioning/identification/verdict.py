@@ -18,7 +18,7 @@ from canshaper.commissioning.identification.driven import DrivenFit, fit_driven
 from canshaper.commissioning.identification.driven_data import driven_s
 from canshaper.commissioning.identification.segments import (
     SETTLING_S,
-    Found,
+    FreeSwings,
     find_free,
 )
 from canshaper.commissioning.identification.series import Kind, Series
@@ -142,13 +142,13 @@ def _long_enough(series: Series) -> bool:
 
 def _free(finding: Finding, series: Sequence[Series], about_s: float | None) -> None:
     """Free swings of all signals together."""
-    found = [(s, f) for s in series if (f := find_free(s, about_s))]
-    if not found:
+    swinging = [(s, f) for s in series if (f := find_free(s, about_s))]
+    if not swinging:
         return
-    best = max((f for _, f in found), key=lambda f: f.worth)
+    best = max((f for _, f in swinging), key=lambda f: f.worth)
     segments = []
-    for one, swings in found:
-        fitting: Found | None = swings
+    for one, swings in swinging:
+        fitting: FreeSwings | None = swings
         if abs(swings.period_s / best.period_s - 1.0) > 0.1:
             fitting = find_free(one, best.period_s)
         segments += fitting.segments if fitting else []

@@ -83,7 +83,7 @@ def limits_for(deployment: Deployment, outcomes: Sequence[Outcome]) -> Limits:
     lag_s = _LAGS_TO_STOP * CraneParameters().near_far.lag_s
     curve = []
     for periods in _DURATIONS_IN_PERIODS:
-        found = least_residual(
+        least = least_residual(
             mode,
             tick_s=tick,
             duration_s=round(periods * mode.period_s / tick) * tick,
@@ -92,7 +92,7 @@ def limits_for(deployment: Deployment, outcomes: Sequence[Outcome]) -> Limits:
             swing=sorted(swing.items()),
             least_tap=0.0,  # a floor would be a bound of our own
         )
-        curve.append((found.duration_s + lag_s, found.residual))
+        curve.append((least.duration_s + lag_s, least.residual))
     return Limits(curve, time_optimal_s(mode, tick_s=tick, rate_per_s=rate) + lag_s)
 
 

@@ -114,9 +114,9 @@ def _search(program: Program, value: Callable[[dict[str, float]], float]) -> tup
             z = np.array(point)
             if z.sum() > top + 1e-9:
                 continue
-            found = value(_measures(program, z))
-            if found < best:
-                best, at = found, z
+            reached = value(_measures(program, z))
+            if reached < best:
+                best, at = reached, z
         width = [2.0 * (b - a) / (m - 1) for a, b, m in zip(low, high, count, strict=True)]
         low = np.maximum(program.low, at - width)
         high = np.minimum(program.high, at + width)

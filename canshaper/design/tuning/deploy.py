@@ -94,13 +94,13 @@ def from_parameters(
 
 
 def tail_for(
-    found: Setting, mode: SwayMode, tick_s: float, machine: Machine
+    setting: Setting, mode: SwayMode, tick_s: float, machine: Machine
 ) -> tuple[float, float] | None:
     """Shortest ``tail_s`` from which on none adds to the residual sway, and what it leaves.
 
     None where not even the longest tail that a file may have is enough.
     """
-    shaper = gff(found.poles_rad_s, found.third_pole_rad_s)
+    shaper = gff(setting.poles_rad_s, setting.third_pole_rad_s)
     best = _left(mode, tick_s, shaper, machine, _LONGEST_TAIL_S)
     result = None
     for tenths in range(round(10.0 * _LONGEST_TAIL_S) - 1, -1, -1):
@@ -111,14 +111,15 @@ def tail_for(
     return result
 
 
-def recommendation(axis: str, found: Setting, tail: tuple[float, float] | None) -> str:
+def recommendation(axis: str, setting: Setting, tail: tuple[float, float] | None) -> str:
     """One plain sentence, and one more where the tail ends the run-on early."""
-    m = found.measures
-    third = f", third_pole_rad_s: {found.third_pole_rad_s:g}" if found.third_pole_rad_s else ""
+    m = setting.measures
+    third = f", third_pole_rad_s: {setting.third_pole_rad_s:g}" if setting.third_pole_rad_s else ""
     text = (
-        f"Use a1: {found.a1:g}, a2: {found.a2:g}{third} for {axis}: {100 * m.worst(0.0):.0f} % of"
-        f" the swing is left at the given length, at most {100 * m.worst(10.0):.0f} % within"
-        f" ±10 % of it, and the crane runs on for {m.run_on_s:.1f} s."
+        f"Use a1: {setting.a1:g}, a2: {setting.a2:g}{third} for {axis}:"
+        f" {100 * m.worst(0.0):.0f} % of the swing is left at the given length,"
+        f" at most {100 * m.worst(10.0):.0f} % within ±10 % of it,"
+        f" and the crane runs on for {m.run_on_s:.1f} s."
     )
     if tail is not None:
         text += (
@@ -145,15 +146,15 @@ def flatness(tuning: Tuning) -> str:
     return f"{' and '.join(ranges)} rad/s cost at most {100 * FLAT:.0f} % more"
 
 
-def as_dict(tuning: Tuning, found: Setting) -> dict[str, Any]:
+def as_dict(tuning: Tuning, setting: Setting) -> dict[str, Any]:
     """Everything of a tuning, for ``--json``."""
-    m = found.measures
+    m = setting.measures
     return {
         "method": tuning.method,
-        "a1": found.a1,
-        "a2": found.a2,
-        "poles_rad_s": list(found.poles_rad_s),
-        "third_pole_rad_s": found.third_pole_rad_s,
+        "a1": setting.a1,
+        "a2": setting.a2,
+        "poles_rad_s": list(setting.poles_rad_s),
+        "third_pole_rad_s": setting.third_pole_rad_s,
         "cost": tuning.cost,
         "active": list(tuning.active),
         "ranges_rad_s": [list(r) for r in tuning.ranges_rad_s],

@@ -80,11 +80,11 @@ def tune(
     built = time.perf_counter()
     points = spread(program, starts) if isinstance(starts, int) else given(program, starts)
     ranges_at = 0.7
-    found: list[Solution] = []
+    solutions: list[Solution] = []
     for i, point in enumerate(points):
         report(ranges_at * i / len(points), f"start {i + 1} of {len(points)}")
-        found.append(program.solve(point))
-    good = [solution for solution in found if solution.success]
+        solutions.append(program.solve(point))
+    good = [solution for solution in solutions if solution.success]
     if not good:
         good = [_second_try(program)]
     best = min(good, key=lambda solution: solution.cost)

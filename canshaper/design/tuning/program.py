@@ -268,8 +268,8 @@ def _deployed_response(task: Task, n: int) -> Any:
     count = round(watched_s / task.tick_s)
     step = ca.Function("tick", [x, gains], [following, y])
     zm = ca.MX.sym("z", n)
-    found = ca.Function("gains", [z], [ca.vertcat(k1, k2, share)])(zm)
-    outputs = step.mapaccum(count)(ca.DM.zeros(3), ca.repmat(found, 1, count))[1]
+    of_point = ca.Function("gains", [z], [ca.vertcat(k1, k2, share)])(zm)
+    outputs = step.mapaccum(count)(ca.DM.zeros(3), ca.repmat(of_point, 1, count))[1]
     return ca.Function("response", [zm], [outputs.T])
 
 

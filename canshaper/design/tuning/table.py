@@ -8,9 +8,9 @@ from canshaper.design.tuning.deploy import Setting
 from canshaper.report.console import new_table
 
 
-def table(found: Setting, before: Setting | None, method: str) -> Table:
+def table(setting: Setting, before: Setting | None, method: str) -> Table:
     """The setting next to the one in the file; residuals through the machine, filter alone."""
-    columns = [found] if before is None else [before, found]
+    columns = [setting] if before is None else [before, setting]
     result = new_table("", *([] if before is None else ["in the file"]), method)
 
     def row(title: str, cell: Callable[[Setting], str]) -> None:
@@ -27,7 +27,7 @@ def table(found: Setting, before: Setting | None, method: str) -> Table:
     row("run-on, s", lambda c: f"{c.measures.run_on_s:.2f}")
     row("mean delay, s", lambda c: f"{c.measures.mean_delay_s:.2f}")
     result.add_row("swing left, %: machine | filter alone")
-    for i, residual in enumerate(found.measures.residuals):
+    for i, residual in enumerate(setting.measures.residuals):
         row(
             f"  length {residual.length_pct:+.0f} %" if residual.length_pct else "  length right",
             lambda c, i=i: (  # type: ignore[misc]

@@ -69,11 +69,11 @@ def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], 
         length: bytes of the frame; those behind it stay.
     """
     behind = (1 << 64) - (1 << 8 * length)
-    found = []
+    modifications = []
     for kind, bits in ((AND, keep | behind), (OR, put)):
         data = (bits & (1 << 64) - 1).to_bytes(8, "little")
-        found.append((kind, _MODIFICATION.pack(0, 0, data, ON_DATA)))
-    return tuple(found)
+        modifications.append((kind, _MODIFICATION.pack(0, 0, data, ON_DATA)))
+    return tuple(modifications)
 
 
 def load_module() -> None:
@@ -91,10 +91,10 @@ def rules() -> list[Rule]:
     names: dict[int, str] = {}
     try:
         bodies = list(ask(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
-        found = [_read(body, names) for body in bodies if body[0] == socket.AF_CAN]
+        rules = [_read(body, names) for body in bodies if body[0] == socket.AF_CAN]
     except OSError as error:
         raise GatewayError(f"rules of can-gw cannot be listed: {error.strerror}") from error
-    return found
+    return rules
 
 
 def add(rule: Rule) -> None:
@@ -187,7 +187,7 @@ def difference(present: Iterable[Rule], expected: Iterable[Rule]) -> tuple[list[
     return more, missing
 
 
-def between(names: Iterable[str], found: Iterable[Rule]) -> list[Rule]:
+def between(names: Iterable[str], rules: Iterable[Rule]) -> list[Rule]:
     """Those of the rules that lead from one of these interfaces to another of them."""
     ends = {*names}
-    return [rule for rule in found if {rule.source, rule.destination} <= ends]
+    return [rule for rule in rules if {rule.source, rule.destination} <= ends]

@@ -21,14 +21,14 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
     """
     gateway = deployment.config.gateway
     assert gateway is not None  # only such deployments are asked
-    found = {
+    patterns = {
         _of(joystick)
         for joystick in deployment.joysticks.values()
         if joystick.key[0] in gateway.between
     }
     for bus in gateway.between:
         routes = deployment.routing.buses[bus]
-        found |= {
+        patterns |= {
             _whatever_priority(can_id) if routes.j1939 and extended else exactly(can_id, extended)
             for can_id, extended in routes.sent
         }
@@ -37,10 +37,10 @@ def excluded(deployment: Deployment) -> frozenset[Pattern]:
         assert not isinstance(message, str)  # checked with the deployment
         can_id, extended = message[1].frame_id, message[1].is_extended_frame
         if is_j1939(message[1]):
-            found.add(_group(can_id, None if can_id & 0xFF == NULL else can_id & 0xFF))
+            patterns.add(_group(can_id, None if can_id & 0xFF == NULL else can_id & 0xFF))
         else:
-            found.add(exactly(can_id, extended))
-    return frozenset(found)
+            patterns.add(exactly(can_id, extended))
+    return frozenset(patterns)
 
 
 def patterns(deployment: Deployment) -> list[Pattern]:
@@ -58,15 +58,15 @@ def fallback_rules(deployment: Deployment) -> list[Rule]:
     """Rules for the frames of the joysticks while the daemon is away."""
     gateway = deployment.config.gateway
     assert gateway is not None
-    found = []
+    rules = []
     for joystick, message in _passed(deployment):
         source = deployment.config.buses[joystick.key[0]].channel
         destination = deployment.config.buses[message.sender.key[0]].channel
         if gateway.fallback == "pass":
-            found.append(Rule(source, destination, _of(joystick)))
+            rules.append(Rule(source, destination, _of(joystick)))
         elif gateway.fallback == "neutral":
-            found.append(Rule(source, destination, _of(joystick), _neutral(message)))
-    return found
+            rules.append(Rule(source, destination, _of(joystick), _neutral(message)))
+    return rules
 
 
 def _passed(deployment: Deployment) -> Iterator[tuple[BoundJoystick, RewrittenMessage]]:

@@ -22,11 +22,9 @@ class SourceEvent:
     @property
     def text(self) -> str:
         """For the log."""
-        found = f"bus={self.bus} message={self.message} source={self.source:#04x}"
+        text = f"bus={self.bus} message={self.message} source={self.source:#04x}"
         return (
-            found
-            if self.source == self.received
-            else f"{found} ignored, taken={self.received:#04x}"
+            text if self.source == self.received else f"{text} ignored, taken={self.received:#04x}"
         )
 
 

@@ -167,16 +167,16 @@ class J1939Network(BusProtocol):
 
     def _active_faults(self, bus: str) -> list[tuple[int, int]]:
         """(SPN, FMI): axes that cannot move as they are asked, valves that do not follow."""
-        first, found = self._configs[bus].first_spn, []
+        first, active = self._configs[bus].first_spn, []
         for i, runner in enumerate(self._axes.values()):
             if runner.bound.config.valve.bus != bus:
                 continue
             if (fmi := FMI_OF.get(runner.axis.reason)) is not None:
-                found.append((first + 2 * i, fmi))
+                active.append((first + 2 * i, fmi))
             following = runner.feedback.following if runner.feedback else Following.UNKNOWN
             if (fmi := FMI_OF_FOLLOWING.get(following)) is not None:
-                found.append((first + 2 * i + 1, fmi))
-        return found
+                active.append((first + 2 * i + 1, fmi))
+        return active
 
 
 def _cyclic(deployment: Deployment, bus: str) -> Iterator[int]:
