@@ -5,7 +5,7 @@
 # make versions   lowest versions of every dependency; newest Python
 # make coverage   every line and branch of what decides whether a valve moves (within make test)
 # make mutation   does a test notice every small change of it? (mutation-core: within make test)
-# make paper   the paper's figures and numbers beside ours, in out/paper
+# make paper   the paper's figures and numbers next to ours, in out/paper
 # make soak MINUTES=30   the closed loop on vcan with random faults; everything is counted
 # make j1939 MINUTES=10   a drive with J1939; cantools and tshark read every frame
 # make docs   the pages as a site that opens without a network: out/site/index.html

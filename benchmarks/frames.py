@@ -111,7 +111,7 @@ class Ticking:
         self._high = False
         self._slack_ns = 0  # from the moment asked for to the frame on the bus
         self._grid_ns = 0  # one of the valve frames
-        self._taken_ns = 0  # from the last moment at which a tick takes a frame to its valve frame
+        self._latest_ns = 0  # from the last moment at which a tick takes a frame to its valve frame
 
     def find_phase(self) -> None:
         """Bring the axis into steady motion; find the last moment at which a tick takes a frame.
@@ -125,10 +125,10 @@ class Ticking:
         seen = self._sweep(self._at, self.tick_ns, 50)
         self._grid_ns = seen[0].out_ns
         for width_ns in (self.tick_ns // 10, self.tick_ns // 100 + 20_000, 8_000):
-            self._taken_ns = min(map(self._before, seen))
-            last = self._grid_ns - self._taken_ns
+            self._latest_ns = min(map(self._before, seen))
+            last = self._grid_ns - self._latest_ns
             seen += self._sweep(last - width_ns * 2 // 3 - self._slack_ns, width_ns, 80)
-        self._taken_ns = min(map(self._before, seen))
+        self._latest_ns = min(map(self._before, seen))
 
     def measure(self, at_work: Callable[[], bool]) -> list[Result]:
         """Frames at every phase, once the load is at work."""
@@ -138,7 +138,7 @@ class Ticking:
         seen = self._sweep(self._at, self.tick_ns, self.count)
         ticks = (time.monotonic_ns() - begin) / self.tick_ns
         cpu = (cpu_ns(self.pid) - before) / 1e3 / ticks
-        processing = [(self._taken_ns + self._late(e)) / 1e3 for e in seen]
+        processing = [(self._latest_ns + self._late(e)) / 1e3 for e in seen]
         return [
             Result(f"{self.title}: processing", processing, cpu),
             Result(f"{self.title}: from outside", [e.gateway_us for e in seen]),

@@ -1,4 +1,4 @@
-"""A deployment with the DBC file of a whole machine, beside cantools loading that file.
+"""A deployment with the DBC file of a whole machine, next to cantools loading that file.
 
 ``canshaper check`` of the shipped deployment with thousands of messages more in its DBC file, and
 cantools alone; each in a process of its own, its start included, in turn.

@@ -107,7 +107,7 @@ class Bench:
 
         What waits is read before: ours is the higher priority than that of a loop without any.
         """
-        self._wire.forget()
+        self._wire.drain()
         begin = at = time.monotonic_ns() + JOYSTICK_NS
         while at < begin + duration_ns:
             at += JOYSTICK_NS

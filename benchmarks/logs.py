@@ -56,7 +56,7 @@ def gvret(path: Path, frames: Iterable[can.Message]) -> None:
             file.write(frame.data.hex(",").upper() + ",\n")
 
 
-def taken_s(read: Callable[[Path], Iterable[object]], path: Path) -> float:
+def cpu_s(read: Callable[[Path], Iterable[object]], path: Path) -> float:
     """CPU time of reading all of it."""
     begin = time.process_time()
     for _ in read(path):
@@ -93,8 +93,7 @@ def main() -> None:
             files[name] = path, files[like][1]
         for name, (ours, theirs) in files.items():
             pairs = [
-                (taken_s(read_log, ours), taken_s(can.LogReader, theirs))
-                for _ in range(arguments.runs)
+                (cpu_s(read_log, ours), cpu_s(can.LogReader, theirs)) for _ in range(arguments.runs)
             ]
             first, second = (statistics.median(times) for times in zip(*pairs, strict=True))
             ratio = statistics.median(one / other for one, other in pairs)

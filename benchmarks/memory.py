@@ -64,7 +64,7 @@ def sample(pid: int, log: Path) -> list[int]:
 def drive(
     port: Port, joysticks: JoystickNode, duration_ms: int, each_tick: Callable[[int], None]
 ) -> None:
-    """Move the joysticks and make the faults; ``each_tick`` is told the time, ms."""
+    """Move the joysticks and make the faults; ``each_tick`` gets the time, ms."""
     begin = time.monotonic_ns()
     for at_ms in range(0, duration_ms + 1, TICK_MS):
         frames = joysticks.frames(at_ms) if at_ms % MINUTE_MS >= SILENCE_MS or not at_ms else []

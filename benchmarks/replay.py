@@ -1,7 +1,7 @@
-"""How many times faster than real time a log is replayed, beside python-can only reading it.
+"""How many times faster than real time a log is replayed, next to python-can only reading it.
 
 The log is a drive of the closed loop as a daemon's own bus carries it: joysticks, valves, status
-and what the simulated crane tells, some 410 frames a second. Replayed as the black box of that
+and what the simulated crane reports, some 410 frames a second. Replayed as the black box of that
 daemon, every frame compared, and as a log at the ticks of a clock; without table and picture.
 
     python benchmarks/replay.py [--minutes 10] [--runs 3] [--config forwarder.yaml]
@@ -84,7 +84,7 @@ def write_drive(path: Path, box: Path, seconds: float, config: str) -> int:
     return lines
 
 
-def taken(run: Callable[[], object], runs: int) -> float:
+def run_time_s(run: Callable[[], object], runs: int) -> float:
     """Median time of a run, s of its processor: other work on the machine does not count."""
     times = []
     for _ in range(runs):
@@ -125,7 +125,7 @@ def main() -> None:
             ("replay of the black box", lambda: replay(box, config)),
             ("replay, ticks of a clock", lambda: replay(path, config)),
         ):
-            time_s = taken(run, arguments.runs)
+            time_s = run_time_s(run, arguments.runs)
             print(f"{title:33} {time_s:6.2f} s, {seconds / time_s:6.0f} x real time")
         grown = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss - before_kb
         print(f"memory grown by {grown / 1024:.1f} MiB")

@@ -1,10 +1,10 @@
-"""From starting the daemon to its first valve frame, beside the least a gateway could need.
+"""From starting the daemon to its first valve frame, next to the least a gateway could need.
 
 The peer imports python-can and cantools, loads the same DBC and sends one frame. Both are separate
 processes on a multicast group of python-can, started in turn. Processor time until then as well:
 other work on the machine changes it less.
 
-Then the processor time of ``canshaper --help``, beside the same with what the work of the verbs
+Then the processor time of ``canshaper --help``, next to the same with what the work of the verbs
 imports: a deployment, its check, tables.
 
     python benchmarks/startup.py [--runs 7]

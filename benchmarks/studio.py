@@ -175,8 +175,8 @@ def enable(stage: Stage, page: int) -> None:
     try:
         until(ready, "axes ready")
     except SystemExit as error:
-        told = "\n".join(f"{e.source}: {e.text}" for e in stage.events.since(0)[-20:])
-        raise SystemExit(f"{error}; last events:\n{told}") from None
+        events = "\n".join(f"{e.source}: {e.text}" for e in stage.events.since(0)[-20:])
+        raise SystemExit(f"{error}; last events:\n{events}") from None
 
 
 def measured(result: Condition, work: Callable[[], Any]) -> None:

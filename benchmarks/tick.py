@@ -1,4 +1,4 @@
-"""Cost of one tick of the daemon, beside a bare gateway of python-can and cantools.
+"""Cost of one tick of the daemon, next to a bare gateway of python-can and cantools.
 
 Both take the same two joystick frames from a bus and send four valve frames to it; the bus is
 python-can's ``virtual`` one, so that no kernel time is counted. The gateway only copies: receive,

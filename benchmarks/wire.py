@@ -96,7 +96,7 @@ class Wire:
 
     def exchange(self, at_ns: int, pct: float, right_before_ns: int = 0, *, jump: bool) -> Exchange:
         """Send, and wait for the answer: the next valve frame, or the next that jumps as asked."""
-        self.forget()
+        self.drain()
         send_ns = self.send(at_ns, pct, right_before_ns)
         for _ in range(MOST_UNMOVED):
             out_ns, back_ns, rise = self._valve()
@@ -107,7 +107,7 @@ class Wire:
         _, in_ns, _ = receive_stamped(self._in)
         return Exchange(send_ns, in_ns, out_ns, back_ns)
 
-    def forget(self) -> int:
+    def drain(self) -> int:
         """Drop what waits; how many of it were valve frames."""
         dropped = 0
         for port in (self._in, self._out):
@@ -132,8 +132,8 @@ class Wire:
 def stamped_port(channel: str, can_id: int) -> socket.socket:
     """A socket that hears one message, with the kernel's stamps."""
     port = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
-    wanted = struct.pack("=II", can_id, 0xC00007FF)
-    port.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, wanted)
+    filters = struct.pack("=II", can_id, 0xC00007FF)
+    port.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)
     port.setsockopt(socket.SOL_SOCKET, SO_TIMESTAMPNS, 1)
     port.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 20)
     port.bind((channel,))
@@ -158,8 +158,8 @@ def sleep_until(at_ns: int) -> None:
 def wait_for_frames(wire: Wire, process: subprocess.Popen[bytes], log: Path) -> None:
     """Wait until a gateway sends valve frames."""
     until = time.monotonic() + START_S
-    wire.forget()
-    while not wire.forget():
+    wire.drain()
+    while not wire.drain():
         if process.poll() is not None or time.monotonic() > until:
             raise SystemExit(f"no valve frame from {process.args}:\n{log.read_text()}")
         time.sleep(0.05)

@@ -180,7 +180,7 @@ class BusApart:
     def _receive_all(self) -> None:
         empty_ns = boottime_ns()
         while not self._closing:
-            asked_ns = boottime_ns()
+            polled_ns = boottime_ns()
             result: can.Message | Exception | None
             try:
                 result = self._bus.recv(0)
@@ -193,7 +193,7 @@ class BusApart:
                 with suppress(OSError):  # it is full, which says as much; or closed
                     self._news.send(b"\0")
             if not isinstance(result, can.Message):
-                empty_ns = asked_ns
+                empty_ns = polled_ns
                 self._pause(failed=result is not None)
 
     def _pause(self, *, failed: bool) -> None:

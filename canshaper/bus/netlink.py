@@ -40,11 +40,11 @@ def ask(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
     Raises:
         OSError: the kernel refuses, or this process may not open such a socket.
     """
-    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as asked:
+    with socket.socket(socket.AF_NETLINK, socket.SOCK_RAW, socket.NETLINK_ROUTE) as kernel:
         header = _HEADER.pack(_HEADER.size + len(body), kind, REQUEST | flags, 1, 0)
-        asked.send(header + body)
+        kernel.send(header + body)
         while True:
-            data = asked.recv(ROOM)
+            data = kernel.recv(ROOM)
             at = 0
             while at < len(data):
                 length, answer, _flags, _number, _port = _HEADER.unpack_from(data, at)

@@ -111,7 +111,7 @@ def not_opened(name: str, config: Bus, error: Exception) -> BusError:
 class ListeningPort:
     """A port that sends only what a deployment that listens may send; all else is left out.
 
-    The last thing before the bus: whatever is asked of it, no valve hears of it.
+    The last thing before the bus: whatever is sent through it, no valve receives it.
     """
 
     def __init__(self, port: Port, ids: BusRoutes) -> None:

@@ -30,7 +30,7 @@ from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 
-# Frames taken in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
+# Frames read in one tick at most: at 1 Mbit/s a bus carries 180 frames in 20 ms; ten times that
 # empties any backlog and still cannot hold up the tick for ever.
 MOST_FRAMES = 2000
 # Of ids that no one knows; the rest is dropped, their count is "at least".
@@ -55,7 +55,7 @@ class RawPort:
 
     Args:
         name: name of the bus in the deployment file.
-        open_sockets: opens, non-blocking, a socket for the messages that are taken and perhaps
+        open_sockets: opens, non-blocking, a socket for the messages that are received and perhaps
             two for what else is to be seen, see ``socketcan.open_sockets``; called again after
             the interface was gone.
         ids: the messages that matter, handed to it.

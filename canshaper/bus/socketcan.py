@@ -32,14 +32,14 @@ _MEMINFO = struct.Struct("=9I")  # linux/sock_diag.h; the last is SK_MEMINFO_DRO
 def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     """Open the sockets of one interface, and look at its device where the deployment names one.
 
-    With ``ids`` there are three: for the messages that are taken; for those that we send, which
+    With ``ids`` there are three: for the messages that are received; for those that we send, which
     hears our own frames back, other senders and the error frames; for ids that no one knows. So
     neither our own frames nor a flood of foreign ones stand before a joystick's. Without ``ids``,
     one for everything.
 
     Raises:
         OSError: the kernel has no CAN, or there is no such interface, or it has no CAN FD.
-        WrongDeviceError: the interface is another device; nothing was sent or taken.
+        WrongDeviceError: the interface is another device; nothing was sent or received.
     """
     opened: list[socket.socket] = []
     try:

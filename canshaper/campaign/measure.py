@@ -115,5 +115,5 @@ class _Tracks:
         """Of every axis: its way less what the joystick asked for, s of full speed."""
         for name, axis in axes.items():
             most = self._limits[name].maximum
-            asked = math.fsum(min(max(one, -most), most) for one in axis.joystick)
-            yield abs(math.fsum(axis.speed) - asked) * self._tick_s
+            commanded = math.fsum(min(max(one, -most), most) for one in axis.joystick)
+            yield abs(math.fsum(axis.speed) - commanded) * self._tick_s

@@ -120,7 +120,7 @@ def confirmed(text: str, *, default: bool) -> bool:
     return typer.confirm(text, default=default)
 
 
-def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
+def ask(text: str, parse: Callable[[str], _T], default: str) -> _T:
     """Ask until the answer is one."""
     if _given:
         return _given.answer(text, parse, default)
@@ -132,8 +132,8 @@ def asked(text: str, parse: Callable[[str], _T], default: str) -> _T:
             echo(f"  {error}", err=True)
 
 
-def name(taken: Collection[str]) -> Callable[[str], str]:
-    """Takes a word that can be a name in a deployment file and is none of those taken, or NONE."""
+def name(used: Collection[str]) -> Callable[[str], str]:
+    """Takes a word that can be a name in a deployment file and is not in use, or NONE."""
 
     from canshaper.config.flow import plain
 
@@ -141,8 +141,8 @@ def name(taken: Collection[str]) -> Callable[[str], str]:
         if text != NONE and not (text.isidentifier() and plain(text) == text):
             allowed = "a word of letters, digits and _, other than true, false and null"
             raise ValueError(f"expected {allowed}, got {text!r}")
-        if text in taken:
-            raise ValueError(f"expected another one than {', '.join(taken)}, got {text!r}")
+        if text in used:
+            raise ValueError(f"expected another one than {', '.join(used)}, got {text!r}")
         return text
 
     return parse
@@ -216,4 +216,4 @@ def whole(low: float, high: float) -> Callable[[str], int]:
 
 def period_ms(message: str) -> int:
     """Ask for the period of a message, in ms."""
-    return asked(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")
+    return ask(f"{message}: period in ms, which the DBC does not say", whole(1, 1000), "20")

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import MOST_OFFERED, NONE, asked, name, one, period_ms, whole
+from canshaper.cli.answers import MOST_OFFERED, NONE, ask, name, one, period_ms, whole
 from canshaper.cli.common import echo
 from canshaper.cli.node_questions import Nodes
 from canshaper.cli.scaling_questions import command_scaling, valve_scaling
@@ -33,7 +33,7 @@ def add_axes(
         likely = suggest.axis_name(command.name)
         default = f"{joystick.name}_{likely}" if likely in names else likely
         text = f"Axis of {message.name}.{command.name}, - for none"
-        axis = asked(text, name(names), default if two_sided else NONE)
+        axis = ask(text, name(names), default if two_sided else NONE)
         valve = None if axis == NONE else _valve_of(axis, command, others)
         if valve is None:
             continue
@@ -84,7 +84,7 @@ def _valve_of(
     first, *_ = commands
     alike = suggest.likeness(possible[0].name, command.name) >= suggest.LIKELY
     text = f"  {axis}: valve command, such as {', '.join([*commands][:MOST_OFFERED])}, - for none"
-    answer = asked(text, one([*commands, NONE]), first if alike else NONE)
+    answer = ask(text, one([*commands, NONE]), first if alike else NONE)
     if answer == NONE:
         return None
     others.remove(commands[answer][0])
@@ -109,4 +109,4 @@ def _timeout(axis: str, cycle_ms: int, set_ms: int) -> int:
         raise UsageError(f"{axis}: its valve has no timeout of three periods of {cycle_ms} ms")
     shortest, most = timeouts
     text = f"  {axis}: silence after which the valve closes by itself, ms (its manual)"
-    return asked(text, whole(shortest, most), str(min(max(set_ms or 200, shortest), most)))
+    return ask(text, whole(shortest, most), str(min(max(set_ms or 200, shortest), most)))

@@ -85,12 +85,12 @@ class Stop:
     """Asked for by SIGTERM or SIGINT; a second time it ends at once."""
 
     def __init__(self) -> None:
-        self.asked = False
+        self.requested = False
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
-        self.asked = True
+        self.requested = True
         signal.signal(number, signal.SIG_DFL)
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 from canshaper.cli.answers import (
     MOST_OFFERED,
     NONE,
-    asked,
+    ask,
     channel,
     one,
     period_ms,
@@ -54,14 +54,14 @@ def machine_of(
             "no message has a signal of more than two bits, which could be a joystick;"
             " see docs/deployment.md"
         )
-    channel_name = asked("CAN interface", channel, "can0")
-    bitrate = asked("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
+    channel_name = ask("CAN interface", channel, "can0")
+    bitrate = ask("Bit rate, bit/s", whole(*limits(Bus, "bitrate")), "250000")
     joysticks: list[tuple[FirstJoystick, Message]] = []
     chosen = _chosen(messages)
     for message in (message for message in possible if message.name in chosen):
         joysticks.append(_joystick(message, messages, [one for one, _ in joysticks], nodes))
-    taken = {*chosen, *(joystick.switch for joystick, _ in joysticks)}
-    others = [message for message in messages if message.name not in taken]
+    used = {*chosen, *(joystick.switch for joystick, _ in joysticks)}
+    others = [message for message in messages if message.name not in used]
     axes: list[FirstAxis] = []
     for joystick, message in joysticks:
         add_axes(axes, joystick, message, others, nodes)
@@ -97,7 +97,7 @@ def _data_bitrate(messages: "list[Message]", uses: Collection[str], bitrate: int
         return None
     most = limits(Bus, "data_bitrate")[1]
     text = "CAN FD: bit rate of the data, bit/s"
-    return asked(text, whole(bitrate, most), str(FIRST_DATA_BITRATE))
+    return ask(text, whole(bitrate, most), str(FIRST_DATA_BITRATE))
 
 
 def _chosen(messages: "list[Message]") -> list[str]:
@@ -109,7 +109,7 @@ def _chosen(messages: "list[Message]") -> list[str]:
     offered = [message.name for message in likely]
     text = f"Messages of the joysticks, such as {', '.join(offered[:MOST_OFFERED])}"
     names = [message.name for message in possible]
-    return asked(text, several(names), " ".join(enabled or offered[:1]))
+    return ask(text, several(names), " ".join(enabled or offered[:1]))
 
 
 def _page(message: "Message") -> "tuple[Message, int | None]":
@@ -123,7 +123,7 @@ def _page(message: "Message") -> "tuple[Message, int | None]":
     values = sorted({i for s in message.signals for i in s.multiplexer_ids or ()})
     text = f"{message.name}: value of {signal.name} with which it is meant, of"
     allowed = [str(value) for value in values]
-    answer = int(asked(f"{text} {', '.join(allowed)}", one(allowed), allowed[0]))
+    answer = int(ask(f"{text} {', '.join(allowed)}", one(allowed), allowed[0]))
     page = corrected(message, Protected(bus="", message=message.name, multiplexor=answer), {})
     return (message if isinstance(page, str) else page), answer
 
@@ -146,7 +146,7 @@ def _joystick(
     def switch(text: str, looks: re.Pattern[str], *, needed: bool = False) -> str | None:
         allowed = [signal.name for signal in left] + ([] if needed else [NONE])
         default = suggest.named(left, looks) or (allowed[0] if needed else NONE)
-        answer = asked(f"{message.name}: {text}, of {', '.join(allowed)}", one(allowed), default)
+        answer = ask(f"{message.name}: {text}, of {', '.join(allowed)}", one(allowed), default)
         left[:] = [signal for signal in left if signal.name != answer]
         return None if answer == NONE else answer
 
@@ -204,7 +204,7 @@ def _switch_elsewhere(
     enabling = (name for name in names if suggest.ENABLE.search(name))
     likely = names[0] if joysticks else next(enabling, names[0])
     offered = ", ".join(names[:MOST_OFFERED])
-    answer = asked(f"{message.name}: enable switch, such as {offered}", one(names), likely)
+    answer = ask(f"{message.name}: enable switch, such as {offered}", one(names), likely)
     if answer in joysticks:
         return None, None, answer, None
     of, _, signal = answer.partition(".")
@@ -220,5 +220,5 @@ def _code(signal: "Signal") -> int:
     text += ", ".join(f"{code} {name}" for code, name in choices.items())
     likely = suggest.enabling_code(signal)
     return int(
-        asked(text, one([str(code) for code in choices]), "" if likely is None else str(likely))
+        ask(text, one([str(code) for code in choices]), "" if likely is None else str(likely))
     )

@@ -4,7 +4,7 @@ from collections.abc import Callable, Collection, Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import NONE, asked, confirmed, several, whole
+from canshaper.cli.answers import NONE, ask, confirmed, several, whole
 from canshaper.cli.common import echo
 
 if TYPE_CHECKING:
@@ -47,10 +47,10 @@ class Nodes:
 
         eds = Eds(path)
         likely = _likely_name(path.stem, self.named)
-        name = asked(f"{path.name}: name of the node", _name(self.named), likely)
+        name = ask(f"{path.name}: name of the node", _name(self.named), likely)
         ids = [node.id for node in self.named.values()]
         free = next(number for number in range(_FIRST, _LAST + 1) if number not in ids)
-        node_id = asked(f"{name}: node id", _node_id(ids), str(eds.node or free))
+        node_id = ask(f"{name}: node id", _node_id(ids), str(eds.node or free))
         node = Node(eds, node_id)
         for pdo in node.pdos:
             off = "" if pdo.on else ", off"
@@ -64,12 +64,12 @@ class Nodes:
         if possible:
             likely = " ".join(n for n, digital in possible.items() if digital) or NONE
             text = f"  {name}: objects of which each bit is a switch, of {', '.join(possible)}"
-            switches = asked(f"{text}, - for none", several([*possible, NONE]), likely)
+            switches = ask(f"{text}, - for none", several([*possible, NONE]), likely)
         silent = [p.name for p in node.pdos if p.transmitted and p.event_timer_ms == 0]
         cycle_ms = None
         if silent:
             text = f"  {name}: event timer to be set for {', '.join(silent)}, ms"
-            cycle_ms = asked(text, whole(5, 1000), "20")
+            cycle_ms = ask(text, whole(5, 1000), "20")
         self.named[name] = node
         self.messages += messages.messages(node, name, switches, cycle_ms)
         self._pdos |= {messages.message_name(name, pdo): (name, pdo) for pdo in node.pdos}
@@ -119,7 +119,7 @@ class Nodes:
         from canshaper.config.first import FirstCanopen
 
         ids = [node.id for node in self.named.values()]
-        ours = asked("Node id of canshaper", _node_id(ids), str(_OURS))
+        ours = ask("Node id of canshaper", _node_id(ids), str(_OURS))
         text = "canshaper starts the nodes (NMT), as no other master does"
         master = confirmed(text, default=True)
         names = [name for name in self.named if any(self.name_of(m) == name for m in used)]
@@ -185,27 +185,27 @@ def _label(pdo: "Pdo", key: tuple[int, int]) -> str | None:
     return next((label for one, label in named if (one.index, one.subindex) == key), None)
 
 
-def _likely_name(stem: str, taken: Collection[str]) -> str:
+def _likely_name(stem: str, used: Collection[str]) -> str:
     word = "".join(c if c.isascii() and c.isalnum() else "_" for c in stem.lower()).strip("_")
     word = (word if word and word[0].isalpha() else f"node_{word}")[: _NAME_LETTERS - 3]
-    return next(n for n in (word, *(f"{word}_{i}" for i in range(2, 129))) if n not in taken)
+    return next(n for n in (word, *(f"{word}_{i}" for i in range(2, 129))) if n not in used)
 
 
-def _name(taken: Collection[str]) -> Callable[[str], str]:
-    """Takes a word that can begin the names of messages, and is none of those taken."""
+def _name(used: Collection[str]) -> Callable[[str], str]:
+    """Takes a word that can begin the names of messages, and is none of those in use."""
 
     def parse(text: str) -> str:
         if not (text.isidentifier() and text.isascii() and len(text) <= _NAME_LETTERS):
             allowed = f"a word of letters, digits and _, {_NAME_LETTERS} at most"
             raise ValueError(f"expected {allowed}, got {text!r}")
-        if text in taken:
-            raise ValueError(f"expected another one than {', '.join(taken)}, got {text!r}")
+        if text in used:
+            raise ValueError(f"expected another one than {', '.join(used)}, got {text!r}")
         return text
 
     return parse
 
 
-def _node_id(taken: Collection[int]) -> Callable[[str], int]:
+def _node_id(used: Collection[int]) -> Callable[[str], int]:
     """Takes a node id that no other node has, decimal or as 0x10."""
 
     def parse(text: str) -> int:
@@ -213,8 +213,8 @@ def _node_id(taken: Collection[int]) -> Callable[[str], int]:
             number = int(text, 0)
         except ValueError:
             number = 0
-        if not 1 <= number <= _LAST or number in taken:
-            others = f" other than {', '.join(map(str, taken))}" if taken else ""
+        if not 1 <= number <= _LAST or number in used:
+            others = f" other than {', '.join(map(str, used))}" if used else ""
             raise ValueError(f"expected a node id, 1 to {_LAST}{others}, got {text!r}")
         return number
 

@@ -3,7 +3,7 @@
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from canshaper.cli.answers import asked, one
+from canshaper.cli.answers import ask, one
 from canshaper.cli.common import echo
 from canshaper.report.console import OnProgress, progress_bar
 
@@ -14,11 +14,11 @@ class Terminal:
     def ready(self, words: str) -> None:
         """Say what to do, and wait for Enter."""
         echo(f"\n  {words}")
-        asked("Enter begins", str, "")
+        ask("Enter begins", str, "")
 
     def answer(self, question: str, default: str, allowed: Sequence[str] = ()) -> str:
         """Ask for a word, until it is one that is allowed."""
-        return asked(question, one(allowed) if allowed else str, default)
+        return ask(question, one(allowed) if allowed else str, default)
 
     @contextmanager
     def progress(self, what: str) -> Iterator[OnProgress]:

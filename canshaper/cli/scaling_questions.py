@@ -3,7 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import asked, confirmed, number, one
+from canshaper.cli.answers import ask, confirmed, number, one
 
 if TYPE_CHECKING:
     from cantools.database.can import Message, Signal
@@ -29,15 +29,15 @@ def command_scaling(signal: "Signal", message: "Message") -> "FirstScaling":
     kinds = [MIDDLE, *([FLAGS] if len(flags) > 2 else []), *([SECOND] if rockers else [])]
     guess = suggest.direction_flags(message, signal)
     text = f"  {signal.name}: direction by a middle value, flags or a second signal, of"
-    kind = asked(f"{text} {', '.join(kinds)}", one(kinds), FLAGS if guess else MIDDLE)
+    kind = ask(f"{text} {', '.join(kinds)}", one(kinds), FLAGS if guess else MIDDLE)
     if kind == MIDDLE:
         return _around_middle(signal)
     full = None if magnitude_range(signal) is None else _full(signal, 0.0)
     if kind == SECOND:
         text = f"  {signal.name}: the signal of the other direction, of {', '.join(rockers)}"
-        return FirstScaling(full, negative=asked(text, one(rockers), rockers[0]))
+        return FirstScaling(full, negative=ask(text, one(rockers), rockers[0]))
     text = f"  {signal.name}: flags of neutral, negative and positive, of {', '.join(flags)}"
-    chosen = asked(text, _three(flags), " ".join(guess or flags[:3]))
+    chosen = ask(text, _three(flags), " ".join(guess or flags[:3]))
     return FirstScaling(full, flags=chosen)
 
 
@@ -65,7 +65,7 @@ def _around_middle(signal: "Signal") -> "FirstScaling":
     low, high = suggest.reach(signal)
     middle = suggest.likely_middle(signal)
     text = f"  {signal.name}: its value in the middle, at zero command"
-    zero = asked(text, number(low, high), f"{middle:.12g}")
+    zero = ask(text, number(low, high), f"{middle:.12g}")
     return FirstScaling(_full(signal, zero), zero, _inverted(signal))
 
 
@@ -76,7 +76,7 @@ def _full(signal: "Signal", zero: float) -> float:
     likely = suggest.likely_full(signal, zero)
     distance = f", from {zero:g}" if zero else ""
     text = f"  {signal.name}: its value at full{distance}"
-    return asked(text, number(1e-6, _LARGEST), f"{likely:.12g}")
+    return ask(text, number(1e-6, _LARGEST), f"{likely:.12g}")
 
 
 def _inverted(signal: "Signal") -> bool:

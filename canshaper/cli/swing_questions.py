@@ -3,7 +3,7 @@
 import re
 from typing import TYPE_CHECKING
 
-from canshaper.cli.answers import MOST_OFFERED, NONE, asked, confirmed, number, one
+from canshaper.cli.answers import MOST_OFFERED, NONE, ask, confirmed, number, one
 
 if TYPE_CHECKING:
     from cantools.database.can import Message
@@ -34,25 +34,25 @@ def swing_of(axis: str, period_s: float) -> "Stopwatch | None":
     question = f"  {axis}: does it make the grapple swing"
     if not confirmed(question, default=not CALM.search(axis)):
         return None
-    seconds = asked("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
-    first = asked("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
-    last = asked("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
+    seconds = ask("    time of ten full swings, s", number(*_ten_swings_s(period_s)), "23.6")
+    first = ask("    how far the first of them goes (any unit)", number(1e-3, 1e6), "20")
+    last = ask("    and the one after the tenth", number(1e-3 * first, first), f"{first / 3:.3g}")
     allowed = number(*limits(Sway, "full_speed_m_s"))
-    speed = asked("    speed of the tip at full deflection, m/s", allowed, "1")
+    speed = ask("    speed of the tip at full deflection, m/s", allowed, "1")
     return Stopwatch(seconds, first, last, speed)
 
 
 def sensor_of(
-    axis: str, swing_s: float, others: "list[Message]", taken: "list[FirstAxis]"
+    axis: str, swing_s: float, others: "list[Message]", bound: "list[FirstAxis]"
 ) -> "FirstSensor | None":
-    """What measures the swing of an axis; ``others`` are messages left, ``taken`` have theirs."""
+    """What measures the swing of an axis; ``others`` are messages left, ``bound`` axes have one."""
     from canshaper.config.first import FirstSensor
     from canshaper.config.load import limits
     from canshaper.config.sway_sensor import SwaySensor
     from canshaper.machine import suggest
     from canshaper.machine.sway_sensor import LEAST_FUSION
 
-    used = {(one.sensor.message, one.sensor.signal) for one in taken if one.sensor}
+    used = {(one.sensor.message, one.sensor.signal) for one in bound if one.sensor}
     possible = {
         f"{message.name}.{signal.name}": (message, signal)
         for message, signal in suggest.sway_sensors(others, swing_s)
@@ -61,7 +61,7 @@ def sensor_of(
     if not possible:
         return None
     text = f"  {axis}: sway sensor on the tool, such as {', '.join([*possible][:MOST_OFFERED])}"
-    answer = asked(f"{text}, - for none", one([*possible, NONE]), NONE)
+    answer = ask(f"{text}, - for none", one([*possible, NONE]), NONE)
     if answer == NONE:
         return None
     message, signal = possible[answer]
@@ -70,12 +70,12 @@ def sensor_of(
     if (signal.unit or "").endswith("/s"):
         return FirstSensor(message.name, signal.name, "rate", timeout_ms)
     text = "    angle in the joint, or inclination against the vertical"
-    kind = asked(text, one(["angle", "inclination"]), "angle")
+    kind = ask(text, one(["angle", "inclination"]), "angle")
     fusion_s = None
     if kind == "inclination":
         shortest, longest = LEAST_FUSION * swing_s, limits(SwaySensor, "fusion_s")[1]
         text = "    time constant with which accelerations correct its gyro, s (its data sheet)"
-        fusion_s = asked(text, number(shortest, longest), f"{max(5.0, shortest):.2g}")
+        fusion_s = ask(text, number(shortest, longest), f"{max(5.0, shortest):.2g}")
     return FirstSensor(message.name, signal.name, kind, timeout_ms, fusion_s)
 
 
@@ -88,10 +88,10 @@ def slewing_of(axis: str) -> "FirstSlewing | None":
     if not confirmed(f"  {axis}: does it turn the crane", default=bool(SLEW.search(axis))):
         return None
     allowed = number(*limits(Slewing, "full_speed_rad_s"))
-    speed = asked("    speed at full deflection, rad/s (a turn is 6.28)", allowed, "0.5")
+    speed = ask("    speed at full deflection, rad/s (a turn is 6.28)", allowed, "0.5")
     least, most = limits(Slewing, "largest_radius_m")
     allowed = number(least, min(most, _FASTEST_M_S / speed))
-    return FirstSlewing(speed, asked("    largest radius of the tip, m", allowed, "9"))
+    return FirstSlewing(speed, ask("    largest radius of the tip, m", allowed, "9"))
 
 
 def _ten_swings_s(period_s: float) -> tuple[float, float]:
@@ -124,12 +124,12 @@ def motion_of(axes: "list[FirstAxis]", others: "list[Message]") -> "FirstMotion 
     likely = next((name for name in possible if NEAR_FAR.search(name)), NONE)
     text = f"Axis that moves the tip in and out, and is to move a little with {slew}, of"
     text += f" {', '.join(possible)}, - for none"
-    near_far = asked(text, one([*possible, NONE]), likely)
+    near_far = ask(text, one([*possible, NONE]), likely)
     if near_far == NONE:
         return None
     radii = suggest.radii(others, RADIUS_TIMEOUT_MS)
     if not radii:
         return FirstMotion(slew, near_far)
     text = f"Measured radius of the tip, of {', '.join(radii[:MOST_OFFERED])}, - for none"
-    radius = asked(text, one([*radii, NONE]), radii[0])
+    radius = ask(text, one([*radii, NONE]), radii[0])
     return FirstMotion(slew, near_far, None if radius == NONE else radius)

@@ -6,7 +6,7 @@ MIT-licensed Python package autosar-e2e and of torsko/autosar-e2e, which agree.
 
 All lay a header over the first bytes of a message. In profiles 1 and 2 the CRC fills byte 0, the
 counter the lower half of byte 1; 11 and 22 are the same with fewer variants. Other positions are
-not taken. Profiles 4 and 7 have headers of 12 and 20 bytes, which only frames of CAN FD hold.
+not supported. Profiles 4 and 7 have headers of 12 and 20 bytes, which only frames of CAN FD hold.
 """
 
 import binascii

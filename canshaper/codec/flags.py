@@ -98,7 +98,7 @@ class RockerVelocity:
 
 
 def _fault(flags: tuple[int, int, int]) -> Reason:
-    """Why these flags tell no direction."""
+    """Why these flags show no direction."""
     codes = {flag for flag in flags if flag > 1}
     if not codes:
         return Reason.JOYSTICK_CONTRADICTORY

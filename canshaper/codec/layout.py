@@ -19,7 +19,7 @@ FD_LENGTHS = (*range(9), 12, 16, 20, 24, 32, 48, 64)
 
 
 def layout_fault(message: Message) -> str | None:
-    """Why the bits of a message cannot be read, or None; cantools tells with a frame only."""
+    """Why the bits of a message cannot be read, or None; cantools reports it with a frame only."""
     if not isinstance(message.cycle_time, int | None):
         return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
     for signal in message.signals:

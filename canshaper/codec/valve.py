@@ -24,7 +24,7 @@ class ValveMessage:
         self.sender = sender
         self.raw: dict[str, Any] = dict(sender.fields.start)
         self.bus, self._id, self._extended = sender.key
-        # Where there is nothing to seal: a call less on the way of every frame.
+        # Where there is nothing to protect: a call less on the way of every frame.
         protector = sender.protector
         self._next = protector.protect if sender.protection.check else protector.without_check
 

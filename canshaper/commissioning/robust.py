@@ -90,11 +90,11 @@ def design_robust(
     tick_s = tick_ms / 1000.0
     if residual_pct is not None and duration_s is not None:
         raise UsageError("expected one of --duration and --residual, got both")
-    asked: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
+    requirements: dict[str, Any] = {"tick_s": tick_s, "range_pct": range_pct, "rate_per_s": rate}
     two = _second(second, mode, tick_s, rate)
     try:
-        without = _designed(mode, None, duration_s, residual_pct, asked)
-        shaper = _designed(mode, two, duration_s, residual_pct, asked) if two else without
+        without = _designed(mode, None, duration_s, residual_pct, requirements)
+        shaper = _designed(mode, two, duration_s, residual_pct, requirements) if two else without
         measured = _evaluated(bound, mode, tick_s, shaper)
     except ValueError as error:
         raise UsageError(f"axis {axis}: {error}") from None
@@ -106,7 +106,7 @@ def design_robust(
         range_pct,
         shaper,
         measured,
-        _section(shaper, mode, asked, tick_ms, two),
+        _section(shaper, mode, requirements, tick_ms, two),
         round(shaper.duration_s + 0.1, 1) if tail_s < shaper.duration_s else None,
         (two, without) if two else None,
     )
@@ -207,20 +207,20 @@ def _designed(
     second: SecondMode | None,
     duration_s: float | None,
     residual_pct: float | None,
-    asked: dict[str, Any],
+    requirements: dict[str, Any],
 ) -> RobustShaper:
 
     if residual_pct is not None:
-        return shortest(mode, residual_pct=residual_pct, second=second, **asked)
-    tick_s = asked["tick_s"]
+        return shortest(mode, residual_pct=residual_pct, second=second, **requirements)
+    tick_s = requirements["tick_s"]
     seconds = duration_s or round(0.77 * mode.period_s / tick_s) * tick_s
-    return least_residual(mode, duration_s=seconds, second=second, **asked)
+    return least_residual(mode, duration_s=seconds, second=second, **requirements)
 
 
 def _section(
     shaper: RobustShaper,
     mode: SwayMode,
-    asked: dict[str, Any],
+    requirements: dict[str, Any],
     tick_ms: int,
     second: SecondMode | None,
 ) -> dict[str, Any]:
@@ -228,9 +228,9 @@ def _section(
 
     designed_for: dict[str, Any] = {
         **designed(mode),
-        "length_range_pct": asked["range_pct"],
+        "length_range_pct": requirements["range_pct"],
         "duration_s": round(shaper.duration_s, 4),
-        "valve_rate_per_s": asked["rate_per_s"],
+        "valve_rate_per_s": requirements["rate_per_s"],
     }
     if second:
         covers = {"length_range_pct": second.range_pct}

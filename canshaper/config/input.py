@@ -1,4 +1,4 @@
-"""A message that is taken, as it stands in a deployment file."""
+"""A message that is received, as it stands in a deployment file."""
 
 from typing import Annotated
 
@@ -7,7 +7,7 @@ from canshaper.config.section import number
 
 
 class Input(Protected):
-    """A message that is taken, with its age limit and its protection."""
+    """A message that is received, with its age limit and its protection."""
 
     source: Annotated[int, number(0, 253, "", "source address of the sender, in J1939")] | None = (
         None

@@ -1,4 +1,4 @@
-"""How a message is protected, taken or sent: counter and checksum, or a profile of AUTOSAR E2E."""
+"""How a message is protected: alive counter and checksum, or a profile of AUTOSAR E2E."""
 
 from typing import Annotated, Any, Literal, NamedTuple, Self
 
@@ -137,7 +137,7 @@ class E2e(Section):
 
 
 class Protected(Section):
-    """A message that is taken or sent, and its protection."""
+    """A message that is received or sent, and its protection."""
 
     bus: str = Field(description="name of the bus of the message")
     message: str = Field(description="message in the DBC files")

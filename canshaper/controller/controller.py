@@ -106,7 +106,7 @@ class Controller:
         return NOWHERE.union(*(protocol.silent for protocol in self._protocols))
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a frame from a bus.
+        """A frame was received.
 
         Args:
             frame: the frame.

@@ -57,7 +57,7 @@ class InputFinder(Generic[_Input]):
 
 
 class _Noted(Generic[_Input]):
-    """An input that takes nothing, but notes that the frame is its own."""
+    """An input that keeps nothing, but notes that the frame is its own."""
 
     def __init__(self, finder: InputFinder[_Input], bound: _Input) -> None:
         self._finder = finder

@@ -19,7 +19,7 @@ class FrameProcessor(Protocol):
         """Whether the frame that was handed out last is one of a valve, and any moves."""
 
     def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
-        """Take a frame from a bus; what it leaves as on the other bus of a gateway, or None."""
+        """A frame was received; what it leaves as on the other bus of a gateway, or None."""
 
     def stalled(self) -> None:
         """The loop stood still for too long: what comes before the next tick has waited."""
@@ -54,7 +54,7 @@ class FramePort(Protocol):
 def receive_waiting(
     processor: FrameProcessor, ports: Mapping[str, FramePort], now_ns: int, standstill: Standstill
 ) -> int:
-    """Take all waiting frames; those of a joystick that pass a gateway leave at once or not at all.
+    """Receive what waits; frames of a joystick that pass a gateway leave at once or not at all.
 
     Args:
         processor: what the frames are for.
@@ -87,7 +87,7 @@ def io_cycle(
     missed: int,
     standstill: Standstill,
 ) -> None:
-    """Take all waiting frames, tick, send, then take what can wait.
+    """Receive all waiting frames, tick, send, then receive what can wait.
 
     A frame that moves a valve and was computed before the process was held up does not leave
     after that. Its tick is none that was made, so the next one sees how long the loop stood still.

@@ -23,14 +23,14 @@ class Reloads:
     def __init__(self, load: Callable[[], Deployment], refuse: Callable[[str], object]) -> None:
         self._load = load
         self._refuse = refuse
-        self._asked = False
+        self._requested = False
         self._reading: ConfigReload | None = None
         self.ready: Deployment | None = None
-        self._waiting_told = False
+        self._waiting_logged = False
 
     def ask(self) -> None:
         """Begin one at the next step; a signal handler may call it."""
-        self._asked = True
+        self._requested = True
 
     def step(self, *, neutral: bool) -> None:
         """Go a step towards the deployment as its files are now.
@@ -40,11 +40,11 @@ class Reloads:
         Args:
             neutral: nothing moves.
         """
-        if not (self._asked or self._reading or self.ready):
+        if not (self._requested or self._reading or self.ready):
             return
-        if self._asked and neutral:
+        if self._requested and neutral:
             self.end()  # of files that may have changed since
-            self._asked, self.ready = False, None
+            self._requested, self.ready = False, None
             try:
                 self._reading = ConfigReload(self._load)
             except OSError as error:
@@ -55,10 +55,10 @@ class Reloads:
                 self.ready = result
             else:
                 self._refuse(result)
-        waiting = not neutral and bool(self._asked or self.ready)
-        if waiting and not self._waiting_told:
+        waiting = not neutral and bool(self._requested or self.ready)
+        if waiting and not self._waiting_logged:
             log.info("reload=waiting until every axis is neutral")
-        self._waiting_told = waiting
+        self._waiting_logged = waiting
 
     def end(self) -> None:
         """End what is being read, if something is."""

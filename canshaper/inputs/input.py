@@ -1,4 +1,4 @@
-"""A message that is taken: is it whole, right, in sequence, and still fresh?"""
+"""A message that is received: is it whole, right, in sequence, and still fresh?"""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -51,7 +51,7 @@ class Input(ABC):
         self.commands: dict[str, float | Reason] = {}
 
     def receive(self, data: bytes, arrived_ns: int) -> FrameFault:
-        """Take a frame, or say what is wrong with it; only a good one is news."""
+        """Receive a frame, or return its fault; only a good one counts."""
         try:
             raw, commands = self._codec.decode(data)
         except WrongLengthError:

@@ -11,7 +11,7 @@ _new = tuple.__new__  # CommandInput(...) in half the time
 
 
 class JoystickInput(Input):
-    """Takes the frames of one joystick; answers what an axis may use of them at a moment.
+    """Receives the frames of one joystick; answers what an axis may use of them at a moment.
 
     Attributes:
         pressed: the switch to press, where it is none of its own.
@@ -110,7 +110,7 @@ class JoystickInput(Input):
         Args:
             signal: name of its velocity signal.
             now_ns: monotonic time.
-            releases: as they were when this axis asked last.
+            releases: as they were at the last tick of this axis.
             trip: a cause for neutral at once, handed through.
             neutral_band: |joystick| up to which it counts as neutral and may stand still for ever.
         """

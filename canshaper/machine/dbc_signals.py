@@ -30,7 +30,7 @@ def signals_fault(text: bytes, length: int) -> tuple[list[bytes], str | None]:
 def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
     multiplexers = sum(mark.endswith(b"M") for _, mark, *_ in rows)
     every = 0  # bits that any signal has; the lowest bit of the first byte is the lowest
-    taken: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
+    used: dict[bytes, int] = {b"": 0}  # those of each value of the multiplexer
     masks: list[tuple[bytes, int]] = []
     names: set[tuple[bytes, bytes]] = set()
     for name, mark, first, count, order in rows:
@@ -43,11 +43,11 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
         if (name, chosen) in names:
             return f"has two signals of the name {name.decode()}"
         names.add((name, chosen))
-        before = taken[b""] | taken.get(chosen, 0) if chosen else every
+        before = used[b""] | used.get(chosen, 0) if chosen else every
         if before & mask:
             other = next(n for n, m in masks if m & mask & before)
             return f"has overlapping signals, {other.decode()} and {name.decode()}"
-        taken[chosen] = taken.get(chosen, 0) | mask
+        used[chosen] = used.get(chosen, 0) | mask
         every |= mask
         masks.append((name, mask))
     return None

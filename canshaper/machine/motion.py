@@ -18,12 +18,12 @@ class BoundMotion:
 
 def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
     """Every motion, by name; an axis is part of one at most."""
-    taken: dict[str, str] = {}
+    moved: dict[str, str] = {}
     motions = {}
     for name, motion in lookup.config.motion.items():
         place: Place = ("motion", name)
         for key in ("slew", "near_far"):
-            _check_axis(lookup, (*place, key), getattr(motion, key), taken, turns=key == "slew")
+            _check_axis(lookup, (*place, key), getattr(motion, key), moved, turns=key == "slew")
         _check_crane(lookup, (*place, "near_far"), motion)
         radius = bind_radius(lookup, (*place, "radius"), motion.radius) if motion.radius else None
         motions[name] = BoundMotion(motion, radius)
@@ -31,7 +31,7 @@ def bind_motions(lookup: Lookup) -> dict[str, BoundMotion]:
 
 
 def _check_axis(
-    lookup: Lookup, place: Place, name: str | None, taken: dict[str, str], *, turns: bool
+    lookup: Lookup, place: Place, name: str | None, moved: dict[str, str], *, turns: bool
 ) -> None:
     if name is None:
         return
@@ -40,9 +40,9 @@ def _check_axis(
     if name not in axes:
         add(place, f"expected an axis, got {name!r}; there are {', '.join(axes)}")
         return
-    if name in taken:
-        add(place, f"expected an axis that is in no other motion, got {name!r} of {taken[name]}")
-    taken.setdefault(name, at)
+    if name in moved:
+        add(place, f"expected an axis that is in no other motion, got {name!r} of {moved[name]}")
+    moved.setdefault(name, at)
     for key in ("sway", "slewing") if turns else ("sway",):
         if getattr(axes[name], key) is None:
             add(place, f"expected an axis with {key}, got {name!r} without")

@@ -140,9 +140,9 @@ def report_dict(
         "crane": _crane_dict(raw, shaped),
         "axes": {name: _axis_dict(axis) for name, axis in _compare(raw, shaped).items()},
     }
-    taken = report.keys() & (facts or {}).keys()
-    if taken:
-        raise ValueError(f"facts may not replace {sorted(taken)} of the report")
+    repeated = report.keys() & (facts or {}).keys()
+    if repeated:
+        raise ValueError(f"facts may not replace {sorted(repeated)} of the report")
     return report | {name: _finite(fact) for name, fact in (facts or {}).items()}
 
 

@@ -183,8 +183,8 @@ class _Try:
         parts = range(1, 20) if far else ()
         self.line = [Bbox.from_bounds(x + dx * k / 20, y + dy * k / 20, 3.0, 3.0) for k in parts]
 
-    def is_free(self, taken: list[Bbox], others: list[Bbox], lines: list[Bbox]) -> bool:
+    def is_free(self, used: list[Bbox], others: list[Bbox], lines: list[Bbox]) -> bool:
         """Whether the name covers nothing, and its line none of the others."""
-        if any(self.box.overlaps(one) for one in (*taken, *lines)):
+        if any(self.box.overlaps(one) for one in (*used, *lines)):
             return False
         return not any(piece.overlaps(one) for piece in self.line for one in others)

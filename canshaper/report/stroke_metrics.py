@@ -66,12 +66,12 @@ def run_on_travel(t_s: list[float], trace: AxisTrace, stroke: Stroke) -> float:
 def dip(trace: AxisTrace, stroke: Stroke) -> float:
     """How far the output fell back while the joystick was held, in parts of full command."""
     first, last = stroke.plateau
-    sent_max, asked_max, dip = -math.inf, 0.0, 0.0
+    sent_max, command_max, dip = -math.inf, 0.0, 0.0
     for k in range(stroke.press, last + 1):
-        sent, asked = stroke.direction * trace.sent[k], abs(trace.joystick[k])
-        sent_max, asked_max = max(sent_max, sent), max(asked_max, asked)
+        sent, command = stroke.direction * trace.sent[k], abs(trace.joystick[k])
+        sent_max, command_max = max(sent_max, sent), max(command_max, command)
         if k >= first:
-            dip = max(dip, (sent_max - sent) - (asked_max - asked))
+            dip = max(dip, (sent_max - sent) - (command_max - command))
     return dip
 
 

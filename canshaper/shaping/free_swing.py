@@ -25,7 +25,7 @@ FIRST_S = 4.0
 # With a second mode: process noise of the first one's rate and of its own, and what is expected
 # of it at the first measurement, deg and deg/s. So slow is the first one that the second, which is
 # driven too, hardly gets into it.
-QUICKNESS_BESIDE, SECOND_QUICKNESS = 0.4, 5.0
+QUICKNESS_OF_TWO, SECOND_QUICKNESS = 0.4, 5.0
 FIRST_SECOND_DEG, FIRST_SECOND_DEG_S = 2.0, 20.0
 
 
@@ -88,7 +88,7 @@ class TwoFreeSwings(FreeSwing):
         by: what the second mode changes by in a tick, see ``step``.
     """
 
-    __slots__ = ("_beside", "_beside_first", "_by", "_second")
+    __slots__ = ("_by", "_first_of_second", "_gains_of_second", "_second")
 
     def __init__(
         self,
@@ -97,9 +97,9 @@ class TwoFreeSwings(FreeSwing):
         by: tuple[float, float, float, float],
     ) -> None:
         super().__init__(measured, [(one[0], one[1], one[2]) for one in gains])
-        self._beside_first = [(one[3], one[4]) for one in gains]
+        self._first_of_second = [(one[3], one[4]) for one in gains]
         self._by = by
-        self._beside = iter(self._beside_first)
+        self._gains_of_second = iter(self._first_of_second)
         self._second = FreeSwing(measured, [(0.0, 0.0, 0.0)])
 
     def step(self, by: tuple[float, float, float, float]) -> None:
@@ -113,7 +113,7 @@ class TwoFreeSwings(FreeSwing):
 
     def correct(self, error: float) -> float:
         """As without a second mode."""
-        angle, rate = next(self._beside, self._beside_first[-1])
+        angle, rate = next(self._gains_of_second, self._first_of_second[-1])
         second = self._second
         second.angle += angle * error
         second.rate += rate * error
@@ -122,7 +122,7 @@ class TwoFreeSwings(FreeSwing):
     def begin(self, unexplained: float) -> None:
         """The first measurement."""
         self._second.angle = self._second.rate = 0.0
-        self._beside = iter(self._beside_first)
+        self._gains_of_second = iter(self._first_of_second)
         super().begin(unexplained)
 
 
@@ -141,7 +141,7 @@ def observer_gains(
     """
     swing, ticks, offset = swing_over(mode, tick_s), tick_s / TICK_OF_NOISE_S, limits.offset
     rates, second = timing.measured is Measured.RATE, limits.second
-    quickness = timing.quickness if second is None else QUICKNESS_BESIDE
+    quickness = timing.quickness if second is None else QUICKNESS_OF_TWO
     shown = [float(not rates), float(rates), 1.0]
     step = [[1.0 + swing[0], swing[1], 0.0], [swing[2], 1.0 + swing[3], 0.0], [0.0, 0.0, 1.0]]
     noise = [ANGLE_PER_RATE * quickness, quickness, OFFSET_NOISE[timing.measured]]

@@ -67,9 +67,9 @@ class SmallStrokes:
         """
         if command:
             maximum = self._maximum
-            asked = min(max(command, -maximum), maximum)
-            self._due += asked - applied
-            self._left -= abs(asked)
+            clipped = min(max(command, -maximum), maximum)
+            self._due += clipped - applied
+            self._left -= abs(clipped)
             return target
         if low == 0.0 == high:  # nothing was commanded within the tail
             self.clear()

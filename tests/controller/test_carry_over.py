@@ -322,7 +322,7 @@ def test_the_joystick_that_counted_still_does(j1939: J1939Rig) -> None:
     j1939.events.clear()
     j1939.tick(bjm("BJM1", 0x34), bjm("BJM2"))
     assert j1939.fault == "SECOND_SENDER"
-    assert "bus=crane message=BJM1 source=0x34 ignored, taken=0x33" in j1939.events
+    assert "bus=crane message=BJM1 source=0x34 ignored, received=0x33" in j1939.events
     reload(j1939)
     j1939.events.clear()
     j1939.tick(bjm("BJM1", 0x34), bjm("BJM1"), bjm("BJM2"))

@@ -25,7 +25,7 @@ def test_nothing_is_sent_on_the_bus_of_the_deployment(tmp_path: Path) -> None:
     assert logged(tmp_path / "vcan0.log") == []
     assert found["vcan0"]["found"] == "up; a virtual bus, nothing else to check"
     assert found["joystick left"]["level"] == "bad"
-    assert found["joystick left"]["found"] == "0 frames heard"
+    assert found["joystick left"]["found"] == "0 frames received"
 
 
 def test_the_joysticks_are_heard(tmp_path: Path) -> None:

@@ -1,5 +1,6 @@
 """Names of mutants: each operator has its own, and a refactoring leaves it as it is."""
 
+import ast
 import runpy
 from collections.abc import Callable, Sequence
 from pathlib import Path
@@ -91,3 +92,25 @@ def test_a_name_without_a_reason_is_no_entry_nor_is_a_reason_without_a_name(
     file.write_text(f"# Mutants.\n\n{text}", encoding="utf-8")
     with pytest.raises(SystemExit, match="no name or no reason"):
         explained(file)
+
+
+def functions() -> set[str]:
+    """Every function of the program by its full name."""
+    names = set()
+    for path in (ROOT / "canshaper").rglob("*.py"):
+        module = ".".join(path.relative_to(ROOT).with_suffix("").parts)
+        waiting: list[tuple[str, ast.AST]] = [(module, ast.parse(path.read_text(encoding="utf-8")))]
+        while waiting:
+            name, node = waiting.pop()
+            for one in ast.iter_child_nodes(node):
+                if isinstance(one, ast.ClassDef | ast.FunctionDef):
+                    waiting.append((f"{name}.{one.name}", one))
+            if isinstance(node, ast.FunctionDef):
+                names.add(name)
+    return names
+
+
+def test_each_survivor_is_of_a_function_that_is_there() -> None:
+    reasons = explained(ROOT / "tests/mutation/survivors.txt")
+    assert len(reasons) > 100
+    assert {name.partition(":")[0] for name in reasons} - functions() == set()

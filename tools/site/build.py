@@ -55,7 +55,7 @@ def commands() -> Iterator[str]:
 
 
 def stage() -> None:
-    """Lay the sources as the repository has them, and what is generated beside them."""
+    """Lay the sources as the repository has them, and what is generated next to them."""
     shutil.rmtree(PAGES, ignore_errors=True)
     for name in SOURCES:
         place = PAGES / name

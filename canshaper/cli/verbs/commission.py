@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.answers import answered_by, asked, one
+from canshaper.cli.answers import answered_by, ask, one
 from canshaper.cli.common import (
     CHANNEL,
     FILE,
@@ -171,7 +171,7 @@ def _one(procedure: "Procedure", step: "Step") -> None:
         choices = (AGAIN, SKIP, STOP) if proposal.poor else (YES, AGAIN, SKIP, STOP)
         what = "accept" if not proposal.poor else "too poor"
         default = STOP if proposal.poor else YES
-        answer = asked(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
+        answer = ask(f"{step.name}: {what} ({', '.join(choices)})", one(choices), default)
         if answer == YES:
             procedure.accept(proposal)
         elif answer == SKIP:

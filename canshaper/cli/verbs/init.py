@@ -87,9 +87,9 @@ def init(
             names = [_relative(path, folder) for path in (*files, *([own] if eds else []))]
             machine = machine_of(messages, names, interface, nodes)
             uses = uses_of(machine, messages)
-            wanted = nodes.parameters(uses)
-            writes = set_by_sdo and _confirmed(machine, wanted)
-        notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in wanted)]
+            parameters = nodes.parameters(uses)
+            writes = set_by_sdo and _confirmed(machine, parameters)
+        notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in parameters)]
         if eds:
             _write_dbc(own, nodes)
         _write(file, draft, first_deployment(replace(machine, notes=notes)))
@@ -97,7 +97,7 @@ def init(
     for note in notes:
         echo(f"  {note}")
     if writes:
-        _set_by_sdo(machine, nodes, wanted)
+        _set_by_sdo(machine, nodes, parameters)
     left = [axis.name for axis in machine.axes if axis.swing and not _designed(file, axis.name)]
     echo("What comes next:")
     echo(f"  canshaper check {file}")
@@ -107,12 +107,12 @@ def init(
     echo(f"  canshaper commission {file}")
 
 
-def _confirmed(machine: "FirstMachine", wanted: "Sequence[Parameter]") -> bool:
+def _confirmed(machine: "FirstMachine", parameters: "Sequence[Parameter]") -> bool:
     """Whether parameters are to be written; on a real bus the operator is asked."""
-    if not wanted:
+    if not parameters:
         return False
     where = f"{machine.interface} channel {machine.channel}"
-    text = f"Write {len(wanted)} parameters into the nodes on {where}, now"
+    text = f"Write {len(parameters)} parameters into the nodes on {where}, now"
     return _bus(machine).is_virtual or confirmed(text, default=False)
 
 
@@ -122,10 +122,10 @@ def _bus(machine: "FirstMachine") -> "Bus":
     return Bus(interface=machine.interface, channel=machine.channel, bitrate=machine.bitrate)
 
 
-def _set_by_sdo(machine: "FirstMachine", nodes: Nodes, wanted: "Sequence[Parameter]") -> None:
+def _set_by_sdo(machine: "FirstMachine", nodes: Nodes, parameters: "Sequence[Parameter]") -> None:
     from canshaper.commissioning.nodes.parameters import write
 
-    for line in write(_bus(machine), nodes.named, wanted):
+    for line in write(_bus(machine), nodes.named, parameters):
         echo(f"  {line}")
 
 

@@ -57,13 +57,13 @@ class _Stop:
     """Asked for by SIGTERM or SIGINT."""
 
     def __init__(self) -> None:
-        self._asked = False
+        self._left = False
         for number in (signal.SIGTERM, signal.SIGINT):
             signal.signal(number, self._on_signal)
 
     def going(self) -> bool:
         """Whether no signal came yet."""
-        return not self._asked
+        return not self._left
 
     def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self._asked = True
+        self._left = True

@@ -89,12 +89,12 @@ def record(
     stop = Stop()
     log = out
     try:
-        log = out if out.suffix == ".log" else _beside(out)
+        log = out if out.suffix == ".log" else _log_of(out)
         with Live(console=console, refresh_per_second=4) as live:
 
             def report(so_far: "Recording") -> bool:
                 live.update(_line(so_far, out))
-                return not stop.asked
+                return not stop.requested
 
             recording.run(log, seconds, report)
             live.update(_line(recording, out))
@@ -127,7 +127,7 @@ def _last(file: str, control: Path | None) -> None:
     echo(f"written in {folder}")
 
 
-def _beside(out: Path) -> Path:
+def _log_of(out: Path) -> Path:
     """A new log next to a bundle, such as drive.x2k9.log: drive.log may be another recording.
 
     Raises:

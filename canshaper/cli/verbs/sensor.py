@@ -142,7 +142,7 @@ def _listen(deployment: "Deployment", log: Path, seconds: float | None) -> None:
         def report(so_far: Recording) -> bool:
             text = f"{so_far.seconds:.0f} s, {so_far.frames.total()} frames"
             shown.update(f"listening, drive now: {text} (Ctrl-C ends it)")
-            return not stop.asked
+            return not stop.requested
 
         recording.run(log, seconds, report)
 

@@ -97,20 +97,20 @@ def tune(
         refuse_shipped(file)
     bound, sway = swinging_axis(deployment, axis)
     try:
-        asked: dict[str, Any] = {
+        required: dict[str, Any] = {
             "max_jump": max_jump,
             "max_rate_per_s": max_rate,
             "max_run_on_s": max_run_on_s,
             "third_pole": third_pole,
         }
-        beyond = length_range_pct is not None or any(asked.values())
-        asked |= {"pole_distance": pole_distance, "within_command": within_command}
+        beyond = length_range_pct is not None or any(required.values())
+        required |= {"pole_distance": pole_distance, "within_command": within_command}
         task = _task(
             deployment,
             bound,
             sway,
             (q, r, s, p),
-            asked,
+            required,
             states=states,
             horizon_s=horizon_s,
             length_range_pct=length_range_pct,
@@ -131,27 +131,27 @@ def _task(
     bound: "BoundAxis",
     sway: "Sway",
     weights: tuple[float, float, float, float],
-    asked: dict[str, Any],
+    required: dict[str, Any],
     **options: Any,
 ) -> "Task":
     """What the options ask, with what the deployment says of the axis where they say nothing."""
     from canshaper.design.tuning.formulation import Requirements, Task, Weights
 
     limits = bound.config.limits
-    if asked["max_rate_per_s"] is None:
-        asked["max_rate_per_s"] = limits.slowest_per_s
-    elif asked["max_rate_per_s"] == float("inf"):
-        asked["max_rate_per_s"] = None
-    if asked["within_command"] is None:
-        asked["within_command"] = not limits.allow_faster
-    if options["length_range_pct"] is not None and asked["max_run_on_s"] is None:
-        asked["max_run_on_s"] = limits.tail_s
+    if required["max_rate_per_s"] is None:
+        required["max_rate_per_s"] = limits.slowest_per_s
+    elif required["max_rate_per_s"] == float("inf"):
+        required["max_rate_per_s"] = None
+    if required["within_command"] is None:
+        required["within_command"] = not limits.allow_faster
+    if options["length_range_pct"] is not None and required["max_run_on_s"] is None:
+        required["max_run_on_s"] = limits.tail_s
     q, r, s, p = weights
     return Task(
         mode=sway.mode(),
         tick_s=deployment.config.tick_ms / 1000.0 * bound.period_ticks,
         weights=Weights((q, q), r, s, p),
-        require=Requirements(**asked),
+        require=Requirements(**required),
         **options,
     )
 

@@ -52,15 +52,15 @@ def run_live(
         stopped = "Ctrl-C" if number == signal.SIGINT else signal.Signals(number).name
 
     before = {number: signal.signal(number, stop) for number in STOPS}
-    told_ns = 0
+    next_report_ns = 0
     limit_ns = boottime_ns() + round(1e9 * WAIT_LIMIT_S)
     standstill = Standstill(deployment)
 
     def body(now_ns: int, missed: int, _late_ns: int) -> bool:
-        nonlocal told_ns
+        nonlocal next_report_ns
         io_cycle(drive, ports, now_ns, missed, standstill)
-        if now_ns >= told_ns:
-            told_ns = now_ns + 200_000_000
+        if now_ns >= next_report_ns:
+            next_report_ns = now_ns + 200_000_000
             on_progress(drive)
         if stopped and not drive.ended:
             drive.ended = f"stopped: {stopped}"

@@ -43,7 +43,7 @@ def run_simulated(
 
 
 def _give_room(plant: PlantNode, deployment: Deployment, drive: CalibrationDrive) -> None:
-    """Bring the axis back with its joystick, as a person does who is told to."""
+    """Bring the axis back with its joystick, as a person does on request."""
     actuator = plant.crane.boom.axes[drive.axis]
     back = Script("back", (Stroke(drive.axis, 0.0, LONGEST_BACK_S, BACK),), 2.0 * LONGEST_BACK_S)
     hand = JoystickNode(deployment, back)

@@ -81,7 +81,7 @@ def _find(deployment: Deployment, message: str, signal: str, *, fd: bool) -> tup
             deployment, f"expected a signal of {message}, got {signal!r}; there are {names}"
         )
     if match[1].is_multiplexed():
-        raise _problem(deployment, f"{message} is multiplexed; nothing can be taken from it")
+        raise _problem(deployment, f"{message} is multiplexed; nothing can be read from it")
     lengths = FD_LENGTHS if fd else range(CLASSICAL_BYTES + 1)
     if match[1].length not in lengths:
         text = f"{message}: expected the length of a frame, {lengths[-1]} bytes at most"

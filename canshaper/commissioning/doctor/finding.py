@@ -13,7 +13,7 @@ class Level(Enum):
     WARNING = "warning"
     """It works; something can be better, or could not be checked."""
     BAD = "bad"
-    """Not fit until it is mended."""
+    """Not fit until it is repaired."""
 
 
 @dataclass(frozen=True)

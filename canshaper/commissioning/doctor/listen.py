@@ -54,8 +54,8 @@ def listen(
             on_progress(passed)
             ready, _, _ = select.select(list(sockets), [], [], min(LOOK_S, seconds - passed))
             for one in ready:
-                if taken := _next(one, sockets[one]):
-                    frame, time_ns = taken
+                if received := _next(one, sockets[one]):
+                    frame, time_ns = received
                     if bound := finder.find(frame, time_ns):
                         arrivals_ns[names[bound.key]].append(time_ns)
     finally:
@@ -88,7 +88,7 @@ def _regular(name: str, times_ns: list[int], cycle_ms: int, timeout_ms: int) -> 
     gaps = summary(gaps_ns)
     if gaps is None:
         remedy = "switch the machine on; look at bit rate, wiring and the id in the DBC file"
-        return Finding(name, Level.BAD, f"{len(times_ns)} frames heard", remedy)
+        return Finding(name, Level.BAD, f"{len(times_ns)} frames received", remedy)
     text = (
         f"{gaps.count + 1} frames, a period of {gaps.p50 / 1000:.1f} ms (DBC: {cycle_ms} ms),"
         f" the longest {gaps.max / 1000:.1f} ms"

@@ -34,7 +34,7 @@ class WatchedPort(RawPort):
         fd: what is sent in frames of CAN FD; None on a bus of classical CAN.
 
     Attributes:
-        taken: frames so far.
+        received: frames so far.
     """
 
     def __init__(
@@ -45,14 +45,14 @@ class WatchedPort(RawPort):
         on_sent: Callable[[Frame], None],
         fd: Iterable[tuple[int, bool]] | None = None,
     ) -> None:
-        self.taken = 0
+        self.received = 0
         self._on_sent = on_sent
         super().__init__(name, lambda _ids: [one], None, on_fault, confirms=False, fd=fd)
 
     def frames(self) -> Iterator[Frame]:
         """Every frame that waits."""
         for frame in super().frames():
-            self.taken += 1
+            self.received += 1
             yield frame
 
     def send(self, frame: Frame) -> bool:
@@ -95,7 +95,7 @@ class Loop:
         self._collector = Collector()
         # Arrays, not lists: the collector has nothing to look through in them.
         self._late, self._began, self._ended = array("q"), array("q"), array("q")
-        self._taken, self._sent = array("q"), array("q")
+        self._received, self._sent = array("q"), array("q")
         self._missed = 0
         self._events: list[tuple[str, str, str]] = []
         self._moved: set[str] = set()
@@ -115,7 +115,7 @@ class Loop:
         self._housekeeping(now_ns)
         self._late.append(late_ns)
         self._began.append(now_ns)
-        self._taken.extend(port.taken for port in self._ports.values())
+        self._received.extend(port.received for port in self._ports.values())
         self._missed += missed
         self._ended.append(boottime_ns())
         return now_ns < self._until_ns
@@ -140,7 +140,7 @@ class Loop:
             "late_ns": list(self._late),
             "began_ns": list(self._began),
             "ended_ns": list(self._ended),
-            "taken": list(self._taken),
+            "received": list(self._received),
             "sent": list(self._sent),
             "missed": self._missed,
             "events": self._events,

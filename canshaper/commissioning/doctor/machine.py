@@ -71,7 +71,7 @@ def preemption(root: Path, version: str) -> Finding:
         r"\bpreempt=(\w+)", _read(root / "proc/cmdline") or ""
     )
     if mode is None:
-        text = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt tells root which mode it is in"
+        text = "PREEMPT_DYNAMIC; /sys/kernel/debug/sched/preempt has for root which mode it is in"
         return Finding("kernel", Level.NOTE, text, "boot with preempt=full to be sure")
     text = f"PREEMPT_DYNAMIC in mode {mode[1]}"
     if mode[1] in ("full", "lazy"):

@@ -123,7 +123,7 @@ def run_of(
         late_ns=record["late_ns"][1:],
         valve_ns=[at_ns - began[tick] for tick, at_ns in last.items()],
         tick_ns=[end - begin for begin, end in zip(began, ended, strict=True)],
-        joystick_ns=_joystick_ns(deployment, record["taken"], sent, hand),
+        joystick_ns=_joystick_ns(deployment, record["received"], sent, hand),
         missed=record["missed"],
         events=[tuple(event) for event in record["events"]],
         moved=record["moved"],
@@ -135,7 +135,7 @@ def run_of(
 
 def _joystick_ns(
     deployment: Deployment,
-    taken: list[int],
+    received: list[int],
     sent: list[tuple[int, int, int]],
     hand: dict[str, list[tuple[int, int]]],
 ) -> list[int]:
@@ -151,7 +151,9 @@ def _joystick_ns(
     for number, axis in enumerate(deployment.axes.values()):
         joystick = axis.config.command.joystick
         bus = deployment.config.joysticks[joystick].bus
-        counts = taken[buses.index(bus) :: len(buses)]  # frames taken, up to and with each tick
+        counts = received[
+            buses.index(bus) :: len(buses)
+        ]  # frames received, up to and with each tick
         answers = [(tick, at_ns) for tick, valve, at_ns in sent if valve == number]
         i = 0
         for place, (which, at_ns) in enumerate(hand[bus]):

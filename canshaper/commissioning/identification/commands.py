@@ -121,12 +121,12 @@ class Commands:
         return None
 
     def others(self, axis: str) -> list[tuple[float, float]]:
-        """Stretches in which other axes are asked to move.
+        """Stretches in which other axes are commanded.
 
         By their joysticks where these are in the log: what a two-axis motion adds makes no swing.
         """
-        asked = [self._of(n, (self._joysticks, self._valves)) for n in self._axes if n != axis]
-        return [part for command in asked if command for part in _moving(command)]
+        others = [self._of(n, (self._joysticks, self._valves)) for n in self._axes if n != axis]
+        return [part for command in others if command for part in _moving(command)]
 
     def idle(self) -> list[tuple[float, float]] | None:
         """Stretches in which every axis stands; None where no command is in the log."""

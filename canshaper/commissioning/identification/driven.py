@@ -64,7 +64,7 @@ class Stretch:
 
 @dataclass(frozen=True, slots=True)
 class DrivenFit:
-    """What the driven swing tells.
+    """What the driven swing shows.
 
     Attributes:
         full_speed_m_s: speed of the tip at full command; None where the signal is no angle.

@@ -99,7 +99,7 @@ class Series:
         value: in rad, rad/s or its own unit.
         command: commands of the axis, where the log has them.
         idle: stretches in which no axis was commanded to move, s; None where that is not known.
-        others: stretches in which other axes were asked to move, s.
+        others: stretches in which other axes were commanded, s.
         at: value of the deployment's grapple signal, where the log has it.
         notes: what was left out while reading.
     """

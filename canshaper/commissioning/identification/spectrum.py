@@ -9,7 +9,7 @@ from scipy.signal import find_peaks
 from canshaper.commissioning.identification.series import Array, pieces
 
 SHORTEST_S, LONGEST_S = 0.3, 12.0
-# Values of a part of a signal from which on its spectrum tells something, and its length.
+# Values of a part of a signal from which on its spectrum shows something, and its length.
 LEAST_VALUES, PART_S = 24, 30.0
 # Width of the window that smooths, part of a period.
 SMOOTHED = 0.6

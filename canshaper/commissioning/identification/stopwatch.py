@@ -1,4 +1,4 @@
-"""Period and damping by stopwatch: swings counted, seconds taken, first and last amplitude read."""
+"""Period and damping by stopwatch: swings counted and timed, first and last amplitude read."""
 
 import math
 

@@ -24,11 +24,11 @@ _TIME = re.compile(r"time|zeit|seconds|timestamp|^t$|uptime", re.IGNORECASE)
 _TIME_UNITS = {"s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "μs": 1e-6, "ns": 1e-9}
 _GYRO = re.compile(r"gyr|rotation.?rate|angular.?(rate|vel)|omega|drehrate", re.IGNORECASE)
 _ACCELERATION = re.compile(r"acc|beschl", re.IGNORECASE)
-# Time between samples of a phone or a logger, s; tells the unit of times that have none.
+# Time between samples of a phone or a logger, s; shows the unit of times that have none.
 _SAMPLING_S = (5e-4, 0.5)
 # A table with more wrong lines than one in so many is no table.
 _WRONG_LINES = 50
-# No sensor tells more, in whatever unit, and nanoseconds since 1970 are fewer; squares stay finite.
+# No sensor has more, in whatever unit, and nanoseconds since 1970 are fewer; squares stay finite.
 _LARGEST = 1e30
 # The year 2286; no clock is there.
 _LATEST_S = 1e10
@@ -76,7 +76,7 @@ class Table:
         """The column of that name, with or without its unit, large or small.
 
         Raises:
-            IdentificationError: there is none; tells those that are there.
+            IdentificationError: there is none; the message lists those that are there.
         """
         lower = name.strip().lower()
         for known in self.columns:

@@ -110,10 +110,10 @@ def missing(node: Node, used: Sequence[tuple[Pdo, Use]]) -> Iterator[str]:
             yield f"{timer}: expected every {use.cycle_ms} ms by other means"
 
 
-_Wanted = tuple[tuple[int, int], int, str]
+_Setting = tuple[tuple[int, int], int, str]
 
 
-def _services(node: Node) -> Iterator[_Wanted]:
+def _services(node: Node) -> Iterator[_Setting]:
     if not node.value(*_HEARTBEAT):
         yield _HEARTBEAT, HEARTBEAT_MS, "ms between two heartbeats"
     if node.value(*_GUARD_TIME):
@@ -121,7 +121,7 @@ def _services(node: Node) -> Iterator[_Wanted]:
     yield _EMCY, EMERGENCY + node.id, "identifier of its emergency messages"
 
 
-def _of_pdo(node: Node, pdo: Pdo, use: Use) -> Iterator[_Wanted]:
+def _of_pdo(node: Node, pdo: Pdo, use: Use) -> Iterator[_Setting]:
     if pdo.transmission not in _BY_EVENT:
         yield (pdo.index, TRANSMISSION), _PROFILE, f"{pdo.name} on no SYNC"
     if pdo.transmitted and use.cycle_ms:

@@ -48,10 +48,10 @@ def explain(program: Program) -> str:
     """Say which requirements conflict and, for each, what the others leave attainable."""
     limits = _limits(program.task)
     slow, fast = program.task.slowest()[0], program.task.fastest()[0]
-    asked = "; ".join(text.format(f"{limit:.3g}") for limit, text in limits.values())
+    requirements = "; ".join(text.format(f"{limit:.3g}") for limit, text in limits.values())
     lines = [
         f"no poles of {slow:.3g} ({program.task.slowest()[1]}) to {fast:.3g} rad/s"
-        f" ({program.task.fastest()[1]}) keep all of: {asked}"
+        f" ({program.task.fastest()[1]}) keep all of: {requirements}"
     ]
     for name, (_, text) in limits.items():
         others = {n: limit for n, (limit, _) in limits.items() if n != name}

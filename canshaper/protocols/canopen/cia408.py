@@ -1,7 +1,7 @@
 """A valve of CiA 408: brought step by step into the state in which it follows its set point.
 
 Control and status word as a maker's own driver uses them: init, disabled, hold, active, at least
-50 ms apart, each when the status word tells the state before. The set point stays 0 until then,
+50 ms apart, each when the status word shows the state before. The set point stays 0 until then,
 because the axis is neutral until then. A fault is reset by an edge of the ready bit; the axis stays
 tripped until the operator resets it.
 """
@@ -57,7 +57,7 @@ class ValveControl(Input):
         arrived_ns: int,
         accepted: bool,
     ) -> FrameFault:
-        """The low four bits tell the state; that it has left ACTIVE takes no trust."""
+        """The low four bits have the state; that it has left ACTIVE takes no trust."""
         state = int(raw[self._signal]) & STATE_MASK
         self._left |= state != ValveState.ACTIVE
         if accepted:

@@ -67,7 +67,7 @@ class RemoteNode:
     def alarm(self, data: bytes, _arrived_ns: int) -> FrameFault:
         """Receive an emergency message.
 
-        Error code 0 tells that one error is over; only with an error register of 0 are all.
+        Error code 0 says that one error is over; only with an error register of 0 are all.
         """
         if len(data) != 8:
             return FrameFault.WRONG_LENGTH

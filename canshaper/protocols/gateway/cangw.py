@@ -79,7 +79,7 @@ def changed_bytes(keep: int, put: int, length: int) -> tuple[tuple[int, bytes], 
 def load_module() -> None:
     """Load the module, where it is none of the kernel's own parts and not there yet."""
     if not Path("/sys/module/can_gw").exists():
-        subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # add() tells why
+        subprocess.run(["modprobe", "can-gw"], capture_output=True, check=False)  # add() says why
 
 
 def rules() -> list[Rule]:

@@ -1,6 +1,6 @@
 """Which frames pass a gateway: all but some, in the words that filters of the kernel take.
 
-A filter of can-gw, and each of those of a socket, tells the frames that it wants. All frames but a
+A filter of can-gw, and each of those of a socket, names the frames that it passes. All frames but a
 few are the union of patterns that cover the rest; no two of them meet, so no frame passes twice.
 """
 

@@ -101,7 +101,7 @@ class AddressClaim:
             and (destination == GLOBAL or (destination == self._address and not lost))
         ):
             pgn = int.from_bytes(frame.data, "little")
-            self._asked(pgn, source, now_ns, by_name=destination != GLOBAL)
+            self._on_request(pgn, source, now_ns, by_name=destination != GLOBAL)
 
     def _contended(self, other: int, now_ns: int) -> None:
         if other > self._number and not self._guest:
@@ -112,7 +112,7 @@ class AddressClaim:
         self._refused.clear()
         self._due_ns = now_ns + self._delay_ns
 
-    def _asked(self, pgn: int, source: int, now_ns: int, *, by_name: bool) -> None:
+    def _on_request(self, pgn: int, source: int, now_ns: int, *, by_name: bool) -> None:
         if pgn == CLAIMED:
             lost = self.state is ClaimState.LOST
             self._claim_at(now_ns + (self._delay_ns if lost else 0))

@@ -24,7 +24,9 @@ class SourceEvent:
         """For the log."""
         text = f"bus={self.bus} message={self.message} source={self.source:#04x}"
         return (
-            text if self.source == self.received else f"{text} ignored, taken={self.received:#04x}"
+            text
+            if self.source == self.received
+            else f"{text} ignored, received={self.received:#04x}"
         )
 
 

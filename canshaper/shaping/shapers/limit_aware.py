@@ -38,7 +38,7 @@ class LimitAware:
     """
 
     spreads = True
-    __slots__ = ("_asked", "_gff", "_shaper", "_sway", "_twin")
+    __slots__ = ("_gff", "_shaper", "_sway", "_twin", "_unlimited")
 
     def __init__(self, sway: SwayModel, shaper: Fir, rate_per_s: float = math.inf) -> None:
         omega, fastest = sway.mode.omega_rad_s, -1.0 / (POLE_PER_OMEGA * sway.tick_s)
@@ -52,29 +52,29 @@ class LimitAware:
         self._sway = sway
         self._twin = SwayModel(sway.mode, sway.tick_s)
         self._shaper = shaper
-        self._asked = 0.0
+        self._unlimited = 0.0
 
     def copy_state(self, old: "LimitAware") -> None:
         """Go on from where another one stands."""
-        self._twin = old._twin.retuned(self._sway.mode, old._asked)
-        self._asked = old._asked
+        self._twin = old._twin.retuned(self._sway.mode, old._unlimited)
+        self._unlimited = old._unlimited
         self._shaper.copy_state(old._shaper)
 
     def reset_to_steady_state(self, command: float) -> None:
         """Begin with a command that has long been there, and no swing that limits have made."""
         self._twin.angle, self._twin.rate = self._sway.angle, self._sway.rate
-        self._asked = command
+        self._unlimited = command
         self._shaper.reset_to_steady_state(command)
 
     def step(self, command: float) -> float:
         """Output for this tick's command, before limits."""
         sway, twin = self._sway, self._twin
-        twin.step(self._asked)
+        twin.step(self._unlimited)
         if sway.angle == 0.0 == sway.rate:  # never moved, or started again after a fault
             twin.angle = twin.rate = 0.0
-        self._asked = asked = self._shaper.step(command)
+        self._unlimited = unlimited = self._shaper.step(command)
         return (
-            asked
+            unlimited
             - self._gff.k1 * (sway.angle + sway.free_angle - twin.angle)
             - self._gff.k2 * (sway.rate + sway.free_rate - twin.rate)
         )

@@ -61,7 +61,7 @@ def test_levels(gaps_ms: list[float], level: Level) -> None:
 def test_what_is_said() -> None:
     text = "100 frames, a period of 20.0 ms (DBC: 20 ms), the longest 60.0 ms"
     assert judged([20.0] * 99 + [60.0]).found == text
-    assert judged([]).found == "0 frames heard"
+    assert judged([]).found == "0 frames received"
 
 
 def test_other_buses_are_not_listened_to(two_buses: Path) -> None:

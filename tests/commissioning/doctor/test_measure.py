@@ -25,7 +25,7 @@ WAVING = Waving("waving", (), math.inf)
 
 
 def record(**changes: Any) -> dict[str, Any]:
-    empty = {"late_ns": [], "began_ns": [], "ended_ns": [], "taken": [], "sent": []}
+    empty = {"late_ns": [], "began_ns": [], "ended_ns": [], "received": [], "sent": []}
     rest = {"missed": 0, "events": [], "moved": [], "faults": {}, "policy": None, "memory": None}
     return {**empty, **rest, **changes}
 
@@ -44,7 +44,7 @@ def test_a_joystick_frame_is_answered_by_the_valve_frame_of_the_tick_that_took_i
         late_ns=[0, 1 * MS, 2 * MS],
         began_ns=[10 * MS, 30 * MS, 50 * MS],
         ended_ns=[12 * MS, 33 * MS, 54 * MS],
-        taken=[1, 4, 7],
+        received=[1, 4, 7],
         sent=[
             *(0, 0, 10 * MS, 0, 1, 11 * MS, 0, 2, 11 * MS),
             *(1, 0, 31 * MS, 1, 1, 31 * MS, 1, 2, 32 * MS),
@@ -66,7 +66,7 @@ def test_buses_and_slow_valves_are_kept_apart(two_buses: Path) -> None:
         late_ns=[0] * 4,
         began_ns=[t * MS for t in (10, 20, 30, 40)],
         ended_ns=[t * MS for t in (11, 21, 31, 41)],
-        taken=[*(0, 0), *(1, 0), *(1, 2), *(2, 2)],  # crane, boom
+        received=[*(0, 0), *(1, 0), *(1, 2), *(2, 2)],  # crane, boom
         sent=[
             *(0, 0, 10 * MS, 0, 1, 10 * MS, 0, 2, 10 * MS),
             *(2, 0, 32 * MS, 2, 1, 32 * MS, 2, 2, 33 * MS),  # every second tick

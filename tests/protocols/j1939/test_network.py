@@ -43,7 +43,7 @@ def test_the_first_of_two_joysticks_counts_and_the_other_is_named_once(rig: Rig)
     assert flow(sent) > 50.0
     assert rig.fault == "SECOND_SENDER"
     named = [e for e in rig.events if "ignored" in e]
-    assert named == ["bus=crane message=BJM1 source=0x34 ignored, taken=0x33"]
+    assert named == ["bus=crane message=BJM1 source=0x34 ignored, received=0x33"]
 
 
 def test_the_other_joystick_takes_over_after_silence_and_never_in_motion(rig: Rig) -> None:
