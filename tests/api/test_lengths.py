@@ -7,7 +7,7 @@ import pytest
 
 ROOT = Path(__file__).parents[2]
 MOST = 60
-TREES = ("canshaper", "sim", "studies", "tools", "benchmarks", "examples")
+TREES = ("canshaper", "sim", "studies", "tools", "benchmarks", "examples", "tests")
 VERBS = ROOT / "canshaper" / "cli" / "verbs"
 
 

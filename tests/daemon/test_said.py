@@ -64,6 +64,19 @@ class Diary:
         monkeypatch.setattr(module, "Collector", Collector)
         monkeypatch.setattr(module, "refuse_huge_pages", lambda: diary.note("no huge pages"))
         monkeypatch.setattr(module, "lock_memory", lambda: diary.note("memory locked"))
+        self._watch_box(monkeypatch)
+        send = FakePort.send
+
+        def sends(port: FakePort, frame: Any) -> bool:
+            if 0x200 <= frame.can_id <= 0x202:
+                diary.note(f"{port.name} {frame.can_id:#x}")
+            return send(port, frame)
+
+        monkeypatch.setattr(FakePort, "send", sends)
+        bench.opening = lambda channel: diary.note(f"open {channel}")
+
+    def _watch_box(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        diary, bench = self, self._bench
         begin, close, after_tick = BlackBox.begin, BlackBox.close, BlackBox.after_tick
 
         def begins(box: BlackBox, now_ns: int) -> None:
@@ -82,15 +95,6 @@ class Diary:
         monkeypatch.setattr(BlackBox, "after_tick", follows)
         monkeypatch.setattr(BlackBox, "begin", begins)
         monkeypatch.setattr(BlackBox, "close", closes)
-        send = FakePort.send
-
-        def sends(port: FakePort, frame: Any) -> bool:
-            if 0x200 <= frame.can_id <= 0x202:
-                diary.note(f"{port.name} {frame.can_id:#x}")
-            return send(port, frame)
-
-        monkeypatch.setattr(FakePort, "send", sends)
-        bench.opening = lambda channel: diary.note(f"open {channel}")
 
     def note(self, line: str) -> None:
         self.lines.append((len(self.starts) - 1, line))

@@ -77,14 +77,7 @@ class AxisJudge:
         """
         joystick, axis = self.joystick, self.axis
         faults = joystick.faults(axis, now_ns)
-        alone = joystick.disagreements > self._disagreements or joystick.disagree(now_ns)
-        self._disagreements = joystick.disagreements
-        off = joystick.fresh(now_ns) and joystick.enable() == 0
-        released = alone or off or joystick.releases > self._releases
-        pressed = joystick.presses[axis.name] > self._presses or joystick.resets > self._resets
-        pressed |= self._pressed_again
-        self._releases, self._resets = joystick.releases, joystick.resets
-        self._presses = joystick.presses[axis.name]
+        alone, released, pressed = self._switches(now_ns)
         causes, self.causes = self.causes, set()
         self._pressed_since = pressed or (self._pressed_since and not causes)
         in_motion = self.state in MOVING  # as it told last; ``agrees`` holds that against the valve
@@ -129,6 +122,18 @@ class AxisJudge:
         self._bounds(index, deflection if abs(deflection) > axis.band else 0.0, slewing)
         stops = began == FREE and self.mode == STOP and bool(faults)
         self._must_fall = stops and self._settled()
+
+    def _switches(self, now_ns: int) -> tuple[bool, bool, bool]:
+        """Whether an enable switch does not agree, enable is released, a switch was pressed."""
+        joystick, name = self.joystick, self.axis.name
+        alone = joystick.disagreements > self._disagreements or joystick.disagree(now_ns)
+        off = joystick.fresh(now_ns) and joystick.enable() == 0
+        released = alone or off or joystick.releases > self._releases
+        pressed = joystick.presses[name] > self._presses or joystick.resets > self._resets
+        pressed |= self._pressed_again
+        self._disagreements, self._releases = joystick.disagreements, joystick.releases
+        self._resets, self._presses = joystick.resets, joystick.presses[name]
+        return alone, released, pressed
 
     def _go(self, mode: int) -> None:
         self.mode = mode
