@@ -57,9 +57,11 @@ test-long: .venv/test-ready
 test-others: .venv/test-ready
 	$(NICE) .venv/bin/python -m pytest -q -m "not study" $(GATE:%=--ignore=%)
 
-# Every seed of noise, instant of a fault and combination of a sway sensor; prints the worst.
+# Every seed of noise, instant of a fault and combination of a sway sensor, prints the worst; the
+# other 7500 drives with faults.
 test-studies: .venv/test-ready
-	$(NICE) .venv/bin/python -m pytest -q -s -m study tests/closed_loop tests/commissioning/sensor
+	$(NICE) .venv/bin/python -m pytest -q -s -m study tests/closed_loop tests/commissioning/sensor \
+		tests/faults
 
 test-socketcan: .venv/test-ready
 	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_socketcan.py tests/hil/test_daemon.py \

@@ -172,7 +172,7 @@ class Controller:
         if self._stood_still:
             self._stood_still = False
             self._invalidate()
-        overrun = self._overruns(missed) if missed or self._overrun.late else False
+        overrun = self._overrun.tick(late=missed > 0) if missed or self._overrun.late else False
         changed = []
         silent = self.silent_buses if self._protocols else NOWHERE
         if missed or self.motions:
@@ -219,6 +219,7 @@ class Controller:
     def _before_axes(self, now_ns: int, last: int, now: int) -> None:
         """Axes have held their output for what was missed; what moves as one adds to them."""
         if now > last + 1:
+            self.counters.add(FrameFault.MISSED_DEADLINE, now - last - 1)
             for runner in self.axes.values():
                 runner.hold(last, now)
         for motion in self.motions:
@@ -239,7 +240,6 @@ class Controller:
             motion = bound.config
             near_far = self.axes[motion.near_far] if motion.near_far else None
             slew, radius = self.axes[motion.slew], inputs.radii.get(name)
-            slew.radius = radius
             one = MotionRunner(name, motion, slew, near_far, radius, tick_s=tick_s)
             self.motions.append(one)
 
@@ -253,11 +253,6 @@ class Controller:
                 self.counters.add(event.fault)
         if sensor := self._sensors.get(name):
             self.events += sensor.events()
-
-    def _overruns(self, missed: int) -> bool:
-        if missed:
-            self.counters.add(FrameFault.MISSED_DEADLINE, missed)
-        return self._overrun.tick(late=missed > 0)
 
     def stalled(self) -> None:
         """The loop stood still for longer than any input may be old: nothing good still holds.

@@ -72,6 +72,7 @@ class MotionRunner:
         self._radius, self._circle_m, self._tick_s = radius, config.radius_m, tick_s
         slewing = slew.bound.config.slewing
         assert slewing is not None  # checked with the deployment
+        slew.add_radius(radius)
         turning = _Member(slew, slewing.full_speed_rad_s)
         self._near_far = _Member(near_far, _full_speed_m_s(near_far)) if near_far else None
         self._members = [one for one in (turning, self._near_far) if one]
@@ -117,8 +118,7 @@ class MotionRunner:
         tip_m = self._radius.fresh(now_ns) if self._radius else None
         self._motion.step((now - last) * tick_s, tip_m, self._circle_m)
         for member in members:
-            member.runner.added = member.moving.added
-            member.runner.damps = member.moving.damps
+            member.runner.add_velocity(member.moving.added, damps=member.moving.damps)
         if tip_m is None and self._radius and not apart:
             apart = RADIUS
         return None if apart == self._apart else self._changed(apart)

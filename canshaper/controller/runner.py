@@ -2,13 +2,14 @@
 
 import math
 from dataclasses import replace
-from typing import Protocol, Self
+from typing import Self
 
 from canshaper.codec.frame import Frame
 from canshaper.config.schema import AxisConfig
 from canshaper.controller.sets import SetChooser
 from canshaper.inputs.feedback import Feedback
 from canshaper.inputs.input import EmergencyStopInput
+from canshaper.inputs.joystick import CommandSource
 from canshaper.inputs.profile import ProfileChoice
 from canshaper.inputs.sway_sensor import SensorNode, SwaySensorInput, SwaySignal
 from canshaper.inputs.value import ValueInput
@@ -29,31 +30,15 @@ FOREIGN_NS = 1_000_000_000
 LEAST_RADIUS_M = 0.5
 
 
-class CommandSource(Protocol):
-    """Where an axis gets its joystick from."""
-
-    def command(
-        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
-    ) -> CommandInput:
-        """What the axis may use now, see ``JoystickInput``."""
-
-    @property
-    def releases(self) -> int:
-        """How often its enable was seen released."""
-
-
 class AxisRunner:
     """One axis with its codecs: when it is due, what it sends.
 
     Attributes:
         bound: the axis with its codecs, and with the configuration that is in force.
         period_ticks, period_s: time between two commands to its valve.
-        added: velocity that a two-axis motion adds to this one, fraction of full speed.
-        damps: the motion makes this axis swing, which a sway sensor may damp.
         alone: a measurement is made with it: it is part of no motion.
         feedback: what the valve says of itself, where it does.
         chooser: which sway data and filter are in force, where there is a choice.
-        radius: measured radius of the tip, of an axis that turns: its speed is by that.
     """
 
     def __init__(self, bound: BoundAxis, tick_s: float, joystick: CommandSource) -> None:
@@ -80,12 +65,11 @@ class AxisRunner:
         self._trip: Reason | None = None  # noted since the last tick
         self._invalid = False  # the input was lost since the last tick, though it may be back
         self._foreign_ns: int | None = None  # arrival of the last frame of a foreign sender
-        self.added = 0.0
-        self.damps = False
+        self.add_velocity(0.0, damps=False)
         self.alone = False
         self._interlocks: list[Interlock] = []
         self.chooser: SetChooser | None = None
-        self.radius: ValueInput | None = None
+        self._radius: ValueInput | None = None
         self._sway_signal: SwaySignal | None = None
         self.feedback = Feedback(bound.feedback, period_s) if bound.feedback else None
 
@@ -112,10 +96,18 @@ class AxisRunner:
         self._trip = self._trip or Reason.SECOND_SENDER
         self._foreign_ns = now_ns
 
+    @property
+    def added(self) -> float:
+        """Velocity that a two-axis motion adds to this axis, fraction of full speed."""
+        return self._added
+
+    def add_velocity(self, added: float, *, damps: bool) -> None:
+        """What a two-axis motion adds to this axis from now on, see ``Axis.act``."""
+        self._added, self._damps = added, damps
+
     def drop_added(self) -> None:
         """Nothing is added any more, and the next output is not faster for what was."""
-        self.added = 0.0
-        self.damps = False
+        self.add_velocity(0.0, damps=False)
         self.axis.drop_added()
 
     def add_interlock(self, interlock: Interlock) -> None:
@@ -135,6 +127,10 @@ class AxisRunner:
         damps, timing = bound.config.use == "damp", bound.timing(self.period_s)
         self.axis.sensed = SensedSway(sway, timing, bound.limits, damps=damps)
 
+    def add_radius(self, radius: ValueInput | None) -> None:
+        """Of an axis that turns: the speed of its tip is by this radius, where it is measured."""
+        self._radius = radius
+
     def measured_by(self, node: SensorNode) -> None:
         """Count what its sway sensor measures only while this node works."""
         assert self._sway_signal is not None  # of an axis with a sensor
@@ -149,7 +145,7 @@ class AxisRunner:
         """
         self._joystick = joystick
         self.alone = True
-        self.added, self.damps = 0.0, False
+        self.add_velocity(0.0, damps=False)
         if axis is not None:
             self.axis, self.chooser = axis, None
 
@@ -224,8 +220,8 @@ class AxisRunner:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
             value, scale = self._sway_signal.take(), self._scale(now_ns)
-            axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self.damps)
-        transition = axis.act(command, self.added, damps=self.damps)
+            axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
+        transition = axis.act(command, self._added, damps=self._damps)
         self._put(axis.raw)
         return transition
 
@@ -259,7 +255,7 @@ class AxisRunner:
 
     def _scale(self, now_ns: int) -> float:
         """Swing in rad of a model angle of 1, see ``SwayModel``, at the tip's full speed now."""
-        if self.radius is not None and (radius_m := self.radius.fresh(now_ns)):
+        if self._radius is not None and (radius_m := self._radius.fresh(now_ns)):
             slewing = self.bound.config.slewing
             assert slewing is not None  # checked with the deployment
             self._full_speed_m_s = max(radius_m, LEAST_RADIUS_M) * slewing.full_speed_rad_s

@@ -1,6 +1,6 @@
 """What is known of one joystick now: its last good frame, and what an axis may use of it."""
 
-from typing import Any, Self
+from typing import Any, Protocol, Self
 
 from canshaper.codec.frame import FrameFault
 from canshaper.inputs.input import GOOD, Input, Switch
@@ -8,6 +8,19 @@ from canshaper.machine.inputs import BoundJoystick
 from canshaper.shaping.states import CommandInput, Reason
 
 _new = tuple.__new__  # CommandInput(...) in half the time
+
+
+class CommandSource(Protocol):
+    """Where an axis gets its joystick from."""
+
+    def command(
+        self, signal: str, now_ns: int, releases: int, trip: Reason | None, neutral_band: float
+    ) -> CommandInput:
+        """What the axis may use now, see ``JoystickInput``."""
+
+    @property
+    def releases(self) -> int:
+        """How often its enable was seen released."""
 
 
 class JoystickInput(Input):

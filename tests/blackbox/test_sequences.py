@@ -22,7 +22,7 @@ from tests.faults.guarded import Unrefused
 from tests.faults.sequence import Sequence
 from tests.faults.shipped import CONFIG, NAMES
 
-COUNT = int(os.environ.get("CANSHAPER_BOXES", "6"))
+COUNT = int(os.environ.get("CANSHAPER_BOXES", "3"))
 
 
 def kept(name: str, seed: int) -> list[tuple[bytes, bytes]]:

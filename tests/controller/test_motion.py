@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import pytest
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.controller.events import MotionEvent, StateEvent
 from canshaper.shaping.axis import Axis
@@ -422,6 +422,16 @@ def test_missed_ticks_are_no_way_that_is_lost(changed_rig: Make) -> None:
         way += sum(near_far(rig, 200, Slew=1000))
         ways.append(way * TICK_S)
     assert ways[1] == pytest.approx(ways[0], abs=0.01)
+
+
+def test_only_a_deadline_that_was_missed_is_counted(changed_rig: Make) -> None:
+    rig = moving_as_one(changed_rig)
+    rig.run(3, Slew=1000)
+    counters = rig.controller.counters
+    assert counters.last_fault is FrameFault.NONE
+    rig.tick(missed=2)
+    assert counters.last_fault is FrameFault.MISSED_DEADLINE
+    assert counters.values["MissedDeadlines"] == 2
 
 
 def test_an_axis_that_is_measured_is_alone(changed_rig: Make) -> None:

@@ -19,9 +19,17 @@ from tests.faults.variants import NAMES, machine
 
 DRIVES = 10_000
 CHUNK = 250
+# So many in every run; the others in ``make test-studies``.
+OFTEN = 2_500
 
 
-@pytest.mark.parametrize("first", range(0, DRIVES, CHUNK))
+@pytest.mark.parametrize(
+    "first",
+    [
+        *range(0, OFTEN, CHUNK),
+        *(pytest.param(i, marks=pytest.mark.study) for i in range(OFTEN, DRIVES, CHUNK)),
+    ],
+)
 def test_no_fault_makes_a_wrong_move(first: int) -> None:
     stats: Counter[str] = Counter()
     wrong = []
