@@ -127,8 +127,9 @@ class JoystickInput(Input):
             trip: a cause for neutral at once, handed through.
             neutral_band: |joystick| up to which it counts as neutral and may stand still for ever.
         """
-        pressed, known = self.pressed, self.releases
-        now_released = self.released
+        pressed = self.pressed
+        known = self._releases if pressed is None else pressed.releases
+        now_released = self._released if pressed is None else pressed.released
         released = now_released or known > releases
         if pressed is not None and (gone := pressed.lost(now_ns)):
             # Not known is not enabled; that it is known again is no press.
