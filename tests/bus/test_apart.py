@@ -437,7 +437,7 @@ def test_a_line_that_is_closed_meanwhile_is_no_end(held: Held) -> None:
     bus.shutdown()
 
 
-def test_where_nobody_says_how_much_waits_nothing_does() -> None:
+def test_where_no_one_says_how_much_waits_nothing_does() -> None:
     assert unsent(-1) == 0
     with suppress(OSError):
         apart.discard_unsent(-1)

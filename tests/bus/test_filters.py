@@ -38,7 +38,7 @@ MESSAGES = st.frozensets(
 
 
 @given(taken=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
-def test_each_message_is_heard_by_the_socket_that_is_for_it(
+def test_each_message_is_received_by_the_socket_that_is_for_it(
     taken: frozenset[tuple[int, bool]],
     sent: frozenset[tuple[int, bool]],
     known: frozenset[tuple[int, bool]],

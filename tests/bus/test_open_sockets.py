@@ -109,7 +109,7 @@ def test_on_a_bus_of_can_fd_every_socket_has_its_frames(made: list[Made]) -> Non
     assert [options(one, RAW).get(socket.CAN_RAW_FD_FRAMES) for one in made] == [None] * 3
 
 
-def test_an_interface_that_is_not_set_up_for_can_fd_is_told(
+def test_an_interface_that_is_not_set_up_for_can_fd_is_reported(
     made: list[Made], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     there = tmp_path / "sys/class/net/can0"
@@ -311,7 +311,7 @@ def test_a_port_of_socketcan_has_the_name_the_messages_and_the_faults_of_its_bus
         one.close()
 
 
-def test_an_error_without_words_is_told_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_error_without_words_is_reported_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
     def none(*_: object) -> None:
         raise ValueError
 

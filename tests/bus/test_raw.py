@@ -136,7 +136,7 @@ def test_another_deployment_gets_its_own_filters(
     assert filtered == [(line.near, others)]
 
 
-def test_what_overflows_of_ids_that_nobody_knows_is_no_fault() -> None:
+def test_what_overflows_of_ids_that_no_one_knows_is_no_fault() -> None:
     """Frames of others at their own pace: nothing of ours is lost."""
     faults, _ = overflowing(UNKNOWN)
     assert faults == []
@@ -166,7 +166,7 @@ def overflowing(number: int) -> tuple[list[FrameFault], RawPort]:
 
 
 @pytest.mark.parametrize("number", [TAKEN, SENT_BACK])
-def test_a_queue_that_has_run_over_is_told_once_for_each_time(number: int) -> None:
+def test_a_queue_that_has_run_over_is_reported_once_for_each_time(number: int) -> None:
     """On UDP, whose queue overflows as that of a CAN socket does."""
     faults: list[FrameFault] = []
     pairs = [udp_pair() for _ in range(3)]
@@ -224,7 +224,7 @@ def test_a_full_queue_of_the_interface_is_a_failed_send_and_no_more(line: Line, 
     assert line.port.send(VALVE)
 
 
-def test_another_error_is_told_until_a_frame_gets_through(line: Line) -> None:
+def test_another_error_is_reported_until_a_frame_gets_through(line: Line) -> None:
     line.near[SENT_BACK].fail = OSError(errno.EINVAL, "other")
     for _ in range(3):
         assert not line.port.send(VALVE)

@@ -35,7 +35,7 @@ def up(line: Line) -> None:
         near.fail = None
 
 
-def test_an_interface_that_is_down_is_told_once_and_used_again(line: Line) -> None:
+def test_an_interface_that_is_down_is_reported_once_and_used_again(line: Line) -> None:
     line.unconfirmed(most=2)
     down(line)
     for _ in range(10):

@@ -118,7 +118,9 @@ def test_two_files_meet_the_same_drives(tmp_path: Path) -> None:
         ("accept: { residual_p99: 1 }", "accept.residual_p99: "),
     ],
 )
-def test_a_wrong_range_or_limit_is_told_with_its_line(tmp_path: Path, more: str, line: str) -> None:
+def test_a_wrong_range_or_limit_is_reported_with_its_line(
+    tmp_path: Path, more: str, line: str
+) -> None:
     done = campaign(machine(tmp_path, more), "--out", str(tmp_path / "out"))
     assert done.exit_code == 2
     assert line in done.output
@@ -138,7 +140,7 @@ def test_a_share_without_a_drive_is_refused(tmp_path: Path) -> None:
     assert (done.exit_code, done.output) == (2, "--shard: expected 3 shares at most, got 5/5\n")
 
 
-def test_a_report_that_cannot_be_is_told_before_anything_is_driven(tmp_path: Path) -> None:
+def test_a_report_that_cannot_be_is_reported_before_anything_is_driven(tmp_path: Path) -> None:
     out, file = tmp_path / "out", tmp_path / "file"
     file.touch()
     for report, text in (
@@ -150,7 +152,7 @@ def test_a_report_that_cannot_be_is_told_before_anything_is_driven(tmp_path: Pat
         assert not out.exists()
 
 
-def test_an_out_that_is_a_file_is_told(tmp_path: Path) -> None:
+def test_an_out_that_is_a_file_is_reported(tmp_path: Path) -> None:
     (tmp_path / "out").touch()
     done = campaign(PLAIN, "--out", str(tmp_path / "out"))
     assert (done.exit_code, done.output) == (2, f"{tmp_path / 'out'}: File exists\n")

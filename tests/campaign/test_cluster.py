@@ -120,7 +120,7 @@ def test_a_worker_that_is_killed_loses_no_drive_and_none_counts_twice(
     assert {name: column[::20] for name, column in columns.items()} == expected
 
 
-def test_a_worker_of_another_version_is_told_and_the_rest_goes_on(
+def test_a_worker_of_another_version_is_reported_and_the_rest_goes_on(
     nodes: Nodes, tmp_path: Path
 ) -> None:
     copy = another_version(tmp_path / "other")
@@ -144,7 +144,7 @@ def test_only_workers_of_another_version_end_the_campaign(nodes: Nodes, tmp_path
     assert "every worker has another version than this program" in done.output
 
 
-def test_a_scheduler_that_is_not_there_is_told_in_one_line(
+def test_a_scheduler_that_is_not_there_is_reported_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("canshaper.campaign.engine.CONNECT_S", 0.5)
@@ -158,7 +158,7 @@ def test_a_scheduler_that_is_not_there_is_told_in_one_line(
 @pytest.mark.parametrize(
     "address", ["nonsense", "tcp://host:port", "tcp://127.0.0.1", "http://x:1"]
 )
-def test_an_address_that_is_none_is_told_before_anything_connects(
+def test_an_address_that_is_none_is_reported_before_anything_connects(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, address: str
 ) -> None:
     def connects(*_arguments: object, **_options: object) -> None:

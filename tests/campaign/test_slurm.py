@@ -134,7 +134,7 @@ def test_what_slurm_refuses_ends_the_campaign_in_one_line(monkeypatch: pytest.Mo
     assert says("squeue", "--noheader") == ""
 
 
-def test_a_machine_without_slurm_is_told_in_one_line(
+def test_a_machine_without_slurm_is_reported_in_one_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))

@@ -111,7 +111,7 @@ def test_a_folder_without_drives_cannot_be_merged(tmp_path: Path) -> None:
         Store(tmp_path / "a", ABOUT).merge(tmp_path / "none")
 
 
-def test_a_file_that_is_cut_off_is_told(tmp_path: Path) -> None:
+def test_a_file_that_is_cut_off_is_reported(tmp_path: Path) -> None:
     store = Store(tmp_path, ABOUT)
     store.add([row(1)])
     store.flush()

@@ -182,7 +182,7 @@ def test_run_moves_nothing_over_a_long_way_that_is_not_stated(
     assert invoke("run", str(file), "--listen-only").exit_code == 3  # as it moves nothing
 
 
-def test_check_of_a_broken_file_tells_every_problem(broken: Path) -> None:
+def test_check_of_a_broken_file_reports_every_problem(broken: Path) -> None:
     result = invoke("check", str(broken))
     assert result.exit_code == 2
     assert result.stdout == ""

@@ -66,7 +66,7 @@ def logs(out: Path) -> dict[str, Any]:
     return {f"{log['machine']}/{Path(log['log']).name}": log for log in rows}
 
 
-def test_every_log_is_replayed_through_both_and_a_bad_one_is_told(
+def test_every_log_is_replayed_through_both_and_a_bad_one_is_reported(
     fleet: Path, tmp_path: Path
 ) -> None:
     done = run("replay", str(fleet), "--config", PLAIN, "--config", ROBUST, "--out", str(tmp_path))
@@ -114,14 +114,14 @@ def test_periods_of_all_machines_and_where_one_has_drifted(fleet: Path, tmp_path
 
 
 @pytest.mark.parametrize("verb", [("replay", "--config"), ("identify", "--file")])
-def test_a_folder_without_logs_is_told(verb: tuple[str, str], tmp_path: Path) -> None:
+def test_a_folder_without_logs_is_reported(verb: tuple[str, str], tmp_path: Path) -> None:
     (tmp_path / "empty").mkdir()
     done = run(verb[0], str(tmp_path / "empty"), verb[1], PLAIN, "--out", str(tmp_path / "out"))
     text = f"{tmp_path / 'empty'}: expected a folder with logs, got one without\n"
     assert (done.exit_code, done.output) == (2, text)
 
 
-def test_a_log_that_is_cut_off_is_told_as_it_is_alone(fleet: Path, tmp_path: Path) -> None:
+def test_a_log_that_is_cut_off_is_reported_as_it_is_alone(fleet: Path, tmp_path: Path) -> None:
     whole = gzip.compress((fleet / "north" / "monday.log").read_bytes())
     (tmp_path / "logs").mkdir()
     (tmp_path / "logs" / "cut.log.gz").write_bytes(whole[: len(whole) // 2])
@@ -170,7 +170,7 @@ def test_the_report_of_a_fleet_says_which_file_it_is_of(fleet: Path, tmp_path: P
     assert load_deployment(Path(PLAIN)).identity.lines()[0] in report.read_text()
 
 
-def test_a_part_that_the_log_does_not_have_is_told(fleet: Path, tmp_path: Path) -> None:
+def test_a_part_that_the_log_does_not_have_is_reported(fleet: Path, tmp_path: Path) -> None:
     log = str(fleet / "north" / "monday.log")
     done = CliRunner().invoke(
         app, ["replay", log, "--config", PLAIN, "--from", "900", "--out", str(tmp_path)]

@@ -26,7 +26,7 @@ def test_a_file_without_a_gateway_has_no_rules() -> None:
     assert "expected a section gateway, got none" in result.stderr
 
 
-def test_a_kernel_that_refuses_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_kernel_that_refuses_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse() -> list[Rule]:
         raise GatewayError("rules of can-gw cannot be listed: no")
 
@@ -40,7 +40,7 @@ def test_a_kernel_that_refuses_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     ("fallback", "told"),
     [("stop", "no joystick does"), ("neutral", "neutral joysticks do"), ("pass", "WARNING: ")],
 )
-def test_the_check_tells_what_passes(tmp_path: Path, fallback: str, told: str) -> None:
+def test_the_check_reports_what_passes(tmp_path: Path, fallback: str, told: str) -> None:
     text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
     file = tmp_path / "machine.yaml"
     file.write_text(text.replace("fallback: neutral", f"fallback: {fallback}"))

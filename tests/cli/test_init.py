@@ -205,7 +205,7 @@ def test_a_crane_that_no_axis_turns_has_no_motion(tmp_path: Path) -> None:
     assert (config.axes["slew"].slewing, config.motion) == (None, {})
 
 
-def test_a_wrong_answer_is_told_and_asked_again(tmp_path: Path) -> None:
+def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     given = {
         "CAN interface": "can 0\ncan0",

@@ -51,7 +51,7 @@ def test_valves_and_crane_do_the_same_whether_anybody_listens(
     assert {*sent} < {*received}
 
 
-def test_no_status_is_sent_where_nobody_listens() -> None:
+def test_no_status_is_sent_where_no_one_listens() -> None:
     deployment = load_deployment(CONFIG / "forwarder-robust.yaml")
     script = Script("still", (), 1.0)
     sent: list[Frame] = []

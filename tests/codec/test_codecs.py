@@ -113,7 +113,7 @@ def raw_joystick(joystick: int) -> bytes:
         (1023, Reason.JOYSTICK_NOT_AVAILABLE),
     ],
 )
-def test_codes_are_told_from_commands(raw: int, command: float | Reason) -> None:
+def test_codes_are_distinguished_from_commands(raw: int, command: float | Reason) -> None:
     values, commands = joystick("Joystick").decode(raw_joystick(raw))
     assert values["Joystick"] == raw
     assert commands == {"Joystick": pytest.approx(command)}
@@ -312,7 +312,7 @@ def axis_status(*values: Any) -> dict[str, Any]:
     return decoded
 
 
-def test_status_carries_what_it_is_told() -> None:
+def test_status_carries_what_it_gets() -> None:
     decoded = axis_status(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, -0.25, 12.34)
     assert decoded == pytest.approx(
         {

@@ -295,7 +295,7 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
         ),
     ],
 )
-def test_the_range_tells_whether_a_joystick_has_flags(
+def test_the_range_shows_whether_a_joystick_has_flags(
     machine: Machine, change: tuple[str, str], flags: bool, says: str
 ) -> None:
     line = machine.in_dbc("BO_ 272 JoystickLeft", "BO_ 272 JoystickLeft")

@@ -92,7 +92,7 @@ def test_a_frozen_counter_is_no_news_however_often_its_sender_was_silent() -> No
         assert not checker.qualified
 
 
-def test_after_silence_any_counter_but_the_last_begins_anew_once() -> None:
+def test_after_silence_any_counter_but_the_last_begins_again_once() -> None:
     for restart in range(256):
         checker = made()
         faults(checker, 100)
@@ -132,7 +132,7 @@ def qualified(checker: SequenceChecker, counts: list[int]) -> list[bool]:
     return [checker.check(b"", count) is GOOD and checker.qualified for count in counts]
 
 
-def test_one_good_frame_is_enough_unless_told() -> None:
+def test_one_good_frame_is_enough_by_default() -> None:
     assert qualified(made(), [1, 9, 10]) == [True, False, True]
 
 

@@ -126,7 +126,7 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
          "positive: C }", "expected one of flags and negative, got both"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_told(tmp_path: Path, new: str, told: str) -> None:
+def test_what_cannot_be_is_reported(tmp_path: Path, new: str, told: str) -> None:
     assert told in problems(tmp_path, ("signal: RotateLeft, negative: RotateRight", new))
 
 

@@ -68,7 +68,7 @@ def test_the_example_of_a_maker() -> None:
     ("steps", "data"),
     [(0, "00ff300000ffffff"), (64_000, "faff3100faffffff"), (-6_400, "19ff320019ffffff")],
 )
-def test_both_resolutions_tell_the_same(steps: int, data: str) -> None:
+def test_both_resolutions_report_the_same(steps: int, data: str) -> None:
     codec = avc("ExtFlow", "PortFlow")
     assert codec.steps == 64_000
     codec.put(steps)
@@ -169,12 +169,12 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_told(machine: Machine, valve: str, says: str) -> None:
+def test_what_does_not_fit_is_reported(machine: Machine, valve: str, says: str) -> None:
     found = with_valves(machine, ("Slew", f"message: AVC0, timeout_ms: 200, {valve}")).problems()
     assert any(says in problem for problem in found), found
 
 
-def test_a_flow_that_its_bits_do_not_reach_is_told_with_its_line(machine: Machine) -> None:
+def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Machine) -> None:
     broken = with_valves(
         machine, ("Slew", f"message: AVC0, signal: PortFlow, timeout_ms: 200, {CODES}")
     )

@@ -143,7 +143,7 @@ def test_a_wrong_kind_of_every_filter(tmp_path: Path, value: object) -> None:
         assert "expected one of 'off', 'gff'" in found[where(place)].message
 
 
-def test_faults_in_sets_are_told_as_everywhere(tmp_path: Path) -> None:
+def test_faults_in_sets_are_reported_as_everywhere(tmp_path: Path) -> None:
     data = whole(DeploymentConfig, "gff")
     axis = data["axes"]["name0"]
     axis["gain_schedule"][0]["breakpoint"] = 1e7

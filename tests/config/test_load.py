@@ -226,7 +226,7 @@ def test_keys_allowed_do_not_depend_on_the_name_of_the_axis(
     ]
 
 
-def test_all_problems_are_told_at_once_in_the_order_of_the_file(
+def test_all_problems_are_reported_at_once_in_the_order_of_the_file(
     shipped: str, problems: Problems
 ) -> None:
     text = shipped

@@ -148,7 +148,7 @@ def test_keys_are_words(file: Path, text: str, says: str) -> None:
     assert fault(file, text) == says
 
 
-def test_every_double_key_is_told_with_its_first_line(problems: Problems) -> None:
+def test_every_double_key_is_reported_with_its_first_line(problems: Problems) -> None:
     text = "a:\n  b: 1\n  c: 2\n  b: 3\nd: 4\na: 5\nd: 6\n"
     assert problems(text) == [
         "machine.yaml:4: a.b: key stands twice, first in line 2",

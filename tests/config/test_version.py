@@ -77,19 +77,21 @@ def test_an_old_file_is_answered_with_every_key_that_moved(problems: Problems) -
     assert len(ANSWERS) == 1 + len(MOVED)
 
 
-def test_done_as_told_it_is_a_good_file(load: Load, problems: Problems) -> None:
+def test_done_as_reported_it_is_a_good_file(load: Load, problems: Problems) -> None:
     assert problems(renamed(OLD)) == ANSWERS[:1]
     config = load(f"version: 1\n{renamed(OLD)}")
     assert config.joysticks["left"].stuck_s == 10
     assert config.axes["slew"].profiles["calm"].gain_schedule[0].breakpoint == 0
 
 
-def test_half_way_only_what_is_left_is_told(problems: Problems) -> None:
+def test_half_way_only_what_is_left_is_reported(problems: Problems) -> None:
     text = "version: 1\n" + renamed(OLD).replace("{ joystick: left", "{ lever: left")
     assert problems(text) == ["machine.yaml:16: axes.slew.command.lever: moved to joystick"]
 
 
-def test_other_faults_of_an_old_file_are_told_with_the_keys_that_moved(problems: Problems) -> None:
+def test_other_faults_of_an_old_file_are_reported_with_the_keys_that_moved(
+    problems: Problems,
+) -> None:
     text = OLD.replace("timeout_ms: 100", "timeout_ms: soon").replace("lever: left,", "lever: 3,")
     found = problems(text)
     assert len(found) == len(ANSWERS) + 2
@@ -97,7 +99,7 @@ def test_other_faults_of_an_old_file_are_told_with_the_keys_that_moved(problems:
     assert any(p.startswith("machine.yaml:15: axes.slew.command.joystick: ") for p in found)
 
 
-def test_a_key_with_both_names_is_told_once(problems: Problems) -> None:
+def test_a_key_with_both_names_is_reported_once(problems: Problems) -> None:
     text = "version: 1\n" + renamed(OLD).replace("tick_ms: 20", "tick_ms: 20\nlevers: {}")
     assert problems(text) == ["machine.yaml:3: levers: moved to joysticks"]
 

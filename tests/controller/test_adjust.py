@@ -54,7 +54,7 @@ def strokes(rig: Rig, *, ticks: int = 400) -> list[int]:
     return sent
 
 
-def test_the_table_tells_now_and_file_and_ends(make: Make) -> None:
+def test_the_table_reports_now_and_file_and_ends(make: Make) -> None:
     adjuster = Adjuster(make().controller)
     assert adjuster.table()["axes.slew.sway.period_s"] == {
         "now": 2.356,

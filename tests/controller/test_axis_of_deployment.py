@@ -84,7 +84,7 @@ def test_a_filter_that_feeds_back_knows_the_slower_rate_of_the_valve(
     assert max(got) > 0.5
 
 
-def test_an_axis_without_sway_tells_none(changed_rig: Make) -> None:
+def test_an_axis_without_sway_reports_none(changed_rig: Make) -> None:
     rig = changed_rig()
     for tick in range(20):
         status = rig.run(1, Lift=1000 if tick > 2 else 0).get("LiftStatus")
@@ -92,7 +92,7 @@ def test_an_axis_without_sway_tells_none(changed_rig: Make) -> None:
     assert rig.state("lift") is State.ACTIVE
 
 
-def test_an_axis_takes_its_joystick_from_where_it_is_told(rig: Rig) -> None:
+def test_an_axis_takes_its_joystick_from_where_it_is_connected(rig: Rig) -> None:
     class Elsewhere:
         deflection = 0.0
         releases = 0

@@ -19,7 +19,7 @@ def still(sent: dict[str, dict[str, Any]]) -> bool:
     return all(sent[v]["Velocity"] == 0 for v in VALVES)
 
 
-def test_a_tick_is_punctual_unless_told(rig: Rig) -> None:
+def test_a_tick_is_punctual_by_default(rig: Rig) -> None:
     for _ in range(3):
         assert [*rig.controller.tick(rig.now_ns)]
         rig.now_ns += TICK_NS
@@ -224,7 +224,7 @@ def test_a_wrong_frame_does_not_refresh_the_joystick(rig: Rig) -> None:
     assert rig.state() is State.STOPPING
 
 
-def test_bus_faults_are_told(rig: Rig) -> None:
+def test_bus_faults_are_reported(rig: Rig) -> None:
     rig.controller.counters.add(FrameFault.ERROR_FRAME)
     rig.controller.counters.add(FrameFault.BUS_ERROR)
     status = rig.tick()["ShaperStatus"]

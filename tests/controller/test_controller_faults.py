@@ -95,7 +95,7 @@ def test_neutral_frames_are_neutral_whatever_moves(rig: Rig) -> None:
 # -- time ------------------------------------------------------------------------------------------
 
 
-def test_a_stall_trips_what_moves_and_forgets_the_joysticks(rig: Rig) -> None:
+def test_a_stall_trips_what_moves_and_invalidates_the_joysticks(rig: Rig) -> None:
     rig.moving()
     rig.controller.stalled()
     assert still(rig.tick())

@@ -24,7 +24,7 @@ def test_without_a_word_of_it_nothing_begins(machine: Machine) -> None:
     assert machine.states() == READY
 
 
-def test_a_second_sender_is_told_without_a_word_of_it(machine: Machine) -> None:
+def test_a_second_sender_is_reported_without_a_word_of_it(machine: Machine) -> None:
     machine.rig.receive(Frame("crane", 0x200, False, bytes(2)))
     machine.rig.run(1)
     assert machine.states()[0] == (State.TRIPPED, "SECOND_SENDER")
@@ -106,7 +106,7 @@ def test_frames_that_are_wrong_are_none(changed_rig: Make, wrong: str) -> None:
     }.get(wrong, FrameFault.UNKNOWN_ID)
 
 
-def test_a_stall_forgets_it(machine: Machine) -> None:
+def test_a_stall_invalidates_it(machine: Machine) -> None:
     machine.moving()
     machine.rig.controller.stalled()
     assert still(machine.rig.tick())

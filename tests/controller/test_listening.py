@@ -33,7 +33,7 @@ def test_of_the_plain_machine_only_status_is_sent() -> None:
     assert sent("forwarder.yaml") == ids_of("forwarder.yaml", *names)
 
 
-def test_no_node_of_canopen_is_started_or_heard() -> None:
+def test_no_node_of_canopen_is_started_or_received() -> None:
     assert not sent("canopen-forwarder.yaml") & {0, 0x700 + canopen.OURS}
 
 
@@ -133,7 +133,7 @@ def test_after_an_outage_it_is_asked_for_again() -> None:
     assert set(sent_ids(rig, 50)) <= {j1939.NO_CLAIM}
 
 
-def test_no_fault_is_told_and_no_request_refused() -> None:
+def test_no_fault_is_reported_and_no_request_refused() -> None:
     rig = guest()
     rig.run(100)
     rig.receive(j1939.request(0xFECA), j1939.request(0xFEDA, to=j1939.OWN))

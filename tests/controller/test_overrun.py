@@ -133,7 +133,7 @@ def test_late_ticks_on_the_way_back_lengthen_it(rig: Rig) -> None:
     assert rig.state() is State.READY
 
 
-def test_what_is_left_of_a_storm_is_forgotten_in_fifty_ticks(rig: Rig) -> None:
+def test_what_is_left_of_a_storm_is_over_in_fifty_ticks(rig: Rig) -> None:
     rig.moving()
     for _ in range(3):
         for _ in range(MANY - 1):
@@ -158,7 +158,7 @@ def test_a_released_enable_in_the_tick_of_the_overrun_too(rig: Rig) -> None:
     assert (rig.state(), rig.reason()) == (State.TRIPPED, "ENABLE_LOST")
 
 
-def test_the_fault_of_a_joystick_is_told_before_that_of_the_loop(rig: Rig) -> None:
+def test_the_fault_of_a_joystick_is_reported_before_that_of_the_loop(rig: Rig) -> None:
     rig.moving()
     for _ in range(MANY - 1):
         late(rig, Slew=1000)

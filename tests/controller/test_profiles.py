@@ -139,7 +139,7 @@ def test_a_frame_that_does_not_count_is_no_press(changed_rig: Callable[..., Forw
         ),
     ],
 )
-def test_a_button_that_cannot_be_is_told(
+def test_a_button_that_cannot_be_is_reported(
     changed_rig: Callable[..., Forwarder], changes: dict[str, str], says: str
 ) -> None:
     with pytest.raises(ConfigError) as caught:

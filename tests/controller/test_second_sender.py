@@ -36,7 +36,7 @@ def test_its_valve_is_neutral_in_the_next_tick_and_no_other(rig: Rig, data: byte
     assert rig.controller.counters.last_fault is FrameFault.SECOND_SENDER
 
 
-def test_it_is_told_before_anything_moves(rig: Rig) -> None:
+def test_it_is_reported_before_anything_moves(rig: Rig) -> None:
     rig.receive(FOREIGN)
     rig.run(1)
     assert slew(rig) == TRIPPED

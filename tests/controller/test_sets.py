@@ -104,7 +104,7 @@ def test_the_weight_chooses_where_the_operator_has_no_choice(changed_rig: Make) 
     assert period_s(rig) == pytest.approx(2.9)
 
 
-def test_an_axis_without_a_choice_tells_the_set_0(changed_rig: Make) -> None:
+def test_an_axis_without_a_choice_reports_the_set_0(changed_rig: Make) -> None:
     rig = changed_rig(dbc=DBC)
     told = [
         sent["SlewStatus"]["ActiveSet"] for _ in range(20) if "SlewStatus" in (sent := rig.run())
@@ -154,7 +154,7 @@ def test_the_operator_chooses(chosen: Rig) -> None:
     assert poles(chosen) == base
 
 
-def test_the_status_tells_it_where_there_is_a_signal(chosen: Rig) -> None:
+def test_the_status_reports_it_where_there_is_a_signal(chosen: Rig) -> None:
     chosen.receive(load(1000))
     for _ in range(20):
         sent = chosen.run(1)
@@ -187,7 +187,7 @@ def test_between_two_sets_of_a_very_slow_swing_the_loop_goes_on(
     assert rig.controller.axes["slew"].axis.sent > 0.0
 
 
-def test_what_cannot_run_between_two_sets_is_told(changed_rig: Make) -> None:
+def test_what_cannot_run_between_two_sets_is_reported(changed_rig: Make) -> None:
     """Taps may miss the sum 1 by a thousandth; between two such, rounding can make it more."""
     one = "kind: robust, tick_ms: 20, taps: [0.056, 0.87, 0.075]"
     two = "kind: robust, tick_ms: 20, taps: [0.57, 0.2, 0.231]"
@@ -249,7 +249,7 @@ def test_in_full_motion_nothing_jumps(chosen: Rig) -> None:
         ),
     ],
 )
-def test_what_does_not_fit_is_told(changed_rig: Make, old: str, new: str, says: str) -> None:
+def test_what_does_not_fit_is_reported(changed_rig: Make, old: str, new: str, says: str) -> None:
     changed = {key: value.replace(old, new) for key, value in YAML.items()}
     assert changed != YAML
     with pytest.raises(ConfigError) as caught:

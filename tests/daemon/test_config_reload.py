@@ -109,7 +109,7 @@ def test_a_long_answer_comes_whole() -> None:
     assert len(answer_text) > 65_536
 
 
-def test_an_error_nobody_thought_of_is_a_refusal() -> None:
+def test_an_error_no_one_thought_of_is_a_refusal() -> None:
     def load() -> Deployment:
         raise ZeroDivisionError("division by zero")
 

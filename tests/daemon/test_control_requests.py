@@ -117,12 +117,14 @@ def test_the_log_says_who_asked_for_a_black_box(
     assert line.startswith("INFO black-box=asked uid=")
 
 
-def test_black_boxes_are_written_where_the_daemon_was_told(bench: Bench, tmp_path: Path) -> None:
+def test_black_boxes_are_written_where_the_daemon_was_started_with(
+    bench: Bench, tmp_path: Path
+) -> None:
     daemon = Daemon(lambda: load_deployment(bench.file), tmp_path)
     assert daemon._black_box.report()["folder"] == str(tmp_path)
 
 
-def test_a_request_that_is_none_is_told_what_is_one(bench: Bench, path: Path) -> None:
+def test_a_request_that_is_none_is_answered_with_what_is_one(bench: Bench, path: Path) -> None:
     assert answered(bench, path, {"get": 1}) == {
         "erro"
         "r": 'expected {} or {"set": {KEY: VALUE}} or {"black_box": "write"}, got another object'

@@ -84,7 +84,7 @@ def test_a_request_is_answered_and_says_who_asks(rig: Rig) -> None:
         (b"[" * 60000, "expected a request of 4096 bytes at most, got more"),
     ],
 )
-def test_nonsense_is_told_and_the_next_request_served(rig: Rig, data: bytes, why: str) -> None:
+def test_nonsense_is_reported_and_the_next_request_served(rig: Rig, data: bytes, why: str) -> None:
     with rig.connected() as one:
         one.send(data)
         rig.serve()

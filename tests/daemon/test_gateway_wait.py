@@ -146,7 +146,7 @@ def test_without_socketcan_it_says_that_others_do_not_pass(
     ]
 
 
-def test_rules_are_looked_at_while_nothing_moves_and_told_once(
+def test_rules_are_looked_at_while_nothing_moves_and_reported_once(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
     caplog.set_level(logging.INFO)

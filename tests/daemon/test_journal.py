@@ -132,7 +132,7 @@ def test_a_full_pipe_is_not_waited_for(pipe: Pipe) -> None:
     assert [line[3:8] for line in lines] == [f"{n:4} " for n in range(len(lines))]
 
 
-def test_some_lines_are_kept_the_others_are_counted_and_told(pipe: Pipe) -> None:
+def test_some_lines_are_kept_the_others_are_counted_and_reported(pipe: Pipe) -> None:
     """Every line is either there, in order, or in the count."""
     handler = JournalHandler(pipe.writer, journal=True)
     total = 5000
@@ -189,7 +189,7 @@ def test_a_full_disk_stops_nothing(lines: int) -> None:
         os.close(fd)
 
 
-def test_after_a_full_disk_the_log_goes_on_and_tells_the_gap(pipe: Pipe) -> None:
+def test_after_a_full_disk_the_log_goes_on_and_reports_the_gap(pipe: Pipe) -> None:
     full = os.open("/dev/full", os.O_WRONLY)
     fd = os.dup(full)
     handler = JournalHandler(fd, journal=True)
@@ -232,7 +232,7 @@ def test_kept_lines_that_find_the_disk_full_are_counted_too(pipe: Pipe) -> None:
     assert lines[1:] == [f"<4>{total - written} lines of the log were lost"]
 
 
-def test_a_terminal_that_nobody_reads_stops_nothing() -> None:
+def test_a_terminal_that_no_one_reads_stops_nothing() -> None:
     """A shell over a network that stalls: the terminal has room for a part of a line only."""
     master, slave = os.openpty()
     try:

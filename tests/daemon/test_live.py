@@ -105,7 +105,7 @@ def test_set_writes_when_asked(daemon: Daemon) -> None:
     )
 
 
-def test_set_tells_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
+def test_set_reports_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
     status, told = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
     assert (status, told) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
     daemon.logged(rf"set=refused uid=\d+ pid=\d+ {PERIOD}: expected 1.8 to 3, got 4")
@@ -138,7 +138,7 @@ def test_an_option_without_a_section_is_an_error() -> None:
     assert (status, "--control: the deployment file has no control section" in told) == (2, True)
 
 
-def test_one_that_listens_tells_its_status_and_no_valve(tmp_path: Path) -> None:
+def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> None:
     """Beside another controller on the same bus, whose frames have the ids of our valves."""
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     names = ("JoystickLeft", "SlewCommand", "SlewStatus", "ShaperStatus")

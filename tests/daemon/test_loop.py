@@ -58,7 +58,7 @@ def test_the_first_call_is_at_once_and_the_others_at_their_deadlines() -> None:
     assert seen == [(i * PERIOD_NS, 0, 0) for i in range(5)]
 
 
-def test_it_ends_when_told_to_without_another_sleep() -> None:
+def test_it_ends_on_request_without_another_sleep() -> None:
     clock = Clock()
     assert calls(clock, []) == [(0, 0, 0)]
     assert clock.slept == []
@@ -153,7 +153,7 @@ def test_time_and_count_stay_together(work_ms: list[int], late_us: list[int]) ->
         assert 0 <= at - deadline * PERIOD_NS < PERIOD_NS
 
 
-def test_who_waits_otherwise_is_told_for_how_long() -> None:
+def test_who_waits_otherwise_is_informed_for_how_long() -> None:
     clock = Clock()
     waited: list[float] = []
     left = iter((True, True, False))

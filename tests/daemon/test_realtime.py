@@ -172,7 +172,7 @@ def test_below_a_limit_nothing_is_locked() -> None:
     assert locked == 0
 
 
-def test_a_refusal_of_the_kernel_is_told() -> None:
+def test_a_refusal_of_the_kernel_is_reported() -> None:
     """A root by name only, as containers have it: the limit holds for him."""
     if os.geteuid() != 0:
         pytest.skip("not root: below a limit the kernel is not asked")

@@ -467,7 +467,7 @@ def test_faults_of_messages_that_are_not_used_are_counted_in_the_log(
     ]
 
 
-def test_a_filter_that_no_longer_fits_is_told_in_the_log(
+def test_a_filter_that_no_longer_fits_is_reported_in_the_log(
     bench: Bench, caplog: pytest.LogCaptureFixture
 ) -> None:
     old = "a1: 0.708, a2: 0.12 } #"

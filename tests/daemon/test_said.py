@@ -305,7 +305,7 @@ def test_a_reload_in_motion_is_logged_as_waiting_while_it_waits(
 # -- buses of a reload -----------------------------------------------------------------------------
 
 
-def test_a_port_that_stays_open_is_told_what_it_is_for_now(
+def test_a_port_that_stays_open_gets_what_it_is_for_now(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     watched: list[Any] = []

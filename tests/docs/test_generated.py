@@ -69,7 +69,7 @@ def test_every_reason_fault_and_state_has_its_texts() -> None:
     assert all(text.words and text.cause for text in REASON_TEXTS.values())
 
 
-def test_the_reaction_is_told_by_the_number() -> None:
+def test_the_reaction_is_reported_by_the_number() -> None:
     assert REACTION_OF.keys() == {*Reason}
     for reason, reaction in REACTION_OF.items():
         kinds = [Reaction.NONE, Reaction.SHAPED_STOP, Reaction.NEUTRAL]

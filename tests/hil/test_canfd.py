@@ -134,7 +134,7 @@ def test_a_foreign_joystick_of_can_fd_moves_the_valve(tmp_path: Path) -> None:
         assert daemon.end() == 0, daemon.text()
 
 
-def test_an_interface_that_has_only_classical_frames_is_told(tmp_path: Path) -> None:
+def test_an_interface_that_has_only_classical_frames_is_reported(tmp_path: Path) -> None:
     """At the start, and by the doctor; nothing is sent."""
     ip = ["ip", "link", "set", OTHER]
     subprocess.run([*ip, "down"], check=True)

@@ -28,7 +28,7 @@ def test_nothing_is_sent_on_the_bus_of_the_deployment(tmp_path: Path) -> None:
     assert found["joystick left"]["found"] == "0 frames received"
 
 
-def test_the_joysticks_are_heard(tmp_path: Path) -> None:
+def test_the_joysticks_are_received(tmp_path: Path) -> None:
     with joysticks_on("vcan0"):
         found = doctor(tmp_path / "doctor.json", "--no-load", "--listen", "1")
     for name in ("joystick left", "joystick right"):

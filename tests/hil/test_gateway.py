@@ -285,7 +285,7 @@ def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
             assert passed.data[7] == REFERENCE[kind](0, bytes(passed.data[:7]), 8)
 
 
-def test_a_fallback_that_is_left_in_place_is_told_and_moves_nothing(tmp_path: Path) -> None:
+def test_a_fallback_that_is_left_in_place_is_reported_and_moves_nothing(tmp_path: Path) -> None:
     """Two senders of one message: whoever started the daemon by hand is to see it."""
     file = write(tmp_path)
     rules(file, "away")
@@ -298,7 +298,7 @@ def test_a_fallback_that_is_left_in_place_is_told_and_moves_nothing(tmp_path: Pa
         wait(far, "SlewStatus", lambda v: v["Reason"] == "SECOND_SENDER")
 
 
-def test_missing_rules_are_told(tmp_path: Path) -> None:
+def test_missing_rules_are_reported(tmp_path: Path) -> None:
     with service(tmp_path / "log", "run", str(write(tmp_path))) as daemon:
         daemon.wait_log("gateway=rules-missing 40 of 40")
 

@@ -194,7 +194,7 @@ def test_bus_off_is_seen_and_survived(
         drive(far, joysticks)
 
 
-def test_passive_is_told_and_goes_on(
+def test_passive_is_reported_and_goes_on(
     bus: can.BusABC, joysticks: Joysticks, daemon: Service
 ) -> None:
     drive(bus, joysticks)

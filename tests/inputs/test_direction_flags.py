@@ -48,7 +48,7 @@ def flagged(changed_rig: Make) -> Rig:
     return rig
 
 
-def test_the_flags_tell_the_way(flagged: Rig) -> None:
+def test_the_flags_show_the_way(flagged: Rig) -> None:
     assert velocity(flagged.run(100, **RIGHT)) > 90
     assert velocity(flagged.run(200, **LEFT)) < -90
     assert velocity(flagged.run(300, **CENTRE)) == 0

@@ -38,7 +38,7 @@ def test_a_press_out_of_sequence_holds_until_a_free_frame_in_sequence(
     assert entry.stop(40 * MS, entry.presses) is None
 
 
-def test_a_press_between_two_ticks_is_told_in_the_next_one(
+def test_a_press_between_two_ticks_is_reported_in_the_next_one(
     stop: tuple[EmergencyStopInput, Machine],
 ) -> None:
     entry, sender = stop

@@ -24,7 +24,7 @@ def run(rig: Rig, ticks: int, left: float, opening: float | None, **options: int
     return [e.split(" feedback")[0] for e in rig.events if "axis=slew valve" in e]
 
 
-def test_a_valve_that_follows_is_told_once(rig: Rig) -> None:
+def test_a_valve_that_follows_is_reported_once(rig: Rig) -> None:
     assert run(rig, 100, 0.0, 0.0) == [FOLLOWING]
 
 
@@ -51,7 +51,7 @@ def test_a_valve_may_take_its_time_to_settle(rig: Rig) -> None:
     assert run(rig, 20, 0.0, 60.0) == []
 
 
-def test_silence_is_told_and_the_way_back(rig: Rig) -> None:
+def test_silence_is_reported_and_the_way_back(rig: Rig) -> None:
     run(rig, 50, 0.0, 0.0)
     assert run(rig, 10, 0.0, None) == []
     assert run(rig, 10, 0.0, None) == [LOST]
@@ -59,7 +59,7 @@ def test_silence_is_told_and_the_way_back(rig: Rig) -> None:
     assert run(rig, 5, 0.0, 0.0) == [FOLLOWING]
 
 
-def test_a_valve_that_was_never_heard_of_is_told_after_its_timeout() -> None:
+def test_a_valve_that_never_sent_is_reported_after_its_timeout() -> None:
     rig = Rig()
     assert LOST in run(rig, 40, 0.0, None)
 
@@ -78,7 +78,7 @@ def test_one_valve_from_two_addresses(rig: Rig) -> None:
     assert run(rig, 5, 0.0, 0.0) == []
 
 
-def test_the_other_nodes_are_told_which_valve_does_not_follow(rig: Rig) -> None:
+def test_the_other_nodes_are_informed_which_valve_does_not_follow(rig: Rig) -> None:
     run(rig, 50, 0.0, 0.0)
     for number in (1, 2):
         rig.receive(avef(number, 0.0))

@@ -49,7 +49,7 @@ def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
     assert rig.state() is State.TRIPPED
 
 
-def test_a_reset_that_is_stuck_and_an_enable_off_beside_a_broken_joystick(rig: Rig) -> None:
+def test_a_reset_that_is_stuck_and_an_enable_off_next_to_a_broken_joystick(rig: Rig) -> None:
     tripped(rig, Reset=1).run(1, Slew=32766, Enable=0, Reset=1)
     rig.run(2, Enable=0, Reset=1)
     assert rig.state() is State.TRIPPED
@@ -100,7 +100,7 @@ def test_a_reset_that_is_held_while_the_loop_is_late(rig: Rig) -> None:
     assert rig.state() is State.NEUTRAL_WAIT
 
 
-def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
+def test_a_reset_that_is_held_while_the_emergency_stop_is_not_received(
     changed_rig: Callable[..., Rig],
 ) -> None:
     machine = Machine(changed_rig)
@@ -116,7 +116,7 @@ def test_a_reset_that_is_held_while_the_emergency_stop_is_not_heard(
     assert rig.state() is State.NEUTRAL_WAIT
 
 
-def test_what_trips_is_told_before_a_released_enable(rig: Rig) -> None:
+def test_what_trips_is_reported_before_a_released_enable(rig: Rig) -> None:
     rig.run(3)
     rig.receive(Frame("crane", 0x200, False, bytes(2)))
     rig.run(1, Enable=0)

@@ -96,7 +96,7 @@ def test_a_radius_after_a_jump_is_not_taken_the_next_is(tip: Tip) -> None:
     assert tip.known_m == pytest.approx(7.0)
 
 
-def test_after_silence_a_radius_begins_anew(tip: Tip) -> None:
+def test_after_silence_a_radius_begins_again(tip: Tip) -> None:
     tip.send(4000)
     tip.now_ns += 101_000_000
     assert tip.send(5000, step=9) is FrameFault.NONE

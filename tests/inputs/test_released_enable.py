@@ -27,7 +27,7 @@ def test_a_release_counts_in_one_tick_only(rig: Rig) -> None:
     assert (rig.state(), rig.reason()) == (State.NEUTRAL_WAIT, "RESET")
 
 
-def test_of_a_joystick_that_is_silent_since_then_silence_is_told(
+def test_of_a_joystick_that_is_silent_since_then_silence_is_reported(
     changed_rig: Callable[..., Rig],
 ) -> None:
     """A valve of 200 ms on a joystick that is old after 100 ms."""
@@ -59,7 +59,7 @@ def test_a_reset_needs_the_joystick_in_neutral_with_the_enable_released_too(rig:
     assert rig.state() is State.TRIPPED
 
 
-def test_with_a_broken_joystick_and_the_enable_released_a_trip_is_still_told(rig: Rig) -> None:
+def test_with_a_broken_joystick_and_the_enable_released_a_trip_is_still_reported(rig: Rig) -> None:
     rig.run(3)
     rig.receive(Frame("crane", 0x200, False, bytes(2)))
     rig.run(1, Slew=32766, Enable=0)

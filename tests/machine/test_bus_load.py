@@ -86,7 +86,7 @@ def test_of_two_buses_each_has_its_own_messages(machine: Machine) -> None:
     assert load.share == pytest.approx(3 * 50 * longest_frame_bits(False, 2) / 125_000)
 
 
-def test_check_tells_it_and_warns(machine: Machine) -> None:
+def test_check_reports_it_and_warns(machine: Machine) -> None:
     check = ["check", str(machine.directory / "machine.yaml")]
     machine.load()
     told = CliRunner().invoke(app, check)

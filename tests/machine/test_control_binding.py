@@ -68,7 +68,7 @@ def test_numbers_of_sway_filter_and_limits_may_be_changed(machine: Machine) -> N
         ),
     ],
 )
-def test_what_cannot_be_changed_is_told(machine: Machine, text: str, why: str) -> None:
+def test_what_cannot_be_changed_is_reported(machine: Machine, text: str, why: str) -> None:
     line = adjustable(machine, text)
     (problem,) = machine.problems()
     key = text.partition(":")[0]

@@ -85,7 +85,7 @@ def test_sizes_that_no_memory_holds(machine: Machine, old: str, new: str, number
     ]
 
 
-def test_overlapping_signals_are_told_at_their_message(machine: Machine) -> None:
+def test_overlapping_signals_are_reported_at_their_message(machine: Machine) -> None:
     machine.in_dbc("NearFar : 16|16@1-", "NearFar : 8|16@1-")
     line = machine.in_dbc("BO_ 272", "BO_ 272")
     assert machine.problems() == [
@@ -107,7 +107,7 @@ def test_a_table_without_its_signal_is_a_warning_and_named_by_none(machine: Mach
     assert "Leftover" not in {str(name) for name in (enable.choices or {}).values()}
 
 
-def test_a_type_without_its_signal_is_told_at_the_type(machine: Machine) -> None:
+def test_a_type_without_its_signal_is_reported_at_the_type(machine: Machine) -> None:
     machine.in_dbc("VAL_ 272 Enable", "SIG_VALTYPE_ 272 Enabel : 1;\nVAL_ 272 Enable")
     line = machine.in_dbc("SIG_VALTYPE_ 272", "SIG_VALTYPE_ 272")
     (problem,) = machine.problems()
@@ -382,7 +382,7 @@ def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
         ),
     ],
 )
-def test_numbers_that_are_none_are_told(
+def test_numbers_that_are_none_are_reported(
     machine: Machine, old: str, new: str, message: str, says: str
 ) -> None:
     machine.in_dbc(old, new)

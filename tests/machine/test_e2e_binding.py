@@ -265,7 +265,7 @@ HEADER = "its header takes the first 12 bits of"
         ),
     ],
 )
-def test_one_fault_is_told_with_its_line(
+def test_one_fault_is_reported_with_its_line(
     tmp_path: Path, changes: list[tuple[str, str]], at: str, says: str
 ) -> None:
     found = problems(tmp_path, *changes)

@@ -86,7 +86,7 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
          "expected the message of joystick right, or one of no joystick, got 'JoystickLeft'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_told(tmp_path: Path, old: str, new: str, told: str) -> None:
+def test_what_cannot_be_is_reported(tmp_path: Path, old: str, new: str, told: str) -> None:
     found = problems(tmp_path, (old, new))
     assert any(told in problem for problem in found), found
 

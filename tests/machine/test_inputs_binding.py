@@ -437,7 +437,7 @@ def test_an_emergency_stop_without_a_cycle_is_a_problem_of_the_dbc(stoppable: Ma
     ]
 
 
-def test_problems_of_joysticks_and_stop_are_told_together(stoppable: Machine) -> None:
+def test_problems_of_joysticks_and_stop_are_reported_together(stoppable: Machine) -> None:
     stoppable.in_yaml("enable: Enable", "enable: On")
     stop(stoppable, STOP.replace("Pressed", "Button").replace("100", "20") + " }")
     places = [p.split(": ")[1] for p in stoppable.problems()]

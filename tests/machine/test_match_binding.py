@@ -66,7 +66,7 @@ def test_two_devices(tmp_path: Path, first: str, second: str) -> None:
         ('{ serial: "1", path: a }', "{ path: a }"),
     ],
 )
-def test_two_channels_that_nothing_tells_apart(tmp_path: Path, first: str, second: str) -> None:
+def test_two_channels_that_nothing_distinguishes(tmp_path: Path, first: str, second: str) -> None:
     """Their names could change hands, and both would match."""
     file = machine(tmp_path, first, second)
     with pytest.raises(ConfigError) as caught:
@@ -130,7 +130,7 @@ def wrong(*_arguments: Any) -> Any:
     raise WrongDeviceError("expected driver peak_usb, but vcan0 has driver vcan")
 
 
-def test_a_wrong_device_is_told_with_the_line_of_the_file(
+def test_a_wrong_device_is_reported_with_the_line_of_the_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(module, "open_sockets", wrong)

@@ -97,7 +97,9 @@ def measured(**changes: str) -> str:
         ),
     ],
 )
-def test_what_does_not_fit_is_told_with_its_line(machine: Machine, text: str, says: str) -> None:
+def test_what_does_not_fit_is_reported_with_its_line(
+    machine: Machine, text: str, says: str
+) -> None:
     line = moving(machine, text)
     (problem,) = machine.problems()
     assert says in problem

@@ -134,7 +134,7 @@ SAYS = [
 
 
 @pytest.mark.parametrize(("text", "says"), SAYS)
-def test_what_is_wrong_is_told_at_its_line(machine: Machine, text: str, says: str) -> None:
+def test_what_is_wrong_is_reported_at_its_line(machine: Machine, text: str, says: str) -> None:
     line = sensing(machine, text)
     (problem,) = machine.problems()
     assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway_sensor{says}")

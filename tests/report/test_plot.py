@@ -167,7 +167,7 @@ def test_nothing_drawn_leaves_the_picture(pair: Pair, seen: Pair, *, known: bool
         assert box.y1 <= frame.y1
 
 
-def test_without_a_residual_window_the_peak_is_told(
+def test_without_a_residual_window_the_peak_is_reported(
     hand_made: Callable[..., Recording], tmp_path: Path
 ) -> None:
     def joystick(t: float) -> float:

@@ -23,7 +23,7 @@ def report(pair: tuple[Recording, Recording]) -> dict[str, Any]:
     return report_dict(*pair, transport="udp_multicast", missed_deadlines=0)
 
 
-def test_table_tells_every_number_within_80_columns(report: dict[str, Any]) -> None:
+def test_table_reports_every_number_within_80_columns(report: dict[str, Any]) -> None:
     text = printed(report)
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text
@@ -58,7 +58,7 @@ def test_lift_shows_dashes_for_sway_and_its_times(report: dict[str, Any]) -> Non
     assert "0.3" in next(line for line in lines if "time to 95" in line).split()[-1]
 
 
-def test_swing_in_the_other_plane_is_told_where_there_is_some(report: dict[str, Any]) -> None:
+def test_swing_in_the_other_plane_is_reported_where_there_is_some(report: dict[str, Any]) -> None:
     text = printed(report)
     assert "After slew, residual sway in the other plane" in text
     assert "After near-far" not in text
@@ -68,7 +68,7 @@ def test_swing_in_the_other_plane_is_told_where_there_is_some(report: dict[str, 
     ("raw_deg", "shaped_deg", "with_filters"),
     [(91.0, 20.0, "off"), (91.0, 95.0, "off and filters on"), (89.0, 20.0, "")],
 )
-def test_a_grapple_above_the_horizontal_is_told(
+def test_a_grapple_above_the_horizontal_is_reported(
     pair: tuple[Recording, Recording], raw_deg: float, shaped_deg: float, with_filters: str
 ) -> None:
     drives = []

@@ -118,7 +118,7 @@ def test_whatever_is_asked_speed_and_time_are_bounded(
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_time_counts_while_the_axis_is_moved_and_nobody_commands_it(sign: float) -> None:
+def test_time_counts_while_the_axis_is_moved_and_no_one_commands_it(sign: float) -> None:
     time = AddedTime(3)
     for _ in range(5):  # below what the valve can: it does not move
         assert time.allowed(sign, commanded=False, moved=False)

@@ -321,7 +321,7 @@ def test_a_command_that_is_no_number_never_reaches_the_valve(
         drive.moving()
 
 
-def test_a_broken_model_starts_anew(drive: Drive) -> None:
+def test_a_broken_model_starts_again(drive: Drive) -> None:
     drive.moving()
     drive.model.angle = math.nan
     drive.tick(PUSHED)

@@ -317,7 +317,7 @@ def test_in_the_long_run_joystick_and_addition_are_sent_in_full(
     assert sent == pytest.approx(200 * (joystick + added), abs=0.02)
 
 
-def test_what_was_owed_is_forgotten_at_rest() -> None:
+def test_what_was_carried_is_dropped_at_rest() -> None:
     limits = OutputLimits(rise_per_s=1.0, tail_s=0.0)
     axis, fresh = axis_with(limits), axis_with(limits)
     for added in (0.5, 0.5, 0.0, 0.0):

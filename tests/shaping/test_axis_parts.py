@@ -76,7 +76,7 @@ def test_a_retune_loses_the_travel_of_small_strokes(moving: Axis) -> None:
     assert small.with_name("lose")
 
 
-def test_the_sensor_is_told_of_every_tick_and_of_a_retune() -> None:
+def test_the_sensor_gets_every_tick_and_a_retune() -> None:
     rig = Rig().trusted()
     rig.axis.allow_added(0.25, 5.0)
     sensed = watched(rig.axis, "sensed")

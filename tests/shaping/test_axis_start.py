@@ -155,7 +155,7 @@ def test_an_axis_that_starts_latched_is_not_freed_by_an_enable_that_is_held(driv
     assert drive.state is State.TRIPPED
 
 
-def test_with_the_enable_off_a_joystick_that_tells_nothing_is_no_news(drive: Drive) -> None:
+def test_with_the_enable_off_a_joystick_that_reports_nothing_is_no_news(drive: Drive) -> None:
     drive.tick(CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE, enabled=False))
     assert drive.axis.reason is Reason.ENABLE_OFF
     drive.tick(CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE))

@@ -47,7 +47,7 @@ def test_zvd_forgives_a_wrong_length_where_zv_does_not() -> None:
     assert residual_left(zvd, off, 0.02) == pytest.approx(0.006, abs=0.002)
 
 
-def test_ei_leaves_its_residual_at_the_nominal_period_and_less_beside_it() -> None:
+def test_ei_leaves_its_residual_at_the_nominal_period_and_less_next_to_it() -> None:
     nominal = SwayMode.from_period(2.2, 0.0)
     taps = ei_taps(nominal, 0.02, 0.05)
     assert math.fsum(taps) == pytest.approx(1.0)

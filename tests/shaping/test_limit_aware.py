@@ -131,7 +131,7 @@ class Broken:
         return math.nan if self.broken else wanted
 
 
-def test_after_output_invalid_it_starts_anew() -> None:
+def test_after_output_invalid_it_starts_again() -> None:
     mode = MODES[1]
     sway = SwayModel(mode, TICK_S)
     broken = Broken(Fir(zv_taps(mode, TICK_S)))

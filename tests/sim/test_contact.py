@@ -108,7 +108,7 @@ def test_a_pile_stops_the_grapple_while_the_tip_goes_on(height_m: float) -> None
     assert one.state.theta6_rad > free.state.theta6_rad + math.radians(5.0)
 
 
-def test_a_pile_beside_the_boom_is_met_by_slewing_on_both_sides_alike() -> None:
+def test_a_pile_next_to_the_boom_is_met_by_slewing_on_both_sides_alike() -> None:
     turned = []
     for side in (1.0, -1.0):
         one = crane(ground_m=HANGS_M - 0.1, pile_height_m=0.8, pile_radius_m=3.0, pile_width_m=1.0)

@@ -141,7 +141,7 @@ def test_initial_sway_swings_on_its_own() -> None:
     assert s.time_s == pytest.approx(10.0, abs=1e-9)
 
 
-def test_a_grapple_swung_over_is_told() -> None:
+def test_a_grapple_swung_over_is_reported() -> None:
     crane = Crane(sway=Sway(theta6_rate_rad_s=3.0))
     drive(crane, "slew", [0.0] * 100)
     assert not crane.swung_over

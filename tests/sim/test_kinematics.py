@@ -82,7 +82,7 @@ def test_angles_put_the_tip_where_it_is_asked(boom: Boom, q: tuple[float, float,
     assert (lift, knuckle) == pytest.approx(q[:2], abs=1e-6)
 
 
-def test_a_tip_out_of_reach_is_told() -> None:
+def test_a_tip_out_of_reach_is_reported() -> None:
     with pytest.raises(ValueError, match=r"radius 9.1 m, height 1.7 m .* out of reach"):
         BOOMS[0].angles(9.1, 1.7, 3.0)
     with pytest.raises(ValueError, match="out of reach"):

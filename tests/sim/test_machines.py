@@ -68,7 +68,7 @@ def test_axes_choose_the_machine() -> None:
     ]
 
 
-def test_axes_that_the_machine_lacks_are_told(tmp_path: Path) -> None:
+def test_axes_that_the_machine_lacks_are_reported(tmp_path: Path) -> None:
     deployment = renamed(tmp_path, TIP_FILE, ("\n  near_far:", "\n  boom:"))
     expected = (
         r"axes.boom: the crane has slew, near_far, lift, or joint by joint"
@@ -181,7 +181,7 @@ def test_shipped_deployments_are_good(file: Path) -> None:
         ),
     ],
 )
-def test_commands_tell_what_does_not_fit(arguments: list[str], text: str) -> None:
+def test_commands_report_what_does_not_fit(arguments: list[str], text: str) -> None:
     done = CliRunner().invoke(app, arguments)
     assert done.exit_code == 2
     assert text in done.output

@@ -64,7 +64,7 @@ def test_bounds_are_kept_with_the_fastest_motion_in_the_asked_direction(
     assert scale == pytest.approx(best.x[0], abs=1e-5)
 
 
-def test_rounding_beside_a_blocked_joint_does_not_stop_the_tip() -> None:
+def test_rounding_next_to_a_blocked_joint_does_not_stop_the_tip() -> None:
     """A straight arm pointing level, only the knuckle free: it alone can lift the tip."""
     jacobian = BOOM.jacobian(1.3e-28, 0.0, 0.0)
     solver = ResolvedRates(jacobian, FULL, 0.2)
@@ -74,7 +74,7 @@ def test_rounding_beside_a_blocked_joint_does_not_stop_the_tip() -> None:
     assert scale == pytest.approx(0.0161, abs=1e-4)
 
 
-def test_the_wish_is_met_where_the_bounds_leave_a_choice() -> None:
+def test_the_command_is_met_where_the_bounds_leave_a_choice() -> None:
     solver = ResolvedRates(BOOM.jacobian(0.8, -1.2, 1.0), FULL, 0.2)
     p = solver.least_squares(0.3, 0.0)
     scale, rates = solver.within(p, Bounds((-1.0,) * 3, (1.0,) * 3), 0.1)

@@ -62,11 +62,11 @@ def test_a_drive_within_the_limits_passes() -> None:
     ],
     ids=["tripped", "against", "faster", "jump", "alone", "after the tail"],
 )
-def test_what_must_not_be_is_told(frames: list[Logged], what: str) -> None:
+def test_what_must_not_be_is_reported(frames: list[Logged], what: str) -> None:
     assert what in " ".join(judged(frames).wrong)
 
 
-def test_what_the_sensor_still_moves_though_it_is_not_trusted_is_told() -> None:
+def test_what_the_sensor_still_moves_though_it_is_not_trusted_is_reported() -> None:
     slower, held = [*RISE[:6], *[0.5] * 155], [1.0] * 161
     assert not judged(log(slower, held)).follows()
     assert judged(log(slower, held, sensor=TRUSTED)).follows()

@@ -23,7 +23,7 @@ from tests.systemd.unit import ANSWER_S, Unit, add_vcan, run
 MOST_EXPOSURE = 1.5
 
 
-def test_started_means_that_the_valves_are_told_neutral(installed: None, tmp_path: Path) -> None:
+def test_started_means_that_the_valves_get_neutral(installed: None, tmp_path: Path) -> None:
     unit = Unit("forwarder")
     with candump(tmp_path / "start.log", "vcan0"):
         unit.systemctl("start")
@@ -32,7 +32,7 @@ def test_started_means_that_the_valves_are_told_neutral(installed: None, tmp_pat
     assert re.search("started file=/etc/canshaper/forwarder.yaml", unit.text())
 
 
-def test_process_is_real_time_locked_and_nobody(forwarder: Unit) -> None:
+def test_process_is_real_time_locked_and_no_one(forwarder: Unit) -> None:
     process = Path("/proc") / forwarder.show("MainPID")
     scheduling = run("chrt", "--pid", process.name).stdout
     assert "SCHED_FIFO" in scheduling
@@ -76,7 +76,7 @@ def test_exposure_of_the_loaded_unit(forwarder: Unit) -> None:
     assert float(found[1]) <= MOST_EXPOSURE
 
 
-def test_joystick_moves_the_valve_and_the_status_tells(
+def test_joystick_moves_the_valve_and_the_status_reports(
     forwarder: Unit, bus: can.BusABC, joysticks: Joysticks
 ) -> None:
     forwarder.wait(partial(drive, bus, joysticks), StatusText=".*slew ACTIVE.*")
@@ -99,7 +99,7 @@ def test_killed_in_motion_it_comes_back_and_waits_for_neutral(
         drive(later, joysticks)
 
 
-def test_hang_is_ended_by_the_watchdog_and_the_journal_tells_where(forwarder: Unit) -> None:
+def test_hang_is_ended_by_the_watchdog_and_the_journal_reports_where(forwarder: Unit) -> None:
     assert forwarder.show("WatchdogUSec") == "1s"  # the unit's own
     before, cursor = forwarder.number("NRestarts"), forwarder.cursor()
     forwarder.systemctl("kill", "--signal=STOP")

@@ -87,7 +87,7 @@ FAULTS = [
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_faults_are_told_with_file_and_line(
+def test_faults_are_reported_with_file_and_line(
     shipped_path: Path, tmp_path: Path, fault: tuple[str, str, str, str]
 ) -> None:
     old, new, place, message = fault
@@ -99,7 +99,7 @@ def test_faults_are_told_with_file_and_line(
     assert message in found
 
 
-def test_all_faults_are_told_at_once(tmp_path: Path) -> None:
+def test_all_faults_are_reported_at_once(tmp_path: Path) -> None:
     found = problems(tmp_path / "crane.yaml", "name: 7\nwheels: 8\n")
     assert sorted(f.split(": ")[1] for f in found) == ["grapple", "joints", "name", "wheels"]
     assert (

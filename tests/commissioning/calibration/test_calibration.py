@@ -82,7 +82,7 @@ def test_a_quick_or_low_ramp_finds_the_same_valve(
         assert direction.delay == pytest.approx(2 * rate_per_s * 0.1, abs=0.01)
 
 
-def test_a_ramp_too_quick_for_the_feedback_is_told() -> None:
+def test_a_ramp_too_quick_for_the_feedback_is_reported() -> None:
     def samples(commands: list[float]) -> list[Sample]:
         return [Sample(command, max(0.0, command - 0.1)) for command in commands]
 
@@ -216,13 +216,13 @@ def test_no_other_valve_moves(deployment: Deployment) -> None:
         (["--axis", "slew", "--speed", "Rate"], "--speed: expected MESSAGE.SIGNAL, got Rate"),
     ],
 )
-def test_wrong_options_are_told(arguments: list[str], says: str) -> None:
+def test_wrong_options_are_reported(arguments: list[str], says: str) -> None:
     told = CliRunner().invoke(app, ["calibrate", str(FILE), *arguments])
     assert told.exit_code == 2
     assert says in told.output
 
 
-def test_a_signal_that_is_none_of_the_axis_is_told(deployment: Deployment) -> None:
+def test_a_signal_that_is_none_of_the_axis_is_reported(deployment: Deployment) -> None:
     drive = CalibrationDrive(deployment, "slew", ("TipVelocity", "VerticalSpeed"), RAMP)
     run_simulated(drive, deployment, None, nothing)
     with pytest.raises(CalibrationError, match="positive commands: the axis did not move"):
@@ -234,7 +234,7 @@ def test_no_signal_at_all_is_refused(deployment: Deployment) -> None:
         CalibrationDrive(deployment, "slew", ("TipVelocity", "Nothing"), RAMP)
 
 
-def test_an_axis_that_stands_at_its_end_is_told() -> None:
+def test_an_axis_that_stands_at_its_end_is_reported() -> None:
     up = [Sample(c / 1000, min(max(0.0, c / 1000 - 0.05), 0.1)) for c in range(400)]
     with pytest.raises(CalibrationError, match="does not rise with the command"):
         fit(up, up[-20:], list(reversed(up)), 0.0)

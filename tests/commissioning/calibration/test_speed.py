@@ -150,7 +150,7 @@ def test_in_a_gateway_the_frames_of_the_joystick_move_the_crane() -> None:
     assert drive.neutral_frames() == []  # the last frame of the joystick was
 
 
-def test_the_end_in_a_gateway_can_be_told_more_than_once() -> None:
+def test_the_end_in_a_gateway_can_be_reported_more_than_once() -> None:
     deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
     heard = [Frame("machine", 0x402, False, bytes(6))]
     drive = drive_on(deployment, "slew", ("TipVelocity", "SlewRate"), heard, 150)

@@ -90,7 +90,7 @@ def test_without_load_there_is_one_run(tmp_path: Path) -> None:
     assert "under load" not in done.stdout
 
 
-def test_a_wrong_deployment_is_told_before_anything_runs(tmp_path: Path) -> None:
+def test_a_wrong_deployment_is_reported_before_anything_runs(tmp_path: Path) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text("tick_ms: 0\n")
     done = doctor(file)

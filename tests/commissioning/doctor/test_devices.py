@@ -94,7 +94,7 @@ def test_the_match_to_paste_is_one_that_holds(
     assert again.level is Level.OK
 
 
-def test_channels_of_one_adapter_are_told_apart_by_a_rule_alone(here: FakeDevices) -> None:
+def test_channels_of_one_adapter_are_distinguished_by_a_rule_alone(here: FakeDevices) -> None:
     """A .link file has no word for them; which attribute counts, its driver knows."""
     assert finding(here, "can1").remedy.splitlines()[1:] == [
         "for a name of its own (then channel: can-crane in the deployment file)",

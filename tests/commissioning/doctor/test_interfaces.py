@@ -134,7 +134,7 @@ def test_queue_limits(queue: int, level: Level) -> None:
     assert interfaces.queue(link).level is level
 
 
-def test_error_counters_of_the_controller_are_told() -> None:
+def test_error_counters_of_the_controller_are_reported() -> None:
     text = (IP / "can1-good.json").read_text()
     text = text.replace('"berr_counter":{"tx":0,"rx":0}', '"berr_counter":{"tx":8,"rx":0}')
     link = parse_ip(text)
@@ -165,7 +165,7 @@ def test_output_that_is_not_json() -> None:
 
 
 @pytest.mark.parametrize(("flags", "level"), [("0x40081", OK), ("0x40080", BAD)])
-def test_without_ip_the_kernel_tells_less(tmp_path: Path, flags: str, level: Level) -> None:
+def test_without_ip_the_kernel_reports_less(tmp_path: Path, flags: str, level: Level) -> None:
     directory = tmp_path / "sys/class/net/can0"
     directory.mkdir(parents=True)
     for name, text in (("type", "280"), ("flags", flags), ("tx_queue_len", "10"), ("mtu", "16")):

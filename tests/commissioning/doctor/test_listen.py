@@ -101,7 +101,7 @@ class Packets:
         os.close(self._end)
 
 
-def test_joysticks_of_j1939_are_heard_from_whatever_address(
+def test_joysticks_of_j1939_are_received_from_whatever_address(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     frames = []

@@ -78,7 +78,7 @@ def test_throttling(tmp_path: Path, runtime: str, level: Level) -> None:
     assert machine.throttling(tmp_path).level is level
 
 
-def test_a_system_that_tells_nothing_is_no_error(tmp_path: Path) -> None:
+def test_a_system_that_reports_nothing_is_no_error(tmp_path: Path) -> None:
     for found in (
         machine.throttling(tmp_path),
         machine.swap(tmp_path),
@@ -225,7 +225,7 @@ def test_virtual_machine_without_the_tool(tmp_path: Path) -> None:
     assert machine.virtual(None, tmp_path).level is Level.OK
 
 
-def test_isolated_processors_are_told(tmp_path: Path) -> None:
+def test_isolated_processors_are_reported(tmp_path: Path) -> None:
     write(tmp_path, **{f"{CPU}isolated": "\n"})
     assert machine.processors(tmp_path, 4).found == "4, isolated: none"
     write(tmp_path, **{f"{CPU}isolated": "2-3\n"})

@@ -79,7 +79,7 @@ def test_the_interval_holds_the_truth() -> None:
     assert float(np.median(halves)) < 0.01  # an interval as wide as the world would hold it too
 
 
-def test_a_large_swing_is_slower_and_told_as_a_small_one() -> None:
+def test_a_large_swing_is_slower_and_reported_as_a_small_one() -> None:
     time, angle = swung(EMPTY, 40.0, SLEW)
     found = identify("slew", "", [noisy(time, angle, 1, 0.2)])
     assert found.usable, found.poor

@@ -79,7 +79,7 @@ def test_commands_that_fall_silent_are_not_taken_for_standing(
     assert [b for _, b in slew.idle] == pytest.approx([2.0, 6.0, 8.0, 12.0], abs=0.05)
 
 
-def test_joysticks_tell_the_commands_where_no_valve_does(
+def test_joysticks_report_the_commands_where_no_valve_does(
     tmp_path: Path, deployment: Deployment
 ) -> None:
     """A machine on which canshaper does not run yet: the joystick goes to the valve as it is."""
@@ -136,7 +136,7 @@ def test_mixed_clocks(log: Path, deployment: Deployment) -> None:
         read_can(log, "", SWAY, deployment.messages)
 
 
-def test_no_values_are_left_out_and_told(tmp_path: Path) -> None:
+def test_no_values_are_left_out_and_reported(tmp_path: Path) -> None:
     """Codes that the DBC names, values beyond its range, and frames that are too short."""
     text = (ROOT / "dbc" / "forwarder.dbc").read_text()
     dbc = tmp_path / "a.dbc"
@@ -196,7 +196,7 @@ def test_an_acceleration_is_refused(tmp_path: Path) -> None:
         bind("GrappleSway.SwayParallel", messages_of(dbc))
 
 
-def test_j1939_takes_any_priority_and_tells_two_addresses(tmp_path: Path) -> None:
+def test_j1939_takes_any_priority_and_reports_two_addresses(tmp_path: Path) -> None:
     dbc = tmp_path / "a.dbc"
     dbc.write_text(
         'VERSION ""\nNS_ :\nBS_:\nBU_: A\n'
@@ -216,7 +216,7 @@ def test_j1939_takes_any_priority_and_tells_two_addresses(tmp_path: Path) -> Non
         read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))
 
 
-def test_the_signal_of_the_grapple_is_read_beside(tmp_path: Path) -> None:
+def test_the_signal_of_the_grapple_is_read_next_to(tmp_path: Path) -> None:
     text = FILE.read_text().replace("../dbc/forwarder.dbc", str(ROOT / "dbc" / "forwarder.dbc"))
     file = tmp_path / "machine.yaml"
     # Any cyclic message will do for the weight.
@@ -231,7 +231,7 @@ def test_the_signal_of_the_grapple_is_read_beside(tmp_path: Path) -> None:
     assert found.at == pytest.approx(3.06)
 
 
-def test_a_long_log_tells_how_far_it_is(tmp_path: Path, deployment: Deployment) -> None:
+def test_a_long_log_reports_how_far_it_is(tmp_path: Path, deployment: Deployment) -> None:
     lines = candump(tmp_path / "a.log", TOLD).read_text().splitlines()
     log = tmp_path / "b.log"
     rows = [f"({1.7e9 + 20 + 0.001 * k:.6f}) can0 123#00" for k in range(50_000)]

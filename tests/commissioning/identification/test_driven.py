@@ -53,7 +53,7 @@ def test_a_part_of_the_stretches_first_finds_what_all_of_them_do(
     assert fewer.period_s.half == pytest.approx(every.period_s.half, rel=0.1)
 
 
-def test_driven_motion_of_two_directions_tells_no_damping_that_it_cannot_know() -> None:
+def test_driven_motion_of_two_directions_reports_no_damping_that_it_cannot_know() -> None:
     """A heavy tool that is hardly damped takes swing from the other direction and gives it back."""
     heavy = Grapple(l2_m=2.2, m2_kg=900.0, c5_n_m_s_rad=125.0, c6_n_m_s_rad=125.0)
     _, case = cases(heavy, BOTH, 0.15, 0.1, seed=2)

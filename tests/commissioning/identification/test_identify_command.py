@@ -172,7 +172,7 @@ def test_a_stopwatch(tmp_path: Path, file: Path) -> None:
     assert not (tmp_path / "out").exists()  # nothing to draw
 
 
-def test_too_poor_is_told_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:
+def test_too_poor_is_reported_and_not_written(tmp_path: Path, file: Path, logs: Path) -> None:
     before = file.read_bytes()
     result = run(tmp_path, logs / "still.log", "--file", file, "--write")
     assert result.exit_code == 1
@@ -261,7 +261,7 @@ BAD = {
 
 
 @pytest.mark.parametrize("name", BAD)
-def test_what_is_wrong_is_told(tmp_path: Path, file: Path, logs: Path, name: str) -> None:
+def test_what_is_wrong_is_reported(tmp_path: Path, file: Path, logs: Path, name: str) -> None:
     before = file.read_bytes()
     options, text = BAD[name]
     result = run(tmp_path, *(o.format(logs=logs, file=file) for o in options))

@@ -142,7 +142,7 @@ def test_the_joysticks_were_never_left_alone() -> None:
     assert found.free is None
 
 
-def test_dry_friction_is_told() -> None:
+def test_dry_friction_is_reported() -> None:
     """Amplitude falls in a straight line, not exponentially."""
     time = times(25.0)
     omega = 2.0 * math.pi / PERIOD

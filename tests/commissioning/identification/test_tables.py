@@ -79,7 +79,7 @@ def test_degrees_a_second(tmp_path: Path) -> None:
     assert series.value[5] == pytest.approx(math.radians(table.columns["Gyroscope x (deg/s)"][5]))
 
 
-def test_a_round_swing_is_told(tmp_path: Path) -> None:
+def test_a_round_swing_is_reported(tmp_path: Path) -> None:
     told = driven(30.0, sway=Sway(0.15, 0.0, 0.0, 0.3))
     series = series_of(read_table(phone(tmp_path / "a.csv", told)), "", None)
     assert any("swing it in one direction only" in note for note in series.notes)
@@ -94,7 +94,7 @@ def test_a_table_that_is_cut_off(tmp_path: Path) -> None:
     assert table.notes == [f"{file}:1501: the last line is cut off and left out"]
 
 
-def test_some_wrong_lines_are_left_out_and_told(tmp_path: Path) -> None:
+def test_some_wrong_lines_are_left_out_and_reported(tmp_path: Path) -> None:
     file = phone(tmp_path / "a.csv", SWUNG)
     lines = file.read_text().splitlines()
     lines[100] = "battery low"
@@ -109,7 +109,9 @@ def test_some_wrong_lines_are_left_out_and_told(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("number", ["", "nan", "inf", "1e12"])
 @pytest.mark.parametrize("at", [2, 700, 1501])
-def test_a_line_without_a_time_is_left_out_and_told(tmp_path: Path, at: int, number: str) -> None:
+def test_a_line_without_a_time_is_left_out_and_reported(
+    tmp_path: Path, at: int, number: str
+) -> None:
     file = phone(tmp_path / "a.csv", SWUNG)
     lines = file.read_text().splitlines()
     lines[at - 1] = number + "," + lines[at - 1].partition(",")[2]

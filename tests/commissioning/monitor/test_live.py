@@ -137,7 +137,7 @@ def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
         (["forwarder.yaml", "--refresh", "50"], 2, "Invalid value for '--refresh'"),
     ],
 )
-def test_what_cannot_be_is_told(arguments: list[str], code: int, text: str) -> None:
+def test_what_cannot_be_is_reported(arguments: list[str], code: int, text: str) -> None:
     result = CliRunner().invoke(app, ["monitor", *arguments])
     assert result.exit_code == code
     assert text in result.output

@@ -119,7 +119,7 @@ def test_it_fits_the_terminal(deployment: Deployment) -> None:
     assert len(text(monitor, NOW + 30_000 * MS, 80, 60)) > 50  # as many events as there is room
 
 
-def test_before_anything_is_heard_it_says_so(deployment: Deployment) -> None:
+def test_before_anything_is_received_it_says_so(deployment: Deployment) -> None:
     lines = text(Monitor(deployment), NOW)
     assert "SILENT" in lines[0]
     assert sum("no status received" in line for line in lines) == 3

@@ -234,7 +234,9 @@ def test_one_bad_pdo_does_not_stop_the_others(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_file_that_is_none_is_told_in_one_line(text: bytes, fault: str, tmp_path: Path) -> None:
+def test_a_file_that_is_none_is_reported_in_one_line(
+    text: bytes, fault: str, tmp_path: Path
+) -> None:
     file = tmp_path / "joy.eds"
     file.write_bytes(text)
     with pytest.raises(ConfigError) as raised:

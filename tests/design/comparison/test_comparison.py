@@ -318,7 +318,7 @@ def test_a_candidate_gets_time_to_run_on(
     assert with_candidate(deployment, by_name["off"]).motions == {}
 
 
-def test_an_out_that_is_a_file_is_told_before_anything_is_driven(
+def test_an_out_that_is_a_file_is_reported_before_anything_is_driven(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def drives(*_arguments: object, **_options: object) -> None:

@@ -116,7 +116,7 @@ def _turned(poles: tuple[float, float]) -> tuple[float, float]:
 # -- requirements ------------------------------------------------------------------------------
 
 
-def test_active_requirements_are_told_and_no_others() -> None:
+def test_active_requirements_are_reported_and_no_others() -> None:
     double = "real poles (14d)"
     expected: dict[Requirements, set[str]] = {
         FREE: {double},

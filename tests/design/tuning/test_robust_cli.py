@@ -86,12 +86,12 @@ def test_a_filter_that_the_adjustable_range_refuses_is_not_written(file: Path) -
     assert file.read_text() == before
 
 
-def test_a_tail_too_short_is_told(file: Path) -> None:
+def test_a_tail_too_short_is_reported(file: Path) -> None:
     assert "tail_s is 2 s" in run(str(file), "--axis", "near_far", "--duration", "2.4")[1]
     assert "tail_s" not in run(str(file), "--axis", "near_far", "--duration", "1.6")[1]
 
 
-def test_it_tells_how_far_the_tip_travels_and_what_a_longer_tail_would_need(file: Path) -> None:
+def test_it_reports_how_far_the_tip_travels_and_what_a_longer_tail_would_need(file: Path) -> None:
     words = (str(file), "--axis", "near_far", "--duration")
     good, long = (" ".join(run(*words, seconds)[1].split()) for seconds in ("1.8", "2.4"))
     assert "near_far travels 0.85 m with it; its limits allow 2.13 m." in good

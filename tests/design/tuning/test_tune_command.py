@@ -237,7 +237,7 @@ def test_errors_leave_the_file_alone(file: Path, name: str) -> None:
     assert file.read_bytes() == before
 
 
-def test_an_out_that_is_a_file_is_told(file: Path, tmp_path: Path) -> None:
+def test_an_out_that_is_a_file_is_reported(file: Path, tmp_path: Path) -> None:
     (tmp_path / "here").touch()
     result = run(file, "--axis", "slew", "--method", "manual", "--out", str(tmp_path / "here"))
     assert (result.exit_code, result.output) == (2, f"{tmp_path / 'here'}: File exists\n")

@@ -69,7 +69,7 @@ def test_a_stopped_node_is_started_too(rig: CanopenRig) -> None:
     assert rig.commands == [bytes((START, NODES["left"]))]
 
 
-def test_who_is_no_master_starts_nobody(guest: CanopenRig) -> None:
+def test_who_is_no_master_starts_no_one(guest: CanopenRig) -> None:
     guest.states = dict.fromkeys(NODES, PRE_OPERATIONAL)
     for node in NODES:
         guest.heartbeat(node, 0)
@@ -226,7 +226,7 @@ def test_release_of_enable_and_a_valve_fault_count_in_a_stop_for_a_node(rig: Can
 
 
 @pytest.mark.parametrize("can_id", [0x700 + OURS, 0x000])
-def test_a_second_one_of_us_is_told(rig: CanopenRig, can_id: int) -> None:
+def test_a_second_one_of_us_is_reported(rig: CanopenRig, can_id: int) -> None:
     """Our heartbeat, and the commands of the master, come from nobody else."""
     rig.ready()
     rig.receive(can_id, b"\x05" if can_id else b"\x80\x00")
@@ -248,7 +248,7 @@ def test_other_services_are_daily_life(rig: CanopenRig, can_id: int) -> None:
 
 
 @pytest.mark.parametrize("can_id", [0x001, 0x101, 0x1A5, 0x480, 0x6FF])
-def test_a_pdo_that_nobody_knows_is_a_fault(rig: CanopenRig, can_id: int) -> None:
+def test_a_pdo_that_no_one_knows_is_a_fault(rig: CanopenRig, can_id: int) -> None:
     rig.receive(can_id, bytes(8))
     assert rig.last_fault == "UNKNOWN_ID"
 

@@ -84,7 +84,7 @@ def test_a_valve_that_boots_for_ten_seconds_is_waited_for(rig: CanopenRig) -> No
     rig.until(lambda: rig.axis()[0] == "READY", 200)
 
 
-def test_a_valve_that_was_active_before_is_brought_to_work_anew(rig: CanopenRig) -> None:
+def test_a_valve_that_was_active_before_is_brought_to_work_again(rig: CanopenRig) -> None:
     rig.valves["slew"].state = ACTIVE
     assert [word for word, _ in words(rig, 60)] == [INIT, DISABLED, HOLD, ACTIVE]
 
@@ -150,7 +150,7 @@ def test_a_valve_in_motion_that_falls_back_begins_with_init(rig: CanopenRig) -> 
     assert rig.axis() == FAULT
 
 
-def test_a_status_word_that_is_lost_in_motion_stops_and_begins_anew(rig: CanopenRig) -> None:
+def test_a_status_word_that_is_lost_in_motion_stops_and_begins_again(rig: CanopenRig) -> None:
     rig.moving()
     rig.valves["slew"].silent = True
     passed = rig.until(lambda: rig.axis() == FAULT, Slew=30000)
@@ -164,7 +164,7 @@ def test_a_status_word_that_is_lost_in_motion_stops_and_begins_anew(rig: Canopen
     assert rig.axis()[0] == "READY"
 
 
-def test_a_node_that_restarts_in_motion_is_begun_anew_at_once(rig: CanopenRig) -> None:
+def test_a_node_that_restarts_in_motion_begins_again_at_once(rig: CanopenRig) -> None:
     """Its last status word says ACTIVE still, and must not be believed."""
     rig.moving()
     rig.states["slew"] = PRE_OPERATIONAL
@@ -187,7 +187,7 @@ def test_the_last_frame_of_a_working_valve_says_hold_and_0(rig: CanopenRig) -> N
     assert last[0x222][2:] == b"\0\0"
 
 
-def test_stall_forgets_what_the_valve_said(rig: CanopenRig) -> None:
+def test_stall_drops_what_the_valve_sent(rig: CanopenRig) -> None:
     rig.moving()
     rig.controller.stalled()
     assert rig.tick()["slew"] == {"ControlWord": INIT, "SetPoint": 0}

@@ -209,7 +209,7 @@ def test_a_frame_that_did_not_go_out_trips(rig: GatewayRig) -> None:
     assert rig.state() == ("TRIPPED", "SEND_FAILED")
 
 
-def test_ids_that_nobody_knows_are_no_fault_in_the_line(rig: GatewayRig) -> None:
+def test_ids_that_no_one_knows_are_no_fault_in_the_line(rig: GatewayRig) -> None:
     rig.run(3)
     for bus in ("joysticks", "machine"):
         assert rig.receive(Frame(bus, 0x7E8, False, bytes(8))) is None
@@ -247,7 +247,7 @@ def crc(data: bytes) -> int:
     return found
 
 
-def test_the_checksum_is_made_anew(tmp_path: Path) -> None:
+def test_the_checksum_is_made_again(tmp_path: Path) -> None:
     rig = GatewayRig(tmp_path, yaml=PROTECTED, dbc=(CHECKSUM,))
     bad = rig.joystick()
     assert rig.receive(bad) is None
@@ -261,7 +261,7 @@ def test_the_checksum_is_made_anew(tmp_path: Path) -> None:
         rig.tick()
 
 
-def test_e2e_is_made_anew(tmp_path: Path) -> None:
+def test_e2e_is_made_again(tmp_path: Path) -> None:
     """Its header fills the first 12 bits, so the joysticks move up by two bytes."""
     ids = list(range(1, 17))
     profile = Profile2(ids)

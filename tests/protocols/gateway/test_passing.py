@@ -28,7 +28,7 @@ def test_a_frame_passes_once_unless_it_is_excluded(excluded: list[Pattern], word
 
 
 @given(st.sets(words, max_size=6), words)
-def test_ids_of_both_widths_are_told_apart(excluded: set[int], word: int) -> None:
+def test_ids_of_both_widths_are_distinguished(excluded: set[int], word: int) -> None:
     hidden = [exactly(i & ~EFF_FLAG, bool(i & EFF_FLAG)) for i in excluded]
     passes = any(pattern.fits(word) for pattern in all_but(hidden))
     assert passes == (word not in excluded)

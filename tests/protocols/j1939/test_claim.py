@@ -117,7 +117,7 @@ def test_claims_for_other_addresses_and_cannot_claim_are_none_of_ours(rig: Rig) 
 
 
 @pytest.mark.parametrize("to", [0xFF, OWN])
-def test_our_address_is_told_to_who_asks_also_while_waiting_and_when_lost(
+def test_our_address_is_sent_to_who_asks_also_while_waiting_and_when_lost(
     rig: Rig, to: int
 ) -> None:
     rig.tick()
@@ -210,7 +210,7 @@ def test_a_frame_that_did_not_go_out_has_us_say_our_address_again(rig: Rig) -> N
     assert AVC | OWN in ids(again)
 
 
-def test_off_the_bus_no_axis_goes_on_and_the_address_is_claimed_anew(rig: Rig) -> None:
+def test_off_the_bus_no_axis_goes_on_and_the_address_is_claimed_again(rig: Rig) -> None:
     rig.moving()
     rig.controller.on_bus_off("crane")
     assert ids(rig.tick()) == [CLAIM]

@@ -74,13 +74,13 @@ def bus() -> Bus:
     return Bus()
 
 
-def test_no_fault_is_told_every_second(bus: Bus) -> None:
+def test_no_fault_is_reported_every_second(bus: Bus) -> None:
     bus.run([], 151)
     assert [t for t, _ in bus.heard] == [0, SECOND_NS, 2 * SECOND_NS, 3 * SECOND_NS]
     assert {data for _, data in bus.heard} == {bytes((0, 0xFF, 0, 0, 0, 0, 0xFF, 0xFF))}
 
 
-def test_one_fault_is_told_at_once_with_the_lamp_and_its_end_too(bus: Bus) -> None:
+def test_one_fault_is_reported_at_once_with_the_lamp_and_its_end_too(bus: Bus) -> None:
     bus.run([], 20)
     bus.run([(FIRST, 9)])
     when, data = bus.heard[-1]
@@ -142,7 +142,7 @@ def test_every_reason_for_a_stop_is_a_fault_or_is_known_to_be_none() -> None:
     assert stops - told - NO_FAULTS <= {"VALVE_NOT_READY"}
 
 
-def test_the_machine_tells_which_axes_cannot_move_and_why() -> None:
+def test_the_machine_reports_which_axes_cannot_move_and_why() -> None:
     rig = Rig()
     for _ in range(14):
         sent = rig.tick(bjm("BJM1"))  # the right joystick is silent
@@ -154,7 +154,7 @@ def test_the_machine_tells_which_axes_cannot_move_and_why() -> None:
     assert found == [(FIRST + 1, 9, 1), (FIRST + 3, 9, 1), (FIRST + 4, 9, 1), (FIRST + 5, 9, 1)]
 
 
-def test_a_broadcast_is_begun_anew_after_the_address_was_not_ours() -> None:
+def test_a_broadcast_begins_again_after_the_address_was_not_ours() -> None:
     rig = Rig().claimed()
     while BROADCAST not in ids(rig.run(1)[0]):
         pass

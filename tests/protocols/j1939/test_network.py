@@ -87,7 +87,7 @@ def test_a_second_joystick_without_an_address_of_its_own(rig: Rig, source: int) 
     assert flow(sent) > 50.0
 
 
-def test_nobody_else_may_use_our_address(rig: Rig) -> None:
+def test_no_one_else_may_use_our_address(rig: Rig) -> None:
     for _ in range(30):
         rig.tick(bjm("BJM1", OWN), bjm("BJM2"))
     assert rig.reason() == "JOYSTICK_TIMEOUT"
