@@ -114,7 +114,7 @@ class BlackBox:
         if self._folder is None:
             raise ValueError(NO_FOLDER)
         if not self._frozen and not self._writer:
-            self._why, self._due_ns = self._why or "asked for", 0
+            self._why, self._due_ns = self._why or "requested", 0
 
     def report(self) -> dict[str, object]:
         """How many files were tried to be written, and what was wrong with the last one."""

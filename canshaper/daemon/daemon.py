@@ -160,7 +160,7 @@ class Daemon:
         if "black_box" in request:
             if request["black_box"] == "write":
                 self._black_box.ask()
-                log.info("black-box=asked %s", peer)
+                log.info("black-box=requested %s", peer)
             return {"black_box": self._black_box.report()}
         if "set" in request:
             try:

@@ -155,7 +155,7 @@ def _poles_and_sway(ladders: Mapping[tuple[str, str], list[Run]]) -> list[Fact]:
             for m in METRICS
         }
         at_three = printed.LADDER.index((-3.0, -3.0))
-        told = "; ".join(
+        reported = "; ".join(
             f"{METRIC_WORDS[m]} " + ", ".join(str(round(v)) for v in values)
             for m, values in by_metric.items()
         )
@@ -182,7 +182,7 @@ def _poles_and_sway(ladders: Mapping[tuple[str, str], list[Run]]) -> list[Fact]:
                 "reduce sway",
                 f"peak by {round(far['peak'])} % at -10",
                 all(value > 0.0 for value in far.values()),
-                f"reduction in %, {plane}, linear valve, double poles -2, -3, -5, -10: {told};"
+                f"reduction in %, {plane}, linear valve, double poles -2, -3, -5, -10: {reported};"
                 " the farther out, the less of the peak and the RMS",
             )
         )

@@ -81,11 +81,11 @@ def pole_figure(pairs: Sequence[tuple[Run, Run]]) -> Figure:
 def pole_finding(pairs: Sequence[tuple[Run, Run]]) -> str:
     """The finding of figure 3 or 4: the peak on the linear plant over the poles."""
     plane = pairs[0][0].planes[0]
-    told = ", ".join(
+    reported = ", ".join(
         f"{change(run.swing(plane, 'peak').reduction_pct)} ({poles(run.poles_rad_s)})"
         for run, _ in (pairs[0], *pairs[-2:])
     )
-    return f"{axis_title(pairs[0][0].axis)}, linear valve: slow poles, less swing: peak {told}"
+    return f"{axis_title(pairs[0][0].axis)}, linear valve: slow poles, less swing: peak {reported}"
 
 
 def optimum_figure(runs: tuple[Run, Run], claims: Sequence[tuple[Plane, float]]) -> Figure:
@@ -127,11 +127,11 @@ def optimum_finding(run: Run, claims: Sequence[tuple[Plane, float]]) -> str:
     verdict = "every reading" if len(holds) == len(METRICS) else "no reading"
     if 0 < len(holds) < len(METRICS):
         verdict = f"{' and '.join(_METRIC_WORDS[m] for m in holds)} only"
-    told = "; ".join(
+    reported = "; ".join(
         f"{_METRIC_WORDS[m]} {', '.join(change(v) for v in reached[m])}" for m in METRICS
     )
     how = "in" if verdict.endswith("reading") else "for"
-    return f"{axis_title(run.axis)}: > {claimed} % holds {how} {verdict}: {told}"
+    return f"{axis_title(run.axis)}: > {claimed} % holds {how} {verdict}: {reported}"
 
 
 def _size(planes: Sequence[Plane]) -> tuple[int, int]:

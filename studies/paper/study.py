@@ -126,9 +126,9 @@ class Study:
 
 def steps(figures: tuple[int, ...], *, table: bool) -> int:
     """How often a study of these figures will call ``on_progress``."""
-    wanted = set(FIGURES) if table else set(figures)
-    count = sum(len(LADDER) * len(PLANTS) for f in (3, 4) if f in wanted)
-    count += sum(len(PLANTS) for f in (7, 8) if f in wanted) + (6 in wanted)
+    expected = set(FIGURES) if table else set(figures)
+    count = sum(len(LADDER) * len(PLANTS) for f in (3, 4) if f in expected)
+    count += sum(len(PLANTS) for f in (7, 8) if f in expected) + (6 in expected)
     if table:
         # The slewing crane with the near-far poles is in no figure.
         count += len(PLANTS) + len(reductions.LENGTHS_M) + len(reductions.RESTS_S)

@@ -70,13 +70,13 @@ def fill(port: Port, least: int = 0) -> list[Frame]:
     """
     end, number = time.monotonic() + ANSWER_S, 0
     while time.monotonic() < end:
-        taken = []
+        received = []
         while port.send(numbered(number)):
-            taken.append(numbered(number))
+            received.append(numbered(number))
             number += 1
             time.sleep(0.0005)
-        if len(taken) > least:
-            return taken
+        if len(received) > least:
+            return received
         time.sleep(0.01)
     raise AssertionError("it took all")
 
@@ -164,7 +164,7 @@ def test_a_blocked_serial_line_is_seen_and_nothing_of_it_comes_later(
     slcan: Port, line: SerialLine, faults: list[FrameFault]
 ) -> None:
     line.read()
-    taken = fill(slcan, least=2 * THEIR_BYTES // len(text(FRAME)))
+    received = fill(slcan, least=2 * THEIR_BYTES // len(text(FRAME)))
     assert slcan.state is BusState.NOT_CONFIRMED
     reported = len(faults)
     assert not slcan.send(FRAME), "held for a while"
@@ -172,7 +172,7 @@ def test_a_blocked_serial_line_is_seen_and_nothing_of_it_comes_later(
     until(lambda: slcan.send(FRAME._replace(can_id=0x333)))
     until(lambda: b"t3338" in line.read())
     # The other end of a pseudo-terminal has a buffer of its own, as an adapter has.
-    late = [one for one in taken if text(one) in line.text]
+    late = [one for one in received if text(one) in line.text]
     assert len(late) <= THEIR_BYTES // len(text(FRAME)), "what the kernel had taken is dropped"
     assert text(FRAME) not in line.text
     line.write(b"t1101FF\r")

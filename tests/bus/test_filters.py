@@ -22,8 +22,8 @@ class Filtered(socket.socket):
     def hears(self, word: int, *, join: bool) -> bool:
         found = []
         for can_id, mask in self.filters:
-            wanted = can_id & ~CAN_INV_FILTER
-            found.append((word & mask == wanted & mask) is not bool(can_id & CAN_INV_FILTER))
+            expected = can_id & ~CAN_INV_FILTER
+            found.append((word & mask == expected & mask) is not bool(can_id & CAN_INV_FILTER))
         return all(found) if join else any(found)
 
 
@@ -51,13 +51,13 @@ def test_each_message_is_received_by_the_socket_that_is_for_it(
         everything = taken | sent | known | others
         for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
             word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
-            heard = [
+            received = [
                 first.hears(word, join=False),
                 second.hears(word, join=False),
                 third.hears(word, join=True),
             ]
             message = (can_id, extended)
-            assert heard == [
+            assert received == [
                 message in taken,
                 message in sent,
                 message not in taken | sent | known,
@@ -66,12 +66,12 @@ def test_each_message_is_received_by_the_socket_that_is_for_it(
 
 def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
     taken = frozenset({(0x110, False)})
-    for size, heard in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
+    for size, received in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
         known = frozenset((0x1000 + i, True) for i in range(size))
         with Filtered() as first, Filtered() as second, Filtered() as third:
             ids = BusRoutes(taken, frozenset(), frozenset(), known)
             set_filters([first, second, third], ids)
             assert len(third.filters) <= MOST_FILTERS
-            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is heard
+            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is received
             assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
             assert not third.hears(0x110, join=True)

@@ -228,7 +228,7 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
     }
     result = init(file, given)
     assert result.exit_code == 0, result.output
-    for told in (
+    for reported in (
         "expected a whole number, 10000 to 1000000, got 'fast'",
         "expected some of JoystickLeft, JoystickRight, ",
         "got 'Left'",
@@ -249,7 +249,7 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
         "expected one of near_far, -, got 'turn'",
         "expected one of TipPosition.Radius, -, got 'Radius'",
     ):
-        assert told in result.output
+        assert reported in result.output
     config = load_deployment(file).config
     assert config.buses["crane"].bitrate == 500_000
     assert config.axes["turn"].valve.timeout_ms == 300
@@ -300,9 +300,9 @@ def test_what_is_found_at_the_end_leaves_a_draft_with_the_answers(tmp_path: Path
     given = answers({"CAN interface": "can7"})
     result = CliRunner().invoke(app, arguments, input=given)
     assert result.exit_code == 2
-    told = [line for line in result.output.splitlines() if str(tmp_path) in line][1:]
-    assert "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got 50 ms" in told[0]
-    assert told[1:] == [f"{draft}: kept with all answers; fix it there and rename it to {file}"]
+    reported = [line for line in result.output.splitlines() if str(tmp_path) in line][1:]
+    assert "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got 50 ms" in reported[0]
+    assert reported[1:] == [f"{draft}: kept with all answers; fix it there and rename it to {file}"]
     assert not file.exists()
     again = CliRunner().invoke(app, arguments, input=given)
     assert (again.exit_code, f"{draft}: is there already" in again.output) == (2, True)

@@ -336,13 +336,13 @@ def test_the_counter_is_that_of_the_header(
 def test_qualification_counts_good_headers() -> None:
     check = Profile1(0x123, "both")
     checker = made(check, qualify=3)
-    told = []
+    reported = []
     for count in (0, 1, 2, 3):
         checker.check(check.protect(bytes(8), count), 0)
-        told.append(checker.qualified)
+        reported.append(checker.qualified)
     checker.check(flipped(check.protect(bytes(8), 4), 60), 0)
-    told.append(checker.qualified)
+    reported.append(checker.qualified)
     for count in (5, 6, 7):
         checker.check(check.protect(bytes(8), count), 0)
-        told.append(checker.qualified)
-    assert told == [False, False, True, True, False, False, False, True]
+        reported.append(checker.qualified)
+    assert reported == [False, False, True, True, False, False, False, True]

@@ -140,11 +140,11 @@ def test_one_good_frame_is_enough_by_default() -> None:
 def test_so_many_good_frames_in_a_row_at_the_start_and_after_a_wrong_one(qualify: int) -> None:
     checker = made(qualify=qualify)
     counts = list(range(qualify + 3))
-    wanted = [False] * (qualify - 1) + [True] * 4
-    assert qualified(checker, counts) == wanted
+    expected = [False] * (qualify - 1) + [True] * 4
+    assert qualified(checker, counts) == expected
     jump = [counts[-1] + 50]
     assert qualified(checker, jump) == [False]
-    assert qualified(checker, [jump[0] + 1 + i for i in counts]) == wanted
+    assert qualified(checker, [jump[0] + 1 + i for i in counts]) == expected
 
 
 def test_silence_begins_the_count_again() -> None:

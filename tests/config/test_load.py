@@ -201,11 +201,13 @@ def test_one_fault_is_one_problem_with_its_line(
     text, line = changed(shipped, old, new)
     (problem,) = problems(text)
     assert says in problem
-    told = re.match(r"machine\.yaml:(\d+): ", problem)
-    assert told, problem
+    reported = re.match(r"machine\.yaml:(\d+): ", problem)
+    assert reported, problem
     # a problem of a whole axis stands at its name, that of an added line one below
     name = shipped.splitlines().index("  slew:") + 1
-    assert int(told[1]) in ((name,) if "sway data for" in says else (line, line + new.count("\n")))
+    assert int(reported[1]) in (
+        (name,) if "sway data for" in says else (line, line + new.count("\n"))
+    )
 
 
 @pytest.mark.parametrize("name", ["slew", "command", "limits", "buses", "kind", "0"])

@@ -62,8 +62,8 @@ def test_the_table_reports_now_and_file_and_ends(make: Make) -> None:
         "low": 1.8,
         "high": 3.0,
     }
-    told = adjuster.change({"axes.slew.sway.period_s": 2})
-    assert told == ["axes.slew.sway.period_s=2 was=2.356"]
+    reported = adjuster.change({"axes.slew.sway.period_s": 2})
+    assert reported == ["axes.slew.sway.period_s=2 was=2.356"]
     assert adjuster.table()["axes.slew.sway.period_s"]["now"] == 2.0
     assert adjuster.table()["axes.slew.sway.period_s"]["file"] == 2.356
 

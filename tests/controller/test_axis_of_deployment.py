@@ -45,14 +45,14 @@ def test_the_grid_is_that_of_the_valve(changed_rig: Make) -> None:
 
 def sent(rig: Rig, axis: Axis) -> tuple[list[float], list[float]]:
     """What slew sends, and what an axis made by hand sends, through a stroke of two seconds."""
-    got, wanted = [], []
+    got, expected = [], []
     for tick in range(200):
         joystick = 1000 if 3 <= tick < 100 else 0
         rig.run(1, Slew=joystick)
         axis.tick(CommandInput(joystick / 1000.0))
         got.append(rig.controller.axes["slew"].axis.sent)
-        wanted.append(axis.sent)
-    return got, wanted
+        expected.append(axis.sent)
+    return got, expected
 
 
 def by_hand(rig: Rig, sway: SwayModel | None, shaper: Any) -> Axis:
@@ -62,8 +62,8 @@ def by_hand(rig: Rig, sway: SwayModel | None, shaper: Any) -> Axis:
 
 def test_a_filter_that_needs_the_tick_has_it(changed_rig: Make) -> None:
     rig = changed_rig({FILTER: "    filter: { kind: first_order, time_constant_s: 0.3 }\n"})
-    got, wanted = sent(rig, by_hand(rig, None, FirstOrder(0.02, time_constant_s=0.3)))
-    assert got == wanted
+    got, expected = sent(rig, by_hand(rig, None, FirstOrder(0.02, time_constant_s=0.3)))
+    assert got == expected
     assert max(got) > 0.9
 
 
@@ -79,8 +79,8 @@ def test_a_filter_that_feeds_back_knows_the_slower_rate_of_the_valve(
     mode = rig.deployment.axes["slew"].config.sway
     assert mode is not None
     sway = SwayModel(mode.mode(), 0.02)
-    got, wanted = sent(rig, by_hand(rig, sway, LimitAware(sway, Fir([0.5, 0.5]), 1.0)))
-    assert got == wanted
+    got, expected = sent(rig, by_hand(rig, sway, LimitAware(sway, Fir([0.5, 0.5]), 1.0)))
+    assert got == expected
     assert max(got) > 0.5
 
 

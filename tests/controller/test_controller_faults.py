@@ -214,19 +214,19 @@ def test_a_slow_valve_does_not_slow_its_status(changed_rig: Make) -> None:
 
 
 def test_status_comes_in_its_cycle_and_with_every_transition(rig: Rig) -> None:
-    told: list[tuple[int, int, int]] = []
+    reported: list[tuple[int, int, int]] = []
     for tick in range(200):
         sent = rig.run(1, Slew=800 if 20 <= tick < 60 else 0)
         if "SlewStatus" in sent:
-            told.append((tick, sent["SlewStatus"]["State"], sent["SlewStatus"]["Reason"]))
+            reported.append((tick, sent["SlewStatus"]["State"], sent["SlewStatus"]["Reason"]))
         assert ("SlewStatus" in sent) is (tick % 5 == 0 or bool(rig.controller.events))
         for event in rig.controller.events:
             if event.axis == "slew":
-                assert told[-1] == (tick, event.transition.new, event.transition.reason)
+                assert reported[-1] == (tick, event.transition.new, event.transition.reason)
         assert ("ShaperStatus" in sent) is (tick % 25 == 0)
         rig.controller.events = [e for e in rig.controller.events if e.axis == "nobody"]
-    assert [s for _, s, _ in told][:1] == [State.READY]
-    assert {s for _, s, _ in told} == {State.READY, State.ACTIVE}
+    assert [s for _, s, _ in reported][:1] == [State.READY]
+    assert {s for _, s, _ in reported} == {State.READY, State.ACTIVE}
 
 
 def test_status_shows_joystick_and_valve(rig: Rig) -> None:

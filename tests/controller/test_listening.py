@@ -41,8 +41,8 @@ def test_j1939_keeps_its_address_for_the_status_and_for_nothing_else(tmp_path: P
     machine = ROOT / "config" / "j1939-forwarder.yaml"
     valves = {a.valve.message.sender.key[1] for a in load_deployment(machine).axes.values()}
     listening = load_deployment(machine).listening()
-    told = [s for s in (listening.status, *(a.status for a in listening.axes.values())) if s]
-    assert told
+    reported = [s for s in (listening.status, *(a.status for a in listening.axes.values())) if s]
+    assert reported
     assert j1939.CLAIM in sent("j1939-forwarder.yaml")
     assert not sent("j1939-forwarder.yaml") & valves
     assert listening.routing.buses["crane"].sent_groups == set()

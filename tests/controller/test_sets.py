@@ -106,10 +106,10 @@ def test_the_weight_chooses_where_the_operator_has_no_choice(changed_rig: Make) 
 
 def test_an_axis_without_a_choice_reports_the_set_0(changed_rig: Make) -> None:
     rig = changed_rig(dbc=DBC)
-    told = [
+    reported = [
         sent["SlewStatus"]["ActiveSet"] for _ in range(20) if "SlewStatus" in (sent := rig.run())
     ]
-    assert set(told) == {0}
+    assert set(reported) == {0}
 
 
 def test_a_weight_that_is_lost_or_not_available_is_none(chosen: Rig) -> None:

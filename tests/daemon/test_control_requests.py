@@ -114,7 +114,7 @@ def test_the_log_says_who_asked_for_a_black_box(
 ) -> None:
     answered(bench, path, {"black_box": "write"})
     (line,) = log("lack-box=asked")
-    assert line.startswith("INFO black-box=asked uid=")
+    assert line.startswith("INFO black-box=requested uid=")
 
 
 def test_black_boxes_are_written_where_the_daemon_was_started_with(

@@ -143,10 +143,12 @@ def test_some_lines_are_kept_the_others_are_counted_and_reported(pipe: Pipe) -> 
     for _ in range(10):
         handler.flush()
         lines += pipe.lines()
-    told = [int(n) for line in lines for n in re.findall(r"(\d+) lines of the log were lost", line)]
+    reported = [
+        int(n) for line in lines for n in re.findall(r"(\d+) lines of the log were lost", line)
+    ]
     numbers = [int(n) for line in lines for n in re.findall(r"^<6>(\d+) x", line)]
     assert numbers == list(range(at_once + MOST_LINES))
-    assert sum(told) == total - len(numbers)
+    assert sum(reported) == total - len(numbers)
     log(handler, "and on")
     assert pipe.lines() == ["<6>and on"]
 
@@ -204,8 +206,10 @@ def test_after_a_full_disk_the_log_goes_on_and_reports_the_gap(pipe: Pipe) -> No
         os.close(full)
         os.close(fd)
     assert "<6>there is room" in lines
-    told = [int(n) for line in lines for n in re.findall(r"(\d+) lines of the log were lost", line)]
-    assert sum(told) == 10
+    reported = [
+        int(n) for line in lines for n in re.findall(r"(\d+) lines of the log were lost", line)
+    ]
+    assert sum(reported) == 10
 
 
 def test_kept_lines_that_find_the_disk_full_are_counted_too(pipe: Pipe) -> None:

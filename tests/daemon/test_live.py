@@ -81,9 +81,9 @@ def test_set_shows_and_changes_and_a_reload_takes_it_back(daemon: Daemon) -> Non
     status, shown = canshaper("set", file)
     assert status == 0
     assert re.search(rf"{PERIOD} +2\.356 +2\.356 +1\.8 +3\b", shown), shown
-    status, told = canshaper("set", file, f"{PERIOD}=2.5")
-    assert (status, told.splitlines()[0]) == (0, f"{PERIOD}: 2.356 -> 2.5")
-    assert "Not written: lost when the daemon ends" in told
+    status, reported = canshaper("set", file, f"{PERIOD}=2.5")
+    assert (status, reported.splitlines()[0]) == (0, f"{PERIOD}: 2.356 -> 2.5")
+    assert "Not written: lost when the daemon ends" in reported
     daemon.logged(rf"set {PERIOD}=2\.5 was=2\.356 uid={os.getuid()} pid={os.getpid()}\n")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text
     table = json.loads(canshaper("set", file, "--json")[1])
@@ -98,20 +98,20 @@ def test_set_writes_when_asked(daemon: Daemon) -> None:
     """What was measured before is gone, and where it came from."""
     speed, origin = "full_speed_m_s: 1.5", ", origin: { date: 2026-11-23, by: me }"
     daemon.file.write_text(daemon.text.replace(speed, speed + origin, 1), encoding="utf-8")
-    status, told = canshaper("set", str(daemon.file), f"{PERIOD}=2.5", "--write")
-    assert (status, told.splitlines()[-1]) == (0, f"Written to {daemon.file}.")
+    status, reported = canshaper("set", str(daemon.file), f"{PERIOD}=2.5", "--write")
+    assert (status, reported.splitlines()[-1]) == (0, f"Written to {daemon.file}.")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text.replace(
         "period_s: 2.356", "period_s: 2.5"
     )
 
 
 def test_set_reports_what_is_refused_and_writes_nothing(daemon: Daemon) -> None:
-    status, told = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
-    assert (status, told) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
+    status, reported = canshaper("set", str(daemon.file), f"{PERIOD}=4", "--write")
+    assert (status, reported) == (1, f"{PERIOD}: expected 1.8 to 3, got 4\n")
     daemon.logged(rf"set=refused uid=\d+ pid=\d+ {PERIOD}: expected 1.8 to 3, got 4")
     assert daemon.file.read_text(encoding="utf-8") == daemon.text
-    status, told = canshaper("set", str(daemon.file), PERIOD)
-    assert (status, told.splitlines()[0][:23]) == (2, "expected KEY=NUMBER, as")
+    status, reported = canshaper("set", str(daemon.file), PERIOD)
+    assert (status, reported.splitlines()[0][:23]) == (2, "expected KEY=NUMBER, as")
 
 
 def test_set_without_a_daemon_or_a_section(tmp_path: Path) -> None:
@@ -119,10 +119,10 @@ def test_set_without_a_daemon_or_a_section(tmp_path: Path) -> None:
     daemon.logged("started file=")
     assert daemon.end() == 0
     assert not (tmp_path / "control.sock").exists()
-    status, told = canshaper("set", str(daemon.file))
-    assert (status, "control.sock: No such file" in told) == (1, True)
-    status, told = canshaper("set", "forwarder.yaml")
-    assert (status, "has no control section" in told) == (2, True)
+    status, reported = canshaper("set", str(daemon.file))
+    assert (status, "control.sock: No such file" in reported) == (1, True)
+    status, reported = canshaper("set", "forwarder.yaml")
+    assert (status, "has no control section" in reported) == (2, True)
 
 
 def test_a_daemon_whose_socket_cannot_be_says_so_and_runs(tmp_path: Path) -> None:
@@ -134,8 +134,11 @@ def test_a_daemon_whose_socket_cannot_be_says_so_and_runs(tmp_path: Path) -> Non
 
 
 def test_an_option_without_a_section_is_an_error() -> None:
-    status, told = canshaper("run", "forwarder.yaml", "--control", "x.sock")
-    assert (status, "--control: the deployment file has no control section" in told) == (2, True)
+    status, reported = canshaper("run", "forwarder.yaml", "--control", "x.sock")
+    assert (status, "--control: the deployment file has no control section" in reported) == (
+        2,
+        True,
+    )
 
 
 def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> None:
@@ -147,7 +150,7 @@ def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> Non
     daemon = Daemon(tmp_path, "--listen-only")
     daemon.logged("listen-only=yes valves=none")
     daemon.logged("started file=")
-    heard: set[int] = set()
+    received: set[int] = set()
     states: list[str] = []
     reasons: set[str] = set()
     shaped = 0.0
@@ -172,7 +175,7 @@ def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> Non
                 got = bus.recv(left)
                 if got is None or bytes(got.data) in mine[-4:]:  # multicast brings our own back
                     continue
-                heard.add(got.arbitration_id)
+                received.add(got.arbitration_id)
                 if got.arbitration_id == status.frame_id:
                     decoded = status.decode(bytes(got.data))
                     states.append(str(decoded["State"]))
@@ -189,4 +192,4 @@ def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> Non
     assert "ACTIVE" in states
     assert "SECOND_SENDER" not in reasons  # a stall of the machine may trip it
     assert "SECOND_SENDER" not in daemon.log()
-    assert not heard & sent
+    assert not received & sent

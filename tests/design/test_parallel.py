@@ -24,12 +24,12 @@ def test_every_job_has_its_result_once(count: int) -> None:
 
 
 def test_jobs_are_taken_a_few_ahead_only() -> None:
-    taken: list[int] = []
-    jobs = (taken.append(n) or n for n in range(1000))
+    received: list[int] = []
+    jobs = (received.append(n) or n for n in range(1000))
     results = Processes(2).run(square, jobs)
     for _ in range(5):
         next(results)
-    assert len(taken) < 20
+    assert len(received) < 20
     results.close()  # type: ignore[attr-defined]
 
 

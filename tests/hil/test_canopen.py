@@ -192,8 +192,8 @@ def test_an_emergency_in_motion_is_neutral_named_reset_and_on_again(
         machine.joysticks["left"].x = 32767
         until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
     messages = logged(log)
-    told = next(m.timestamp for m in messages if m.arbitration_id == 0xA0 and any(m.data[:2]))
-    after = [c for c in commands(log) if c[0] > told]
+    reported = next(m.timestamp for m in messages if m.arbitration_id == 0xA0 and any(m.data[:2]))
+    after = [c for c in commands(log) if c[0] > reported]
     again = next(i for i, c in enumerate(after) if c[1] == ACTIVE and i > 3)
     # One frame may be under way already.
     assert all(point == 0 for _, _, point in after[1:again])

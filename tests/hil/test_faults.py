@@ -80,11 +80,11 @@ def drive(bus: can.BusABC, hand: Hand, axis: str) -> None:
     """Full motion; once more where an emulated machine that stood still has tripped the axis."""
     for _ in range(5):
         setattr(hand, axis.lower(), 100.0)
-        wanted: dict[str, Accept] = {
+        expected: dict[str, Accept] = {
             f"{axis}Command": lambda v: v["Velocity"] > 90.0,
             f"{axis}Status": lambda s: str(s["Reason"]) == "LOOP_STALLED",
         }
-        if wait_for_one(bus, wanted)[0].endswith("Command"):
+        if wait_for_one(bus, expected)[0].endswith("Command"):
             return
         ready(bus, hand, axis)
     raise AssertionError("the machine stands still too often")

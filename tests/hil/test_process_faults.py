@@ -64,11 +64,11 @@ def drive(bus: can.BusABC, joysticks: Joysticks) -> None:
     for _ in range(5):
         ready(bus, joysticks)
         joysticks.values["Slew"] = 100.0
-        wanted: dict[str, Accept] = {
+        expected: dict[str, Accept] = {
             "SlewCommand": lambda v: v["Velocity"] > 90.0,
             "SlewStatus": lambda s: str(s["Reason"]) == "LOOP_STALLED",
         }
-        if wait_for_one(bus, wanted)[0] == "SlewCommand":
+        if wait_for_one(bus, expected)[0] == "SlewCommand":
             return
     raise AssertionError("the machine stands still too often")
 

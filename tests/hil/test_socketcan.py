@@ -66,7 +66,7 @@ def test_python_can_hears_cansend(bus: can.BusABC) -> None:
 
 def test_candump_hears_python_can(bus: can.BusABC) -> None:
     hello = can.Message(arbitration_id=0x7FF, is_extended_id=False)
-    wanted = can.Message(arbitration_id=0x321, data=[0xDE, 0xAD], is_extended_id=False)
+    expected = can.Message(arbitration_id=0x321, data=[0xDE, 0xAD], is_extended_id=False)
     quiet_ms = str(int(ANSWER_S * 1000))  # candump ends after so long without a frame
     with subprocess.Popen(
         [tool("candump"), "-L", "-T", quiet_ms, "vcan0"], stdout=subprocess.PIPE, text=True
@@ -77,7 +77,7 @@ def test_candump_hears_python_can(bus: can.BusABC) -> None:
             # whenever candump listens at last, it prints the next greeting
             assert candump.stdout.readline().split()[1:] == ["vcan0", "7FF#"]
             greeting.stop()
-            bus.send(wanted)
+            bus.send(expected)
             assert any(line.split()[1:] == ["vcan0", "321#DEAD"] for line in candump.stdout)
         finally:
             candump.terminate()

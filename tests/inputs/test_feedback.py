@@ -19,8 +19,8 @@ def run(rig: Rig, ticks: int, left: float, opening: float | None, **options: int
     """Slew commanded, and a valve that stands so far open; what was told of it."""
     rig.events.clear()
     for i in range(ticks):
-        told = [] if opening is None or i % 5 else [avef(0, opening, **options)]
-        rig.tick(bjm("BJM1", X=left), bjm("BJM2"), *told)
+        reported = [] if opening is None or i % 5 else [avef(0, opening, **options)]
+        rig.tick(bjm("BJM1", X=left), bjm("BJM2"), *reported)
     return [e.split(" feedback")[0] for e in rig.events if "axis=slew valve" in e]
 
 
@@ -84,8 +84,8 @@ def test_the_other_nodes_are_informed_which_valve_does_not_follow(rig: Rig) -> N
         rig.receive(avef(number, 0.0))
     sent = []
     for i in range(60):
-        told = [avef(n, 60.0 if n == 0 else 0.0) for n in range(3)] if i % 5 == 0 else []
-        sent += rig.tick(bjm("BJM1"), bjm("BJM2"), *told)
+        reported = [avef(n, 60.0 if n == 0 else 0.0) for n in range(3)] if i % 5 == 0 else []
+        sent += rig.tick(bjm("BJM1"), bjm("BJM2"), *reported)
     single = [f.data for f in sent if f.can_id == DM1]
     assert single, ids(sent).count(BROADCAST)
     # SPN of the first axis' valve, FMI 7: mechanical system not responding

@@ -114,13 +114,13 @@ def test_a_radius_out_of_range_does_not_break_the_sequence(tip: Tip) -> None:
 def test_a_radius_qualifies_too(tmp_path: Path) -> None:
     old = "      timeout_ms: 100\n      e2e: { profile: p01, data_id: 0x77"
     tip = Tip(load(tmp_path, (old, old.replace("e2e", "qualify: 3\n      e2e"))))
-    for wanted in (None, None, 4.0):
+    for expected in (None, None, 4.0):
         assert tip.send(4000) is FrameFault.NONE
-        assert tip.known_m == wanted
+        assert tip.known_m == expected
     assert tip.send(5000, step=5) is FrameFault.COUNTER_JUMP
-    for wanted in (4.0, 4.0, 6.0):
+    for expected in (4.0, 4.0, 6.0):
         tip.send(6000)
-        assert tip.known_m == pytest.approx(wanted)
+        assert tip.known_m == pytest.approx(expected)
 
 
 def test_nothing_known_holds_after_a_stall(tip: Tip) -> None:

@@ -113,15 +113,15 @@ def _obstacles(options: argparse.Namespace) -> dict[str, str | None]:
 
 def _choose(options: argparse.Namespace) -> str:
     """Return the lane to take; raise NoLane with every reason if there is none."""
-    wanted = {
+    expected = {
         name: reason
         for name, reason in _obstacles(options).items()
         if options.lane in ("auto", name)
     }
-    for name, reason in wanted.items():
+    for name, reason in expected.items():
         if reason is None:
             return name
-    raise NoLane("no lane on this machine. " + "; ".join(f"{n}: {r}" for n, r in wanted.items()))
+    raise NoLane("no lane on this machine. " + "; ".join(f"{n}: {r}" for n, r in expected.items()))
 
 
 def _run(job: Job, lane: str) -> int:

@@ -89,15 +89,15 @@ def test_of_two_buses_each_has_its_own_messages(machine: Machine) -> None:
 def test_check_reports_it_and_warns(machine: Machine) -> None:
     check = ["check", str(machine.directory / "machine.yaml")]
     machine.load()
-    told = CliRunner().invoke(app, check)
-    assert told.exit_code == 0
-    assert "% of 250 kbit/s" in told.output
-    assert "WARNING" not in told.output
+    reported = CliRunner().invoke(app, check)
+    assert reported.exit_code == 0
+    assert "% of 250 kbit/s" in reported.output
+    assert "WARNING" not in reported.output
     machine.in_yaml("bitrate: 250000", "bitrate: 40000")
     machine.load()
-    told = CliRunner().invoke(app, check)
-    assert told.exit_code == 0
-    assert "WARNING: above 50 %" in told.output
+    reported = CliRunner().invoke(app, check)
+    assert reported.exit_code == 0
+    assert "WARNING: above 50 %" in reported.output
     machine.in_yaml(", bitrate: 40000", "")
     machine.load()
     assert "load is not known" in CliRunner().invoke(app, check).output

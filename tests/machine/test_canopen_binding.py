@@ -46,8 +46,8 @@ def test_problems_of_the_deployment_have_their_line(
     line = file.read_text()[: file.read_text().index(new)].count("\n") + 1
     found = problems(file)
     assert any(says in one for one in found), found
-    (told,) = (one for one in found if says in one)
-    number = int(told.split("machine.yaml:")[1].split(":")[0])
+    (reported,) = (one for one in found if says in one)
+    number = int(reported.split("machine.yaml:")[1].split(":")[0])
     assert line <= number <= line + new.count("\n")
 
 

@@ -74,7 +74,7 @@ def _simulate(axis: str, shaped: bool, t_s: list[float]) -> AxisTrace:
         t = step * STEP_S
         joystick = joystick_at(axis, t)
         if step % 20 == 0:
-            wanted = joystick
+            expected = joystick
             if shaped and gain:
                 # y = u + (2 z / w) f' - (2 / w) f' with f the double pole at w: D = 1
                 y, rate = filtered
@@ -83,8 +83,8 @@ def _simulate(axis: str, shaped: bool, t_s: list[float]) -> AxisTrace:
                     y += STEP_S * rate
                 filtered = (y, rate)
                 bend = omega**2 * (joystick - y) - 2 * omega * rate
-                wanted = y + 2 * zeta / omega * rate + bend / omega**2
-            move = max(-VALVE_RATE * 0.02, min(VALVE_RATE * 0.02, wanted - sent))
+                expected = y + 2 * zeta / omega * rate + bend / omega**2
+            move = max(-VALVE_RATE * 0.02, min(VALVE_RATE * 0.02, expected - sent))
             sent = round((sent + move) * 125) / 125
         before, speed = speed, speed + STEP_S * (sent - speed) / VALVE_LAG_S
         angle, rate = model

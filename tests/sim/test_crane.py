@@ -123,11 +123,11 @@ def test_swing_does_not_depend_on_the_heading() -> None:
 
 
 def test_an_axis_without_a_frame_keeps_its_command() -> None:
-    told, silent = Crane(), Crane()
+    reported, silent = Crane(), Crane()
     for k, commands in enumerate(mixed_commands(100)):
-        told.step(TICK_S, mixed_commands(100)[k - k % 40])
+        reported.step(TICK_S, mixed_commands(100)[k - k % 40])
         silent.step(TICK_S, commands if k % 40 == 0 else {})
-    assert told.state == silent.state
+    assert reported.state == silent.state
 
 
 def test_initial_sway_swings_on_its_own() -> None:

@@ -26,29 +26,29 @@ def drive(folder: Path) -> list[tuple[float, str, dict]]:
         with service(folder / "hand.log", "operator", str(FILE), *script) as hand:
             assert hand.process.wait() == 0, hand.text()
         assert sim.process.poll() is None, sim.text()
-    heard = []
+    received = []
     for message in logged(log):
         name = message_name(message)
         assert name is not None
-        heard.append((message.timestamp, name, dict(DBC.decode_message(name, message.data))))
-    return heard
+        received.append((message.timestamp, name, dict(DBC.decode_message(name, message.data))))
+    return received
 
 
 def test_after_a_pulse_the_grapple_hangs_still(forwarder: Unit, tmp_path: Path) -> None:
     for _ in range(DRIVES):
-        heard = drive(tmp_path)
-        joysticks = [t for t, name, _ in heard if name == "JoystickLeft"]
+        received = drive(tmp_path)
+        joysticks = [t for t, name, _ in received if name == "JoystickLeft"]
         longest_s = max(later - t for t, later in pairwise(joysticks))
-        told = [str(s["Reason"]) for _, name, s in heard if name == "NearFarStatus"]
-        if longest_s < HELD_UP_S and not HELD_UP & {*told}:
+        reported = [str(s["Reason"]) for _, name, s in received if name == "NearFarStatus"]
+        if longest_s < HELD_UP_S and not HELD_UP & {*reported}:
             break
-        print(f"once more: {longest_s:.2f} s between two frames of the hand; {sorted({*told})}")
+        print(f"once more: {longest_s:.2f} s between two frames of the hand; {sorted({*reported})}")
         forwarder.systemctl("restart")  # a stall is latched
-    released = max(t for t, name, s in heard if name == "JoystickLeft" and s["NearFar"] != 0.0)
-    swings = [(t, max(map(abs, s.values()))) for t, name, s in heard if name == "GrappleSway"]
+    released = max(t for t, name, s in received if name == "JoystickLeft" and s["NearFar"] != 0.0)
+    swings = [(t, max(map(abs, s.values()))) for t, name, s in received if name == "GrappleSway"]
     after = [swing for t, swing in swings if t > released + DWELL_S]
-    fastest = max(s["RadialSpeed"] for _, name, s in heard if name == "TipVelocity")
-    assert fastest > 0.95, sorted({*told})  # of 1 m/s
+    fastest = max(s["RadialSpeed"] for _, name, s in received if name == "TipVelocity")
+    assert fastest > 0.95, sorted({*reported})  # of 1 m/s
     assert max(swing for _, swing in swings) > 2 * MOST_DEG
     assert len(after) > 10
     assert max(after) < MOST_DEG

@@ -27,8 +27,8 @@ def test_started_means_that_the_valves_get_neutral(installed: None, tmp_path: Pa
     unit = Unit("forwarder")
     with candump(tmp_path / "start.log", "vcan0"):
         unit.systemctl("start")
-    told = {message_name(m): m.data[0] for m in logged(tmp_path / "start.log")}
-    assert {name: told.get(name) for name in VALVES} == dict.fromkeys(VALVES, 0)
+    reported = {message_name(m): m.data[0] for m in logged(tmp_path / "start.log")}
+    assert {name: reported.get(name) for name in VALVES} == dict.fromkeys(VALVES, 0)
     assert re.search("started file=/etc/canshaper/forwarder.yaml", unit.text())
 
 

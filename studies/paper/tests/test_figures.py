@@ -50,8 +50,8 @@ def test_pole_titles_carry_the_peaks(
 ) -> None:
     for run, _ in (study.ladder(number)[0], study.ladder(number)[-1]):
         swing = run.swing("perpendicular" if plane == "perpendicular" else "parallel", "peak")
-        told = f"{change(swing.reduction_pct)} ({poles(run.poles_rad_s)})"
-        assert told in headline(figures[number])
+        reported = f"{change(swing.reduction_pct)} ({poles(run.poles_rad_s)})"
+        assert reported in headline(figures[number])
 
 
 @pytest.mark.parametrize("number", [7, 8])

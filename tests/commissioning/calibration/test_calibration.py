@@ -95,10 +95,10 @@ def test_the_curve_goes_into_the_deployment(tmp_path: Path) -> None:
     file = tmp_path / "machine.yaml"
     file.write_text(FILE.read_text().replace("../dbc", str(ROOT / "dbc")))
     options = ["calibrate", str(file), "--axis", "slew", "--top", "25", "--rate", "5", "--write"]
-    told = CliRunner().invoke(app, [*options, "--set", "slew.negative_more_deadband=0.05"])
-    assert told.exit_code == 0, told.output
-    assert "negative: opens at" in told.output
-    assert "above 25 % of the command this is a straight line, not measured" in told.output
+    reported = CliRunner().invoke(app, [*options, "--set", "slew.negative_more_deadband=0.05"])
+    assert reported.exit_code == 0, reported.output
+    assert "negative: opens at" in reported.output
+    assert "above 25 % of the command this is a straight line, not measured" in reported.output
     limits = load_deployment(file).axes["slew"].config.limits
     curve = limits.curve()
     assert curve is not None
@@ -217,9 +217,9 @@ def test_no_other_valve_moves(deployment: Deployment) -> None:
     ],
 )
 def test_wrong_options_are_reported(arguments: list[str], says: str) -> None:
-    told = CliRunner().invoke(app, ["calibrate", str(FILE), *arguments])
-    assert told.exit_code == 2
-    assert says in told.output
+    reported = CliRunner().invoke(app, ["calibrate", str(FILE), *arguments])
+    assert reported.exit_code == 2
+    assert says in reported.output
 
 
 def test_a_signal_that_is_none_of_the_axis_is_reported(deployment: Deployment) -> None:

@@ -155,8 +155,8 @@ def test_the_end_in_a_gateway_can_be_reported_more_than_once() -> None:
     heard = [Frame("machine", 0x402, False, bytes(6))]
     drive = drive_on(deployment, "slew", ("TipVelocity", "SlewRate"), heard, 150)
     assert drive.waiting_for == ""
-    told = [drive.neutral_frames() for _ in range(3)]
-    assert [[frame.data[:2] for frame in frames] for frames in told] == [[bytes(2)]] * 3
+    reported = [drive.neutral_frames() for _ in range(3)]
+    assert [[frame.data[:2] for frame in frames] for frames in reported] == [[bytes(2)]] * 3
 
 
 @pytest.mark.parametrize("verb", [["calibrate"], ["robust"], ["set"], ["tune"]])
@@ -166,9 +166,9 @@ def test_a_shipped_deployment_is_not_written(
     monkeypatch.chdir(tmp_path)
     before = (ROOT / "config" / "forwarder.yaml").read_text()
     axis = [] if verb == ["set"] else ["--axis", "slew"]
-    told = CliRunner().invoke(app, [*verb, "forwarder.yaml", *axis, "--write"])
-    assert told.exit_code == 2, told.output
-    assert "shipped with the package; copy it, then write to the copy" in told.output
+    reported = CliRunner().invoke(app, [*verb, "forwarder.yaml", *axis, "--write"])
+    assert reported.exit_code == 2, reported.output
+    assert "shipped with the package; copy it, then write to the copy" in reported.output
     assert (ROOT / "config" / "forwarder.yaml").read_text() == before
 
 

@@ -132,9 +132,9 @@ def test_a_process_that_fails_says_why_and_leaves_no_other() -> None:
 
 
 def test_two_buses_with_all_that_a_deployment_may_have(two_buses: Path) -> None:
-    told: list[float] = []
-    run = measure(load_deployment(two_buses), 0.5, told.append, load=False)
-    assert told == sorted(told)
+    reported: list[float] = []
+    run = measure(load_deployment(two_buses), 0.5, reported.append, load=False)
+    assert reported == sorted(reported)
     assert run.joystick_ns
     assert min(run.joystick_ns) > 0
     assert len(run.tick_ns) == len(run.late_ns) + 1

@@ -36,9 +36,9 @@ def swung(
     """Times and swing of the tool let go at an angle, then hanging on."""
     start = math.radians(degrees)
     sway = Sway(start) if direction == SLEW else Sway(0.0, start)
-    told = [state for state, _ in driven(seconds, grapple=grapple, sway=sway)]
-    angles = [(s.theta5_rad, s.theta6_rad)[direction] for s in told]
-    return np.array([s.time_s for s in told]), np.array(angles)
+    reported = [state for state, _ in driven(seconds, grapple=grapple, sway=sway)]
+    angles = [(s.theta5_rad, s.theta6_rad)[direction] for s in reported]
+    return np.array([s.time_s for s in reported]), np.array(angles)
 
 
 def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
@@ -128,12 +128,12 @@ def test_a_crane_in_mujoco(direction: int) -> None:
 
 def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
     """The near-far axis driven, with its commands, as an angle or its rate."""
-    told = driven(seconds, pushes)
-    time = np.array([s.time_s for s, _ in told])
+    reported = driven(seconds, pushes)
+    time = np.array([s.time_s for s, _ in reported])
     rate = kind is Kind.RATE
-    swing = np.array([s.theta6_rate_rad_s if rate else s.theta6_rad for s, _ in told])
+    swing = np.array([s.theta6_rate_rad_s if rate else s.theta6_rad for s, _ in reported])
     noise = Coloured(seed, math.radians(0.2), 0.8)
-    commands = np.array([c["near_far"] for _, c in told])
+    commands = np.array([c["near_far"] for _, c in reported])
     speed = np.sign(commands) * np.maximum(0.0, (np.abs(commands) - 0.05) / 0.95)
     unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
     value = swing + np.array([noise() for _ in time])
@@ -179,9 +179,9 @@ def check(found: Finding) -> None:
 
 def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
     """Without commands too: the shape tells where the free swing begins."""
-    told = driven(40.0, STROKES)
-    time = np.array([s.time_s for s, _ in told])
-    angle = np.array([s.theta6_rad for s, _ in told])
+    reported = driven(40.0, STROKES)
+    time = np.array([s.time_s for s, _ in reported])
+    angle = np.array([s.theta6_rad for s, _ in reported])
     found = identify("near_far", "", [noisy(time, angle, 4, 0.05)])
     assert found.usable, found.poor
     assert found.free

@@ -236,11 +236,11 @@ def test_a_long_log_reports_how_far_it_is(tmp_path: Path, deployment: Deployment
     log = tmp_path / "b.log"
     rows = [f"({1.7e9 + 20 + 0.001 * k:.6f}) can0 123#00" for k in range(50_000)]
     write(log, [*lines, *rows])
-    told: list[float] = []
-    read_can(log, "", SWAY, deployment.messages, on_progress=told.append)
-    assert told == sorted(told)
-    assert told[-1] == 1.0
-    assert any(0.0 < part < 1.0 for part in told)
+    reported: list[float] = []
+    read_can(log, "", SWAY, deployment.messages, on_progress=reported.append)
+    assert reported == sorted(reported)
+    assert reported[-1] == 1.0
+    assert any(0.0 < part < 1.0 for part in reported)
 
 
 def test_a_measurement_of_poor_merit_is_left_out(tmp_path: Path) -> None:

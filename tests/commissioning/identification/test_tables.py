@@ -80,8 +80,8 @@ def test_degrees_a_second(tmp_path: Path) -> None:
 
 
 def test_a_round_swing_is_reported(tmp_path: Path) -> None:
-    told = driven(30.0, sway=Sway(0.15, 0.0, 0.0, 0.3))
-    series = series_of(read_table(phone(tmp_path / "a.csv", told)), "", None)
+    reported = driven(30.0, sway=Sway(0.15, 0.0, 0.0, 0.3))
+    series = series_of(read_table(phone(tmp_path / "a.csv", reported)), "", None)
     assert any("swing it in one direction only" in note for note in series.notes)
 
 
@@ -239,9 +239,9 @@ def test_a_can_log_is_no_table(tmp_path: Path) -> None:
 
 
 def test_progress(tmp_path: Path) -> None:
-    told: list[float] = []
+    reported: list[float] = []
     file = tmp_path / "a.csv"
     file.write_text("Time (s),x\n" + "".join(f"{0.01 * k:.2f},{k % 7}\n" for k in range(100_000)))
-    read_table(file, told.append)
-    assert told == sorted(told)
-    assert 0.0 < told[0] < told[-1] <= 1.0
+    read_table(file, reported.append)
+    assert reported == sorted(reported)
+    assert 0.0 < reported[0] < reported[-1] <= 1.0

@@ -153,9 +153,9 @@ def test_a_lost_heartbeat_of_a_joystick_is_a_shaped_stop(rig: CanopenRig) -> Non
 def test_an_emergency_in_motion_is_neutral_with_the_next_frame(rig: CanopenRig) -> None:
     rig.moving()
     rig.emergency("slew", FLOW_COMMAND_LATE)
-    told = rig.run(Slew=30000, Lift=20000)
-    assert told["slew"]["SetPoint"] == 0
-    assert told["lift"]["SetPoint"] > 3000
+    reported = rig.run(Slew=30000, Lift=20000)
+    assert reported["slew"]["SetPoint"] == 0
+    assert reported["lift"]["SetPoint"] > 3000
     assert rig.axis() == FAULT
     assert rig.last_fault == "NODE_EMERGENCY"
     assert any("node=slew" in text and "emergency=0x8003" in text for text in rig.texts)

@@ -137,9 +137,9 @@ def test_every_code_is_read_back(faults: list[Fault]) -> None:
 
 def test_every_reason_for_a_stop_is_a_fault_or_is_known_to_be_none() -> None:
     stops = {r.name for r in Reason if r >= Reason.JOYSTICK_TIMEOUT}
-    told = {r.name for r in FMI_OF}
-    assert not told & NO_FAULTS
-    assert stops - told - NO_FAULTS <= {"VALVE_NOT_READY"}
+    reported = {r.name for r in FMI_OF}
+    assert not reported & NO_FAULTS
+    assert stops - reported - NO_FAULTS <= {"VALVE_NOT_READY"}
 
 
 def test_the_machine_reports_which_axes_cannot_move_and_why() -> None:
