@@ -113,7 +113,7 @@ def test_the_log_says_who_asked_for_a_black_box(
     bench: Bench, path: Path, asked: list[BlackBox], log: Callable[[str], list[str]]
 ) -> None:
     answered(bench, path, {"black_box": "write"})
-    (line,) = log("lack-box=asked")
+    (line,) = log("lack-box=requested")
     assert line.startswith("INFO black-box=requested uid=")
 
 
