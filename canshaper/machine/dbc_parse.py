@@ -8,7 +8,7 @@ import cantools
 from cantools.database.can import Database, Message
 
 from canshaper.errors import Problem
-from canshaper.machine.dbc_text import WIDE_ID
+from canshaper.machine.dbc_text import WIDE_ID, keyword
 
 # What cantools gets of the files of a deployment: messages that are used, and what is of none.
 MOST_PARSED = 400_000
@@ -16,11 +16,12 @@ MOST_PARSED = 400_000
 MOST_WORDS = 90_000
 # Bytes of all messages: cantools takes 10 us for each, whatever is in it.
 MOST_PAYLOAD = 100_000
-_LENGTH = re.compile(r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{1,5})")
+_MESSAGE = rf"{keyword('BO_')}\s+\d+\s+\w+\s*:\s*"
+_LENGTH = re.compile(rf"{_MESSAGE}(\d{{1,5}})")
 # Bytes of a message, first bit and bits of a signal: cantools makes a list of as many, and the
 # memory would not last. The longest of J1939 has 1785 bytes.
 _TOO_LARGE = re.compile(
-    r"\bBO_\s+\d+\s+\w+\s*:\s*(\d{6,})|\bSG_\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{6,})"
+    rf"{_MESSAGE}(\d{{6,}})|{keyword('SG_')}\s+\w+(?:\s+\w+)?\s*:\s*(?:\d+\s*\|\s*)?(\d{{6,}})"
 )
 UNUSABLE = "not a DBC file that can be used"
 SYNTAX = "Invalid syntax"

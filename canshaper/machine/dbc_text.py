@@ -34,7 +34,7 @@ def _row(*parts: str) -> str:
     return _GAP.join(parts)
 
 
-def _word(word: str) -> str:
+def keyword(word: str) -> str:
     """A keyword; what may stand before it comes last, so that the search knows its first letter."""
     return rf"{word}(?<!\w{word})\b"
 
@@ -48,7 +48,7 @@ _SIGNAL = _row(
     *(r"\(", _NUMBER, ",", _NUMBER, r"\)", r"\[", _NUMBER, r"\|", _NUMBER, r"\]"),
     *(_STRING, _NAMES),
 )
-_BO, _SG, _BA, _CM, _REL = (_word(word) for word in ("BO_", "SG_", "BA_", "CM_", "BA_REL_"))
+_BO, _SG, _BA, _CM, _REL = (keyword(word) for word in ("BO_", "SG_", "BA_", "CM_", "BA_REL_"))
 # The last group of each is empty and has its name. None can run on from one statement into the
 # next, so that all of them together take linear time.
 _STATEMENTS = {
@@ -56,8 +56,8 @@ _STATEMENTS = {
         _BO, _id("message"), f"(?P<name>{_NAME})", ":", r"(?P<length>\d{1,5}+)(?![\w.])"
     )
     + f"{_GAP}{_NAME}(?P<signals>(?:{_GAP}{_SIGNAL})*+)(?!{_GAP}SG_\\b)",
-    "table": _row(_word("VAL_"), _id("table"), _NAME, f"{_TABLE};"),
-    "type": _row(_word("SIG_VALTYPE_"), _id("type"), _NAME, ":", r"\d++", ";"),
+    "table": _row(keyword("VAL_"), _id("table"), _NAME, f"{_TABLE};"),
+    "type": _row(keyword("SIG_VALTYPE_"), _id("type"), _NAME, ":", r"\d++", ";"),
     "long": _row(
         _BA, '"SystemMessageLongSymbol"', _BO, _id("long"), r'"(?P<symbol>[^"\\\n]*+)"', ";"
     ),
@@ -65,13 +65,15 @@ _STATEMENTS = {
     "of_signal": _row(_BA, _STRING, _SG, _id("of_signal"), _NAME, _VALUE, ";"),
     "message_text": _row(_CM, _BO, _id("message_text"), _STRING, ";"),
     "signal_text": _row(_CM, _SG, _id("signal_text"), _NAME, _STRING, ";"),
-    "sender": _row(_word("BO_TX_BU_"), _id("sender"), ":", _NAMES, ";"),
-    "group": _row(_word("SIG_GROUP_"), _id("group"), _NAME, _NUMBER, ":", f"(?:{_NAME}{_GAP})*+;"),
-    "choosing": _row(_word("SG_MUL_VAL_"), _id("choosing"), _NAME, _NAME, r"[-\d \t\n,]++;"),
-    "to_node": _row(_REL, _STRING, _word("BU_BO_REL_"), _NAME, _id("to_node"), _VALUE, ";"),
-    "in_node": _row(_REL, _STRING, _word("BU_SG_REL_"), _NAME, _SG, _id("in_node"), _NAME)
+    "sender": _row(keyword("BO_TX_BU_"), _id("sender"), ":", _NAMES, ";"),
+    "group": _row(
+        keyword("SIG_GROUP_"), _id("group"), _NAME, _NUMBER, ":", f"(?:{_NAME}{_GAP})*+;"
+    ),
+    "choosing": _row(keyword("SG_MUL_VAL_"), _id("choosing"), _NAME, _NAME, r"[-\d \t\n,]++;"),
+    "to_node": _row(_REL, _STRING, keyword("BU_BO_REL_"), _NAME, _id("to_node"), _VALUE, ";"),
+    "in_node": _row(_REL, _STRING, keyword("BU_SG_REL_"), _NAME, _SG, _id("in_node"), _NAME)
     + f"{_GAP}{_VALUE}{_GAP};",
-    "no_message": _row(_word("VAL_TABLE_"), _NAME, f"{_TABLE};"),
+    "no_message": _row(keyword("VAL_TABLE_"), _NAME, f"{_TABLE};"),
     # What no statement has taken: a message that is written as no one expects, and the others.
     "odd": _row(_BO, r"[-+\d]"),
     "strings": rf'(?:{_STRING}[^"/BCSV]*+)++',
