@@ -49,11 +49,9 @@ class Guarded:
 
     def tick(self, now_ns: int, missed: int = 0) -> Iterator[Frame]:
         """One tick: the frames to send now; see ``Controller``."""
-        guard, valves = self._guard, self._valves
-        guard.begin(missed)
-        at = guard.at
+        valve_of, at = self._valves.get, self._guard.begin(missed)
         for frame in self._controller.tick(now_ns, missed):
-            valve = valves.get(frame[:3])
+            valve = valve_of(frame[:3])
             if valve is None:
                 yield frame
                 continue

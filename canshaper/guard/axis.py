@@ -136,12 +136,12 @@ class GuardedAxis(Asked):
         if command is None or len(data) != self._length:
             command = self._learn(data)
         direction, size, _, _ = command
-        sure, good_ns = self.sure[direction]
-        last = self._last
+        last, good_ns = self._last, self.sure_ns
         # The usual one: within what is sure to be asked for, and one step of the rates.
-        if size >= sure or now_ns >= good_ns or direction != last[0] or size > last[3]:
+        if size >= self.sure or now_ns >= good_ns or direction != last[0] or size > last[3]:
             command, good_ns, why = self._look(command, now_ns, at)
             if why:
+                self.forbid()
                 return why
         self.part, self.good_ns, self.at, self._last = part, good_ns, at, command
         return ""
@@ -193,6 +193,7 @@ class GuardedAxis(Asked):
             free_ns = min(free_ns, stop.free_ns)
             if free_ns < now_ns:
                 return 0.0, 0
+        joystick.read()
         if direction == FORTH:
             reach, sizes = self.now, self.positive
         else:
@@ -202,7 +203,7 @@ class GuardedAxis(Asked):
         if sizes and (before := largest(sizes, since_ns)) > reach:
             reach, from_ns = before, sizes[0][1]
         reach, until_ns = min(reach, self._maximum), min(from_ns + self._kept_ns, free_ns)
-        self.sure[direction] = min(reach, self._full), until_ns
+        self.sure, self.sure_ns = min(reach, self._full), until_ns
         if self._more:  # for this moment
             reach, until_ns = self._reach(reach, now_ns), now_ns
         return reach, until_ns
@@ -263,6 +264,7 @@ class GuardedAxis(Asked):
 
     def _most(self, now_ns: int) -> float:
         """Speed that was asked for in any direction within the tail."""
+        self._joystick.read()
         since_ns = now_ns - self._kept_ns
         now = abs(self.now) if self._joystick.heard_ns >= since_ns else 0.0
         return max(now, largest(self.positive, since_ns), largest(self.negative, since_ns))

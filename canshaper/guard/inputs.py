@@ -15,7 +15,8 @@ NEVER, FOREVER = -(10**18), 10**19  # ns
 NEUTRAL, FORTH, BACK = range(3)
 Sizes = deque[tuple[float, int]]
 """Each with the time when it was asked for last, the largest first, each later one smaller."""
-NOTHING_SURE = ((0.0, NEVER),) * 3
+# Frames of a joystick whose commands are read together; not so many that the last one waits.
+MOST_UNREAD = 32
 
 
 class Asked:
@@ -27,8 +28,8 @@ class Asked:
         joystick: how its frames are read.
         asks: what it asked, by the bytes of that.
         good_ns: until when the last command may leave again, if nothing forbids it meanwhile.
-        sure: by direction the speed that was asked for at least, and until when that holds, if
-            nothing forbids it meanwhile.
+        sure, sure_ns: speed that was asked for at least in the direction of the last command, and
+            until when that holds, if nothing forbids it meanwhile.
     """
 
     __slots__ = (
@@ -39,6 +40,7 @@ class Asked:
         "now",
         "positive",
         "sure",
+        "sure_ns",
     )
 
     def __init__(self, joystick: JoystickBits) -> None:
@@ -47,7 +49,7 @@ class Asked:
         self.now = 0.0
         self.positive: Sizes = deque()
         self.negative: Sizes = deque()
-        self.sure = list(NOTHING_SURE)
+        self.sure, self.sure_ns = 0.0, NEVER
         self.good_ns = NEVER
 
     def learn(self, data: bytes) -> float:
@@ -59,8 +61,7 @@ class Asked:
 
     def forbid(self) -> None:
         """Nothing holds that was looked up before."""
-        self.good_ns = NEVER
-        self.sure = list(NOTHING_SURE)
+        self.good_ns = self.sure_ns = NEVER
 
     def clear(self) -> None:
         """Nothing was asked."""
@@ -92,7 +93,16 @@ class GuardedInput(ABC):
         heard_ns: when the last one came.
     """
 
-    __slots__ = ("_check", "_choice", "_length", "_source", "_source_ns", "heard_ns", "timeout_ns")
+    __slots__ = (
+        "_check",
+        "_choice",
+        "_length",
+        "_plain",
+        "_source",
+        "_source_ns",
+        "heard_ns",
+        "timeout_ns",
+    )
 
     def __init__(self, bound: BoundInput) -> None:
         self._length = bound.message.length
@@ -101,6 +111,7 @@ class GuardedInput(ABC):
         if chosen := bound.codec.chosen:
             signal = bound.message.get_signal_by_name(chosen.signal)
             self._choice = Field(signal, self._length), chosen.value
+        self._plain = self._check is None and self._choice is None
         self.timeout_ns = bound.config.timeout_ms * 1_000_000
         self._source: int | None = None
         self._source_ns = 0
@@ -116,8 +127,8 @@ class GuardedInput(ABC):
         return False
 
     def counts(self, data: bytes) -> bool:
-        """Whether a frame is whole, right, and of those that are meant."""
-        if len(data) != self._length or (self._check and not self._check.verify(data)):
+        """Whether a frame of the right length is right in itself, and of those that are meant."""
+        if self._check and not self._check.verify(data):
             return False
         return self._choice is None or self._choice[0].raw(data) == self._choice[1]
 
@@ -175,7 +186,7 @@ class GuardedSwitches(GuardedInput):
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if self.counts(data):
+        if len(data) == self._length and (self._plain or self.counts(data)):
             self.heard_ns = now_ns
             for switch in self.switches:
                 switch.note(data, now_ns)
@@ -202,6 +213,7 @@ class GuardedJoystick(GuardedInput):
         "_span",
         "_switch",
         "_switched",
+        "_unread",
         "needed",
         "released",
         "switches",
@@ -220,6 +232,7 @@ class GuardedJoystick(GuardedInput):
         self.switches: list[GuardedSwitch] = []
         self.needed: list[GuardedSwitch] = []
         self._part = b""
+        self._unread: list[tuple[bytes, int]] = []  # and when the one before it came
         self._asked: list[tuple[slice, dict[bytes, float], Asked]] = []
         self.released = False
 
@@ -231,35 +244,46 @@ class GuardedJoystick(GuardedInput):
         self._span = span_of(self._bits)
 
     def note(self, data: bytes, now_ns: int) -> None:
-        """Take a frame."""
-        if not self.counts(data):
+        """Take a frame: a switch counts at once, what is asked when it is looked at."""
+        if len(data) != self._length or not (self._plain or self.counts(data)):
             return
         for switch in self.switches:
             switch.note(data, now_ns)
         part = data[self._span]
         if part != self._part:
             self._part = part
+            self._unread.append((data, self.heard_ns))
             switched = data[self._switch]
             if switched != self._switched and self._enable is not None:
                 self._switched = switched
                 self.released = self._enable.raw(data) == 0
-            released = self.released
-            for span, asks, asked in self._asked:
+                if self.released:
+                    for _, _, asked in self._asked:
+                        asked.forbid()
+            if len(self._unread) == MOST_UNREAD:
+                self.read()
+        self.heard_ns = now_ns
+
+    def read(self) -> None:
+        """Read what the frames have asked that came since this was called last."""
+        if not self._unread:
+            return
+        for span, asks, asked in self._asked:
+            for data, heard_ns in self._unread:
                 ask, before = asks.get(data[span]), asked.now
                 if ask is None:
                     ask = asked.learn(data)
                 # Where it asks for more than before in the same direction, that is all it asked.
                 if ask < before > 0.0:
-                    keep(asked.positive, before, self.heard_ns)
+                    keep(asked.positive, before, heard_ns)
                 elif ask > before < 0.0:
-                    keep(asked.negative, -before, self.heard_ns)
+                    keep(asked.negative, -before, heard_ns)
                 asked.now = ask
-                if released:
-                    asked.forbid()
-        self.heard_ns = now_ns
+        self._unread.clear()
 
     def clear(self) -> None:
         """Nothing was asked until now."""
         self._part = b""
+        self._unread.clear()
         for _, _, asked in self._asked:
             asked.clear()

@@ -105,14 +105,15 @@ class OutputGuard:
         """The loop stood still: nothing that was asked before its next tick holds."""
         self._stood_still = True
 
-    def begin(self, missed: int) -> None:
-        """A tick begins; so many deadlines were missed before it."""
+    def begin(self, missed: int) -> At:
+        """A tick begins; so many deadlines were missed before it: ``at`` of it."""
         number, tick = self.at
-        self.at = number + 1 + missed, tick + 1
+        self.at = at = number + 1 + missed, tick + 1
         if self._stood_still:
             self._stood_still = False
             for joystick in self._joysticks:
                 joystick.clear()
+        return at
 
 
 def _switches(

@@ -69,3 +69,16 @@ def test_a_motion_of_slew_alone_moves_nothing_else(tmp_path: Path) -> None:
     bench = Bench(load_deployment(file), "near_far")
     bench.ramp(0, slew=1.0)
     assert "limit=asked" in bench.sends(10, slew=1.0)
+
+
+def test_the_other_axis_may_have_another_joystick(tmp_path: Path) -> None:
+    text = (shipped.CONFIG / "forwarder-robust.yaml").read_text(encoding="utf-8")
+    left, right = "joystick: left, signal: NearFar", "joystick: right, signal: Lift"
+    assert left in text
+    text = text.replace(left, "").replace(right, left).replace("{ ,", f"{{ {right},")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("../dbc", str(shipped.CONFIG.parent / "dbc")))
+    bench = Bench(load_deployment(file), "near_far")
+    assert bench.deployment.axes["near_far"].config.command.joystick == "right"
+    bench.ramp(34, slew=1.0)
+    assert bench.sends(40, slew=1.0)

@@ -116,6 +116,14 @@ def test_against_the_joystick(sign: int) -> None:
 
 
 @signs
+def test_what_was_refused_the_other_way_is_no_reason_to_go_faster(sign: int) -> None:
+    one = bench(rise_per_s=5.0, fall_per_s=2.0)
+    one.ramp(sign * 25, near_far=sign * 0.2)
+    assert "limit=rate" in one.sends(-sign * 100, near_far=-float(sign))
+    assert "limit=asked" in one.sends(sign * 35, near_far=-float(sign))
+
+
+@signs
 def test_released_it_may_not_even_fall(sign: int) -> None:
     one = bench(fall_per_s=2.0)
     one.ramp(sign * 100, near_far=float(sign))

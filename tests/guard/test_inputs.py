@@ -1,11 +1,14 @@
 """What the guard believes of joysticks and emergency stop, and for how long."""
 
+import random
 from dataclasses import replace
 
 import pytest
 
 from canshaper.codec.frame import Frame
+from canshaper.guard import inputs
 from canshaper.guard.bits import MOST_KNOWN
+from canshaper.guard.inputs import MOST_UNREAD
 from canshaper.guard.output import OutputGuard
 from canshaper.machine.binding import load_deployment
 from tests.faults import shipped, variants
@@ -100,6 +103,29 @@ def test_what_was_asked_in_a_direction_holds_for_the_tail(sign: int) -> None:
     assert [bool(why) for why in held].index(True) == (2000 + 100 + 100 + 60) // 20 - 6 + 1
 
 
+@pytest.mark.parametrize("axis", ["slew", "near_far"])
+@pytest.mark.parametrize("seed", range(4))
+def test_frames_read_together_say_what_each_alone_does(
+    monkeypatch: pytest.MonkeyPatch, seed: int, axis: str
+) -> None:
+    benches = [bench("forwarder-robust", axis) for _ in range(2)]
+    rng, said = random.Random(seed), set()
+    for turn in range(400):
+        asked = {name: rng.uniform(-1, 1) for name in ("slew", "near_far") if rng.random() < 0.7}
+        looks, steps = turn % 40 > 20 + seed, rng.randrange(-30, 31)
+        enable = rng.random() < 0.95
+        whys = []
+        for one, most in zip(benches, (MOST_UNREAD, 1), strict=True):
+            monkeypatch.setattr(inputs, "MOST_UNREAD", most)
+            one.takes(one.joysticks(enable=enable, **asked))
+            whys.append(one.sent(steps if looks else 0))
+        assert whys[0] == whys[1], turn
+        said.add(whys[0] == "")
+        for joystick in benches[0].guard._joysticks:
+            assert len(joystick._unread) < MOST_UNREAD
+    assert said == {False, True}
+
+
 @pytest.mark.parametrize(("steps", "passes"), [(38, True), (39, False)])
 @pytest.mark.parametrize("sign", [1, -1])
 def test_the_rates_hold_for_what_was_asked(sign: int, steps: int, passes: bool) -> None:
@@ -136,6 +162,8 @@ class TestSources:
         return OutputGuard(load_deployment(shipped.CONFIG / "j1939-forwarder.yaml"))
 
     def asked(self, guard: OutputGuard) -> set[float]:
+        for one in guard._joysticks:
+            one.read()
         return {asked.now for one in guard._joysticks for _, _, asked in one._asked}
 
     def test_another_one_counts_after_its_silence(self) -> None:
