@@ -142,8 +142,10 @@ def _check_rewritten(
             add((*place, key), f"{text}, got one")
     text = f"joystick {name}, got another"
     lookup.diagnostics.check_same(place, valve, MESSAGE_KEYS, joystick, text)
-    if valve.timeout_ms <= joystick.timeout_ms:
-        text = f"expected more than the {joystick.timeout_ms} ms of joystick {name}, whose receiver"
+    # What stands in for a lost joystick comes with the first tick after its timeout.
+    lost_ms = joystick.timeout_ms + lookup.config.tick_ms
+    if valve.timeout_ms <= lost_ms:
+        text = f"expected more than {lost_ms} ms, a tick more than joystick {name}, whose receiver"
         text += f" must not give up before we do, got {valve.timeout_ms}"
         add((*place, "timeout_ms"), text)
 

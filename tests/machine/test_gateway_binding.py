@@ -72,7 +72,8 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
             f"{SLEW} {COUNTER}", f"{SLEW}",
             "alive_counter: expected the same as joystick left, got another",
         ),
-        (SLEW, SLEW.replace("200", "100"), "expected more than the 100 ms of joystick left, whose"),
+        (SLEW, SLEW.replace("200", "120"),
+         "expected more than 120 ms, a tick more than joystick left, whose receiver"),
         (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
          "direction: expected none in the message of joystick left, which"),
         (SLEW, f"{SLEW} multiplexor: 3,",  # frames with another value would not pass
@@ -89,6 +90,11 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
 def test_what_cannot_be_is_reported(tmp_path: Path, old: str, new: str, told: str) -> None:
     found = problems(tmp_path, (old, new))
     assert any(told in problem for problem in found), found
+
+
+def test_an_ecu_that_waits_for_a_tick_longer_than_we_do_is_enough(tmp_path: Path) -> None:
+    every = [("timeout_ms: 200", "timeout_ms: 121")] * 3
+    assert {axis.config.valve.timeout_ms for axis in load(tmp_path, *every).axes.values()} == {121}
 
 
 def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
