@@ -115,7 +115,7 @@ def print_stopping(deployment: Deployment, console: Console) -> None:
     axes = stopping(deployment)
     for first in range(0, len(axes), _AXES_A_TABLE):
         console.print(_table(axes[first : first + _AXES_A_TABLE]))
-    console.print(Group(*_notes(axes)))
+    console.print(Group(*_notes(axes), *_motion_notes(deployment)))
 
 
 def _table(axes: list[Stopping]) -> Table:
@@ -155,3 +155,13 @@ def _notes(axes: list[Stopping]) -> Iterator[RenderableType]:
             " its sway.full_speed_m_s, not at the largest one.",
             "dim",
         )
+
+
+def _motion_notes(deployment: Deployment) -> Iterator[RenderableType]:
+    for motion in (bound.config for bound in deployment.motions.values()):
+        if motion.near_far is not None:
+            yield Text(
+                f"{motion.slew}, {motion.near_far}: each of them alone; in their motion the way"
+                " that one adds to the other comes on top.",
+                "dim",
+            )

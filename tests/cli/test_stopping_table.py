@@ -1,12 +1,15 @@
 """Stopping distances that `check` shows: of the real axes of a deployment, at their worst."""
 
 from collections.abc import Callable
+from io import StringIO
 
 import pytest
+from rich.console import Console
 
-from canshaper.commissioning.stopping import stopping
+from canshaper.commissioning.stopping import print_stopping, stopping
+from canshaper.machine.binding import load_deployment
 from tests.controller.test_sets import DBC, YAML
-from tests.rigs.forwarder import Rig
+from tests.rigs.forwarder import ROOT, Rig
 
 Make = Callable[..., Rig]
 
@@ -49,3 +52,12 @@ def test_the_worst_of_all_sets_and_feels_is_shown(changed_rig: Make) -> None:
     slow = release("calm: { filter: { kind: gff, a1: 1.2, a2: 0.3 } }")
     plain = release("calm: { filter: { kind: gff, a1: 0.5, a2: 0.06 } }")
     assert slow > plain + 0.05
+
+
+@pytest.mark.parametrize(("name", "expected"), [("forwarder-robust", True), ("forwarder", False)])
+def test_axes_of_a_motion_are_said_to_be_alone_in_it(name: str, expected: bool) -> None:
+    console = Console(file=StringIO(), width=200)
+    print_stopping(load_deployment(ROOT / "config" / f"{name}.yaml"), console)
+    assert isinstance(console.file, StringIO)
+    note = "slew, near_far: each of them alone; in their motion the way that one adds"
+    assert (note in console.file.getvalue()) is expected
