@@ -153,6 +153,14 @@ class Valve(Scaling, Protected):
     ]
     cia408: Cia408 | None = None
     """State machine of a valve of CANopen."""
+    node: str | None = None
+    """Its CANopen node without CiA 408, such as a drive: its heartbeats and emergencies count."""
+
+    @model_validator(mode="after")
+    def _one_node(self) -> Self:
+        if self.node is not None and self.cia408:
+            raise ValueError("node: expected none with cia408, which has a key of that name")
+        return self
 
     @model_validator(mode="after")
     def _sign(self) -> Self:

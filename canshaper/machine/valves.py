@@ -75,6 +75,7 @@ def bind_valve(
         _bind_command(used, (*place, "also", i), other, magnitude)
         for i, other in enumerate(valve.also)
     ]
+    lookup.check_node(place, valve.bus, valve.node)
     if cia408 := valve.cia408:
         lookup.check_node((*place, "cia408"), valve.bus, cia408.node)
         at: Place = (*place, "cia408", "control")

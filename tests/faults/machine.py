@@ -66,6 +66,11 @@ class Machine:
         }
         self.switches = self._switches(data, messages)
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
+        self.drives = {  # without CiA 408
+            name: self.nodes[section["valve"]["bus"], section["valve"]["node"]]
+            for name, section in data["axes"].items()
+            if "node" in section["valve"]
+        }
         self.sensors = self._sensors(data, messages)
         self.radius: tuple[Key, int, Field] | None = None
         for motion in data.get("motion", {}).values():

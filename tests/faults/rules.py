@@ -122,6 +122,8 @@ class Rules:
         for name, one in self.axes.items():
             if words := self._words.get(name):
                 one.causes |= words.causes(now_ns) | self._nodes[words.words.node].causes(now_ns)
+            if drive := self.machine.drives.get(name):
+                one.causes |= self._nodes[drive].causes(now_ns)
             node = self.machine.joystick_nodes.get(one.axis.joystick.name)
             works = node is None or not self._nodes[node].seen(now_ns)
             if node and self._nodes[node].may_be_lost(now_ns):

@@ -51,6 +51,21 @@ def test_problems_of_the_deployment_have_their_line(
     assert line <= number <= line + new.count("\n")
 
 
+def test_a_valve_with_cia408_has_its_node_there(tmp_path: Path) -> None:
+    file = write_variant(tmp_path, ("SlewCommand\n", "SlewCommand\n      node: slew\n"))
+    (problem,) = problems(file)
+    assert "axes.slew.valve: node: expected none with cia408, which has a key of that" in problem
+
+
+def test_the_node_of_a_drive_is_one_of_its_bus(tmp_path: Path) -> None:
+    text = (ROOT / "config" / "cia402-forwarder.yaml").read_text()
+    text = text.replace("../dbc", str(ROOT / "dbc")).replace("200, node: slew", "200, node: slow")
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    (problem,) = problems(file)
+    assert "axes.slew.valve.node: expected a node of bus crane, got 'slow'; there are" in problem
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -54,8 +54,8 @@ class CanopenNetwork(BusProtocol):
             control = ValveControl(bound, valve.cia408.control, runner.bound.valve.message)
             self.controls[name] = control
             self.bound.append((bound, control))
-        if valve.cia408 and valve.cia408.node:
-            node = self.nodes[valve.bus].nodes[valve.cia408.node]
+        if own := valve.cia408.node if valve.cia408 else valve.node:
+            node = self.nodes[valve.bus].nodes[own]
             runner.add_interlock(NodeGate(node, Reason.VALVE_FAULT, control))
         if joystick.node:
             node = self.nodes[joystick.bus].nodes[joystick.node]

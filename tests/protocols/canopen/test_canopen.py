@@ -102,6 +102,44 @@ def test_a_node_that_restarts_between_two_ticks_is_seen(rig: CanopenRig) -> None
     assert rig.axis() == FAULT
 
 
+WORDS = """      cia408:
+        control: ControlWord
+        status: { bus: crane, message: SlewValve, signal: StatusWord, timeout_ms: 300 }
+        node: slew
+"""
+
+
+@pytest.fixture
+def drive(tmp_path: Path) -> CanopenRig:
+    """Slewed by a node without CiA 408."""
+    return CanopenRig(write_variant(tmp_path, (WORDS, "      node: slew\n")))
+
+
+@pytest.mark.parametrize("state", [PRE_OPERATIONAL, STOPPED, 0])
+def test_a_drive_that_stops_in_motion_is_neutral_at_once(drive: CanopenRig, state: int) -> None:
+    drive.moving()
+    drive.states["slew"] = state
+    assert drive.run(Slew=30000)["slew"]["SetPoint"] == 0
+    drive.states["slew"] = OPERATIONAL
+    drive.run(60, Slew=30000)
+    assert drive.axis() == FAULT
+    assert drive.axis("lift")[0] != "TRIPPED"
+
+
+def test_a_drive_with_an_emergency_is_neutral_at_once(drive: CanopenRig) -> None:
+    drive.moving()
+    drive.emergency("slew", FLOW_COMMAND_LATE)
+    assert drive.run(Slew=30000)["slew"]["SetPoint"] == 0
+    assert drive.axis() == FAULT
+
+
+def test_a_drive_whose_heartbeat_is_lost_is_neutral(drive: CanopenRig) -> None:
+    drive.moving()
+    drive.states["slew"] = -1
+    assert 25 <= drive.until(lambda: drive.axis() == FAULT, Slew=30000) <= 28  # 500 ms
+    assert drive.command("slew")["SetPoint"] == 0
+
+
 def test_a_joystick_that_restarts_between_two_ticks_is_a_shaped_stop(rig: CanopenRig) -> None:
     rig.moving()
     rig.heartbeat("left", 0)
