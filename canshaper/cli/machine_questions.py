@@ -49,6 +49,8 @@ def machine_of(
     from canshaper.machine import suggest
 
     possible = suggest.joysticks(messages)
+    if not messages:
+        raise UsageError("no message of these files can be used")
     if not possible:
         raise UsageError(
             "no message has a signal of more than two bits, which could be a joystick;"

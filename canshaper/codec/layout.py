@@ -22,7 +22,10 @@ def layout_fault(message: Message) -> str | None:
     """Why the bits of a message cannot be read, or None; cantools reports it with a frame only."""
     if not isinstance(message.cycle_time, int | None):
         return f"GenMsgCycleTime: expected a whole number of ms, got {message.cycle_time!r}"
+    multiplexors = {signal.name for signal in message.signals if signal.is_multiplexer}
     for signal in message.signals:
+        if signal.multiplexer_ids and signal.multiplexer_signal not in multiplexors:
+            return f"{signal.name}: expected a multiplexor (M) in its message, got none for it"
         if signal.start < 0:
             return f"{signal.name}: expected a start bit of 0 or more, got {signal.start}"
         first = signal.raw_initial or 0

@@ -38,7 +38,7 @@ def _fault(rows: list[tuple[bytes, ...]], length: int) -> str | None:
         if mask is None:
             return f"has {length} bytes, and the signal {name.decode()} is not within them"
         chosen = b"" if mark.endswith(b"M") else mark
-        if chosen and multiplexers > 1:
+        if multiplexers > 1 and mark.startswith(b"m"):
             continue  # which of them exclude each other is not said here
         if (name, chosen) in names:
             return f"has two signals of the name {name.decode()}"

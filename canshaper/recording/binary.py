@@ -27,7 +27,7 @@ def mf4(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
 
 
 def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
-    """The database of python-can's logger; it has no channels and no frames of CAN FD."""
+    """The database of python-can's logger; without channels, and which frames are of CAN FD."""
     left_out = place.left_out
     try:
         with closing(sqlite3.connect(place.path)) as connection:
@@ -38,7 +38,7 @@ def database(file: BinaryIO, place: Place) -> Iterator[TimedFrame]:
                     left_out["error" if error else "remote"] += 1
                     continue
                 content = b"" if data is None else data
-                if can_id >> (29 if wide else 11) or len(content) > CLASSICAL_BYTES:
+                if can_id >> (29 if wide else 11) or len(content) > MOST_BYTES:
                     left_out["impossible"] += 1
                     continue
                 frame = (_nanoseconds(time_s), "", can_id, bool(wide), bytes(content))

@@ -347,6 +347,7 @@ def test_answers_that_end_early_write_nothing(tmp_path: Path) -> None:
         (None, "none.dbc: No such file"),
         ("nonsense", "not a DBC file"),
         ('VERSION ""\nBO_ 1 Status: 8 ECU\n SG_ A : 0|2@1+ (1,0) [0|1] "" ECU\n', "no message has"),
+        ('VERSION ""\nBO_ 1 S: 1 E\n SG_ A : 0|9@1+ (1,0) [0|1] "" E\n', "can be used"),
     ],
 )
 def test_a_dbc_that_will_not_do(tmp_path: Path, content: str | None, why: str) -> None:

@@ -194,3 +194,15 @@ def test_a_file_with_such_a_message_is_refused(machine: Machine) -> None:
 def test_such_a_message_that_is_not_used_cannot_be_read(machine: Machine) -> None:
     says = float_of_9_bits(machine, 1024, "GrappleSway", "SwayParallel")
     assert machine.load().messages.find("GrappleSway") == f"{machine.directory}/{says}"
+
+
+def test_values_of_a_multiplexor_that_is_none(machine: Machine) -> None:
+    """Two signals in the same bits: only a multiplexor says which of them a frame has."""
+    line = machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 8")
+    rows = ' SG_ Page m : 40|2@1+ (1,0) [0|3] "" SHAPER\n'
+    for i in (0, 1):
+        rows += f' SG_ P{i} m{i} : 42|6@1+ (1,0) [0|63] "" SHAPER\n'
+        machine.dbc += f"SG_MUL_VAL_ 272 P{i} Page {i}-{i};\n"
+    machine.in_dbc(" SG_ Enable : 32|2", f"{rows} SG_ Enable : 32|2")
+    says = "P0: expected a multiplexor (M) in its message, got none for it"
+    assert machine.problems() == [f"machine.dbc:{line}: JoystickLeft: {says}"]

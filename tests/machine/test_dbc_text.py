@@ -225,6 +225,7 @@ def with_signals(*signals: str) -> Iterator[str]:
         ("M M : 0|8", "A m0 : 8|8", "B m1 : 8|8"),
         ("A : 8|8", "B m0 : 0|8", "C m1 : 0|8"),
         ("M M : 0|4", "N m0M : 4|4", "B m1 : 4|8", "C m1 : 8|8"),  # which is of which is not known
+        ("M M : 0|4", "N m0M : 4|4", "O m1M : 4|4", "B m1 : 8|8", "C m1 : 8|8"),
         (),
     ],
 )

@@ -2,6 +2,7 @@
 
 import sqlite3
 import struct
+from contextlib import closing
 from pathlib import Path
 
 import can
@@ -112,6 +113,22 @@ def test_another_database(tmp_path: Path, change: str, text: str) -> None:
     connection.commit()
     connection.close()
     assert text in error_of(path)
+
+
+def test_a_database_does_not_say_which_frames_are_of_can_fd(tmp_path: Path) -> None:
+    lengths = [8, 12, 64]
+    frames = [
+        can.Message(timestamp=n, arbitration_id=n, data=bytes(n), is_fd=n > 8) for n in lengths
+    ]
+    path = written(tmp_path / "a.db", frames)
+    file = LogFile(path)
+    assert [len(frame.data) for frame in file] == lengths
+    assert not file.left_out
+    with closing(sqlite3.connect(path)) as connection:
+        connection.execute("UPDATE messages SET data = zeroblob(65) WHERE arbitration_id = 12")
+        connection.commit()
+    assert [len(frame.data) for frame in file] == [8, 64]
+    assert file.left_out == {"impossible": 1}
 
 
 def test_what_is_no_database(tmp_path: Path) -> None:
