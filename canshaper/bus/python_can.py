@@ -1,5 +1,6 @@
 """A bus of python-can: whatever its interface raises or waits for, the loop goes on."""
 
+import logging
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import suppress
@@ -31,6 +32,22 @@ DEFAULTS: Mapping[str, Mapping[str, Any]] = {
     "serial": {"timeout": 0.01},
     "socketcand": {"tcp_tune": True},
 }
+
+
+class Changed(logging.Filter):
+    """Passes a line of a log only where it is not the one before."""
+
+    _last = ""
+
+    def filter(self, record: logging.LogRecord) -> bool:
+        """Whether it differs from the line before."""
+        text = record.getMessage()
+        before, self._last = self._last, text
+        return text != before
+
+
+# It writes the same line at each of some ten thousand attempts a second to reach its server.
+logging.getLogger("can.interfaces.socketcand.socketcand").addFilter(Changed())
 
 
 class PythonCanPort:

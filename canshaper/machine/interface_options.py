@@ -19,6 +19,9 @@ UNNAMED_FD = frozenset(("kvaser", "neovi"))
 OURS = frozenset(("channel", "bitrate", "can_filters", "receive_own_messages"))
 OURS |= {"fd", "data_bitrate"}
 
+# Types where python-can does not name them.
+UNTYPED = {"host": str, "port": int}
+
 
 def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
     """What is wrong with interface and options of a bus: the key in its section, and what.
@@ -56,7 +59,7 @@ def option_faults(bus: Bus) -> Iterator[tuple[Place, str]]:
             known = ", ".join(parameters) or "it has none"
             text = f"expected an option of {bus.interface} ({known}), got {key}"
             yield ("options", key), text + did_you_mean(key, parameters)
-        elif fault := _value_fault(kinds.get(key), value):
+        elif fault := _value_fault(kinds.get(key, UNTYPED.get(key)), value):
             yield ("options", key), fault
 
 

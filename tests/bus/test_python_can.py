@@ -5,6 +5,7 @@ from typing import Any
 
 import can
 import pytest
+from can.interfaces.socketcand import socketcand
 
 from canshaper.bus import python_can as bus_module
 from canshaper.bus.port import Port, open_port
@@ -178,3 +179,12 @@ def test_of_what_never_comes_back_no_more_than_a_few_are_kept(
         assert multicast.send(frame)
     adapter.found = [received(frame) for frame in frames]
     assert list(multicast.frames()) == frames[:1]
+
+
+def test_what_socketcand_repeats_at_each_attempt_is_logged_once(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    for reason in ("refused", "refused", "no route", "refused", "refused"):
+        socketcand.log.warning(f"Failed to connect: {reason}")
+    lines = [record.getMessage() for record in caplog.records]
+    assert lines == [f"Failed to connect: {one}" for one in ("refused", "no route", "refused")]

@@ -80,6 +80,14 @@ def test_a_value_of_another_type(options: dict[str, Any], text: str) -> None:
     assert faults("slcan", **options) == [(("options", next(iter(options))), text)]
 
 
+@pytest.mark.parametrize(
+    ("options", "text"),
+    [({"port": "29536"}, "expected int, got '29536'"), ({"host": 1}, "expected str, got 1")],
+)
+def test_a_value_whose_type_python_can_does_not_name(options: dict[str, Any], text: str) -> None:
+    assert faults("socketcand", **CLIENT | options) == [(("options", next(iter(options))), text)]
+
+
 def test_an_interface_that_python_can_does_not_have() -> None:
     assert faults("slcam") == [
         (("interface",), "expected an interface of python-can, got slcam; did you mean slcan?")

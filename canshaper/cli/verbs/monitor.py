@@ -1,11 +1,8 @@
 """``canshaper monitor``: a running daemon, live in the terminal."""
 
-import signal
-from types import FrameType
-
 import typer
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, echo, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, NETWORK, Stop, echo, loader
 
 
 def monitor(
@@ -41,29 +38,13 @@ def monitor(
     from canshaper.commissioning.monitor.run import run_live, run_plain
     from canshaper.report.console import SafeConsole
 
-    stop = _Stop()
+    stop = Stop()
     console = SafeConsole()
     deployment = loader(file, interface, channel, network=network)()
     try:
         if plain or not console.is_terminal:
-            run_plain(deployment, echo, stop.going)
+            run_plain(deployment, echo, lambda: not stop.requested)
         else:
-            run_live(deployment, console, refresh_hz, stop.going)
+            run_live(deployment, console, refresh_hz, lambda: not stop.requested)
     except BrokenPipeError:  # who read it has enough
         raise typer.Exit(0) from None
-
-
-class _Stop:
-    """Asked for by SIGTERM or SIGINT."""
-
-    def __init__(self) -> None:
-        self._left = False
-        for number in (signal.SIGTERM, signal.SIGINT):
-            signal.signal(number, self._on_signal)
-
-    def going(self) -> bool:
-        """Whether no signal came yet."""
-        return not self._left
-
-    def _on_signal(self, _number: int, _frame: FrameType | None) -> None:
-        self._left = True

@@ -6,21 +6,24 @@ import pty
 import re
 import select
 import signal
+import socket
 import struct
 import subprocess
 import sys
 import termios
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import pytest
+import yaml
 from typer.testing import CliRunner
 
 from canshaper.bus.multicast import LocalMulticastBus
 from canshaper.cli.app import app
 
+ROOT = Path(__file__).parents[3]
 GROUP = f"239.75.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 BUS = ("--interface", "udp_multicast", "--channel", GROUP)
 COMMAND = (sys.executable, "-m", "canshaper")
@@ -127,6 +130,38 @@ def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
             monitor.stdout.close()
     assert any("axis=slew state=NEUTRAL_WAIT reason=" in line for line in lines)
     assert [m for m in from_our_bus if m.channel == GROUP] == []
+
+
+@pytest.mark.parametrize("verb", ["monitor", "record"])
+@pytest.mark.parametrize(
+    ("number", "codes"), [(signal.SIGINT, (130, -2)), (signal.SIGTERM, (-15,))]
+)
+def test_a_second_signal_ends_what_waits_for_an_adapter(
+    tmp_path: Path, verb: str, number: int, codes: tuple[int, ...]
+) -> None:
+    """A server of socketcand that never answers holds whoever opens it."""
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        options = {"host": "127.0.0.1", "port": server.getsockname()[1]}
+        content = yaml.safe_load((ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8"))
+        content["dbc"] = [str(ROOT / "dbc" / "forwarder.dbc")]
+        bus = {"interface": "socketcand", "channel": "can0", "options": options}
+        content["buses"] = {"crane": bus}
+        file = tmp_path / "machine.yaml"
+        file.write_text(yaml.safe_dump(content), encoding="utf-8")
+        process = subprocess.Popen([*COMMAND, verb, str(file)], cwd=tmp_path)
+        server.settimeout(ANSWER_S)
+        connection, _ = server.accept()
+        try:
+            for _ in range(40):  # two that come together are one; a third kills what leaves
+                process.send_signal(number)
+                with suppress(subprocess.TimeoutExpired):
+                    process.wait(0.5)
+                    break
+            assert process.poll() in codes
+        finally:
+            process.kill()
+            process.wait()
+            connection.close()
 
 
 @pytest.mark.parametrize(
