@@ -46,5 +46,5 @@ def test_the_set_up_of_a_controller_is_seen(tmp_path: Path, can_pair: tuple[str,
 
 def test_an_interface_that_is_not_there_cannot_be_listened_to(tmp_path: Path) -> None:
     found = doctor(tmp_path / "doctor.json", "--no-load", "--channel", "can7", "--listen", "1")
-    assert found["can7"]["found"] == "there is no such interface"
+    assert found["can7"]["found"] == "No such device"
     assert found["joysticks"]["found"] == "cannot listen: No such device"

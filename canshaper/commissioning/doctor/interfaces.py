@@ -1,5 +1,6 @@
 """The CAN interfaces of a deployment, as the system set them up; nothing is opened or sent."""
 
+import errno
 import json
 import os
 import shutil
@@ -11,6 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from canshaper.bus.device import FD_MTU
+from canshaper.bus.port import not_opened
 from canshaper.commissioning.doctor.adapters import adapter_findings
 from canshaper.commissioning.doctor.devices import device_findings
 from canshaper.commissioning.doctor.finding import Finding, Level
@@ -70,7 +72,7 @@ class Link:
 def bus_findings(buses: dict[str, Bus], tick_ms: int) -> list[Finding]:
     """Checks of all buses of a deployment."""
     findings: list[Finding] = []
-    kernel: str | None = None
+    kernel: OSError | None = None
     for name, bus in buses.items():
         if bus.interface != "socketcan":
             findings += adapter_findings(name, bus, tick_ms)
@@ -78,19 +80,21 @@ def bus_findings(buses: dict[str, Bus], tick_ms: int) -> list[Finding]:
         kernel = kernel or kernel_fault()
         if kernel:
             remedy = "sudo modprobe can_raw; where there is no such module, another kernel"
-            findings.append(Finding(f"bus {name}", Level.BAD, kernel, remedy))
+            subject = f"bus {name}"
+            text = str(not_opened(name, bus, kernel)).removeprefix(f"{subject}: ")
+            findings.append(Finding(subject, Level.BAD, text, remedy))
         else:
             findings += link_findings(read_link(bus.channel), bus)
             findings += device_findings(name, bus)
     return findings
 
 
-def kernel_fault() -> str | None:
+def kernel_fault() -> OSError | None:
     """Why this kernel has no SocketCAN, or None where it has."""
     try:
         socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW).close()
     except OSError as error:
-        return f"no SocketCAN in this kernel: {error.strerror}"
+        return error
     return None
 
 
@@ -157,7 +161,7 @@ def link_findings(link: Link | None, bus: Bus) -> list[Finding]:
     name = bus.channel
     if link is None:
         remedy = f"plug the adapter in; a virtual bus: sudo ip link add {name} type vcan"
-        return [Finding(name, Level.BAD, "there is no such interface", remedy)]
+        return [Finding(name, Level.BAD, os.strerror(errno.ENODEV), remedy)]
     if not link.can:
         remedy = "name a CAN interface in the deployment file"
         return [Finding(name, Level.BAD, "is no CAN interface", remedy)]

@@ -12,6 +12,7 @@ from typing import Any
 
 import pytest
 
+from canshaper.bus.port import not_opened
 from canshaper.commissioning.doctor import interfaces
 from canshaper.commissioning.doctor.finding import Finding, Level
 from canshaper.commissioning.doctor.interfaces import (
@@ -209,7 +210,8 @@ def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(socket, "socket", refuse)
     (finding,) = bus_findings({"crane": bus("can0")}, 20)
     assert finding.level is BAD
-    assert finding.found.startswith("no SocketCAN in this kernel")
+    assert finding.found in str(not_opened("crane", bus("can0"), OSError(97, "")))
+    assert finding.found.startswith("cannot open socketcan channel can0: this kernel has no CAN")
     assert "modprobe can_raw" in finding.remedy
 
 
