@@ -334,6 +334,15 @@ def test_a_file_that_is_there_stays(tmp_path: Path) -> None:
     assert load_deployment(file)
 
 
+@pytest.mark.parametrize("folder", ["none", "file"])
+def test_where_nothing_can_be_written_nothing_is_asked(tmp_path: Path, folder: str) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    result = init(tmp_path / folder / "machine.yaml")
+    assert result.exit_code == 2
+    says = f"{tmp_path / folder}: expected a folder that can be written to"
+    assert result.output.strip() == says
+
+
 def test_answers_that_end_early_write_nothing(tmp_path: Path) -> None:
     arguments = ["init", str(tmp_path / "machine.yaml"), "--dbc", str(DBC)]
     result = CliRunner().invoke(app, arguments, input="\n\n\n")

@@ -71,6 +71,8 @@ def doctor(
     try:
         deployment = loader(file, interface, channel)()
         results = Results("Is this PC fit for the machine?", deployment, report, picture)
+        if as_json:  # as of report and picture: reported before anything is measured
+            as_json.parent.mkdir(parents=True, exist_ok=True)
         findings = machine_findings(deployment.config.tick_ms)
         findings += bus_findings(deployment.config.buses, deployment.config.tick_ms)
         if listen_s is not None:
@@ -84,6 +86,8 @@ def doctor(
             data = as_dict(deployment, seconds, runs, findings)
             as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
+        if error.filename is not None:
+            raise
         raise UsageError(str(error)) from None
     print_report(deployment, seconds, runs, findings, results)
 

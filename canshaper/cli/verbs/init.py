@@ -75,6 +75,9 @@ def init(
     for path in (file, draft, *([own] if eds else [])):
         if path.exists() and not force:
             raise UsageError(f"{path}: is there already; --force replaces it")
+    folder = file.resolve().parent
+    if not (folder.is_dir() and os.access(folder, os.W_OK)):
+        raise UsageError(f"{folder}: expected a folder that can be written to")
     with os_errors(file):
         files = dbc or ([] if eds else [data_directory() / "dbc" / "forwarder.dbc"])
         messages = _messages(files)
@@ -83,7 +86,6 @@ def init(
             messages += nodes.messages
             of = ", ".join(map(str, (*files, *(eds or []))))
             echo(f"{len(messages)} messages in {of}.")
-            folder = file.resolve().parent
             names = [_relative(path, folder) for path in (*files, *([own] if eds else []))]
             machine = machine_of(messages, names, interface, nodes)
             uses = uses_of(machine, messages)

@@ -90,6 +90,13 @@ def test_without_load_there_is_one_run(tmp_path: Path) -> None:
     assert "under load" not in done.stdout
 
 
+def test_numbers_that_cannot_be_written_are_reported_before_anything_runs(tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("mine", encoding="utf-8")
+    done = doctor(SHIPPED, "--seconds", "600", "--json", tmp_path / "file" / "doctor.json")
+    assert done.returncode == 2
+    assert done.stderr == f"{tmp_path / 'file'}: File exists\n"
+
+
 def test_a_wrong_deployment_is_reported_before_anything_runs(tmp_path: Path) -> None:
     file = tmp_path / "wrong.yaml"
     file.write_text("tick_ms: 0\n")
