@@ -14,6 +14,8 @@ def main() -> None:
         run()
     except KeyboardInterrupt:
         sys.exit(130)
+    finally:
+        gc.freeze()  # else Python's end looks through all that was loaded, for up to seconds
 
 
 if __name__ == "__main__":

@@ -443,3 +443,24 @@ def test_the_module_is_the_command() -> None:
     )
     assert done.returncode == 0
     assert done.stdout.startswith(f"{SHIPPED}: good")
+
+
+@pytest.mark.parametrize("ends", ["SystemExit(0)", "KeyboardInterrupt"])
+def test_the_end_of_python_does_not_look_through_what_was_loaded(ends: str) -> None:
+    """Its last collection of garbage took seconds after Ctrl-C, with CasADi and SciPy loaded."""
+    code = f"""
+import gc
+from canshaper import __main__
+from canshaper.cli import app
+def end():
+    raise {ends}
+app.main = end
+try:
+    __main__.main()
+except SystemExit as error:
+    print(error.code, gc.get_freeze_count() > 1000)
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    assert done.stdout == f"{0 if '0' in ends else 130} True\n"
