@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from canshaper.cli.common import CHANNEL, FILE, INTERFACE, PICTURE, REPORT, loader
+from canshaper.cli.common import CHANNEL, FILE, INTERFACE, PICTURE, REPORT, echo, loader
 from canshaper.errors import UsageError, WrongDeviceError
 
 if TYPE_CHECKING:
@@ -34,9 +34,7 @@ def doctor(
         min=0.5,
         help="Listen to the joysticks on the real bus.",
     ),
-    as_json: Path | None = typer.Option(
-        None, "--json", metavar="FILE", help="Write all numbers to this file."
-    ),
+    as_json: bool = typer.Option(False, "--json", help="Print everything as JSON."),
     picture: Path | None = PICTURE,
     report: Path | None = REPORT,
 ) -> None:
@@ -55,7 +53,7 @@ def doctor(
 
       canshaper doctor config/forwarder-robust.yaml
 
-      sudo canshaper doctor config/forwarder-robust.yaml --seconds 600 --json doctor.json
+      sudo canshaper doctor config/forwarder-robust.yaml --seconds 600 --json > doctor.json
 
       canshaper doctor config/forwarder-robust.yaml --no-load --listen 10
     """
@@ -70,9 +68,8 @@ def doctor(
 
     try:
         deployment = loader(file, interface, channel)()
-        results = Results("Is this PC fit for the machine?", deployment, report, picture)
-        if as_json:  # as of report and picture: reported before anything is measured
-            as_json.parent.mkdir(parents=True, exist_ok=True)
+        title = "Is this PC fit for the machine?"
+        results = Results(title, deployment, report, picture, quiet=as_json)
         findings = machine_findings(deployment.config.tick_ms)
         findings += bus_findings(deployment.config.buses, deployment.config.tick_ms)
         if listen_s is not None:
@@ -81,14 +78,13 @@ def doctor(
         for name in (IDLE, LOADED) if load else (IDLE,):
             with progress_bar(f"{name}, {seconds:g} s", seconds, refresh_hz=REFRESH_HZ) as passed:
                 runs[name] = measure(deployment, seconds, passed, load=name == LOADED)
-        findings = measured_findings(deployment, runs) + findings
-        if as_json:
-            data = as_dict(deployment, seconds, runs, findings)
-            as_json.write_text(json.dumps(data, indent=2) + "\n", encoding="utf-8")
     except OSError as error:
         if error.filename is not None:
             raise
         raise UsageError(str(error)) from None
+    findings = measured_findings(deployment, runs) + findings
+    if as_json:
+        echo(json.dumps(as_dict(deployment, seconds, runs, findings), indent=2))
     print_report(deployment, seconds, runs, findings, results)
 
     def figure() -> "Figure":

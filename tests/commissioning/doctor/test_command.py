@@ -5,13 +5,13 @@ Times are not judged here: they are those of the machine that runs the tests.
 
 import json
 import os
+import re
 import signal
 import subprocess
 import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -38,17 +38,10 @@ def doctor(*arguments: str | Path) -> subprocess.CompletedProcess[str]:
     )
 
 
-@pytest.fixture(scope="module")
-def short_run(
-    tmp_path_factory: pytest.TempPathFactory,
-) -> tuple[subprocess.CompletedProcess[str], dict[str, Any]]:
-    file = tmp_path_factory.mktemp("doctor") / "doctor.json"
-    done = doctor(SHIPPED, "--seconds", "1", "--json", file)
-    return done, json.loads(file.read_text())
-
-
-def test_the_numbers(short_run: tuple[Any, dict[str, Any]]) -> None:
-    done, data = short_run
+def test_the_numbers() -> None:
+    """Of both runs, as JSON and nothing else."""
+    done = doctor(SHIPPED, "--seconds", "1", "--json")
+    data = json.loads(done.stdout)
     assert done.returncode == (0 if data["fit"] else 1)
     assert data["fit"] == all(f["level"] != "bad" for f in data["findings"])
     assert (data["tick_ms"], data["seconds"]) == (20, 1.0)
@@ -67,34 +60,25 @@ def test_the_numbers(short_run: tuple[Any, dict[str, Any]]) -> None:
         assert run["valve_us"]["p50"] <= run["joystick_us"]["max"]
 
 
-def test_what_people_read(short_run: tuple[Any, dict[str, Any]]) -> None:
-    done, data = short_run
+def test_what_people_read() -> None:
+    done = doctor(SHIPPED, "--seconds", "1")
     out = done.stdout
     assert done.stderr == ""
     assert "Nothing was sent on any bus." in out
     for head in ("tick lateness, us", "joystick to valve, us", "p99.9", "under load"):
         assert head in out
     assert "█" in out
-    for finding in data["findings"]:
-        assert f"{finding['level']:8}{finding['subject']}: {finding['found']}" in out
-        assert finding["remedy"] in out
+    levels = re.findall(r"^(ok|note|warning|bad) +\S[^:\n]*: \S", out, re.MULTILINE)
+    assert len(levels) > 5
+    assert done.returncode == (1 if "bad" in levels else 0)
     verdict = out.splitlines()[-1]
-    assert verdict.startswith("Fit for" if data["fit"] else "Not fit for")
+    assert verdict.startswith("Not fit for" if "bad" in levels else "Fit for")
 
 
-def test_without_load_there_is_one_run(tmp_path: Path) -> None:
-    file = tmp_path / "doctor.json"
-    done = doctor("forwarder.yaml", "--seconds", "0.5", "--no-load", "--json", file)
+def test_without_load_there_is_one_run() -> None:
+    done = doctor("forwarder.yaml", "--seconds", "0.5", "--no-load", "--json")
     assert done.returncode in (0, 1)
-    assert list(json.loads(file.read_text())["runs"]) == ["idle"]
-    assert "under load" not in done.stdout
-
-
-def test_numbers_that_cannot_be_written_are_reported_before_anything_runs(tmp_path: Path) -> None:
-    (tmp_path / "file").write_text("mine", encoding="utf-8")
-    done = doctor(SHIPPED, "--seconds", "600", "--json", tmp_path / "file" / "doctor.json")
-    assert done.returncode == 2
-    assert done.stderr == f"{tmp_path / 'file'}: File exists\n"
+    assert list(json.loads(done.stdout)["runs"]) == ["idle"]
 
 
 def test_a_wrong_deployment_is_reported_before_anything_runs(tmp_path: Path) -> None:
