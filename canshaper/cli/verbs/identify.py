@@ -185,8 +185,9 @@ def _draw(
 
     def figure() -> "Figure":
         from canshaper.commissioning.identification.plot import figure as of_swings
+        from canshaper.commissioning.identification.recommend import headlines
 
-        return of_swings(seen, [a.text for a in advice])
+        return of_swings(seen, headlines(findings, advice))
 
     return results.picture(out / "identify.png", figure) if seen else None
 

@@ -94,13 +94,15 @@ def _to_shown(kind: Kind) -> tuple[float, str]:
 
 
 def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
-    """The longest segment with what is around it."""
+    """The segment with the largest swing, of the signal with the longest, with what is around."""
     longest = max(fit.segments, key=lambda s: float(s.segment.time_s[-1]))
+    same = [s for s in fit.segments if s.segment.source == longest.segment.source]
+    largest = max(same, key=lambda s: float(s.envelope[0]))
     period = fit.period_s.value
-    factor, unit = _to_shown(longest.segment.kind)
-    source = longest.segment.source
-    start = longest.segment.start_s - 3.0 * period
-    end = longest.segment.start_s + float(longest.segment.time_s[-1]) + 2.0 * period
+    factor, unit = _to_shown(largest.segment.kind)
+    source = largest.segment.source
+    start = largest.segment.start_s - 3.0 * period
+    end = largest.segment.start_s + float(largest.segment.time_s[-1]) + 2.0 * period
     series = next(s for s in finding.series if s.source == source)
     time, value = binned(series.time_s, series.value)
     seen = (time >= start) & (time <= end)
@@ -117,11 +119,11 @@ def _draw_free(panel: Axes, finding: Finding, fit: DecayFit) -> None:
             edge = factor * (one.base + sign * one.envelope)
             panel.plot(at, edge, color=SHAPED_COLOUR, linewidth=0.8, linestyle="--")
     text = f" free swing, {len(fit.segments)} found, {fit.swings:.0f} swings"
-    top = 1.05 * factor * float(longest.base[0] + longest.envelope[0])
-    begin = longest.segment.start_s
+    top = 1.05 * factor * float(largest.base[0] + largest.envelope[0])
+    begin = largest.segment.start_s
     panel.text(begin, top, text, color=SHAPED_COLOUR, fontsize=TEXT_PT, weight="bold")
-    around = factor * (longest.base[0])
-    reach = factor * float(longest.envelope[0])
+    around = factor * (largest.base[0])
+    reach = factor * float(largest.envelope[0])
     low = min(float(factor * value[seen].min()), around - reach)
     high = max(float(factor * value[seen].max()), around + reach)
     low, high = max(low, around - 3.0 * reach), min(high, around + 3.0 * reach)

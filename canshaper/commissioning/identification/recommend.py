@@ -87,6 +87,16 @@ def advise(
     return Advice(axis, sway, spread, cover, [], text)
 
 
+def headlines(findings: Sequence[Finding], advice: Sequence[Advice]) -> list[str]:
+    """Recommendations for a picture that has the numbers of each finding: those that say more."""
+    texts = []
+    for one in advice:
+        mine = [finding for finding in findings if finding.axis == one.axis]
+        if len(mine) != 1 or not mine[0].usable:
+            texts.append(one.text)
+    return texts
+
+
 def flow(values: dict[str, float]) -> str:
     """The values as they stand in a deployment file."""
     return "{ " + ", ".join(f"{k}: {v:g}" for k, v in values.items()) + " }"

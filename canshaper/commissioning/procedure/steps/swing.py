@@ -15,7 +15,7 @@ from canshaper.commissioning.identification.data import (
     timed_by_hand,
 )
 from canshaper.commissioning.identification.plot import figure
-from canshaper.commissioning.identification.recommend import Advice
+from canshaper.commissioning.identification.recommend import Advice, headlines
 from canshaper.commissioning.identification.report import lines
 from canshaper.commissioning.identification.table import is_table
 from canshaper.commissioning.identification.verdict import Finding
@@ -191,7 +191,7 @@ def _write(
 
 
 def _figure(findings: Sequence[Finding], advice: Sequence[Advice]) -> Figure:
-    return figure(findings, [one.text for one in advice])
+    return figure(findings, headlines(findings, advice))
 
 
 def swings(deployment: Deployment) -> bool:
