@@ -68,6 +68,7 @@ _NUMBERS = (
 )
 _EVENT = re.compile(r"axis=(\S+) state=(\S+) .*reason=(\S+)")
 _MOVES = 1e-6
+_LATE = 0.8  # of the time axis: a reason from here on ends where its state does
 
 
 def figure(replays: Sequence[Replayed]) -> Figure:
@@ -179,12 +180,15 @@ def _plot(panel: Axes, x: Sequence[float], y: Sequence[float], look: _Look, **op
 
 def _draw_lanes(panel: Axes, name: str, replays: Sequence[Replayed]) -> None:
     """A lane a deployment: the states of the axis, and other events as marks."""
+    late_s = _LATE * max(_seconds(one, one.trace.end_ns) for one in replays)
     for i, one in enumerate(replays):
         low = len(replays) - 1 - i
         for start_s, end_s, state, reason in _spans(one, name):
             if i == 0 and state in (State.STOPPING, State.TRIPPED):
                 words = REASON_TEXTS[reason].words
-                panel.text(start_s, len(replays) + 0.12, words, fontsize=TEXT_PT, va="bottom")
+                side: Any = "right" if start_s > late_s else "left"
+                place = (start_s if side == "left" else end_s, len(replays) + 0.12)
+                panel.text(*place, words, fontsize=TEXT_PT, va="bottom", ha=side)
             if state in _LANES:
                 colour, hatch = _LANES[state]
                 spans = [(start_s, end_s - start_s)]

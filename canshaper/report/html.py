@@ -20,6 +20,7 @@ _STYLE = """
 @page { size: A4; margin: 15mm 20mm }
 body { font: 10pt/1.35 "DejaVu Sans", Arial, sans-serif; color: #222; background: #fff;
   max-width: 170mm; margin: 8mm auto; overflow-wrap: anywhere }
+@media screen { body { padding: 0 4mm } }
 h1 { font-size: 16pt; margin: 0 0 4mm } h2 { font-size: 11pt; margin: 5mm 0 1mm }
 pre { font: 8pt/1.3 "DejaVu Sans Mono", monospace; white-space: pre-wrap; margin: 1.5mm 0 }
 p { margin: 1.5mm 0; white-space: pre-wrap }
@@ -28,7 +29,8 @@ table { border-collapse: collapse; margin: 3mm 0; font-size: 9pt; break-inside: 
 caption { text-align: left; font-weight: bold; padding-bottom: 1mm }
 th, td { padding: .6mm 2.5mm .6mm 0; border-bottom: .2mm solid #bbb; text-align: left;
   vertical-align: top; white-space: pre-wrap }
-.figures td + td, .figures th + th { text-align: right; font-variant-numeric: tabular-nums }
+.figures { overflow-wrap: break-word }
+.right { text-align: right; font-variant-numeric: tabular-nums }
 figure { margin: 4mm 0; break-inside: avoid } img { width: 100% }
 .sign { margin-top: 12mm; break-inside: avoid } .sign td { width: 50mm; height: 14mm;
   vertical-align: bottom; border-bottom: .3mm solid #222 } .sign th { border: 0; font-weight: 400 }
@@ -50,6 +52,7 @@ def document(title: str, facts: Iterable[tuple[str, str]], parts: Iterable[str])
     words = "".join(f"<th>{word}</th>" for word in _SIGNATURES)
     return (
         '<!doctype html>\n<html lang="en"><head><meta charset="utf-8">'
+        '<meta name="viewport" content="width=device-width">'
         '<meta http-equiv="Content-Security-Policy"'
         " content=\"default-src 'none'; img-src data:; style-src 'unsafe-inline'\">"
         f"<title>{_safe(title)}</title><style>{_STYLE}</style></head><body>\n"
@@ -88,12 +91,16 @@ def text(line: str) -> str:
 
 
 def table(shown: Table) -> str:
-    """A table of the terminal: its first column words, the others figures."""
-    heads = "".join(f"<th>{_cell(column.header)}</th>" for column in shown.columns)
+    """A table of the terminal, its columns at the side where they stand there."""
+    sides = [' class="right"' if column.justify == "right" else "" for column in shown.columns]
+
+    def row(kind: str, cells: Iterable[object]) -> str:
+        pairs = zip(sides, cells, strict=True)
+        return "".join(f"<{kind}{side}>{_cell(cell)}</{kind}>" for side, cell in pairs)
+
+    heads = row("th", (column.header for column in shown.columns))
     rows = zip(*(column.cells for column in shown.columns), strict=True)
-    body = "".join(
-        f"<tr>{''.join(f'<td>{_cell(cell)}</td>' for cell in row)}</tr>\n" for row in rows
-    )
+    body = "".join(f"<tr>{row('td', cells)}</tr>\n" for cells in rows)
     caption = f"<caption>{_cell(shown.title)}</caption>" if shown.title else ""
     return f'<table class="figures">{caption}<tr>{heads}</tr>\n{body}</table>'
 

@@ -102,11 +102,12 @@ def test_a_stamp_names_deployment_version_and_date() -> None:
 def test_a_table_of_the_terminal_becomes_one_of_the_page() -> None:
     table = Table(title="what")
     table.add_column("name")
-    table.add_column("°")
-    table.add_row("<slew>", Text("1.5", style="bold"))
+    table.add_column("°", justify="right")
+    table.add_column("bar")
+    table.add_row("<slew>", Text("1.5", style="bold"), "██")
     text = html.table(table)
     assert "<caption>what</caption>" in text
-    assert "<td>&lt;slew&gt;</td><td>1.5</td>" in text
+    assert '<td>&lt;slew&gt;</td><td class="right">1.5</td><td>██</td>' in text
 
 
 def test_report_of_a_demo(tmp_path: Path) -> None:

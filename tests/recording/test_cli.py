@@ -6,6 +6,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from matplotlib.figure import Figure
 from matplotlib.text import Text
 from typer.testing import CliRunner
 
@@ -111,6 +112,12 @@ def test_options_that_cannot_be(tmp_path: Path) -> None:
     assert "No such file" in called(tmp_path / "none.log", *file, code=2)
 
 
+def assert_inside(drawn: Figure) -> None:
+    """No text leaves the picture."""
+    boxes = [text.get_window_extent() for text in drawn.findobj(Text) if text.get_text()]
+    assert max(box.x1 for box in boxes) <= drawn.bbox.x1
+
+
 def test_the_picture_has_both_deployments_states_and_reasons_and_leaves_out_what_is_idle(
     tmp_path: Path,
 ) -> None:
@@ -127,14 +134,18 @@ def test_the_picture_has_both_deployments_states_and_reasons_and_leaves_out_what
     assert [line.get_linestyle() for line in command.lines][:2] == ["-", "--"]
     reasons = {text.get_text() for panel in drawn.axes for text in panel.texts}
     assert {"enable released in motion", "no joystick message"} <= reasons
+    last_s = max(text.get_position()[0] for panel in drawn.axes for text in panel.texts)
+    cut = _run(DRIVE, files, {}, (0.0, last_s + 0.5), tmp_path, None)
+    for one in cut:
+        one.measure()
+    assert_inside(figure(cut))  # with a reason at its very end
     for one in replays:  # all numbers that a title can have
         for metrics in (one.measures, one.straight):
             for name in metrics:
                 full = {"peak_deg": 12.3, "residual_deg": 12.3, "run_on_s": 1.2}
                 metrics[name] = replace(metrics[name], **full)
     drawn = figure(replays)
-    boxes = [text.get_window_extent() for text in drawn.findobj(Text) if text.get_text()]
-    assert max(box.x1 for box in boxes) <= drawn.bbox.x1
+    assert_inside(drawn)
     for one in replays:  # the lift rests
         for column in one.trace._rows["lift"]:
             column[:] = array("d", [0.0] * len(column))

@@ -7,6 +7,7 @@ from canshaper.commissioning.procedure.pictures import embedded
 from canshaper.commissioning.procedure.sheet import shown
 from canshaper.commissioning.procedure.state import Record, State, Status
 from canshaper.commissioning.procedure.step import FILE, Context, Outcome, Step
+from canshaper.commissioning.procedure.steps.drive import DRIVE
 from canshaper.machine.deployment import Deployment
 from canshaper.report import html
 from canshaper.report.console import new_table
@@ -41,7 +42,7 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     if state.simulated:
         title += ": REHEARSAL, nothing in it is of a machine"
         crane.append(("simulated crane", " ".join(state.changes) or "the nominal one"))
-    facts = [*crane, *html.facts(deployment, datetime.now().astimezone())]
+    facts = [*_result(steps), *crane, *html.facts(deployment, datetime.now().astimezone())]
     summary = new_table("step", "is", "at", "canshaper", title="Steps")
     for name, one in steps.items():
         done = one.status is Status.DONE
@@ -50,6 +51,17 @@ def document(deployment: Deployment, state: State, steps: dict[str, Record], fol
     for name, one in steps.items():
         parts += _step(name, one, folder)
     return html.document(title, facts, parts)
+
+
+def _result(steps: dict[str, Record]) -> list[tuple[str, str]]:
+    """What the day was for, where it was measured: the swing that is left."""
+    drive = steps.get(DRIVE.name)
+    crane = drive.numbers.get("crane") if drive and drive.status is Status.DONE else None
+    if not crane:
+        return []
+    before, after = (crane[f"residual_{when}_deg"] for when in ("before", "after"))
+    text = f"residual sway {before} degrees without the filters, {after} with them"
+    return [("before, after", f"{text}: {crane['residual_left_pct']:g} % left")]
 
 
 def _standing(one: Record) -> str:
