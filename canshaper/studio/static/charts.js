@@ -2,6 +2,7 @@
 import { History } from "/static/history.js";
 import { nameOf, text } from "/static/language.js";
 import { Lanes, spans } from "/static/lanes.js";
+import { large } from "/static/theme.js";
 import uPlot from "/static/vendor/uplot.js";
 
 const KEPT_S = 600;
@@ -64,14 +65,15 @@ export class Charts {
   plot(id, legendId, series, scale, y, paint) {
     const host = document.getElementById(id);
     const grid = { stroke: css("--line"), width: 1 };
-    const axis = { stroke: css("--quiet"), grid, ticks: { show: false }, font: "11px system-ui, sans-serif" };
+    const axis = { stroke: css("--quiet"), grid, ticks: { show: false }, font: `${11 * large()}px system-ui, sans-serif` };
+    const [wide, tall] = [38 * large(), 22 * large()];
     const plot = new uPlot({
       width: host.clientWidth, height: host.clientHeight, cursor: { sync: { key: "charts" }, drag: { setScale: false, x: false }, points: { show: false } }, legend: { show: false },
       padding: [6, 16, 0, 0],
       scales: { x: { time: false, range: () => this.range() }, y },
       hooks: { setCursor: [(u) => this.showCursor(u)], ready: [(u) => this.listen(u)], draw: [...(paint ? [paint] : []), (u) => this.line(u)] },
-      axes: paint ? [{ show: false }, { ...axis, size: 38, values: (_, v) => v.map(() => ""), grid: { show: false } }]
-        : [{ ...axis, size: 22, values: (_, v) => v.map((s) => (s || this.stoppedAt || this.at !== null ? `${s} s` : text("chart.now"))) }, { ...axis, size: 38 }],
+      axes: paint ? [{ show: false }, { ...axis, size: wide, values: (_, v) => v.map(() => ""), grid: { show: false } }]
+        : [{ ...axis, size: tall, values: (_, v) => v.map((s) => (s || this.stoppedAt || this.at !== null ? `${s} s` : text("chart.now"))) }, { ...axis, size: wide }],
       series: [{}, ...series.map((s) => ({ stroke: s.stroke, width: s.width ?? 1.5, dash: s.dash, points: { show: false } }))],
     }, [[], ...series.map(() => [])], host);
     plot.lines = series;

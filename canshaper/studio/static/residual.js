@@ -1,5 +1,6 @@
 // What the filter in force leaves of the swing, over the length that the pendulum really has.
 import { text } from "/static/language.js";
+import { large } from "/static/theme.js";
 import uPlot from "/static/vendor/uplot.js";
 
 const SOON_MS = 300; // a slider that is dragged asks once
@@ -49,7 +50,8 @@ export class Residual {
     }
     const { believes, file } = curve;
     const grid = { stroke: css("--line"), width: 1 };
-    const axis = { stroke: css("--quiet"), grid, ticks: { show: false }, font: "12px system-ui, sans-serif", labelFont: "12px system-ui, sans-serif" };
+    const font = `${12 * large()}px system-ui, sans-serif`;
+    const axis = { stroke: css("--quiet"), grid, ticks: { show: false }, font, labelFont: font };
     this.plot = new uPlot({
       width: this.host.clientWidth, height: this.host.clientHeight - this.legend.offsetHeight,
       legend: { show: false }, cursor: { drag: { setScale: false, x: false } }, padding: [12, 20, 0, 0],

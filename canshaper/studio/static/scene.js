@@ -9,6 +9,9 @@ const LEAP_S = 1; // a longer step is another part of a drive
 const BEHIND_S = 0.07; // pictures are drawn a little late, so that there are two to draw between
 const FIELD_DEG = 42;
 const NARROW_FIELD_DEG = 58; // on a phone that is held upright
+const EDGE = 0.92; // of half the picture: a grapple beyond is led back into it
+const FARTHEST_M = 30; // from where the eye does that
+const SOFTWARE_POINTS = 200_000; // of a picture that a processor draws quickly
 const SLOW_MS = 30; // a picture that takes longer on average is drawn with fewer points
 const QUICK_MS = 20; // one that takes less, with more again
 
@@ -20,8 +23,9 @@ export class Scene {
     this.offset = null;
     const software = drawnBySoftware();
     this.finest = Math.min(window.devicePixelRatio, 2);
-    this.coarsest = software ? 0.5 : 0.75;
-    this.sharpness = this.finest;
+    const few = Math.sqrt(SOFTWARE_POINTS / Math.max(1, canvas.clientWidth * canvas.clientHeight));
+    this.coarsest = software ? Math.min(0.5, few) : 0.75;
+    this.sharpness = software ? Math.min(this.finest, few) : this.finest;
     this.cost = 16;
     this.judged = 0;
     this.renderer = new THREE.WebGLRenderer({ canvas, antialias: !software, powerPreference: "high-performance" });
@@ -36,6 +40,7 @@ export class Scene {
     this.controls.minDistance = 4;
     this.controls.maxDistance = 45;
     this.controls.enableDamping = true;
+    this.controls.addEventListener("start", () => { this.ownView = true; });
     this.world = new THREE.Group();
     this.world.rotation.x = -Math.PI / 2;
     this.scene.add(this.world);
@@ -117,9 +122,21 @@ export class Scene {
         if (b.cranes[name]) crane.pose(this.hello, mixed(a.cranes[name] ?? b.cranes[name], b.cranes[name], part));
       }
     }
+    this.keepInside();
     this.controls.update();
     this.renderer.render(this.scene, this.camera);
     this.judge(now, performance.now() - began);
+  }
+
+  /** Step back while a grapple is not in the picture, until a person chooses what is seen. */
+  keepInside() {
+    const eye = this.camera.position.clone().sub(this.controls.target);
+    if (this.ownView || eye.length() > FARTHEST_M) return;
+    const outside = Object.values(this.cranes).some((crane) => {
+      const at = crane.grapple.getWorldPosition(new THREE.Vector3()).project(this.camera);
+      return crane.group.visible && crane.grapple.visible && Math.max(Math.abs(at.x), Math.abs(at.y)) > EDGE;
+    });
+    if (outside) this.camera.position.copy(this.controls.target).add(eye.multiplyScalar(1.01));
   }
 
   between(t) {
