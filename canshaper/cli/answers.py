@@ -94,7 +94,39 @@ class Given:
             raise ConfigError(problems)
 
 
-_given: Given | None = None
+class Proposed:
+    """The proposals of all questions as their answers, for a person to look at before.
+
+    Attributes:
+        rows: question and proposal.
+    """
+
+    def __init__(self) -> None:
+        self.rows: list[tuple[str, str]] = []
+
+    def answer(self, text: str, parse: Callable[[str], _T], default: str) -> _T:
+        """The proposal.
+
+        Raises:
+            ValueError: there is none.
+        """
+        value = parse(default)
+        self.rows.append((text, default))
+        return value
+
+
+_given: Given | Proposed | None = None
+
+
+@contextmanager
+def answered_with(proposed: Proposed) -> Iterator[None]:
+    """Answer all questions in the block by their proposals."""
+    global _given  # noqa: PLW0603  # of the one command that runs
+    _given = proposed
+    try:
+        yield
+    finally:
+        _given = None
 
 
 @contextmanager
@@ -104,11 +136,11 @@ def answered_by(path: Path | None, *, yes: bool = False) -> Iterator[None]:
     With ``yes`` what has no line in it is answered as by Enter, without a file everything.
     """
     global _given  # noqa: PLW0603  # of the one command that runs
-    _given = Given(path) if path or yes else None
+    _given = given = Given(path) if path or yes else None
     try:
         yield
-        if _given:
-            _given.check_all_used()
+        if given:
+            given.check_all_used()
     finally:
         _given = None
 

@@ -112,12 +112,20 @@ def design_robust(
     )
 
 
+def outline(one: RobustDesign) -> str:
+    """How long it takes, and what it leaves."""
+    shaper = one.shaper
+    return (
+        f"Robust shaper for {one.bound.name}: {shaper.duration_s:.2f} s, mean delay"
+        f" {shaper.mean_delay_s:.2f} s; alone it leaves at most {100.0 * shaper.residual:.1f} % of"
+        f" the swing at lengths within ±{one.range_pct:g} %."
+    )
+
+
 def print_design(deployment: Deployment, one: RobustDesign, console: Console) -> None:
     """What it does, what it costs, how far the tip travels with it."""
     axis = one.bound.name
-    console.print(
-        f"Robust shaper for {axis}: {_outline(one.shaper)} at lengths within ±{one.range_pct:g} %."
-    )
+    console.print(outline(one))
     console.print(_table(one.measured))
     if one.second:
         console.print(_second_table(one))
@@ -173,13 +181,6 @@ def _evaluated(bound: BoundAxis, mode: SwayMode, tick_s: float, shaper: RobustSh
         tick_s,
         lambda model: build_shaper("robust", tick_s, model, valve_rate_per_s=rate, taps=taps),
         Machine.of(bound),
-    )
-
-
-def _outline(shaper: RobustShaper) -> str:
-    return (
-        f"{shaper.duration_s:.2f} s, mean delay {shaper.mean_delay_s:.2f} s, at most"
-        f" {100.0 * shaper.residual:.1f} % of the swing left"
     )
 
 

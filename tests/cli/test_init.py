@@ -19,6 +19,7 @@ ROOT = Path(__file__).parents[2]
 DBC = ROOT / "dbc" / "forwarder.dbc"
 # The questions in their order, with the first words of each.
 QUESTIONS = (
+    "Is all of it right",
     "CAN interface",
     "Bit rate",
     "Messages of the joysticks",
@@ -63,6 +64,7 @@ QUESTIONS = (
 def answers(given: Mapping[str, str]) -> str:
     """Enter for every question but these; several tries are separated by a line."""
     assert {*given} <= {*QUESTIONS}
+    given = {"Is all of it right": "n", **given}
     return "".join(f"{given.get(question, '')}\n" for question in QUESTIONS)
 
 
@@ -168,7 +170,7 @@ def test_without_the_tools_the_filter_is_one_to_begin_with(
     def missing(*_arguments: object, **_options: object) -> None:
         raise ModuleNotFoundError("No module named 'scipy.optimize'", name="scipy.optimize")
 
-    monkeypatch.setattr("canshaper.cli.verbs.robust.design", missing)
+    monkeypatch.setattr("canshaper.commissioning.robust.design_robust", missing)
     file = tmp_path / "machine.yaml"
     result = init(file, {"slew ten": "30"})
     assert result.exit_code == 0, result.output
@@ -345,7 +347,7 @@ def test_where_nothing_can_be_written_nothing_is_asked(tmp_path: Path, folder: s
 
 def test_answers_that_end_early_write_nothing(tmp_path: Path) -> None:
     arguments = ["init", str(tmp_path / "machine.yaml"), "--dbc", str(DBC)]
-    result = CliRunner().invoke(app, arguments, input="\n\n\n")
+    result = CliRunner().invoke(app, arguments, input="n\n\n\n")
     assert result.exit_code == 1
     assert list(tmp_path.iterdir()) == []
 
@@ -693,3 +695,30 @@ def test_a_message_with_too_few_steps_or_the_switch_of_a_joystick_is_no_valve(
     assert "boom: valve command: expected one of Boom.Flow, -, got 'Coarse.Step'" in result.output
     result = of_dbc(tmp_path, [dbc], f"{answers}Boom.Flow\nAxis of Stick.Y = -\n")
     assert result.exit_code == 0, result.output
+
+
+def test_one_enter_takes_the_whole_proposal(tmp_path: Path) -> None:
+    """It is shown first, and gives the machine of Enter for each question."""
+    whole, each = tmp_path / "whole.yaml", tmp_path / "each.yaml"
+    result = CliRunner().invoke(app, ["init", str(whole), "--dbc", str(DBC)], input="\n")
+    assert result.exit_code == 0, result.output
+    shown = [" ".join(line.split()) for line in result.output.splitlines()]
+    for row in (
+        "JoystickLeft: enable switch Enable",
+        "Axis of JoystickLeft.Slew slew",
+        "time of ten full swings, s 23.6",
+        "rotate: valve command none",
+        "Measured radius of the tip TipPosition.Radius",
+    ):
+        assert row in shown
+    assert init(each).exit_code == 0
+    assert whole.read_text() == each.read_text()
+
+
+def test_what_has_no_proposal_is_asked_at_once(tmp_path: Path) -> None:
+    dbc = tmp_path / "bare.dbc"
+    dbc.write_text(BARE, encoding="cp1252")
+    words = ["init", str(tmp_path / "machine.yaml"), "--dbc", str(dbc)]
+    result = CliRunner().invoke(app, words, input="can7\n")
+    assert result.output.splitlines()[1].startswith("CAN interface [can0]:")
+    assert "Is all of it right" not in result.output

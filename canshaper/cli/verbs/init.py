@@ -3,15 +3,17 @@
 import os
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import typer
 
 from canshaper.cli.answers import answered_by, confirmed
-from canshaper.cli.common import EXTRAS, echo, install_line, os_errors, print_warnings
+from canshaper.cli.common import EXTRAS, echo, install_line, loader, os_errors, print_warnings
 from canshaper.cli.machine_questions import machine_of
 from canshaper.cli.node_questions import Nodes, uses_of
+from canshaper.cli.proposal import accepted
 from canshaper.errors import CanshaperError, ConfigError, UsageError
 from canshaper.shipped import data_directory
 
@@ -42,9 +44,10 @@ def init(
 ) -> None:
     """Ask a few questions about a machine and write its first deployment.
 
-    Looks through the DBC files for joysticks, valves and switches and offers what it finds; Enter
-    takes what stands in brackets, "-" leaves a thing out. What the DBC does not say is asked: full
-    deflection, value in the middle, direction by flags or by a second signal. Written with reduced
+    Looks through the DBC files for joysticks, valves and switches, and shows the whole machine as
+    it would be; where that is not right, or something is missing, it asks. Enter then takes what
+    stands in brackets, "-" leaves a thing out. What the DBC does not say is asked: full deflection,
+    value in the middle, direction by flags or by a second signal. Written with reduced
     speed, and as we recommend: a robust shaper for each axis that swings (without SciPy a G_FF to
     begin with), slew and near-far as one motion. Ctrl-C writes nothing; should the check of the
     whole file find something after all, the answers stay in a draft next to it. Machines of J1939
@@ -87,7 +90,8 @@ def init(
             of = ", ".join(map(str, (*files, *(eds or []))))
             echo(f"{len(messages)} messages in {of}.")
             names = [_relative(path, folder) for path in (*files, *([own] if eds else []))]
-            machine = machine_of(messages, names, interface, nodes)
+            ask = partial(machine_of, messages, names, interface, nodes)
+            machine = (None if answers else accepted(ask)) or ask()
             uses = uses_of(machine, messages)
             parameters = nodes.parameters(uses)
             writes = set_by_sdo and _confirmed(machine, parameters)
@@ -105,8 +109,8 @@ def init(
     echo(f"  canshaper check {file}")
     for axis in left:
         echo(f"  canshaper robust {file} --axis {axis} --write")
-    echo(f"  canshaper commission {file} --simulated")
-    echo(f"  canshaper commission {file}")
+    echo(f"  canshaper commission {file} --simulated  # at the desk")
+    echo(f"  canshaper commission {file}  # on the machine")
 
 
 def _confirmed(machine: "FirstMachine", parameters: "Sequence[Parameter]") -> bool:
@@ -139,10 +143,12 @@ def _write_dbc(path: Path, nodes: Nodes) -> None:
 
 def _designed(file: Path, axis: str) -> bool:
     """Whether a robust shaper was designed for an axis and written; otherwise says why not."""
-    from canshaper.cli.verbs.robust import design
-
     try:
-        design(str(file), axis, write=True)
+        from canshaper.commissioning.robust import design_robust, outline, write_design
+
+        deployment = loader(str(file))()
+        one = design_robust(deployment, axis)
+        write_design(deployment, one)
     except ModuleNotFoundError as error:
         missing = (error.name or "").partition(".")[0]
         if missing not in EXTRAS:
@@ -151,6 +157,7 @@ def _designed(file: Path, axis: str) -> bool:
     except CanshaperError as error:
         echo(f"axis {axis}: no robust shaper yet: {error}")
     else:
+        echo(outline(one))
         return True
     return False
 

@@ -56,34 +56,6 @@ def robust(
 
       canshaper robust config/forwarder.yaml --axis slew --report slew.html
     """
-    design(
-        file,
-        axis,
-        range_pct=range_pct,
-        duration_s=duration_s,
-        residual_pct=residual_pct,
-        second=second,
-        write=write,
-        as_json=as_json,
-        picture=picture,
-        report=report,
-    )
-
-
-def design(
-    file: str,
-    axis: str,
-    *,
-    range_pct: float = 15.0,
-    duration_s: float | None = None,
-    residual_pct: float | None = None,
-    second: str | None = None,
-    write: bool = False,
-    as_json: bool = False,
-    picture: Path | None = None,
-    report: Path | None = None,
-) -> None:
-    """Design, print and write; arguments as the options of the verb."""
     from canshaper.cli.results import Results
     from canshaper.commissioning.filter_file import written_line
     from canshaper.commissioning.robust import (

@@ -72,7 +72,7 @@ def figure(
     measured = [evaluate(mode, tick_s, f.shaper_for, machine, LENGTHS_PCT) for f in filters]
     fig = new_figure(WIDTH_PX, _HEIGHT_PX, dpi=PRINT_DPI)
     title = f"{axis_title(axis)}: at most {100.0 * measured[0].worst(range_pct):.1f} % of the swing"
-    title += f" is left within ±{range_pct:g} % length"
+    title += f" is left within ±{range_pct:g} % length, through limits and valve"
     fig.suptitle(title, x=0.012, ha="left", fontsize=HEAD_PT, weight="bold")
     grid = fig.add_gridspec(
         2, 2, left=0.085, right=0.985, top=0.885, bottom=0.1, hspace=0.36, wspace=0.22
