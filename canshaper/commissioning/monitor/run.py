@@ -6,6 +6,7 @@ from collections.abc import Callable
 from rich.console import Console
 from rich.live import Live
 
+from canshaper.commissioning.monitor.keys import Keys, pressed_keys, waiting
 from canshaper.commissioning.monitor.state import Monitor
 from canshaper.commissioning.monitor.view import clock, screen, status_line
 from canshaper.errors import BusError
@@ -78,17 +79,22 @@ def run_live(
     ear = Ear(deployment, monitor)
     plain = not (console.encoding or "").lower().startswith("utf")
     pause_s = 1.0 / rate_hz
+    keys = Keys([*deployment.axes])
     try:
-        with Live(console=console, screen=True, auto_refresh=False) as live:
+        with pressed_keys() as can, Live(console=console, screen=True, auto_refresh=False) as live:
             due_s = time.monotonic()
-            while going():
+            while going() and not keys.ended:
                 ear.listen(max(0.0, due_s - time.monotonic()))
                 if time.monotonic() < due_s:
                     continue
                 due_s = time.monotonic() + pause_s
-                width, height = console.size
-                now_ns = time.time_ns()
-                live.update(screen(monitor, now_ns, width, height, plain=plain), refresh=True)
+                paused = keys.paused
+                keys.press(waiting() if can else "")
+                if paused and keys.paused:
+                    continue
+                shown = keys if can else None
+                picture = screen(monitor, time.time_ns(), *console.size, plain=plain, keys=shown)
+                live.update(picture, refresh=True)
     finally:
         ear.close()
 

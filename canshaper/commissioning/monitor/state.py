@@ -2,6 +2,7 @@
 
 from collections import Counter, deque
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.finder import InputFinder
@@ -16,6 +17,15 @@ WINDOW_NS = 2_000_000_000
 # for less than an eye sees, and after a second where the DBC gives no cycle.
 LATE_CYCLES, LEAST_LATE_NS, LATE_NS = 3, 300_000_000, 1_000_000_000
 MOST_EVENTS = 200
+MOST_SAMPLES = 2000  # of an axis: its status comes ten times a second or more often
+
+
+class Sample(NamedTuple):
+    """What the status of an axis said at a time: what is sent to the valve, predicted sway."""
+
+    time_ns: int
+    valve_pct: float
+    sway_deg: float
 
 
 @dataclass
@@ -72,6 +82,7 @@ class Monitor:
         digest: what the daemon says that it runs; None before it says it.
         events: what changed lately, oldest first.
         others: frames that are no classical data frames, by kind.
+        samples: of the last status messages of each axis.
     """
 
     def __init__(self, deployment: Deployment) -> None:
@@ -82,15 +93,19 @@ class Monitor:
         self.messages: dict[Key, MessageRate] = {}
         self._finder = InputFinder(deployment.config.buses, deployment.inputs())
         self._buses = {name: MessageRate(name, None) for name in deployment.config.buses}
-        self._seen = 0
+        self.samples: dict[str, deque[Sample]] = {
+            name: deque(maxlen=MOST_SAMPLES) for name in deployment.axes
+        }
+        self._axis_of: dict[Key, str] = {}
         self.digest: int | None = None
         for bound in deployment.inputs():
             self.messages[bound.key] = MessageRate(bound.message.name, bound.message.cycle_time)
-        for axis in deployment.axes.values():
+        for name, axis in deployment.axes.items():
             message = axis.valve_message
             key = axis.valve.message.sender.key
             self.messages.setdefault(key, MessageRate(message.name, message.cycle_time))
             if axis.status:
+                self._axis_of[axis.status.sender.key] = name
                 self._status(axis.status.sender.key, axis.status.sender.fields.message)
         if deployment.status:
             self._status(deployment.status.sender.key, deployment.status.sender.fields.message)
@@ -113,6 +128,9 @@ class Monitor:
         if rate is not None:
             rate.take(frame.time_ns)
         self.history.take(frame)
+        if (name := self._axis_of.get(key)) and (status := self.history.axes.get(name)):
+            shaped, sway = (status.values[one] for one in ("ShapedCommand", "PredictedSway"))
+            self.samples[name].append(Sample(frame.time_ns, shaped, sway))
         identity = self.deployment.identity_status
         if identity and key == identity.sender.key and (values := identity.decode(frame.data)):
             self._compare_identity(values["Digest"], frame.time_ns)

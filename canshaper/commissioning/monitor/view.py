@@ -1,4 +1,4 @@
-"""The monitor's picture: text in 80 columns, and one line for pipes.
+"""The monitor's picture: text for terminals of any width, and one line for pipes.
 
 Nothing is shown by colour alone: what is stale says so, what is late too.
 """
@@ -6,21 +6,13 @@ Nothing is shown by colour alone: what is stale says so, what is late too.
 from collections.abc import Iterator, Sequence
 from datetime import datetime
 
+from rich.console import Console
 from rich.text import Text
 
+from canshaper.commissioning.monitor.axes import DIM, NARROW, STALE, rows
+from canshaper.commissioning.monitor.keys import HELP, Keys
 from canshaper.commissioning.monitor.state import MessageRate, Monitor
 
-STYLES = {
-    "ACTIVE": "bold green",
-    "READY": "green",
-    "BYPASS_ON": "bold yellow",
-    "STOPPING": "bold yellow",
-    "TRIPPED": "bold red",
-}
-STALE = "bold red"
-DIM = "dim"
-HALF = 10  # columns of a bar on either side of its middle
-NAME = 11
 SHORT = {
     "MissedDeadlines": "missed",
     "WrongLength": "length",
@@ -34,7 +26,15 @@ IN_FIRST_LINE = 4
 SLOW = 0.8
 
 
-def screen(monitor: Monitor, now_ns: int, width: int, height: int, *, plain: bool) -> Text:
+def screen(
+    monitor: Monitor,
+    now_ns: int,
+    width: int,
+    height: int,
+    *,
+    plain: bool,
+    keys: Keys | None = None,
+) -> Text:
     """Everything at a moment, in as many lines as there are.
 
     Args:
@@ -43,11 +43,15 @@ def screen(monitor: Monitor, now_ns: int, width: int, height: int, *, plain: boo
         width: columns of the terminal.
         height: its lines.
         plain: only characters of ASCII.
+        keys: what a person has chosen; None where no key can come.
     """
-    lines = [_head(monitor, now_ns)]
-    for name in monitor.deployment.axes:
-        lines += _axis(monitor, name, now_ns, plain=plain)
+    lines = [_head(monitor, now_ns, keys)]
+    only = keys.axis if keys else None
+    for name in [only] if only else monitor.deployment.axes:
+        lines += rows(monitor, name, now_ns, width, plain=plain)
     lines += [Text(), *_counters(monitor, now_ns)]
+    lines = [part for line in lines for part in _wrapped(line, width)]
+    height -= bool(keys)
     rates = _rates(monitor, now_ns, width)
     least_events = 4
     room = height - len(lines) - least_events - 2
@@ -59,13 +63,32 @@ def screen(monitor: Monitor, now_ns: int, width: int, height: int, *, plain: boo
         text = ", ".join(f"{rate.name} {_wrong(rate, now_ns)}" for rate in late)
         lines.append(Text(f"late: {text}" if late else "all other messages in time", DIM))
     room = height - len(lines) - 1
-    events = list(monitor.events)[-room:] if room > 0 else []
+    events = _events(monitor, only, width)[-room:] if room > 0 else []
     if events:
-        lines.append(Text("events", DIM))
-        lines += [Text(f"{clock(event.time_ns)} {event.text}") for event in events]
+        lines += [Text("events", DIM), *events]
+    lines = lines[:height]
+    if keys:
+        lines += [Text()] * (height - len(lines)) + [Text(HELP, DIM)]
     for line in lines:
         line.truncate(width)
-    return Text("\n").join(lines[:height])
+    return Text("\n").join(lines)
+
+
+def _events(monitor: Monitor, only: str | None, width: int) -> list[Text]:
+    """What has changed, of everything or of the one axis that is shown."""
+    shown = [e for e in monitor.events if only is None or f"axis={only} " in f"{e.text} "]
+    lines = (Text(f"{clock(event.time_ns)} {event.text}") for event in shown)
+    return [part for line in lines for part in _wrapped(line, width)]
+
+
+def _wrapped(line: Text, width: int) -> list[Text]:
+    """A line as it is, on a narrow terminal in several where it is longer."""
+    if width >= NARROW or len(line) <= width:
+        return [line]
+    first, *others = line.wrap(Console(), width, tab_size=8)
+    rest = Text(" ").join(others)
+    rest.rstrip()
+    return [first, *(Text("  ").append(part) for part in rest.wrap(Console(), width - 2))]
 
 
 def status_line(monitor: Monitor, now_ns: int) -> str:
@@ -95,59 +118,16 @@ def clock(time_ns: int) -> str:
     return f"{datetime.fromtimestamp(time_ns / 1e9):%H:%M:%S.%f}"[:-3]
 
 
-def bar(percent: float, *, plain: bool) -> str:
-    """A bar from the middle to the left or right; full at 100 %."""
-    full, empty, middle = ("#", ".", "|") if plain else ("█", "·", "│")
-    size = min(HALF, round(abs(percent) / 100.0 * HALF))
-    if size == 0 and abs(percent) >= 1.0:
-        size = 1  # what moves is seen
-    left = full * size if percent < 0 else ""
-    right = full * size if percent > 0 else ""
-    return f"{left.rjust(HALF, empty)}{middle}{right.ljust(HALF, empty)}"
-
-
-def _head(monitor: Monitor, now_ns: int) -> Text:
+def _head(monitor: Monitor, now_ns: int, keys: Keys | None) -> Text:
     text = Text("canshaper monitor", "bold")
+    if keys and keys.paused:
+        text.append(" PAUSED", STALE)
     text.append(f"  {monitor.deployment.path.name}", "default")
     for bus, config in monitor.deployment.config.buses.items():
         rate = monitor.frames_per_s(bus, now_ns)
         said = f"{rate:.0f} frames/s" if rate else "SILENT"
         text.append(f"  {bus} {config.channel}: {said}", "default" if rate else STALE)
     return text.append(f"  {clock(now_ns)[:8]}", DIM)
-
-
-# Fields of an axis that have a place of their own.
-IN_ROWS = ("State", "Reason", "RawCommand", "ShapedCommand", "PredictedSway", "ActiveSet")
-
-
-def _axis(monitor: Monitor, name: str, now_ns: int, *, plain: bool) -> Iterator[Text]:
-    """Two lines: state and joystick, reason and what is sent."""
-    status = monitor.history.axes.get(name)
-    if status is None:
-        has_status = monitor.deployment.axes[name].status is not None
-        missing = "no status received" if has_status else "it has no status message"
-        yield Text(f"{name:{NAME}.{NAME}} {missing}", DIM)
-        yield Text()
-        return
-    stale_s = monitor.stale_s(name, now_ns)
-    style = DIM if stale_s is not None else ""
-    first = _row(name, status.state, "input", status.values["RawCommand"], style, plain=plain)
-    number = status.values.get("ActiveSet")
-    yield first.append(f"  set {number}" if number else "", style)
-    reason = status.reason if stale_s is None else f"STALE {stale_s:.1f} s"
-    second = _row("", reason, "valve", status.values["ShapedCommand"], style, plain=plain)
-    if stale_s is not None:
-        second.stylize(STALE, NAME + 1, NAME + 1 + len(reason))
-    swings = monitor.deployment.axes[name].config.sway is not None
-    second.append(f"  sway {status.values['PredictedSway']:+.1f}" if swings else "", style)
-    others = (f"  {one} {text}" for one, text in status.shown.items() if one not in IN_ROWS)
-    yield second.append("".join(others), style)
-
-
-def _row(name: str, word: str, of: str, percent: float, style: str, *, plain: bool) -> Text:
-    text = Text(f"{name:{NAME}.{NAME}} ", style or "bold")
-    text.append(f"{word:22.22} ", style or STYLES.get(word, ""))
-    return text.append(f"{of} {bar(percent, plain=plain)} {percent:+4.0f}%", style)
 
 
 def _counters(monitor: Monitor, now_ns: int) -> Iterator[Text]:

@@ -80,6 +80,9 @@ class Terminal:
             assert self.read(), self.seen
             assert time.monotonic() < until, f"no {pattern!r} in\n{picture}"
 
+    def press(self, keys: bytes) -> None:
+        os.write(self._file, keys)
+
     def end(self) -> int:
         """Ctrl-C."""
         self.process.send_signal(signal.SIGINT)
@@ -103,6 +106,10 @@ def test_a_drive_on_the_terminal(tmp_path: Path) -> None:
             assert len(rows) <= 24
             assert max(len(row.rstrip()) for row in rows) <= 80
             terminal.wait_for("JOYSTICK_TIMEOUT")
+            terminal.press(b"ap")
+            picture = terminal.wait_for("PAUSED")
+            assert ("slew " in picture, "near_far " in picture) == (True, False)
+            terminal.press(b"aaap")
         terminal.wait_for("STALE")
     finally:
         code = terminal.end()

@@ -9,8 +9,10 @@ from rich.console import Console
 
 from canshaper.cli.common import loader
 from canshaper.codec.frame import Frame
+from canshaper.commissioning.monitor.axes import bar, line_over_time
+from canshaper.commissioning.monitor.keys import HELP, Keys
 from canshaper.commissioning.monitor.state import Monitor
-from canshaper.commissioning.monitor.view import bar, screen, status_line
+from canshaper.commissioning.monitor.view import screen, status_line
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
 from canshaper.shaping.states import Reason, State
@@ -207,3 +209,73 @@ def test_a_line_for_pipes(deployment: Deployment) -> None:
     assert "missed=3" in line
     assert "crane=2/s" in line
     assert not math.isnan(float(line.split("sway=")[1].split("deg")[0]))
+
+
+def drive(deployment: Deployment, monitor: Monitor) -> None:
+    """Half a minute: right, rest, left, rest; its end is NOW."""
+    for n in range(300):
+        command = {0: 1.0, 2: -1.0}.get(n // 75, 0.0)
+        for axis in deployment.axes.values():
+            assert axis.status
+            said = report(State.ACTIVE, Reason.JOYSTICK_MOVED, command, command, 4.0 * command)
+            monitor.take(heard(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
+
+
+def test_a_wide_terminal_has_lines_over_time(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    drive(deployment, monitor)
+    rows = text(monitor, NOW, width=200)
+    assert max(map(len, rows)) <= 200
+    first, second = rows[1], rows[2]
+    assert ("valve 100 %" in first, "sway 4.0 deg" in second) == (True, True)
+    line = first[first.index("100 %") + 5 :].strip()
+    assert set(line) == {"█", "▅", "▁"}
+    assert line.index("█") < line.index("▅") < line.index("▁")
+    lift = rows[1 + 2 * list(deployment.axes).index("lift") + 1]
+    assert "deg" not in lift  # it makes nothing swing
+    assert not any("100 %" in row for row in text(monitor, NOW, width=100))
+
+
+def test_a_line_over_time_keeps_short_peaks_and_leaves_out_what_did_not_come() -> None:
+    at = [(NOW - 15_000 * MS, 0.0), (NOW - 14_999 * MS, -1.0), (NOW - 14_998 * MS, 0.1)]
+    assert line_over_time(at, NOW, 3, plain=True) == " _ "
+    assert line_over_time([(NOW - 31_000 * MS, 1.0)], NOW, 3, plain=False) == "   "
+    assert line_over_time([(NOW, 9.0)], NOW, 3, plain=False) == "  █"
+
+
+def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
+    monitor = Monitor(deployment)
+    for frame in told(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST):
+        monitor.take(frame)
+    monitor.note(NOW, "axis=slew state=TRIPPED from=ACTIVE reason=ENABLE_LOST")
+    rows = text(monitor, NOW, width=40, height=60)
+    assert max(map(len, rows)) <= 40
+    assert "slew        TRIPPED" in rows
+    assert "  ENABLE_LOST" in rows
+    assert "  in +50%  valve -25%  sway +3.4" in rows
+    assert "last fault" in " ".join(" ".join(rows).split())
+    assert "reason=ENABLE_LOST" in " ".join(rows)
+
+
+def test_keys_pause_choose_an_axis_and_end(deployment: Deployment) -> None:
+    monitor, keys = Monitor(deployment), Keys([*deployment.axes])
+    for frame in told(deployment):
+        monitor.take(frame)
+    monitor.note(NOW, "axis=lift state=READY from=ACTIVE reason=AT_REST")
+
+    def shown() -> list[str]:
+        picture = screen(monitor, NOW, 80, 24, plain=False, keys=keys).plain.splitlines()
+        assert (len(picture), picture[-1]) == (24, HELP)
+        return picture
+
+    assert len([row for row in shown() if " valve " in row]) == len(deployment.axes)
+    keys.press("xa")
+    one = shown()
+    assert (keys.axis, len([row for row in one if " valve " in row])) == ("slew", 1)
+    assert not any("axis=lift" in row for row in one)
+    keys.press("a" * len(deployment.axes))
+    assert keys.axis is None
+    keys.press("p")
+    assert "PAUSED" in shown()[0]
+    keys.press(" q")
+    assert (keys.paused, keys.ended) == (False, True)
