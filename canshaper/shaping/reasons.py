@@ -75,7 +75,7 @@ REASON_TEXTS: Mapping[Reason, ReasonText] = {
         "cause of a trip gone, joystick in neutral, then a rising edge of reset or enable",
     ),
     Reason.COMPENSATING: ReasonText(
-        "moves for slewing, without its own joystick",
+        "moves for another axis",
         "another axis moves this one without its own joystick, within "
         "[bounds](safety.md#added-velocity)",
     ),

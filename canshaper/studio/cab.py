@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterable, Mapping
 from typing import Any, TypeGuard
 
 from canshaper.errors import PageMessageError
+from canshaper.studio.words import said
 from canshaper_sim.hand import Held
 
 SILENT_S = 0.2
@@ -62,7 +63,7 @@ class Cab:
         if page == self.driver:
             return
         if self.driver is not None:
-            self._report(f"page {page} takes the joysticks from page {self.driver}")
+            self._report(said("takes", page=page, other=self.driver))
             self._let_go(now_s)
         self.driver = page
         self._heard_s = now_s
@@ -71,7 +72,7 @@ class Cab:
     def leave(self, page: int, now_s: float) -> None:
         """A page has gone, or has to let go."""
         if page == self.driver:
-            self._report(f"page {page} leaves the joysticks; they go to neutral")
+            self._report(said("leaves", page=page))
             self._let_go(now_s)
             self.driver = None
 
@@ -95,7 +96,7 @@ class Cab:
             self._centred = True
             if self._silent:
                 self._silent, self._release_at_s = False, None
-                self._report(f"page {page} is back")
+                self._report(said("back", page=page))
         self._joysticks = {n: float(v) for n, v in joysticks.items()} if self._centred else {}
 
     def nonsense(self, page: int, now_s: float) -> None:
@@ -129,7 +130,7 @@ class Cab:
         """Move the anti-sway switch."""
         if page == self.driver and on is not self.anti_sway:
             self.anti_sway = on
-            self._report(f"anti-sway switched {'on' if on else 'off'}")
+            self._report(said("on" if on else "off"))
 
     def held(self, now_s: float) -> Held:
         """What the hand does now."""
@@ -142,7 +143,7 @@ class Cab:
         """Let go when the driver is silent; release enable when it is time."""
         silent = self.driver is not None and now_s - self._heard_s > SILENT_S
         if silent and self.enable and self._release_at_s is None:
-            self._report(f"page {self.driver} is silent; joysticks in neutral")
+            self._report(said("silent", page=self.driver))
             self._let_go(now_s)
             self._silent = True
         elif silent:
@@ -151,7 +152,7 @@ class Cab:
             self._release_at_s, self._silent = None, False
             if self.enable:
                 self.enable = False
-                self._report("enable released")
+                self._report(said("released"))
 
     def _let_go(self, now_s: float) -> None:
         self._joysticks, self._centred, self._silent = {}, False, False

@@ -12,6 +12,7 @@ from canshaper.errors import ControlError, PageMessageError
 from canshaper.studio.cab import Cab, is_number
 from canshaper.studio.numbers_channel import NumbersChannel
 from canshaper.studio.stage import Stage
+from canshaper.studio.words import said
 
 SHOW_S = 1.0 / 30.0
 MOST_PER_S = 120
@@ -137,7 +138,7 @@ class Client:
                 name = next(iter(self._wanted))
                 factor = self._wanted.pop(name)
                 if self._stage.snapshot()["driver"] != self._number:
-                    self._refusals.append("only the page that drives may move the sliders")
+                    self._refusals.append(said("sliders"))
                     continue
                 try:
                     await asyncio.to_thread(self._stage.slide, name, factor)
@@ -168,7 +169,7 @@ class Client:
         await self._socket.send_text(json.dumps(what, separators=(",", ":")))
 
     async def _close(self, why: str) -> None:
-        self._stage.events.add("page", f"page {self._number} is closed: {why}", "warn")
+        self._stage.events.add("page", said("closed", page=self._number, why=why), "warn")
         self._stage.with_cab(lambda cab, now_s: cab.nonsense(self._number, now_s))
         self._closed = True
         reason = why.encode()[:MOST_REASON].decode(errors="ignore")

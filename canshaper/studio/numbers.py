@@ -14,6 +14,7 @@ from canshaper.config.load import load_config
 from canshaper.config.numbers import sections_of, write_numbers
 from canshaper.daemon import control_client as client
 from canshaper.errors import CanshaperError, ControlError
+from canshaper.studio.words import said
 
 POLL_S = 1.0
 MOST_CHANGES = 200
@@ -101,7 +102,7 @@ class LiveNumbers:
                 now = self._now().get(key)
                 if now is not None and seen.get(key) != now:
                     who = next((c.who for c in reversed(self._changes) if key in c.numbers), OTHERS)
-                    raise ControlError(f"{key}: is {now:g} by now, changed by {who}; look again")
+                    raise ControlError(said("bynow", key=key, value=f"{now:g}", who=who))
             before = self._now()
             self._set(values, who)
             self._before.append({key: before[key] for key in values})
@@ -115,7 +116,7 @@ class LiveNumbers:
         with self._lock:
             self._look()
             if not self._before:
-                raise ControlError("there is no change to take back")
+                raise ControlError(said("noundo"))
             self._set(self._before[-1], f"{who}, undo")
             self._before.pop()
 
@@ -130,7 +131,7 @@ class LiveNumbers:
             now = self._now()
             values = {key: one for key, one in self._other.items() if one != now.get(key)}
             if not values:
-                raise ControlError("there are no other numbers to compare with")
+                raise ControlError(said("noother"))
             self._set(values, f"{who}, A/B")
             self._before.append({key: now[key] for key in values})
 
@@ -165,11 +166,11 @@ class LiveNumbers:
         with self._lock:
             self._look()
             if _hash(self._file.read_text(encoding="utf-8")) != file_hash:
-                text = f"{self._file}: changed by someone else meanwhile; nothing was written"
-                raise ControlError(text)
+                raise ControlError(said("filechanged", file=self._file))
             values = self._unwritten()
             write_numbers(self._file, values)
-            self._report(f"{who} wrote {', '.join(values) or 'nothing'} into {self._file.name}")
+            keys = ", ".join(values) or "-"
+            self._report(said("wrote", who=who, keys=keys, file=self._file.name))
             self.version += 1
 
     def _unwritten(self) -> dict[str, float]:

@@ -19,7 +19,7 @@ from canshaper.shaping.states import Reason
 from canshaper.studio.axis_view import AxisView, rounded
 from canshaper.studio.sources import Sources
 from canshaper.studio.swing import Swing
-from canshaper.studio.words import fault_words, reason_words, state_level, state_words
+from canshaper.studio.words import fault_words, reason_words, said, state_level, state_words
 from canshaper_sim.axes import EXTENSION, KNUCKLE, LIFT_CYLINDER, NEAR_FAR, SLEW
 
 SILENT_S = 0.5
@@ -145,16 +145,16 @@ class CraneView:
         if self.crane_there(now_s) is not self._crane_there:
             self._crane_there = not self._crane_there
             if not self._crane_there:
-                self._report("the crane is silent; its pose is the last one", "bad")
+                self._report(said("nocrane"), "bad")
                 self.sway_deg = None
                 self._swing.invalidate()
         there = self.daemon_there(now_s)
         if there is not self._daemon_there:
             self._daemon_there = there
             if there:
-                self._report("the daemon is at work", "info")
+                self._report(said("daemon"), "info")
             else:
-                self._report("the daemon is silent; valves close by their own timeout", "bad")
+                self._report(said("nodaemon"), "bad")
                 self.late_us = None
                 for axis in self.axes.values():
                     axis.state = axis.reason = axis.valve = axis.profile = None
@@ -238,7 +238,8 @@ class CraneView:
             self._swing.add(predicted, now_s)
         if view.state is not None and (state, reason) != (view.state, view.reason):
             level = {"bad": "bad", "stop": "warn"}.get(state_level(state), "info")
-            self._report(f"{name}: {state_words(state)} — {reason_words(reason)}", level)
+            words = {"state": state_words(state), "reason": reason_words(reason)}
+            self._report(said("axis", axis=name, **words), level)
         view.state, view.reason = state, reason
         view.profile = self._profile(name, values.get("ActiveSet"))
         self._daemon_s = now_s
@@ -254,7 +255,7 @@ class CraneView:
             return
         fault = int(values["LastFault"])
         if fault not in (self.fault, 0):
-            self._report(f"fault: {fault_words(fault)}", "warn")
+            self._report(said("fault", fault=fault_words(fault)), "warn")
         self.fault, self.missed = fault, int(values["MissedDeadlines"])
         self._daemon_s = now_s
 

@@ -1,4 +1,8 @@
-"""States, reasons and faults by their numbers in words for people."""
+"""States, reasons and faults by their numbers in words for people; what the studio says to them."""
+
+import json
+from functools import cache
+from pathlib import Path
 
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
@@ -8,6 +12,25 @@ FAULTS = {
     fault: "" if fault is FrameFault.NONE else fault.name.lower().replace("_", " ")
     for fault in FrameFault
 }
+
+
+LANGUAGES = Path(__file__).parent / "static" / "languages"
+
+
+@cache
+def _texts() -> dict[str, str]:
+    table: dict[str, str] = json.loads((LANGUAGES / "en.json").read_text(encoding="utf-8"))
+    return table
+
+
+def said(what: str, **values: object) -> str:
+    """What the studio says, in English; the page has the same text in the language of its reader.
+
+    Args:
+        what: key of the text behind "said." in the tables of the page.
+        values: what stands in it.
+    """
+    return _texts()[f"said.{what}"].format(**values)
 
 
 def state_words(number: int) -> str:

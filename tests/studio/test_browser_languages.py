@@ -79,6 +79,10 @@ def test_the_page_speaks_the_language_of_the_browser(
     meaning = f"{table['term.ready']}: {table['term.joystick in neutral']}"
     expect(ready.locator(".means")).to_have_text("" if language == ENGLISH else meaning)
     expect(page.locator("#language")).to_be_disabled()
+    # What the studio says, and a state with its reason; the key of an axis is no word.
+    words = f"{table['axis.slew']}: {table['term.ready']} — {table['term.joystick in neutral']}"
+    expect(page.locator("#events li", has_text=words).first).to_be_visible()
+    expect(page.locator("#events li", has_text=table["said.daemon"]).first).to_be_visible()
     page.evaluate(STAND_STILL, 900)
     stood = table["hiccup.stood"].split("{s}")[0].strip()
     expect(page.locator("#hiccup b")).to_contain_text(stood, timeout=SOON_MS)

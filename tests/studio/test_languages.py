@@ -10,6 +10,7 @@ import pytest
 from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.studio.server import STATIC
+from canshaper.studio.words import said
 
 ENGLISH, OTHERS = "en", ("de", "fi", "sv")
 PLACE = re.compile(r"\{\w+\}")
@@ -17,7 +18,7 @@ KEY = re.compile(r"""data-t(?:-\w+)?="([\w.]+)"|["`]([a-z]\w*(?:\.\w+)+)["`]""")
 NOT_TEXTS = re.compile(r"\.(js|csv|png|json)$")
 # Keys that scripts put together, by what they begin with.
 COMPOSED = ("term.", "axis.", "way.", "crane.", "slider.", "stick.", "gamepad.", "chart.a")
-COMPOSED += ("status.", "step.")
+COMPOSED += ("status.", "step.", "said.")
 NAMES = {"canshaper", "canshaper studio", "Commissioning, canshaper studio", "studio"}
 NAMES |= {"CSV", "PNG", "A/B"}
 
@@ -63,6 +64,25 @@ def test_the_page_asks_for_every_text_and_for_no_other() -> None:
         found |= asked_for(path)
     assert found <= keys
     assert [key for key in keys - found if not key.startswith(COMPOSED)] == []
+
+
+def test_the_studio_says_every_text_that_there_is_for_it_and_no_other() -> None:
+    there = {key[5:] for key in texts(ENGLISH) if key.startswith("said.")}
+    source = "".join(path.read_text() for path in STATIC.parent.glob("*.py"))
+    assert set(re.findall(r'\bsaid\(\s*"(\w+)"', source)) | {"off"} == there
+    assert 'said("on" if on else "off")' in source
+
+
+def test_what_the_studio_says_is_one_of_the_texts_only() -> None:
+    """The page finds the text of its language by the English one."""
+    english = {key[5:]: text for key, text in texts(ENGLISH).items() if key.startswith("said.")}
+    for key, template in english.items():
+        spoken = said(key, **{place[1:-1]: "x y" for place in PLACE.findall(template)})
+        assert [one for one, text in english.items() if pattern(text).fullmatch(spoken)] == [key]
+
+
+def pattern(template: str) -> re.Pattern[str]:
+    return re.compile(".+?".join(re.escape(part) for part in PLACE.split(template)))
 
 
 class Words(HTMLParser):

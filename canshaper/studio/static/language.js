@@ -1,5 +1,5 @@
 // The texts of the page in the language of the person: that chosen here, else that of the browser.
-// States, reasons and events of the daemon stay English, the terms of its log and manual.
+// States and reasons of the daemon stay English where they are shown, the terms of its log and manual.
 
 const LANGUAGES = { en: "English", de: "Deutsch", fi: "Suomi", sv: "Svenska" };
 const ATTRIBUTES = { "data-t-title": "title", "data-t-label": "aria-label" };
@@ -40,6 +40,21 @@ export function meaning(words) {
   const meaning = own[`term.${words}`];
   return meaning && meaning !== words ? meaning : "";
 }
+
+const SAID = Object.entries(english).filter(([key]) => key.startsWith("said."))
+  .map(([key, template]) => [key, new RegExp(`^${template.split(/\{(\w+)\}/)
+    .map((part, i) => (i % 2 ? `(?<${part}>.+?)` : part.replace(/[.*+?^${}()|[\]\\]/g, "\\$&"))).join("")}$`)]);
+
+/** What the studio has said in English, in the language of the page; as it is where that has no text for it. */
+export function spoken(words) {
+  for (const [key, pattern] of SAID) {
+    const match = pattern.exec(words);
+    if (match) return text(key, Object.fromEntries(Object.entries(match.groups ?? {}).map(inOwn)));
+  }
+  return words;
+}
+
+const inOwn = ([kind, value]) => [kind, kind === "axis" ? nameOf("axis", value) : own[`term.${value}`] ?? value];
 
 /** Put the texts into the elements that name their keys, and offer the languages. @param select where. */
 export function translate(select) {

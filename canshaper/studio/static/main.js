@@ -1,5 +1,5 @@
 // The page: it sends where the joysticks are and shows what is on the buses, nothing else.
-import { language, nameOf, text } from "/static/language.js";
+import { language, nameOf, spoken, text } from "/static/language.js";
 import { Link } from "/static/link.js";
 import { Numbers } from "/static/numbers.js";
 import { Panel } from "/static/panel.js";
@@ -66,10 +66,10 @@ function show(message) {
   shell.show(message);
   panel.show(message, mine);
   for (const [, time, source, words, level, clock] of message.events ?? []) {
-    panel.event(time, source, words, level);
-    shell.charts.mark(clock, source, words, level);
+    panel.said(time, source, words, level);
+    shell.charts.mark(clock, source, spoken(words), level);
   }
-  for (const why of message.refused ?? []) panel.event(Date.now() / 1000, "page", text("event.refused", { text: why }), "warn", language);
+  for (const why of message.refused ?? []) panel.event(Date.now() / 1000, "page", text("event.refused", { text: spoken(why) }), "warn", language);
   inForce = message.numbers?.table ?? inForce;
   shell.residual.follow([message.sliders, inForce]);
   if (message.numbers) numbers.show(message.numbers);

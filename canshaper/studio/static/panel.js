@@ -1,6 +1,6 @@
 // States, events, sliders and the large numbers.
 
-import { language, meaning, nameOf, text } from "/static/language.js";
+import { language, meaning, nameOf, spoken, text } from "/static/language.js";
 
 const MOST_EVENTS = 300;
 const OLD_S = 0.5;
@@ -155,8 +155,14 @@ export class Panel {
     }
   }
 
-  /** Add what happened. @param words of the studio: English; the page's own are in its language. */
-  event(time, source, words, level, lang = "en") {
+  /** Add what the studio has said; what the page has no text for stays English, as the log of the daemon. */
+  said(time, source, words, level) {
+    const own = spoken(words);
+    this.event(time, source, own, level, own === words ? "en" : language);
+  }
+
+  /** Add what happened. */
+  event(time, source, words, level, lang) {
     const list = document.getElementById("events");
     const stamp = this.hello.playback ? `${time.toFixed(2)} s` : new Date(time * 1000).toTimeString().slice(0, 8);
     const down = list.scrollHeight - list.scrollTop - list.clientHeight < 30;

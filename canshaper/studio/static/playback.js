@@ -1,5 +1,5 @@
 // The page of a drive that is over: all its pictures are here, and a time bar goes through them.
-import { text } from "/static/language.js";
+import { spoken, text } from "/static/language.js";
 import { Panel } from "/static/panel.js";
 import { Shell } from "/static/shell.js";
 
@@ -69,8 +69,8 @@ async function open(number) {
   panel = new Panel(hello, () => {});
   drive.times.forEach((_, i) => shell.charts.add(drive.message(i)));
   for (const [t, source, words, level] of drive.events) {
-    shell.charts.mark(t, source, words, level);
-    panel.event(t, source, words, level);
+    shell.charts.mark(t, source, spoken(words), level);
+    panel.said(t, source, words, level);
   }
   byId("notes").replaceChildren(...drive.notes.map((note) => Object.assign(document.createElement("li"), { textContent: note, lang: "en" })));
   const bar = byId("time");
