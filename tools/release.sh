@@ -39,7 +39,8 @@ mkdir "$work/empty"
     canshaper studio --help >/dev/null
     mkfifo pages
     canshaper docs --port 0 >pages &
-    read -r _ url _ <pages
+    exec 3<pages # open until the end: it has more to say than its address
+    read -r _ url _ <&3
     python -c "from urllib.request import urlopen; assert b'canshaper' in urlopen('$url').read()"
     kill $!
 )
