@@ -23,6 +23,12 @@ const set = (element, text) => {
   if (element.textContent !== text) element.textContent = text;
 };
 
+/** A number of the file with its unit; those of a filter have their names there. */
+function numberText(name, value) {
+  const words = text(`slider.number.${name}`, { value });
+  return words.startsWith("slider.") ? `${name.replace(/_(s|m|rad_s)$/, "")} ${value}` : words;
+}
+
 export class Panel {
   constructor(hello, slide) {
     this.hello = hello;
@@ -74,7 +80,7 @@ export class Panel {
         const byAxis = {};
         for (const [key, v, p] of numbers) {
           const [, axis, , number] = key.split(".");
-          (byAxis[nameOf("axis", axis)] ??= []).push(`${number.replace(/_(s|m|rad_s)$/, "")} ${(v * f ** p).toPrecision(3)}`);
+          (byAxis[nameOf("axis", axis)] ??= []).push(numberText(number, (v * f ** p).toPrecision(3)));
         }
         set(found, Object.entries(byAxis).map(([axis, all]) => `${axis} ${all.join(" ")}`).join(" · "));
       };
