@@ -48,7 +48,7 @@ def robust(
 
       canshaper robust config/forwarder.yaml --axis near_far
 
-      canshaper robust config/forwarder.yaml --axis slew --range 30 --duration 2.4 --write
+      canshaper robust machine.yaml --axis slew --range 30 --duration 2.4 --write
 
       canshaper robust config/forwarder.yaml --axis near_far --residual 5
 

@@ -79,7 +79,7 @@ def tune(
 
       canshaper tune config/forwarder.yaml --axis slew
 
-      canshaper tune config/forwarder.yaml --axis near_far --third-pole --write
+      canshaper tune machine.yaml --axis near_far --third-pole --write
 
       canshaper tune config/forwarder.yaml --axis slew --length-range 15 --max-run-on 1.9
 
