@@ -86,3 +86,69 @@ def test_axe_finds_nothing(shared: Studio, tab: Callable[..., Page], view: str) 
     page.wait_for_timeout(1000)
     found = Axe().run(page).response["violations"]
     assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+
+
+# Cranes in a pose, drawn for a while: where the grapples are then, in halves of the picture.
+GRAPPLES_SEEN = """async ([hello, shown]) => {
+    const { Scene } = await import("/static/scene.js");
+    const canvas = document.createElement("canvas");
+    canvas.style.cssText = "position: fixed; inset: 0 auto auto 0; width: 600px; height: 340px";
+    document.body.append(canvas);
+    const scene = new Scene(canvas, hello);
+    scene.add(shown);
+    for (let i = 0; i < 200; i += 1) {
+        await new Promise(requestAnimationFrame);
+        scene.draw(performance.now());
+    }
+    const at = Object.values(scene.cranes).map((crane) => {
+        const seen = crane.grapple.getWorldPosition(scene.camera.position.clone());
+        seen.project(scene.camera);
+        return Math.max(Math.abs(seen.x), Math.abs(seen.y));
+    });
+    scene.dispose();
+    canvas.remove();
+    return at;
+}"""
+
+
+@pytest.mark.parametrize("slewed_deg", [-90.0, 160.0])
+def test_no_grapple_leaves_the_picture(
+    shared: Studio, tab: Callable[..., Page], slewed_deg: float
+) -> None:
+    page = tab(shared)
+    with shared.page() as other:
+        shown = other.until(lambda s: all(crane["pose"] for crane in s["cranes"].values()))
+    for crane in shown["cranes"].values():
+        crane["pose"] = [slewed_deg, 8.0, crane["pose"][2]]
+    halves = page.evaluate(GRAPPLES_SEEN, [other.hello, shown])
+    assert len(halves) == 2
+    assert max(halves) < 1.0
+
+
+def test_the_hint_covers_no_words_of_a_view(
+    own: Callable[..., Studio], tab: Callable[..., Page]
+) -> None:
+    page = tab(own())
+    expect(page.locator("#hint")).to_be_visible()
+    page.click("#left")
+    expect(page.locator("#residual-words")).to_be_visible()
+    expect(page.locator("#hint")).to_be_hidden()
+
+
+def test_in_forced_colors_what_is_pressed_is_filled(
+    shared: Studio, tab: Callable[..., Page]
+) -> None:
+    page = tab(shared, forced_colors="active")
+    background = "one => getComputedStyle(one).backgroundColor"
+    page.click("#above")
+    pressed, other = (page.locator(one).evaluate(background) for one in ("#above", "#left"))
+    assert pressed != other
+
+
+def test_on_a_large_screen_charts_and_words_are_larger(
+    shared: Studio, tab: Callable[..., Page]
+) -> None:
+    page = tab(shared, viewport={"width": 3840, "height": 2160})
+    for name, least_px in (("#chart-command", 300), ("#axes td", 40)):
+        box = page.locator(name).first.bounding_box()
+        assert box and box["height"] > least_px
