@@ -266,8 +266,6 @@ class GuardedJoystick(GuardedInput):
 
     def read(self) -> None:
         """Read what the frames have asked that came since this was called last."""
-        if not self._unread:
-            return
         for span, asks, asked in self._asked:
             for data, heard_ns in self._unread:
                 ask, before = asks.get(data[span]), asked.now
