@@ -4,7 +4,8 @@ from canshaper.config.motion import Motion
 from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.value import ValueInput
-from canshaper.shaping.motion import MovingAxis, TwoAxisMotion, farthest_m
+from canshaper.shaping.motion import TwoAxisMotion, farthest_m
+from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.states import State
 
 # An axis at rest in READY may be moved by the other one.

@@ -5,7 +5,8 @@ from collections.abc import Callable
 
 import pytest
 
-from canshaper.shaping.motion import MOST_STEP, MovingAxis, TwoAxisMotion
+from canshaper.shaping.motion import TwoAxisMotion
+from canshaper.shaping.moving_axis import MOST_STEP, MovingAxis
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.sway import SwayMode, SwayModel
 

@@ -1,0 +1,125 @@
+"""An axis as the motion of two sees it: the path of its grapple, and how far it may be moved."""
+
+import math
+from dataclasses import dataclass, field
+
+from canshaper.shaping.sway import SwayModel
+
+# Largest change of an added velocity between two ticks of an axis, fraction of full speed.
+MOST_STEP = 0.1
+_NOTHING = 1e-6
+GrapplePath = tuple[float, float, float, float]
+"""Lead of the tip and its rate, speed and acceleration of the grapple; rad or m, per second."""
+
+
+@dataclass(slots=True)
+class MovingAxis:
+    """One of the two axes, as the motion sees it.
+
+    Attributes:
+        full_speed: rad/s of slew, m/s of near-far.
+        period_s: time for which an added velocity is held.
+        sway: sway model, stepped without the added part.
+        applied: velocity that the model was driven by last, [-1, 1].
+        ahead_s: from now to the time of the model's state: to the end of the period that runs, 0
+            where the next one begins now.
+        commanded: the operator asked for motion within the tail.
+        able: it may carry out what is added.
+        added: velocity to add now, [-1, 1]; the result.
+        sent: velocity that its valve was given last, [-1, 1].
+        farthest: how far this axis may be moved from where its operator left it, rad or m; see
+            ``farthest_m``.
+        largest: fastest velocity that it has there, [0, 1].
+        fall_per_s: fastest fall of its velocity, full speeds per second.
+        damps: the other axis makes this one swing, which may be damped; a result.
+        damped: how far the tip was moved for that, m.
+        way: how far it was moved since its operator left it, rad or m.
+        reached: position that the added velocities reach at the end of the period, rad or m.
+        joins: the other axis moves already; what was not added before is not made up for.
+        stiffness, damping: w^2 and 2 zeta w of the sway mode, rad/s.
+        lag_s: 2 zeta / w.
+    """
+
+    full_speed: float
+    period_s: float
+    sway: SwayModel
+    applied: float = 0.0
+    ahead_s: float = 0.0
+    commanded: bool = False
+    able: bool = False
+    sent: float = 0.0
+    farthest: float = math.inf
+    largest: float = 1.0
+    fall_per_s: float = 5.0
+    added: float = 0.0
+    damps: bool = False
+    damped: float = 0.0
+    way: float = 0.0
+    reached: float = 0.0
+    joins: bool = False
+    stiffness: float = field(init=False)
+    damping: float = field(init=False)
+    lag_s: float = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.follow(self.sway)
+
+    def follow(self, sway: SwayModel) -> None:
+        """The axis has this sway model now."""
+        omega, ratio = sway.mode.omega_rad_s, sway.mode.damping_ratio
+        self.sway = sway
+        self.stiffness, self.damping = omega * omega, 2.0 * ratio * omega
+        self.lag_s = 2.0 * ratio / omega
+
+    def held(self, seconds: float) -> None:
+        """The last output was held for so much longer."""
+        self.reached += self.added * self.full_speed * seconds
+
+    def path(self, after_s: float) -> GrapplePath:
+        """The grapple's motion at a time from now, the applied velocity held until then."""
+        after_s -= self.ahead_s
+        sway, full, applied = self.sway, self.full_speed, self.applied
+        stiffness, damping = self.stiffness, self.damping
+        angle, rate = sway.angle, sway.rate + applied
+        change = -after_s * (stiffness * angle + damping * rate)
+        angle += after_s * (rate + 0.5 * change)
+        rate += change
+        # The grapple's speed is that of the tip less the lead's.
+        pull = stiffness * angle + damping * rate
+        return full * angle, full * rate, full * (applied - rate), full * pull
+
+    def room(self, sign: float) -> float:
+        """Fastest velocity in a direction from which it still stops before ``farthest``."""
+        way = (self.farthest - sign * self.way) / self.full_speed
+        if not way > 0.0:
+            return 0.0
+        # It falls by a step in each period: (v + (v - step) + ...) * period_s <= way.
+        step = self.fall_per_s * self.period_s
+        return 0.5 * (math.sqrt(step * step + 8.0 * self.fall_per_s * way) - step)
+
+    def add(self, target: float, weight: float) -> None:
+        """Run to a position of the added part within the period.
+
+        Args:
+            target: the position, rad or m.
+            weight: 1, or less where the added part ends.
+        """
+        if self.joins:
+            self.joins, self.reached = False, target
+        way = self.period_s * self.full_speed
+        velocity = weight * (target - self.reached) / way
+        last = self.added
+        if velocity > last + MOST_STEP:
+            velocity = last + MOST_STEP
+        elif velocity < last - MOST_STEP:
+            velocity = last - MOST_STEP
+        if self.farthest < math.inf and not self.commanded:
+            velocity = min(max(velocity, -self.room(-1.0)), self.room(1.0))
+        if not _NOTHING <= abs(velocity) <= 1.0:
+            if not abs(velocity) > 1.0:  # next to nothing, or not a number
+                self.added = 0.0
+                return
+            velocity = math.copysign(1.0, velocity)
+        self.added = velocity
+        # What a fading part leaves out is not made up for.
+        self.reached = target if weight < 1.0 else self.reached + velocity * way
