@@ -3,6 +3,7 @@
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 
+from canshaper.codec.signals import find_signal, raw_limits
 from canshaper.config.enable import conditions, named_by
 from canshaper.config.input import Input
 from canshaper.config.source import Place
@@ -81,6 +82,11 @@ def _bind(lookup: Lookup, switches: dict[str, Switch]) -> BoundSwitches | None:
     check_source(used, "a switch")
     for other in others:
         used.integer(("switches", other, "signal"), switches[other].signal, f"switch {other}")
+    for name, one in switches.items():
+        signal = find_signal(bound.message, one.signal)
+        if signal and one.code > (largest := raw_limits(signal)[1]):
+            text = f"expected up to {largest}, of {signal.length} bits of {signal.name}"
+            lookup.diagnostics.add(("switches", name, "code"), f"{text}, got {one.code}")
     names = {name: (one.signal, one.code) for name, one in switches.items()}
     return BoundSwitches(bound.config, bound.message, bound.codec, bound.protection, names)
 
