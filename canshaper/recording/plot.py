@@ -100,7 +100,7 @@ def figure(replays: Sequence[Replayed]) -> Figure:
         top -= tall + gap
         panels.append(panel)
         if kind == "lanes":
-            _draw_lanes(panel, name, replays)
+            _draw_lanes(panel, name, replays, (straight.t_s[0], straight.t_s[-1]))
             continue
         (_draw_sway if kind == "sway" else _draw_command)(panel, name, recordings, straight)
         if kind == "command":
@@ -178,16 +178,21 @@ def _plot(panel: Axes, x: Sequence[float], y: Sequence[float], look: _Look, **op
     panel.plot(x, y, color=look.colour, linewidth=look.width, linestyle=look.style, **options)
 
 
-def _draw_lanes(panel: Axes, name: str, replays: Sequence[Replayed]) -> None:
+def _draw_lanes(
+    panel: Axes, name: str, replays: Sequence[Replayed], shown_s: tuple[float, float]
+) -> None:
     """A lane a deployment: the states of the axis, and other events as marks."""
-    late_s = _LATE * max(_seconds(one, one.trace.end_ns) for one in replays)
+    first_s, last_s = shown_s
+    late_s = first_s + _LATE * (last_s - first_s)
     for i, one in enumerate(replays):
         low = len(replays) - 1 - i
         for start_s, end_s, state, reason in _spans(one, name):
-            if i == 0 and state in (State.STOPPING, State.TRIPPED):
+            inside = start_s < last_s and end_s > first_s
+            if i == 0 and inside and state in (State.STOPPING, State.TRIPPED):
                 words = REASON_TEXTS[reason].words
                 side: Any = "right" if start_s > late_s else "left"
-                place = (start_s if side == "left" else end_s, len(replays) + 0.12)
+                at_s = max(start_s, first_s) if side == "left" else min(end_s, last_s)
+                place = (at_s, len(replays) + 0.12)
                 panel.text(*place, words, fontsize=TEXT_PT, va="bottom", ha=side)
             if state in _LANES:
                 colour, hatch = _LANES[state]

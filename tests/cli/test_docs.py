@@ -22,12 +22,15 @@ def site(tmp_path: Path) -> Path:
     return tmp_path
 
 
+# A shell's background job has Ctrl-C ignored.
 SERVE = """
+import signal
 import sys
 from pathlib import Path
 from canshaper.cli.app import main
 from canshaper.cli.verbs import docs
 
+signal.signal(signal.SIGINT, signal.default_int_handler)
 site = Path(sys.argv.pop())
 docs.site_directory = lambda: site
 main()
