@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from itertools import accumulate
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,27 @@ def test_what_a_wrong_lag_costs_by_length(lag_s: float) -> None:
         if errors == (0,):
             assert (left > without) == (lag_s not in (0.075, 0.1))
     print(f"valve {1000 * lag_s:.0f} ms: right length {row[0]}, 15 % wrong {row[1]}")
+
+
+@pytest.mark.study
+@pytest.mark.long
+@KINDS
+@pytest.mark.parametrize("lag_s", [0.05, 0.15])
+def test_what_a_wrong_lag_and_a_wrong_length_cost_together(sensor: Setup, lag_s: float) -> None:
+    """Most degrees left, and how far the command falls while the joystick is held."""
+    worst, dip = 0.0, 0.0
+    for seed in range(1, 13):
+        for length_m in (0.84, 1.56):
+            noisy = SwaySensorParameters(seed=seed)
+            setup = replace(sensor, lag_s=lag_s, length_m=length_m, sensor=noisy)
+            worst = max(worst, *(setup.drive(name).residual_deg for name in SCRIPTS))
+            pulse = setup.drive("pulse")
+            pairs = zip(pulse.time_s, pulse.sent, strict=True)
+            held = [v for t, v in pairs if t < pulse.script.strokes[0].end_s - 0.1]
+            dip = max(dip, *(top - v for top, v in zip(accumulate(held, max), held, strict=True)))
+    print(f"{worst:.2f} degrees, command falls by {100.0 * dip:.0f} %")
+    assert worst < (5.0 if sensor is GYRO else 1.8)
+    assert dip < 0.2
 
 
 @KINDS
