@@ -10,7 +10,7 @@ from scipy.linalg import solve_discrete_are
 from canshaper.shaping.free_swing import (
     ANGLE_PER_RATE,
     OFFSET_NOISE,
-    QUICKNESS_BESIDE,
+    QUICKNESS_OF_TWO,
     SECOND_QUICKNESS,
     FreeSwing,
     TwoFreeSwings,
@@ -167,7 +167,7 @@ def test_beside_a_second_mode_the_gains_are_those_of_a_kalman_filter_of_both(
     a[3:, 3:] += np.array(swing_over(second, TICK_S)).reshape(2, 2)
     rate = measured is Measured.RATE
     c = np.array([0.0, 1.0, 1.0, 0.0, 1.0] if rate else [1.0, 0.0, 1.0, 1.0, 0.0])
-    quick, other = QUICKNESS_BESIDE, SECOND_QUICKNESS
+    quick, other = QUICKNESS_OF_TWO, SECOND_QUICKNESS
     each = [ANGLE_PER_RATE * quick, quick, OFFSET_NOISE[measured], ANGLE_PER_RATE * other, other]
     q, noise = np.diag(each) ** 2, math.degrees(LIMITS.noise)
     p = np.diag([10.0 / noise, 30.0 / noise, 0.25 / noise, 2.0 / noise, 20.0 / noise]) ** 2
