@@ -59,18 +59,11 @@ class Machine:
             n: Joystick(n, section, messages[section["message"]])
             for n, section in data["joysticks"].items()
         }
-        self.joystick_nodes = {
-            name: self.nodes[section["bus"], section["node"]]
-            for name, section in data["joysticks"].items()
-            if "node" in section
-        }
+        self.joystick_nodes = self._nodes(data["joysticks"])
         self.switches = self._switches(data, messages)
         self.axes = {n: self._axis(n, s, messages) for n, s in data["axes"].items()}
-        self.drives = {  # without CiA 408
-            name: self.nodes[section["valve"]["bus"], section["valve"]["node"]]
-            for name, section in data["axes"].items()
-            if "node" in section["valve"]
-        }
+        valves = {name: section["valve"] for name, section in data["axes"].items()}
+        self.drives = self._nodes(valves)  # without CiA 408
         self.sensors = self._sensors(data, messages)
         self.radius: tuple[Key, int, Field] | None = None
         for motion in data.get("motion", {}).values():
@@ -101,6 +94,11 @@ class Machine:
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns
+
+    def _nodes(self, sections: dict[str, Any]) -> dict[str, Node]:
+        """Nodes of those sections that name one."""
+        named = {name: section for name, section in sections.items() if "node" in section}
+        return {name: self.nodes[one["bus"], one["node"]] for name, one in named.items()}
 
     def _switches(self, data: dict[str, Any], messages: dict[str, Message]) -> list[Switches]:
         """Messages with switches; the joysticks know theirs."""

@@ -150,13 +150,16 @@ def test_ctrl_c_ends_a_measurement_and_is_ctrl_c_again(deployment: Deployment) -
     def interrupted(*_: object) -> None:
         os.kill(os.getpid(), signal.SIGINT)
 
-    before = signal.getsignal(signal.SIGINT)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     speed = speed_signal(deployment, "slew", None)
     drive = CalibrationDrive(deployment, "slew", speed, Ramp(0.03, 0.4))
-    with pytest.raises(KeyboardInterrupt):
-        Machine(Hand(interrupted), []).calibrate(deployment, drive, "It moves.")
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            Machine(Hand(interrupted), []).calibrate(deployment, drive, "It moves.")
+        assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+    finally:
+        signal.signal(signal.SIGINT, before)
     assert drive.ended == "stopped: Ctrl-C"
-    assert signal.getsignal(signal.SIGINT) is before
 
 
 def test_a_measurement_that_cannot_begin_ends_by_itself(

@@ -27,7 +27,7 @@ def run(*words: str) -> tuple[int, str]:
 def test_the_printed_line_is_a_filter_that_check_accepts(file: Path) -> None:
     status, output = run(str(file), "--axis", "near_far", "--duration", "1.8")
     assert status == 0
-    assert "at most 7.7 % of the" in output
+    assert "at most 7.7 % of the" in " ".join(output.split())
     line = output.strip().splitlines()[-1]
     old = next(row for row in file.read_text().splitlines() if "# near-far tuning" in row)
     file.write_text(file.read_text().replace(old, "    " + line))
