@@ -57,7 +57,7 @@ class Guarded:
                 continue
             data = frame[3]
             part = data[valve.span]
-            if part == valve.part and now_ns < valve.good_ns:
+            if part == valve.part and now_ns < valve.valid_until_ns:
                 valve.at = at  # the same command as before, and nothing forbids it since
                 yield frame
             elif not (why := valve.refusal(data, part, now_ns, at)):

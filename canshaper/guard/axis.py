@@ -1,4 +1,4 @@
-"""What one axis may be sent now, and why not more: limits, what was asked, rates."""
+"""What one axis may be sent now, and why not more: limits, commands, rates."""
 
 import math
 from collections.abc import Sequence
@@ -9,7 +9,7 @@ from canshaper.guard.inputs import (
     FOREVER,
     FORTH,
     NEUTRAL,
-    Asked,
+    CommandedAxis,
     GuardedJoystick,
     GuardedSwitch,
     largest,
@@ -23,7 +23,7 @@ EPSILON = 1e-6
 # A velocity is rounded to the nearest step; down by up to one where that would be too fast.
 UP, DOWN = 0.5, 1.0
 # Periods by which an output may be late: tail and stop are whole periods, the last one included,
-# and a compensation follows what asks for it.
+# and a compensation follows its command.
 LATE_PERIODS = 3
 At = tuple[int, int]
 BEFORE: At = (-1, -1)  # the first deadline and the first tick
@@ -31,7 +31,7 @@ Command = tuple[int, float, float, float]
 """Direction, size, that at most before it was rounded, and the size that may follow at once."""
 
 
-class GuardedAxis(Asked):
+class GuardedAxis(CommandedAxis):
     """One axis: what its valve may be sent now.
 
     Attributes:
@@ -136,41 +136,41 @@ class GuardedAxis(Asked):
         if command is None or len(data) != self._length:
             command = self._learn(data)
         direction, size, _, _ = command
-        last, good_ns = self._last, self.sure_ns
-        # The usual one: within what is sure to be asked for, and one step of the rates.
-        if size >= self.sure or now_ns >= good_ns or direction != last[0] or size > last[3]:
-            command, good_ns, why = self._look(command, now_ns, at)
+        last, valid_until_ns = self._last, self.sure_ns
+        # The usual one: within what is sure to be commanded, and one step of the rates.
+        if size >= self.sure or now_ns >= valid_until_ns or direction != last[0] or size > last[3]:
+            command, valid_until_ns, why = self._look(command, now_ns, at)
             if why:
                 self.forbid()
                 return why
-        self.part, self.good_ns, self.at, self._last = part, good_ns, at, command
+        self.part, self.valid_until_ns, self.at, self._last = part, valid_until_ns, at, command
         return ""
 
     def _look(self, command: Command, now_ns: int, at: At) -> tuple[Command, int, str]:
-        """A command with its bound, until when that is good, and why it may not leave."""
+        """A command with its bound, until when that is valid, and why it may not leave."""
         direction, size, bound, _ = command
         if direction == NEUTRAL:
             return command, FOREVER, ""
         last, last_size, last_bound, _ = self._last
         number, tick = at
-        reach, good_ns = self._asked_for(direction, now_ns)
+        reach, valid_until_ns = self._commanded_speed(direction, now_ns)
         period = self._period
         before = self._up - last_size if direction + last == BACK + FORTH else last_bound
         periods = number // period - self.at[0] // period
         highest = self._highest(before, periods)
         allowed = reach if reach < highest else highest
-        if size > allowed and good_ns and direction == last:
+        if size > allowed and valid_until_ns and direction == last:
             # On its way back. The rates do not catch up on deadlines that were missed, so for
             # the fall they do not count; and it has to be lower with each frame.
             fallen = last_bound - (tick - self.at[1]) // period * self._fall_least
             if fallen > allowed:
-                allowed, good_ns = fallen, 0
+                allowed, valid_until_ns = fallen, 0
                 bound = min(bound, fallen)
         elif size >= self._full:
             bound = allowed
         refused = size > allowed + EPSILON
         why = self._why(command, reach, allowed, now_ns) if refused else ""
-        return (direction, size, bound, bound + self._step), good_ns, why
+        return (direction, size, bound, bound + self._step), valid_until_ns, why
 
     def _highest(self, before: float, periods: int) -> float:
         """Speed that the rates allow after one in the same direction, negative in the other."""
@@ -179,16 +179,16 @@ class GuardedAxis(Asked):
             return (left * self._rise if left > 0.0 else 0.0) + self._up
         return before + periods * self._rise + self._up
 
-    def _asked_for(self, direction: int, now_ns: int) -> tuple[float, int]:
-        """Speed that was asked for in a direction, and until when that holds.
+    def _commanded_speed(self, direction: int, now_ns: int) -> tuple[float, int]:
+        """Speed that was commanded in a direction, and until when that holds.
 
         Both are 0 where nothing may move at all.
         """
         since_ns, joystick = now_ns - self._kept_ns, self._joystick
-        from_ns = heard_ns = joystick.heard_ns
-        if joystick.released or heard_ns < now_ns - self._silent_ns:
+        from_ns = received_ns = joystick.received_ns
+        if joystick.released or received_ns < now_ns - self._silent_ns:
             return 0.0, 0
-        free_ns = heard_ns + self._silent_ns
+        free_ns = received_ns + self._silent_ns
         for stop in self._stops:
             free_ns = min(free_ns, stop.free_ns)
             if free_ns < now_ns:
@@ -198,7 +198,7 @@ class GuardedAxis(Asked):
             reach, sizes = self.now, self.positive
         else:
             reach, sizes = -self.now, self.negative
-        if reach < 0.0 or heard_ns < since_ns:
+        if reach < 0.0 or received_ns < since_ns:
             reach = 0.0
         if sizes and (before := largest(sizes, since_ns)) > reach:
             reach, from_ns = before, sizes[0][1]
@@ -230,7 +230,7 @@ class GuardedAxis(Asked):
             limit = stops[0]
         elif self._joystick.released:
             limit = "enable"
-        elif now_ns - self._joystick.heard_ns > self._silent_ns:
+        elif now_ns - self._joystick.received_ns > self._silent_ns:
             limit = "silence"
         elif size == math.inf:
             limit = "command"
@@ -241,7 +241,7 @@ class GuardedAxis(Asked):
         return f"axis={self.name} limit={limit} speed={speed:.3f} allowed={allowed:.3f}"
 
     def _reach(self, reach: float, now_ns: int) -> float:
-        """What may be, beyond what was asked in the direction of the output."""
+        """What may be, beyond what was commanded in the direction of the output."""
         if self._reverse:
             reach = max(reach, self._most(now_ns))
         if self._faster and reach:
@@ -257,16 +257,16 @@ class GuardedAxis(Asked):
 
         Args:
             other: that axis.
-            most: up to this part of full speed, where the operator of this axis asked for nothing.
+            most: up to this part of full speed, where the operator of this axis commands nothing.
         """
         self._more = True
         self._adding, self._added = (other, self), most
 
     def _most(self, now_ns: int) -> float:
-        """Speed that was asked for in any direction within the tail."""
+        """Speed that was commanded in any direction within the tail."""
         self._joystick.read()
         since_ns = now_ns - self._kept_ns
-        now = abs(self.now) if self._joystick.heard_ns >= since_ns else 0.0
+        now = abs(self.now) if self._joystick.received_ns >= since_ns else 0.0
         return max(now, largest(self.positive, since_ns), largest(self.negative, since_ns))
 
 

@@ -87,7 +87,7 @@ class Part:
 
 
 class JoystickBits:
-    """What a joystick frame asks of one axis.
+    """The command of one axis in a joystick frame.
 
     Attributes:
         fields: every field that it is read from.
@@ -109,15 +109,15 @@ class JoystickBits:
         self.fields += [self._negative.field] if self._negative else []
         self.span = span_of(reduce(or_, (field.bits for field in self.fields)))
 
-    def ask(self, data: bytes) -> float:
-        """Part of full speed, [-1, 1]; 0 in neutral and where nothing is asked."""
-        ask = self._part.value(data)
+    def command(self, data: bytes) -> float:
+        """Part of full speed, [-1, 1]; 0 in neutral."""
+        command = self._part.value(data)
         if self._negative is not None:
-            ask -= self._negative.value(data)
+            command -= self._negative.value(data)
         elif self._flags:
             flags = [flag.raw(data) for flag in self._flags]
-            ask *= _SIGNS.get(tuple(flags), 0)
-        return ask if abs(ask) > self._band else 0.0
+            command *= _SIGNS.get(tuple(flags), 0)
+        return command if abs(command) > self._band else 0.0
 
 
 class CommandBits:

@@ -14,57 +14,58 @@ from canshaper.machine.inputs import BoundInput
 NEVER, FOREVER = -(10**18), 10**19  # ns
 NEUTRAL, FORTH, BACK = range(3)
 Sizes = deque[tuple[float, int]]
-"""Each with the time when it was asked for last, the largest first, each later one smaller."""
+"""Each with the time when it was commanded last, the largest first, each later one smaller."""
 # Frames of a joystick whose commands are read together; not so many that the last one waits.
 MOST_UNREAD = 32
 
 
-class Asked:
-    """What a joystick asks of one axis, and asked of late: amortised constant time.
+class CommandedAxis:
+    """An axis as its joystick commands it, now and of late: amortised constant time.
 
     Attributes:
-        now: what its last frame asks, [-1, 1].
-        positive, negative: sizes that it asked before in each direction, where it then asked less.
+        now: command of the last frame, [-1, 1].
+        positive, negative: sizes commanded before in each direction, where the next one was less.
         joystick: how its frames are read.
-        asks: what it asked, by the bytes of that.
-        good_ns: until when the last command may leave again, if nothing forbids it meanwhile.
-        sure, sure_ns: speed that was asked for at least in the direction of the last command, and
+        joystick_commands: those that were read, by their bytes.
+        valid_until_ns: until when the last command may leave again, if nothing forbids it
+            meanwhile.
+        sure, sure_ns: speed that was commanded at least in the direction of the last command, and
             until when that holds, if nothing forbids it meanwhile.
     """
 
     __slots__ = (
-        "asks",
-        "good_ns",
         "joystick",
+        "joystick_commands",
         "negative",
         "now",
         "positive",
         "sure",
         "sure_ns",
+        "valid_until_ns",
     )
 
     def __init__(self, joystick: JoystickBits) -> None:
         self.joystick = joystick
-        self.asks: dict[bytes, float] = {}
+        self.joystick_commands: dict[bytes, float] = {}
         self.now = 0.0
         self.positive: Sizes = deque()
         self.negative: Sizes = deque()
         self.sure, self.sure_ns = 0.0, NEVER
-        self.good_ns = NEVER
+        self.valid_until_ns = NEVER
 
     def learn(self, data: bytes) -> float:
-        """Read what a frame asks."""
-        if len(self.asks) >= MOST_KNOWN:
-            self.asks.clear()
-        ask = self.asks[data[self.joystick.span]] = self.joystick.ask(data)
-        return ask
+        """Read the command in a frame."""
+        if len(self.joystick_commands) >= MOST_KNOWN:
+            self.joystick_commands.clear()
+        command = self.joystick_commands[data[self.joystick.span]] = self.joystick.command(data)
+        return command
 
     def forbid(self) -> None:
         """Nothing holds that was looked up before."""
-        self.good_ns = self.sure_ns = NEVER
+        self.valid_until_ns = self.sure_ns = NEVER
 
     def clear(self) -> None:
-        """Nothing was asked."""
+        """Nothing was commanded."""
         self.now = 0.0
         self.positive.clear()
         self.negative.clear()
@@ -72,7 +73,7 @@ class Asked:
 
 
 def keep(sizes: Sizes, size: float, until_ns: int) -> None:
-    """So much was asked until then."""
+    """So much was commanded until then."""
     while sizes and sizes[-1][0] <= size:
         sizes.pop()
     sizes.append((size, until_ns))
@@ -90,7 +91,7 @@ class GuardedInput(ABC):
 
     Attributes:
         timeout_ns: age at which the message counts as lost.
-        heard_ns: when the last one came.
+        received_ns: when the last one came.
     """
 
     __slots__ = (
@@ -100,7 +101,7 @@ class GuardedInput(ABC):
         "_plain",
         "_source",
         "_source_ns",
-        "heard_ns",
+        "received_ns",
         "timeout_ns",
     )
 
@@ -115,7 +116,7 @@ class GuardedInput(ABC):
         self.timeout_ns = bound.config.timeout_ms * 1_000_000
         self._source: int | None = None
         self._source_ns = 0
-        self.heard_ns = NEVER
+        self.received_ns = NEVER
 
     def from_other(self, source: int, now_ns: int) -> bool:
         """Whether the message is taken from another address, which is not silent yet (J1939)."""
@@ -126,7 +127,7 @@ class GuardedInput(ABC):
         self._source_ns = now_ns
         return False
 
-    def counts(self, data: bytes) -> bool:
+    def accepts(self, data: bytes) -> bool:
         """Whether a frame of the right length is right in itself, and of those that are meant."""
         if self._check and not self._check.verify(data):
             return False
@@ -159,7 +160,7 @@ class GuardedSwitch:
         self._on, self.limit = on, limit
         self._timeout_ns = bound.config.timeout_ms * 1_000_000
         self.free_ns = NEVER
-        self.stops: list[Asked] = []
+        self.stops: list[CommandedAxis] = []
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame that counts."""
@@ -167,8 +168,8 @@ class GuardedSwitch:
             self.free_ns = now_ns + self._timeout_ns
         else:
             self.free_ns = NEVER
-            for asked in self.stops:
-                asked.forbid()
+            for axis in self.stops:
+                axis.forbid()
 
 
 class GuardedSwitches(GuardedInput):
@@ -186,14 +187,14 @@ class GuardedSwitches(GuardedInput):
 
     def note(self, data: bytes, now_ns: int) -> None:
         """Take a frame."""
-        if len(data) == self._length and (self._plain or self.counts(data)):
-            self.heard_ns = now_ns
+        if len(data) == self._length and (self._plain or self.accepts(data)):
+            self.received_ns = now_ns
             for switch in self.switches:
                 switch.note(data, now_ns)
 
 
 class GuardedJoystick(GuardedInput):
-    """A joystick: its enable, and what it asks of its axes.
+    """A joystick: its enable, and the commands of its axes.
 
     Args:
         bound: its message.
@@ -206,7 +207,7 @@ class GuardedJoystick(GuardedInput):
     """
 
     __slots__ = (
-        "_asked",
+        "_axes",
         "_bits",
         "_enable",
         "_part",
@@ -233,55 +234,55 @@ class GuardedJoystick(GuardedInput):
         self.needed: list[GuardedSwitch] = []
         self._part = b""
         self._unread: list[tuple[bytes, int]] = []  # and when the one before it came
-        self._asked: list[tuple[slice, dict[bytes, float], Asked]] = []
+        self._axes: list[tuple[slice, dict[bytes, float], CommandedAxis]] = []
         self.released = False
 
-    def drives(self, asked: Asked) -> None:
+    def drives(self, axis: CommandedAxis) -> None:
         """A joystick of it commands an axis."""
-        self._asked.append((asked.joystick.span, asked.asks, asked))
-        for field in asked.joystick.fields:
+        self._axes.append((axis.joystick.span, axis.joystick_commands, axis))
+        for field in axis.joystick.fields:
             self._bits |= field.bits
         self._span = span_of(self._bits)
 
     def note(self, data: bytes, now_ns: int) -> None:
-        """Take a frame: a switch counts at once, what is asked when it is looked at."""
-        if len(data) != self._length or not (self._plain or self.counts(data)):
+        """Take a frame: a switch counts at once, a command when it is looked at."""
+        if len(data) != self._length or not (self._plain or self.accepts(data)):
             return
         for switch in self.switches:
             switch.note(data, now_ns)
         part = data[self._span]
         if part != self._part:
             self._part = part
-            self._unread.append((data, self.heard_ns))
+            self._unread.append((data, self.received_ns))
             switched = data[self._switch]
             if switched != self._switched and self._enable is not None:
                 self._switched = switched
                 self.released = self._enable.raw(data) == 0
                 if self.released:
-                    for _, _, asked in self._asked:
-                        asked.forbid()
+                    for _, _, axis in self._axes:
+                        axis.forbid()
             if len(self._unread) == MOST_UNREAD:
                 self.read()
-        self.heard_ns = now_ns
+        self.received_ns = now_ns
 
     def read(self) -> None:
-        """Read what the frames have asked that came since this was called last."""
-        for span, asks, asked in self._asked:
-            for data, heard_ns in self._unread:
-                ask, before = asks.get(data[span]), asked.now
-                if ask is None:
-                    ask = asked.learn(data)
-                # Where it asks for more than before in the same direction, that is all it asked.
-                if ask < before > 0.0:
-                    keep(asked.positive, before, heard_ns)
-                elif ask > before < 0.0:
-                    keep(asked.negative, -before, heard_ns)
-                asked.now = ask
+        """Read the commands of the frames that came since this was called last."""
+        for span, commands, axis in self._axes:
+            for data, received_ns in self._unread:
+                command, before = commands.get(data[span]), axis.now
+                if command is None:
+                    command = axis.learn(data)
+                # More than before in the same direction: the one before is no bound any more.
+                if command < before > 0.0:
+                    keep(axis.positive, before, received_ns)
+                elif command > before < 0.0:
+                    keep(axis.negative, -before, received_ns)
+                axis.now = command
         self._unread.clear()
 
     def clear(self) -> None:
-        """Nothing was asked until now."""
+        """Nothing was commanded until now."""
         self._part = b""
         self._unread.clear()
-        for _, _, asked in self._asked:
-            asked.clear()
+        for _, _, axis in self._axes:
+            axis.clear()

@@ -7,8 +7,8 @@ a valve passes only if
   switch that enables it is off or missing,
 - the joystick is not silent for longer than its timeout and the longest stop,
 - it is a command: no signal in it contradicts another,
-- its velocity is not beyond the maximum, nor beyond what a joystick frame within the tail asked in
-  that direction, but for what falls at the valve's rate since then,
+- its velocity is not beyond the maximum, nor beyond what a joystick frame within the tail commanded
+  in that direction, but for what falls at the valve's rate since then,
 - the valve's rates lead from the last frame to this one.
 
 Neutral always passes.
@@ -38,7 +38,7 @@ class GuardedAxes:
 
     span = slice(0, 0)
     part = None
-    good_ns = NEVER
+    valid_until_ns = NEVER
     at = BEFORE
 
     def __init__(self, axes: Sequence[GuardedAxis]) -> None:
@@ -102,7 +102,7 @@ class OutputGuard:
                 group.note(frame.data, now_ns)
 
     def stalled(self) -> None:
-        """The loop stood still: nothing that was asked before its next tick holds."""
+        """The loop stood still: nothing that was commanded before its next tick holds."""
         self._stood_still = True
 
     def begin(self, missed: int) -> At:

@@ -35,8 +35,8 @@ class Bench:
         """Their frames of this tick."""
         return self.hand.frames(self.number * self.tick_ms, Held(joysticks, enable=enable))
 
-    def takes(self, frames: list[Frame]) -> None:
-        """They come in."""
+    def receive(self, frames: list[Frame]) -> None:
+        """The guard receives them."""
         for frame in frames:
             self.guard.inputs[frame[:3]].note(frame.data, self.now_ns)
 
@@ -60,7 +60,7 @@ class Bench:
     def sends(self, steps: int, missed: int = 0, **joysticks: float) -> str:
         """A tick with joysticks and command; why that may not leave."""
         self.number += missed
-        self.takes(self.joysticks(**joysticks))
+        self.receive(self.joysticks(**joysticks))
         return self.sent(steps, missed)
 
     def waits(self, ticks: int) -> None:

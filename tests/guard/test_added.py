@@ -1,4 +1,4 @@
-"""What the other axis of a two-axis motion may ask of an axis."""
+"""How far the other axis of a two-axis motion may command an axis."""
 
 from pathlib import Path
 
@@ -16,11 +16,15 @@ def robust() -> Bench:
 # Before, joysticks, and the most that may follow. Velocity of n of 125 steps behind 5 % dead band:
 # (n / 125 - 0.05) / 0.95. The rise is 0.1 in a tick, and up to 0.25 is added.
 CASES = {
-    "nothing beyond what the own joystick asked": (38, {"near_far": 0.3, "slew": 1.0}, 41),
+    "nothing beyond the command of the own joystick": (38, {"near_far": 0.3, "slew": 1.0}, 41),
     "nothing was added": (25, {"near_far": 1.0}, 38),
     "as fast as may be added": (34, {"slew": 1.0}, 36),
     "by the rates": (10, {"slew": 1.0}, 23),
-    "a joystick within the neutral band asks nothing": (34, {"near_far": 0.01, "slew": 1.0}, 36),
+    "a joystick within the neutral band commands nothing": (
+        34,
+        {"near_far": 0.01, "slew": 1.0},
+        36,
+    ),
 }
 
 
@@ -37,7 +41,7 @@ def test_what_may_follow(sign: int, case: str) -> None:
 
 
 @pytest.mark.parametrize("sign", [1, -1])
-def test_where_nobody_asks_nothing_is_added(sign: int) -> None:
+def test_without_a_command_nothing_is_added(sign: int) -> None:
     bench = robust()
     bench.ramp(0)
     assert bench.sends(sign * 10)

@@ -35,7 +35,7 @@ def axis(one: Bench) -> GuardedAxis:
 
 
 @signs
-def test_beyond_what_was_asked(sign: int) -> None:
+def test_beyond_the_command(sign: int) -> None:
     one = bench()
     assert not one.sends(sign * 25, near_far=sign * 0.2)
     why = one.sends(sign * 50, near_far=sign * 0.2)
@@ -91,14 +91,14 @@ def test_the_other_way_by_way_of_zero(sign: int, missed: int, allowed: float) ->
 def test_a_command_of_another_length_is_none(sign: int) -> None:
     one = bench()
     one.ramp(sign * 25, near_far=sign * 0.2)
-    one.takes(one.joysticks(near_far=sign * 0.2))
+    one.receive(one.joysticks(near_far=sign * 0.2))
     speed = sign * float("inf")
     assert one.sent(sign * 25, cut=1) == f"axis=near_far limit=command speed={speed} allowed=0.200"
 
 
 @signs
 @pytest.mark.parametrize("size", [60, 125])
-def test_both_were_asked_of_late_and_it_still_goes_by_way_of_zero(sign: int, size: int) -> None:
+def test_both_were_commanded_of_late_and_it_still_goes_by_way_of_zero(sign: int, size: int) -> None:
     one = bench(fall_per_s=2.0)
     one.ramp(sign * size, near_far=float(sign))
     for _ in range(30):
@@ -127,7 +127,7 @@ def test_what_was_refused_the_other_way_is_no_reason_to_go_faster(sign: int) -> 
 def test_released_it_may_not_even_fall(sign: int) -> None:
     one = bench(fall_per_s=2.0)
     one.ramp(sign * 100, near_far=float(sign))
-    one.takes(one.joysticks(enable=False, near_far=float(sign)))
+    one.receive(one.joysticks(enable=False, near_far=float(sign)))
     why = one.sent(sign * 25)
     assert why == f"axis=near_far limit=enable speed={sign * 0.2:.3f} allowed=0.000"
 
@@ -165,16 +165,16 @@ class TestEmergencyStop:
         assert bound is not None
         check = bound.protection.check
         assert check is not None
-        one.takes(one.joysticks(near_far=1.0))
+        one.receive(one.joysticks(near_far=1.0))
         pressed = next(d for d in (bytes([1, 0, c]) for c in range(256)) if check.verify(d))
         one.guard.inputs[bound.key].note(pressed, one.now_ns)
         assert "limit=emergency-stop speed=0.284 allowed=0.000" in one.sent(40)
 
-    def test_before_it_was_heard_nothing_moves(self) -> None:
+    def test_before_it_was_received_nothing_moves(self) -> None:
         one = Bench(variants.machine("protected")[1], "near_far")
         bound = one.deployment.emergency_stop
         assert bound is not None
-        one.takes([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
+        one.receive([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
         assert "limit=emergency-stop" in one.sent(10)
 
     def test_at_the_very_end_of_its_silence_it_is_not_what_stops(self) -> None:
@@ -182,10 +182,10 @@ class TestEmergencyStop:
         bound = one.deployment.emergency_stop
         assert bound is not None
         stop = one.guard.inputs[bound.key]
-        while one.now_ns < stop.heard_ns + stop.timeout_ns:
-            one.takes([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
+        while one.now_ns < stop.received_ns + stop.timeout_ns:
+            one.receive([f for f in one.joysticks(near_far=1.0) if f[:3] != bound.key])
             assert not one.sent(60)
-        assert one.now_ns == stop.heard_ns + stop.timeout_ns
+        assert one.now_ns == stop.received_ns + stop.timeout_ns
         assert "limit=rate" in one.sent(125)
         assert "limit=emergency-stop" in one.sent(60)
 
@@ -194,21 +194,21 @@ class TestEmergencyStop:
 def test_the_same_command_may_leave_again_for_the_tail(sign: int) -> None:
     one = bench(stop_s=5.0, tail_s=1.0)
     one.sends(sign * 50, near_far=sign * 0.5)
-    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+    assert axis(one).valid_until_ns == LATE_NS + 1_000_000_000
     one.sends(sign * 50, near_far=sign * 0.2)  # the one before counts
-    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+    assert axis(one).valid_until_ns == LATE_NS + 1_000_000_000
 
 
 @signs
 def test_the_same_command_may_leave_again_until_a_stop_were_over(sign: int) -> None:
     one = bench(stop_s=1.0, tail_s=5.0)
     one.sends(sign * 50, near_far=sign * 0.5)
-    assert axis(one).good_ns == LATE_NS + 1_000_000_000
+    assert axis(one).valid_until_ns == LATE_NS + 1_000_000_000
 
 
 @signs
 @pytest.mark.parametrize("missed", [0, 4])  # which give no time to fall
-def test_what_is_no_longer_asked_falls_by_the_rate(sign: int, missed: int) -> None:
+def test_what_is_no_longer_commanded_falls_by_the_rate(sign: int, missed: int) -> None:
     one = bench(tail_s=0.0, stop_s=5.0, fall_per_s=2.0)  # 0.04 in a tick
     one.ramp(sign * 100, near_far=float(sign))
     for _ in range(LATE_NS // TICK_NS):
@@ -216,9 +216,9 @@ def test_what_is_no_longer_asked_falls_by_the_rate(sign: int, missed: int) -> No
     # From the smaller of what was sent, with the step of rounding, and its bound.
     for steps in (96, 91, 80):
         one.number += missed
-        one.takes(one.joysticks())
+        one.receive(one.joysticks())
         assert not one.sent(sign * steps, missed)
-    one.takes(one.joysticks())
+    one.receive(one.joysticks())
     why = one.sent(sign * 90)
     assert why == f"axis=near_far limit=rate speed={sign * 0.72:.3f} allowed=0.608"
 
@@ -258,13 +258,13 @@ def test_a_slow_valve_falls_by_whole_periods(sign: int) -> None:
     one.waits(1)
     # Of its three ticks one was missed: no whole period has gone by in which it could fall.
     one.number += 1
-    one.takes(one.joysticks())
+    one.receive(one.joysticks())
     assert not one.sent(sign * 60, missed=1)
     one.waits(2)
     assert "limit=rate" in one.sends(sign * 60)
 
 
-def test_at_full_command_a_valve_may_give_less_than_was_asked() -> None:
+def test_at_full_command_a_valve_may_give_less_than_was_commanded() -> None:
     curve = {"curve_command_pct": [-100, -1, 1, 100], "curve_speed_pct": [-80, 0, 0, 90]}
     one = bench(**curve, tail_s=0.0, stop_s=5.0, fall_per_s=2.0)
     one.ramp(-125, near_far=-1.0)
@@ -299,7 +299,7 @@ def test_after_a_standstill_the_largest_of_before_is_forgotten(sign: int) -> Non
 
 
 @signs
-def test_the_other_way_as_fast_as_was_asked_of_late(sign: int) -> None:
+def test_the_other_way_as_fast_as_was_commanded_of_late(sign: int) -> None:
     one = bench(allow_reverse=True)
     for now in (0.4, 0.3, 0.0):
         assert not one.sends(0, near_far=sign * now)

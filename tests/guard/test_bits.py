@@ -27,7 +27,7 @@ def test_joysticks_are_read_as_the_joystick_codec_reads_them(name: str) -> None:
                 data = FieldSet(joystick.message).layout.encode(raw)
             command = joystick.codec.decode(data)[1][config.signal]
             if isinstance(command, float) and abs(command) > config.neutral_pct / 100.0:
-                assert bits.ask(data) == command
+                assert bits.command(data) == command
 
 
 @pytest.mark.parametrize("name", shipped.NAMES)

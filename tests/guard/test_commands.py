@@ -9,7 +9,7 @@ import pytest
 
 from canshaper.config.schema import Command, Valve
 from canshaper.guard.bits import MOST_KNOWN, CommandBits, JoystickBits
-from canshaper.guard.inputs import Asked
+from canshaper.guard.inputs import CommandedAxis
 
 DBC = Path(__file__).parents[2] / "dbc"
 FLOAT = """VERSION ""
@@ -38,22 +38,23 @@ def valve(message: str, signal: str) -> Valve:
 
 
 @pytest.mark.parametrize(
-    ("value", "ask"),
+    ("value", "command"),
     [(0.5, 0.5), (-1.0, -1.0), (0.0, 0.0), (1.5, 0.0), (float("nan"), 0.0), (float("inf"), 0.0)],
 )
-def test_a_float_joystick(value: float, ask: float) -> None:
+def test_a_float_joystick(value: float, command: float) -> None:
     message = cantools.database.load_string(FLOAT, "dbc").get_message_by_name("Joystick")  # type: ignore[union-attr]
     bits = JoystickBits(message, Command(joystick="left", signal="Joystick"))
-    assert bits.ask(struct.pack("<fI", value, 0)) == ask
+    assert bits.command(struct.pack("<fI", value, 0)) == command
 
 
 @pytest.mark.parametrize(
-    ("raw", "ask"), [(0, -1.0), (500, -0.5), (1000, 0.0), (1250, 0.25), (2000, 1.0), (2001, 0.0)]
+    ("raw", "command"),
+    [(0, -1.0), (500, -0.5), (1000, 0.0), (1250, 0.25), (2000, 1.0), (2001, 0.0)],
 )
-def test_a_joystick_whose_zero_is_in_the_middle(raw: int, ask: float) -> None:
+def test_a_joystick_whose_zero_is_in_the_middle(raw: int, command: float) -> None:
     message = cantools.database.load_string(OFFSET, "dbc").get_message_by_name("Joystick")  # type: ignore[union-attr]
     bits = JoystickBits(message, Command(joystick="left", signal="Joystick"))
-    assert bits.ask(struct.pack("<H", raw)) == pytest.approx(ask)
+    assert bits.command(struct.pack("<H", raw)) == pytest.approx(command)
 
 
 @pytest.mark.parametrize(
@@ -91,8 +92,10 @@ def test_a_command_by_a_rocker_of_the_joystick(left: int, right: int, steps: int
 
 def test_what_is_kept_of_a_joystick_is_bounded() -> None:
     message = network("forwarder.dbc").get_message_by_name("JoystickLeft")
-    asked = Asked(JoystickBits(message, Command(joystick="left", signal="Slew")))
+    axis = CommandedAxis(JoystickBits(message, Command(joystick="left", signal="Slew")))
     for raw in range(MOST_KNOWN + 10):
-        ask = asked.learn(struct.pack("<hHI", raw - 1000, 0, 0))
-        assert ask == pytest.approx((raw - 1000) / 1000 if 20 <= abs(raw - 1000) <= 1000 else 0.0)
-    assert len(asked.asks) == 10
+        command = axis.learn(struct.pack("<hHI", raw - 1000, 0, 0))
+        assert command == pytest.approx(
+            (raw - 1000) / 1000 if 20 <= abs(raw - 1000) <= 1000 else 0.0
+        )
+    assert len(axis.joystick_commands) == 10

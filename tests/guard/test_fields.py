@@ -91,29 +91,31 @@ def test_the_same_in_another_resolution_with_an_offset(also: int, good: bool) ->
     assert bits.steps(bytes([50, also, *bytes(6)])) == (50 if good else None)
 
 
-@pytest.mark.parametrize(("raw", "ask"), [(199, 0.0), (200, 0.2), (-199, 0.0), (-200, -0.2)])
-def test_within_its_neutral_band_a_joystick_asks_nothing(raw: int, ask: float) -> None:
+@pytest.mark.parametrize(("raw", "command"), [(199, 0.0), (200, 0.2), (-199, 0.0), (-200, -0.2)])
+def test_within_its_neutral_band_a_joystick_commands_nothing(raw: int, command: float) -> None:
     one = message("Joystick : 0|16@1- (0.1,0) [-100|100]")
     bits = JoystickBits(one, Command(joystick="left", signal="Joystick", neutral_pct=20))
-    assert bits.ask(struct.pack("<hHI", raw, 0, 0)) == pytest.approx(ask)
+    assert bits.command(struct.pack("<hHI", raw, 0, 0)) == pytest.approx(command)
 
 
-def test_a_rocker_asks_by_both_its_signals() -> None:
+def test_a_rocker_commands_by_both_its_signals() -> None:
     one = message("Forth : 8|8@1+ (1,0) [0|100]", "Back : 24|8@1+ (1,0) [0|100]")
     bits = JoystickBits(one, Command(joystick="left", signal="Forth", negative="Back"))
     assert bits.span == slice(1, 4)
     assert len(bits.fields) == 2
-    assert bits.ask(bytes([0, 0, 0, 50, *bytes(4)])) == pytest.approx(-0.5)
+    assert bits.command(bytes([0, 0, 0, 50, *bytes(4)])) == pytest.approx(-0.5)
 
 
 @pytest.mark.parametrize(
-    ("flags", "ask"), [((1, 0, 0), 0.0), ((0, 1, 0), 0.5), ((0, 0, 1), -0.5), ((0, 1, 1), 0.0)]
+    ("flags", "command"), [((1, 0, 0), 0.0), ((0, 1, 0), 0.5), ((0, 0, 1), -0.5), ((0, 1, 1), 0.0)]
 )
-def test_a_joystick_of_flags_asks_where_one_is_set(flags: tuple[int, ...], ask: float) -> None:
+def test_a_joystick_of_flags_commands_where_one_is_set(
+    flags: tuple[int, ...], command: float
+) -> None:
     names = ("Neutral", "Positive", "Negative")
     places = [f"{name} : {8 + 2 * i}|2@1+ (1,0) [0|1]" for i, name in enumerate(names)]
     one = message("Joystick : 0|8@1+ (1,0) [0|100]", *places)
-    told = {"neutral": "Neutral", "positive": "Positive", "negative": "Negative"}
-    bits = JoystickBits(one, Command(joystick="left", signal="Joystick", flags=told))  # type: ignore[arg-type]
+    flag_names = {"neutral": "Neutral", "positive": "Positive", "negative": "Negative"}
+    bits = JoystickBits(one, Command(joystick="left", signal="Joystick", flags=flag_names))  # type: ignore[arg-type]
     switched = sum(flag << 2 * i for i, flag in enumerate(flags))
-    assert bits.ask(bytes([50, switched, *bytes(6)])) == pytest.approx(ask)
+    assert bits.command(bytes([50, switched, *bytes(6)])) == pytest.approx(command)

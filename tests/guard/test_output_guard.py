@@ -185,7 +185,7 @@ def _against(_rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | No
 
 
 def _stale(rng: random.Random, made: Drive, axis: str, at: int) -> Wrong | None:
-    """A command, however small, when nobody has asked for anything within the tail."""
+    """A command, however small, when no one has commanded anything within the tail."""
     full = made.deployment.axes[axis].valve.steps
     rests = at * made.tick_ns > (BEGIN_S + MOVE_S + 3.5) * 1e9
     return _put(rng.choice((-1, 1)) * rng.randint(1, full)) if rests else None

@@ -25,7 +25,7 @@ def commands(machine: Machine, raws: Sequence[int]) -> list[float | Reason]:
         data = (raw & 0xFFFF).to_bytes(2, "little") + bytes(6)
         command = joystick.codec.decode(data)[1]["Slew"]
         asked = 0.0 if isinstance(command, Reason) or abs(command) <= 0.02 else command
-        assert guard.ask(data) == pytest.approx(asked, abs=1e-12)
+        assert guard.command(data) == pytest.approx(asked, abs=1e-12)
         result.append(command)
     return result
 
