@@ -28,8 +28,8 @@ LEAVE_S = LEAVE_NS / 1e9
 PROBE_NS = 500_000_000
 # How long a read waits before the bus counts as seen empty again: a frame looks so much older.
 LOOK_S = 0.005
-# An adapter with nothing to wait on is asked so often.
-ASK_S = 0.002
+# An adapter with nothing to wait on is polled so often.
+POLL_S = 0.002
 # Room for the backlog of a long stall.
 MOST_RECEIVED = 20_000
 # A close waits so long for what was sent last and for the goodbye of the interface.
@@ -66,8 +66,8 @@ class BusApart:
         self._failure: Exception | None = None
         self._closing = False
         self._received: deque[tuple[can.Message | Exception, int]] = deque(maxlen=MOST_RECEIVED)
-        self._seen, self._news = socket.socketpair()
-        for one in (self._seen, self._news):
+        self._wake_reader, self._wake_writer = socket.socketpair()
+        for one in (self._wake_reader, self._wake_writer):
             one.setblocking(False)
         self._sender = self._started(self._send_waiting)
         self._receiver = self._started(self._receive_all)
@@ -111,7 +111,7 @@ class BusApart:
         received = self._received
         if not received:
             with suppress(BlockingIOError):
-                self._seen.recv(4096)
+                self._wake_reader.recv(4096)
             if not received:  # else one came before its descriptor was read empty
                 return None
         message, self.since_ns = received.popleft()
@@ -121,7 +121,7 @@ class BusApart:
 
     def fileno(self) -> int:
         """Descriptor that is readable when a frame waits."""
-        return self._seen.fileno()
+        return self._wake_reader.fileno()
 
     def shutdown(self) -> None:
         """Close the bus once what waits is sent; one that is blocked is left behind."""
@@ -132,8 +132,8 @@ class BusApart:
         if self._sender.is_alive():
             # Else the kernel holds the process at its end until the line took it all.
             discard_unsent(self._descriptor)
-        self._seen.close()
-        self._news.close()
+        self._wake_reader.close()
+        self._wake_writer.close()
 
     def _blocked(self, now_ns: int) -> bool:
         """Whether a frame was or is under way for too long, in the interface or in the kernel."""
@@ -191,7 +191,7 @@ class BusApart:
                 self.lost += len(self._received) == MOST_RECEIVED
                 self._received.append((result, empty_ns))
                 with suppress(OSError):  # it is full, which says as much; or closed
-                    self._news.send(b"\0")
+                    self._wake_writer.send(b"\0")
             if not isinstance(result, can.Message):
                 empty_ns = polled_ns
                 self._pause(failed=result is not None)
@@ -199,12 +199,12 @@ class BusApart:
     def _pause(self, *, failed: bool) -> None:
         """Until there may be a frame."""
         if failed or self._descriptor < 0:
-            time.sleep(ASK_S)
+            time.sleep(POLL_S)
             return
         try:
             select([self._descriptor], [], [], LOOK_S)
         except (OSError, ValueError):  # closed meanwhile
-            time.sleep(ASK_S)
+            time.sleep(POLL_S)
 
 
 def descriptor(bus: can.BusABC) -> int:
@@ -218,7 +218,7 @@ def descriptor(bus: can.BusABC) -> int:
 
 
 def unsent(fileno: int) -> int:
-    """Bytes that the kernel has taken for a line and not sent; 0 where it does not say."""
+    """Bytes that the kernel has queued for a line and not sent; 0 where it does not say."""
     count = array.array("i", [0])
     for request in (SIOCOUTQNSD, TIOCOUTQ):
         with suppress(OSError, ValueError):
@@ -228,6 +228,6 @@ def unsent(fileno: int) -> int:
 
 
 def discard_unsent(fileno: int) -> None:
-    """Drop what the kernel has taken for a serial line and not sent; TCP takes nothing back."""
+    """Drop what the kernel has queued for a serial line and not sent; TCP keeps its queue."""
     with suppress(OSError, ValueError, termios.error):
         termios.tcflush(fileno, termios.TCOFLUSH)

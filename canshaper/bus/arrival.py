@@ -1,6 +1,6 @@
 """When a frame arrived: the kernel's stamp of it, on the clock of the control loop.
 
-The kernel stamps by the wall clock, which somebody may set between the stamp and the read:
+The kernel stamps by the wall clock, which may be set between the stamp and the read:
 docs/decisions/0007-age-and-standstill.md.
 """
 

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.bus.netlink import ACKNOWLEDGE, ask, attributes
+from canshaper.bus.netlink import ACKNOWLEDGE, attributes, request
 from canshaper.config.bus import Bus
 from canshaper.errors import WrongDeviceError
 
@@ -32,7 +32,7 @@ _CHIP_SELECT = re.compile(r"spi\d+\.(\d+)")
 
 
 KindAndBitrates = tuple[str | None, int | None, int | None]
-Ask = Callable[[int], KindAndBitrates]
+LinkQuery = Callable[[int], KindAndBitrates]
 
 
 @dataclass(frozen=True)
@@ -66,7 +66,7 @@ def kind_and_bitrates(index: int) -> KindAndBitrates:
     Raises:
         OSError: there is no such interface, or netlink is not permitted.
     """
-    (body,) = ask(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
+    (body,) = request(GET_LINK, ACKNOWLEDGE, _LINK.pack(socket.AF_UNSPEC, 0, index, 0, 0))
     info = dict(attributes(dict(attributes(body[_LINK.size :])).get(LINK_INFO, b"")))
     kind = info.get(INFO_KIND, b"").rstrip(b"\0").decode() or None
     data = dict(attributes(info.get(INFO_DATA, b""))) if kind == "can" else {}
@@ -75,13 +75,15 @@ def kind_and_bitrates(index: int) -> KindAndBitrates:
     return kind, rates[0], rates[1]
 
 
-def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates) -> Device:
+def read_device(
+    name: str, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates
+) -> Device:
     """The device behind an interface.
 
     Args:
         name: of the interface.
         root: of the file system.
-        ask_kernel: for kind and bit rates of the interface with an index.
+        query_kernel: for kind and bit rates of the interface with an index.
 
     Raises:
         OSError: ENODEV where there is no such interface, or the name changed hands meanwhile;
@@ -91,7 +93,7 @@ def read_device(name: str, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrate
     index = _number(directory / "ifindex")
     if index is None:
         raise OSError(errno.ENODEV, os.strerror(errno.ENODEV))
-    kind, bitrate, data_bitrate = ask_kernel(index)
+    kind, bitrate, data_bitrate = query_kernel(index)
     hardware = directory / "device"
     real = hardware.is_dir()
     places = list(_upwards(hardware.resolve(), root)) if real else []
@@ -148,7 +150,7 @@ def check_mtu(bus: Bus, root: Path = ROOT) -> None:
 
 
 def device_fault(bus: Bus, device: Device) -> str | None:
-    """Why a device is not the one of a bus; None where it is, or the bus asks for none."""
+    """Why a device is not the one of a bus; None where it is, or the bus names none."""
     values = expected(bus, device)
     wrong = [key for key, value in values.items() if getattr(device, key) != value]
     if not wrong:
@@ -182,7 +184,7 @@ def match_fault(bus: Bus) -> str | None:
     return f"{fault}{whereabouts(bus)}" if fault else None
 
 
-def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates) -> str:
+def whereabouts(bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates) -> str:
     """Which interface is the device of a bus now, behind a message; empty where none is named.
 
     It is only reported, never used by itself: which bus is driven stands in the file.
@@ -194,7 +196,7 @@ def whereabouts(bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates
     names = []
     for directory in sorted((root / "sys/class/net").glob("*")):
         try:
-            device = read_device(directory.name, root, ask_kernel)
+            device = read_device(directory.name, root, query_kernel)
         except OSError:  # it went away, or is no interface
             continue
         if all(getattr(device, key) == value for key, value in values.items()):

@@ -29,7 +29,7 @@ def attributes(data: bytes) -> Iterator[tuple[int, bytes]]:
         at += -(-length // 4) * 4
 
 
-def ask(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
+def request(kind: int, flags: int, body: bytes) -> Iterator[bytes]:
     """Send one request; yield the bodies of the answers.
 
     Args:

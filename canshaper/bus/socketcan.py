@@ -33,7 +33,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
     """Open the sockets of one interface, and look at its device where the deployment names one.
 
     With ``ids`` there are three: for the messages that are received; for those that we send, which
-    hears our own frames back, other senders and the error frames; for ids that no one knows. So
+    receives our own frames back, other senders and the error frames; for ids that no one knows. So
     neither our own frames nor a flood of foreign ones stand before a joystick's. Without ``ids``,
     one for everything.
 
@@ -70,7 +70,7 @@ def open_sockets(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
 
 
 def set_filters(sockets: list[socket.socket], ids: BusRoutes) -> None:
-    """Let the three sockets hear these messages."""
+    """Let the three sockets receive these messages."""
     # What the DBC files know besides is left to the reader where it is too much.
     ours = ids.received | ids.sent
     all_known = [m for m in ours | ids.known if not (m[1] and ids.j1939)]

@@ -13,7 +13,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.recording.history import History
 
 HISTORY, LOG = "history.txt", "recording.log"
-# A bundle that somebody sends may be made to fill the disk. A log of candump packs 5 to 30 times,
+# A bundle that someone sends may be made to fill the disk. A log of candump packs 5 to 30 times,
 # and an hour of a full bus at 1 Mbit/s has 2 GB.
 MOST_MEMBERS = 100
 MOST_LOG_BYTES = 4_000_000_000
@@ -50,13 +50,13 @@ def pack(
 
 
 def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
-    """Unpack a bundle into a folder; whoever made it, nothing is written or read elsewhere.
+    """Unpack a bundle into a folder; from any source, nothing is written or read elsewhere.
 
     Returns:
         (log, deployment file).
 
     Raises:
-        LogError: it is no bundle, a damaged one, or too large; tells the member.
+        LogError: it is no bundle, a damaged one, or too large; the message names the member.
     """
     where = f"{path}"
     try:

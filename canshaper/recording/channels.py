@@ -24,13 +24,13 @@ class Kind(Enum):
 
 
 def bus_of_channel(
-    deployment: Deployment, found: Collection[str], given: Mapping[str, str]
+    deployment: Deployment, channels: Collection[str], given: Mapping[str, str]
 ) -> dict[str, str]:
     """Names of the buses by the channels of a log.
 
     Args:
         deployment: the machine.
-        found: channels of the log.
+        channels: those of the log.
         given: channels by bus, as the command line says; else the deployment's own channel counts,
             then the name of the bus, then the only one that there is.
 
@@ -42,10 +42,10 @@ def bus_of_channel(
     for name, bus in buses.items():
         named = given.get(name)
         tries = [named] if named is not None else [bus.channel, name]
-        if named is None and len(found) == 1 and len(buses) == 1:
-            tries += found
-        channel = next((c for c in tries if c in found), None)
-        names = ", ".join(repr(c) for c in sorted(found)) or "none"
+        if named is None and len(channels) == 1 and len(buses) == 1:
+            tries += channels
+        channel = next((c for c in tries if c in channels), None)
+        names = ", ".join(repr(c) for c in sorted(channels)) or "none"
         if channel is None:
             text = f"bus {name}: expected the channel {tries[0]!r}, got {names} in the log"
             raise LogError(f"{text}; choose one of them with --channel {name}=CHANNEL")
@@ -57,7 +57,7 @@ def bus_of_channel(
 
 
 class Sorter:
-    """Tells what frames are to a deployment; each kind of frame is looked at once."""
+    """Says what frames are to a deployment; each kind of frame is looked at once."""
 
     def __init__(self, deployment: Deployment) -> None:
         self._buses = deployment.routing.buses

@@ -55,9 +55,9 @@ class Place:
         """What is wrong here."""
         return LogError(f"{self}: expected {expected}, got {got}")
 
-    def cut_off(self, found: str) -> CutOffError:
+    def cut_off(self, reason: str) -> CutOffError:
         """The log ends here, in the middle of something."""
-        return CutOffError(f"{self}: the log is cut off: {found}")
+        return CutOffError(f"{self}: the log is cut off: {reason}")
 
     def __str__(self) -> str:
         if not self.number:  # nothing is read yet: it is about the whole file

@@ -1,4 +1,4 @@
-"""What the status messages of a daemon tell: states with their reasons, counters."""
+"""What the status messages of a daemon report: states with their reasons, counters."""
 
 from dataclasses import dataclass
 from typing import Any

@@ -18,12 +18,12 @@ from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_M
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 
-# Frames taken from one bus before the next one has its turn.
+# Frames read from one bus before the next one has its turn.
 MOST_AT_ONCE = 2000
 # Of every signal that asks us to end, the next one must not wait for a frame.
 LOOK_S = 0.2
-# How often an interface is asked that has no file to wait for.
-UNTOLD_S = 0.01
+# How often an interface is polled that has no file to wait for.
+POLL_S = 0.01
 
 
 class ReceivedFrame(NamedTuple):
@@ -102,20 +102,20 @@ class Listener:
         Raises:
             BusError: a bus cannot be read any more.
         """
-        all_told = len(self._files) == len(self._sockets)
+        all_have_files = len(self._files) == len(self._sockets)
         try:
-            select.select(self._files, [], [], timeout_s if all_told else UNTOLD_S)
+            select.select(self._files, [], [], timeout_s if all_have_files else POLL_S)
         except (OSError, ValueError) as error:
             raise BusError(f"cannot read: {error}") from error
         received: list[ReceivedFrame] = []
         for one, (name, channel) in self._sockets.items():
             try:
-                take = _raw if isinstance(one, socket.socket) else _python_can
+                receive = _raw if isinstance(one, socket.socket) else _python_can
                 for _ in range(MOST_AT_ONCE):
-                    found = take(one, name, channel)
-                    if found is None:
+                    frame = receive(one, name, channel)
+                    if frame is None:
                         break
-                    received.append(found)
+                    received.append(frame)
             except (OSError, can.CanError) as error:
                 text = getattr(error, "strerror", None) or str(error)
                 raise BusError(f"bus {name}: cannot read {channel}: {text}") from error

@@ -32,7 +32,7 @@ OUT_OF_ORDER_NS = 20_000_000
 # Longer than any break of a drive that is one: a clock was set, or two logs are in one file.
 LONGEST_GAP_NS = 12 * 3600 * 1_000_000_000
 LATEST_NS = LATEST_S * 1_000_000_000
-TELL_EVERY = 8192
+PROGRESS_EVERY = 8192
 BUFFER_BYTES = 1 << 17
 # A log of candump packs 5 to 30 times; one that unpacks without end must not keep us.
 MOST_RATIO, RATIO_FROM_BYTES = 100, 2_000_000
@@ -73,8 +73,8 @@ class LogFile:
         except OSError as error:
             raise place.error(error.strerror or str(error), "a log that can be read") from None
         except _UnpackedWithoutEndError:
-            found = f"more than {MOST_RATIO} bytes for each that is packed"
-            raise place.error(found, "a log of a bus") from None
+            got = f"more than {MOST_RATIO} bytes for each that is packed"
+            raise place.error(got, "a log of a bus") from None
         except zlib.error as error:
             raise place.error(f"damaged packing ({error})", "a log that is whole") from None
 
@@ -82,7 +82,7 @@ class LogFile:
         """Its frames, whose times never go back."""
         packed, suffix = _format(place)
         place.unit = "frame" if suffix in BINARY else "line"
-        tell = 1
+        until_progress = 1
         with self._path.open("rb", buffering=0) as raw:
             size = raw.seek(0, 2)
             raw.seek(0)
@@ -100,9 +100,9 @@ class LogFile:
                     last_ns = self._first_or_out_of_order(time_ns, last_ns, place)
                     yield frame._replace(time_ns=last_ns)
                 latest_ns = last_ns + LONGEST_GAP_NS
-                tell -= 1
-                if not tell:
-                    tell = TELL_EVERY
+                until_progress -= 1
+                if not until_progress:
+                    until_progress = PROGRESS_EVERY
                     if self._progress and not raw.closed:
                         self._progress(raw.tell() / size)
         if last_ns is None:
@@ -121,8 +121,8 @@ class LogFile:
     def _first_or_out_of_order(self, time_ns: int, last_ns: int | None, place: Place) -> int:
         """The time of a frame that does not follow that of the one before."""
         if abs(time_ns) > LATEST_NS:
-            found = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
-            raise place.error(found, "a date before 2286, or a time from the start of the log")
+            got = f"a time further than {LATEST_S} s from zero"  # itself too long to be shown
+            raise place.error(got, "a date before 2286, or a time from the start of the log")
         if last_ns is None:
             return time_ns
         step_ns = time_ns - last_ns

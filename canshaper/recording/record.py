@@ -34,14 +34,14 @@ class Recording:
         self,
         path: Path,
         seconds: float | None,
-        tell: Callable[["Recording"], bool],
+        on_progress: Callable[["Recording"], bool],
     ) -> None:
-        """Record until the time is over, or ``tell`` says that it is enough.
+        """Record until the time is over, or ``on_progress`` says that it is enough.
 
         Args:
             path: the log; one that is there is replaced.
             seconds: how long; None without end.
-            tell: called some times a second; False ends the recording.
+            on_progress: called some times a second; False ends the recording.
 
         Raises:
             BusError: a bus cannot be opened, or not be read any more.
@@ -51,7 +51,7 @@ class Recording:
         try:
             with path.open("w", encoding="ascii", newline="\n") as log:
                 begin = flushed = time.monotonic()
-                while tell(self) and (seconds is None or self.seconds < seconds):
+                while on_progress(self) and (seconds is None or self.seconds < seconds):
                     for frame in listener.frames():
                         log.write(frame.line())
                         self.frames[frame.kind] += 1

@@ -89,8 +89,8 @@ def look(deployment: Deployment, path: Path, given: Mapping[str, str], *, own: b
     except CutOffError:
         if not head:
             raise
-    found = {frame.channel for frame in head}
-    return Drive(path, bus_of_channel(deployment, found, given), None, False)
+    channels = {frame.channel for frame in head}
+    return Drive(path, bus_of_channel(deployment, channels, given), None, False)
 
 
 class Replay:
@@ -202,11 +202,11 @@ class Replay:
         try:
             for time_ns, channel, can_id, extended, data in frames_of(box) if box else self.log:
                 source = (channel, can_id, extended)
-                if (found := known.get(source)) is None:
+                if (target := known.get(source)) is None:
                     bus = channels.get(channel, "")
                     kind = sorter.kind((bus, can_id, extended)) if bus else ignored
-                    found = known[source] = bus, kind
-                bus, kind = found
+                    target = known[source] = bus, kind
+                bus, kind = target
                 if kind is not ignored:
                     yield time_ns, new(Frame, (bus, can_id, extended, data)), kind
         except CutOffError as error:

@@ -137,19 +137,19 @@ def _same(different: int) -> str:
 def _difference_text(deployment: Deployment, difference: Difference) -> str:
     """A difference in the words of the DBC."""
     bus, can_id, extended = difference.key
-    found = [
+    messages = [
         m
         for m in deployment.messages.all()
         if m.is_extended_frame == extended and m.frame_id == can_id
     ]
-    name = found[0].name if found else f"{can_id:#x}"
+    name = messages[0].name if messages else f"{can_id:#x}"
 
     def shown(data: bytes | None) -> str:
         if data is None:
             return "nothing"
-        if not found or len(data) != found[0].length:
+        if not messages or len(data) != messages[0].length:
             return data.hex(" ")
-        values = found[0].decode(data, decode_choices=False)
+        values = messages[0].decode(data, decode_choices=False)
         assert isinstance(values, Mapping)
         return " ".join(f"{k}={v:g}" for k, v in values.items() if isinstance(v, int | float))
 

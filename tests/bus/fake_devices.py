@@ -58,7 +58,7 @@ class FakeDevices:
         if number is not None:
             (directory / "serial").write_text(f"{number}\n")
 
-    def ask(self, index: int) -> tuple[str | None, int | None]:
+    def query(self, index: int) -> tuple[str | None, int | None]:
         """As the kernel would answer."""
         return self.kinds[index]
 

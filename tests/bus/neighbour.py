@@ -63,7 +63,7 @@ def main() -> None:
     sender, receiver = (open_port("crane", bus, faults.append) for _ in range(2))
     for number in range(FRAMES):
         assert sender.send(Frame("crane", 0x100 + number, False, b"x"))
-    received = taken(receiver, 0x100 + FRAMES - 1)
+    received = received_ids(receiver, 0x100 + FRAMES - 1)
     outcome = {"sent": FRAMES, "received": len(received)}
     if not shared:
         file = loader("forwarder.yaml")()
@@ -91,7 +91,7 @@ def slewed(deployment: Deployment) -> bool:
     return max(drive.recording.axes["slew"].sent) > 0
 
 
-def taken(port: Port, last: int) -> list[int]:
+def received_ids(port: Port, last: int) -> list[int]:
     """Ids of the frames that come, up to one that is known to."""
     ids: list[int] = []
     while last not in ids:
@@ -121,7 +121,7 @@ def injected(sender: Port, receiver: Port, mac: bytes) -> list[int]:
             wire.send(to + bytes(6) + struct.pack("!H", ETH_P_IP) + datagram(address, data))
     sender.send(Frame("crane", 0x7FF, False, b""))
     # What is sent to our address, one of the sockets of the port gets.
-    ids = taken(receiver, 0x7FF) + [frame.can_id for frame in sender.frames()]
+    ids = received_ids(receiver, 0x7FF) + [frame.can_id for frame in sender.frames()]
     return sorted(set(ids) - {0x7FF})
 
 

@@ -26,8 +26,8 @@ OTHER = Frame("crane", 0x201, False, b"\x00\x01")
 STATUS = Frame("crane", 0x300, False, bytes(8))
 SENT = frozenset((f.can_id, f.extended) for f in (VALVE, OTHER, STATUS))
 IDS = BusRoutes(frozenset(), SENT, SENT - {(STATUS.can_id, STATUS.extended)}, frozenset())
-# The sockets of a port that is told its ids, by what they hear.
-TAKEN, SENT_BACK, UNKNOWN = range(3)
+# The sockets of a port that has its ids, by what they receive.
+RECEIVED, SENT_BACK, UNKNOWN = range(3)
 
 
 class Near(socket.socket):
@@ -74,7 +74,7 @@ class Line:
         brs: bool = False,
     ) -> None:
         self.faults: list[FrameFault] = []
-        self.asked: list[BusRoutes | None] = []
+        self.opened_with: list[BusRoutes | None] = []
         self.refuse: OSError | WrongDeviceError | None = None
         self.near: list[Near] = []
         self.far: list[socket.socket] = []
@@ -88,7 +88,7 @@ class Line:
         )
 
     def _open(self, ids: BusRoutes | None) -> list[socket.socket]:
-        self.asked.append(ids)
+        self.opened_with.append(ids)
         if self.refuse:
             raise self.refuse
         self.end()
@@ -103,7 +103,7 @@ class Line:
     def monotonic_ns(self) -> int:
         return self.now_ns
 
-    def put(self, message: can.Message, number: int = TAKEN) -> None:
+    def put(self, message: can.Message, number: int = RECEIVED) -> None:
         """A frame comes from the bus."""
         self.far[number].send(build_can_frame(message))
 
@@ -122,18 +122,18 @@ class Line:
         data[MARK_AT] |= MARK
         self.far[SENT_BACK].send(data[:size])
 
-    def heard(self) -> list[Frame]:
+    def received(self) -> list[Frame]:
         """What the port hands out in a tick."""
         return [*self.port.frames(), *self.port.background()]
 
     def sent(self) -> list[bytes]:
         """What went out since the last call."""
-        found = []
+        frames = []
         while True:
             try:
-                found.append(self.far[len(self.far) // 2].recv(100))
+                frames.append(self.far[len(self.far) // 2].recv(100))
             except BlockingIOError:
-                return found
+                return frames
 
     def unconfirmed(self, frame: Frame = VALVE, most: int = 10) -> int:
         """Send it every 20 ms until it is refused; how many were sent."""

@@ -47,7 +47,7 @@ def test_what_is_no_data_frame_is_a_fault(monkeypatch: pytest.MonkeyPatch) -> No
     assert (port.name, port.fileno()) == ("second", 9)
 
 
-def test_a_bus_of_can_fd_takes_and_sends_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bus_of_can_fd_receives_and_sends_its_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     """The interface is asked for it, with its bit rate; which message is one says the id."""
     adapter = Adapter(
         [can.Message(arbitration_id=0x110, is_extended_id=False, is_fd=True, data=bytes(12))]
@@ -74,29 +74,29 @@ def test_a_bus_of_can_fd_takes_and_sends_its_frames(monkeypatch: pytest.MonkeyPa
     assert port.send(Frame("crane", 0x200, False, bytes(64)))
     assert (adapter.sent[-1].is_fd, adapter.sent[-1].bitrate_switch) == (True, False)
     assert faults == []
-    asked = [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened]
-    assert asked == [{}, {}]  # virtual always has it
+    options = [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened]
+    assert options == [{}, {}]  # virtual always has it
 
 
 @pytest.mark.parametrize(
-    ("fd", "data_bitrate", "asked"),
+    ("fd", "data_bitrate", "expected"),
     [
         (False, None, {}),
         (True, None, {"fd": True}),
         (True, 2_000_000, {"fd": True, "data_bitrate": 2_000_000}),
     ],
 )
-def test_other_interfaces_are_asked_for_can_fd(
-    monkeypatch: pytest.MonkeyPatch, fd: bool, data_bitrate: int | None, asked: dict[str, Any]
+def test_other_interfaces_are_opened_with_can_fd(
+    monkeypatch: pytest.MonkeyPatch, fd: bool, data_bitrate: int | None, expected: dict[str, Any]
 ) -> None:
     opened: list[dict[str, Any]] = []
     monkeypatch.setattr(can, "Bus", lambda **options: opened.append(options))
     config = Bus(interface="kvaser", channel="0", fd=fd, data_bitrate=data_bitrate)
     python_can.open_python_can(config)
-    assert [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened] == [asked]
+    assert [{k: v for k, v in o.items() if "fd" in k or "data" in k} for o in opened] == [expected]
 
 
-def test_multicast_beyond_this_machine_hears_one_group_and_nothing_old(
+def test_multicast_beyond_this_machine_receives_one_group_and_nothing_old(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """What another group sent before does not count; what we send comes back and is ours."""

@@ -173,7 +173,7 @@ def test_a_blocked_serial_line_is_seen_and_nothing_of_it_comes_later(
     until(lambda: b"t3338" in line.read())
     # The other end of a pseudo-terminal has a buffer of its own, as an adapter has.
     late = [one for one in received if text(one) in line.text]
-    assert len(late) <= THEIR_BYTES // len(text(FRAME)), "what the kernel had taken is dropped"
+    assert len(late) <= THEIR_BYTES // len(text(FRAME)), "what the kernel had queued is dropped"
     assert text(FRAME) not in line.text
     line.write(b"t1101FF\r")
     until(lambda: list(slcan.frames()))
@@ -223,7 +223,7 @@ class Held:
         self.go = threading.Semaphore(0)
         self.begun: list[int] = []
         self.sent: list[int] = []
-        self.found: list[Any] = []
+        self.waiting: list[Any] = []
         self.closed = False
         self.error: Exception | None = None
 
@@ -236,10 +236,10 @@ class Held:
         self.sent.append(message.data[0])
 
     def recv(self, _timeout_s: float) -> Any:
-        found = self.found.pop(0) if self.found else None
-        if isinstance(found, Exception):
-            raise found
-        return found
+        one = self.waiting.pop(0) if self.waiting else None
+        if isinstance(one, Exception):
+            raise one
+        return one
 
     def fileno(self) -> int:
         if self.line is None:
@@ -366,11 +366,11 @@ def test_a_frame_that_comes_as_the_descriptor_is_emptied_is_not_left(
     bus: BusApart, held: Held
 ) -> None:
     """The descriptor would not be readable again before the next one."""
-    seen = bus._seen
+    seen = bus._wake_reader
 
     class Late:
         def recv(self, size: int) -> bytes:
-            held.found = [message(1)]
+            held.waiting = [message(1)]
             until(lambda: bus._received)
             until(lambda: select([seen], [], [], 0)[0])
             return seen.recv(size)
@@ -378,15 +378,15 @@ def test_a_frame_that_comes_as_the_descriptor_is_emptied_is_not_left(
         def close(self) -> None:
             seen.close()
 
-    bus._seen = Late()  # type: ignore[assignment]
-    found = bus.recv(0)
-    assert found is not None
-    assert found.data == b"\1"
+    bus._wake_reader = Late()  # type: ignore[assignment]
+    received = bus.recv(0)
+    assert received is not None
+    assert received.data == b"\1"
 
 
 def test_a_frame_and_what_is_raised_come_in_their_order(bus: BusApart, held: Held) -> None:
     first, second = message(1), message(2)
-    held.found = [first, ValueError("garbled"), second]
+    held.waiting = [first, ValueError("garbled"), second]
     frames: list[Any] = []
 
     def more() -> bool:
@@ -403,9 +403,9 @@ def test_a_frame_and_what_is_raised_come_in_their_order(bus: BusApart, held: Hel
 
 
 def test_a_backlog_is_bounded(held: Held) -> None:
-    held.found = [message(n % 256) for n in range(MOST_RECEIVED + 10)]
+    held.waiting = [message(n % 256) for n in range(MOST_RECEIVED + 10)]
     bus = BusApart(held)  # type: ignore[arg-type]
-    until(lambda: not held.found)
+    until(lambda: not held.waiting)
     count = 0
     while bus.recv(0):
         count += 1
@@ -431,7 +431,7 @@ def test_a_line_that_is_closed_meanwhile_is_no_end(held: Held) -> None:
     bus = BusApart(held)  # type: ignore[arg-type]
     ours.close()
     theirs.close()
-    held.found = [message(1)]
+    held.waiting = [message(1)]
     until(lambda: bus.recv(0))
     held.go.release(1)
     bus.shutdown()

@@ -21,7 +21,7 @@ from canshaper.bus.python_can import MOST_FAILURES, PythonCanPort
 from canshaper.bus.raw import MOST_FRAMES, REOPEN_NS
 from canshaper.codec.frame import Frame
 from canshaper.config.bus import Bus
-from tests.bus.raw_line import IDS, TAKEN, TICK_NS, Line, message
+from tests.bus.raw_line import IDS, RECEIVED, TICK_NS, Line, message
 
 MS = 1_000_000
 START_NS = 10**12
@@ -61,7 +61,7 @@ def ancillary(wall_ns: int) -> list[tuple[int, int, bytes]]:
     return [(socket.SOL_SOCKET, SO_TIMESTAMPNS, value)]
 
 
-def test_a_stamp_is_found_among_what_else_a_message_carries() -> None:
+def test_a_stamp_is_read_among_what_else_a_message_carries() -> None:
     ((level, kind, value),) = ancillary(WALL_NS + 7)
     assert stamp_ns([]) is None
     others = [(level, kind + 1, value), (level + 1, kind, value), (level, kind, value[:-1])]
@@ -79,7 +79,7 @@ def test_the_kernel_stamps_what_a_port_hands_out() -> None:
         sent_ns = boottime_ns()
         assert [line.port.arrived_ns <= sent_ns for _ in line.port.frames()] == [True] * 3
         line.put(message(0x100))
-        data = line.near[TAKEN].recvmsg(raw.SIZE, arrival.ANCILLARY_BYTES)
+        data = line.near[RECEIVED].recvmsg(raw.SIZE, arrival.ANCILLARY_BYTES)
         stamp = stamp_ns(data[1])
         assert stamp is not None
         assert before_ns <= stamp <= time.time_ns()
@@ -158,7 +158,7 @@ def line(clocks: Clocks, monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
 def stamped(line: Line, *stamps: int | None) -> None:
     """Let the kernel stamp the next frames so."""
     waiting = list(stamps)
-    near, receive = line.near[TAKEN], line.port._receive
+    near, receive = line.near[RECEIVED], line.port._receive
     assert receive == near.recvmsg
 
     def recvmsg(*sizes: int) -> Any:
@@ -210,17 +210,17 @@ def test_a_port_that_was_not_read_to_its_end_was_not_empty(
 def test_a_port_that_failed_was_not_empty(line: Line, clocks: Clocks) -> None:
     stamped(line, None)
     line.put(message(0x100))
-    line.near[TAKEN].fail = OSError(errno.ENETDOWN, "down")
+    line.near[RECEIVED].fail = OSError(errno.ENETDOWN, "down")
     clocks.now_ns += TICK_NS
     assert arrivals_of(line.port) == []
-    line.near[TAKEN].fail = None
+    line.near[RECEIVED].fail = None
     clocks.now_ns += TICK_NS
     assert arrivals_of(line.port) == [0]
 
 
 def test_an_interface_that_comes_back_was_empty_before(line: Line, clocks: Clocks) -> None:
     line.put(message(0x100))
-    line.near[TAKEN].fail = OSError(errno.ENODEV, "gone")
+    line.near[RECEIVED].fail = OSError(errno.ENODEV, "gone")
     assert arrivals_of(line.port) == []
     clocks.now_ns += REOPEN_NS
     assert arrivals_of(line.port) == []

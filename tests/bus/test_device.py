@@ -41,15 +41,15 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeDevices:
     devices.serial("platform/soc/3f980000.usb/usb1/1-1/1-1.2", "0B99")
     devices.add("can3", PCI, driver="kvaser_pci", bitrate=500_000)
     devices.add("vcan0", None, driver="vcan", bitrate=None)
-    defaults = (devices.root, devices.ask)
+    defaults = (devices.root, devices.query)
     for function in (read_device, whereabouts):
         monkeypatch.setattr(function, "__defaults__", defaults)
     return devices
 
 
 def bus(channel: str = "can0", bitrate: int | None = None, **match: Any) -> Bus:
-    asked = Match(**match) if match else None
-    return Bus(interface="socketcan", channel=channel, bitrate=bitrate, match=asked)
+    expected = Match(**match) if match else None
+    return Bus(interface="socketcan", channel=channel, bitrate=bitrate, match=expected)
 
 
 USB_PATH = "pci-0000:00:14.0-usb-0:3:1.0"
@@ -100,16 +100,16 @@ def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
     """What was read may be of both devices."""
     file = here.root / "sys/class/net/can0/ifindex"
 
-    def ask(index: int) -> tuple[str | None, int | None]:
+    def query(index: int) -> tuple[str | None, int | None]:
         file.write_text("77\n")
-        return here.ask(index)
+        return here.query(index)
 
     with pytest.raises(OSError, match="No such device"):
-        read_device("can0", here.root, ask)
+        read_device("can0", here.root, query)
 
 
 @pytest.mark.parametrize(
-    ("asked", "fault"),
+    ("configured", "fault"),
     [
         (bus("can0", serial="0A17"), None),
         (bus("can0", serial="0A17", port=0, path=USB_PATH, driver="peak_usb"), None),
@@ -144,9 +144,11 @@ def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
         ),
     ],
 )
-def test_a_device_against_the_deployment(here: FakeDevices, asked: Bus, fault: str | None) -> None:
-    assert match_fault(asked) == fault
-    assert bool(device_fault(asked, read_device(asked.channel))) is bool(fault)
+def test_a_device_against_the_deployment(
+    here: FakeDevices, configured: Bus, fault: str | None
+) -> None:
+    assert match_fault(configured) == fault
+    assert bool(device_fault(configured, read_device(configured.channel))) is bool(fault)
 
 
 def test_what_is_no_interface_does_not_matter(here: FakeDevices) -> None:
@@ -198,7 +200,7 @@ def test_a_name_that_changes_hands_while_it_is_opened(
         check(bus("can0", serial="0A17"), *(Bound(*names) for names in sockets))
 
 
-def test_without_match_nothing_is_asked(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_match_nothing_is_read(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(module, "read_device", None)
     check(bus("can0", bitrate=250_000), None)
 
@@ -208,7 +210,7 @@ def test_an_interface_that_goes_while_it_is_opened_is_gone(here: FakeDevices) ->
         check(bus("can9", serial="0A17"), Bound("can9"))
 
 
-def test_a_kernel_that_cannot_be_asked_is_no_right_device(
+def test_a_kernel_that_does_not_answer_is_no_right_device(
     here: FakeDevices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """Without AF_NETLINK in the unit: an error of its own, not "this kernel has no CAN"."""
@@ -261,18 +263,18 @@ def test_kind_and_bit_rate_of_an_interface(
     message: bytes,
     expected: tuple[str | None, int | None, int | None],
 ) -> None:
-    asked: list[tuple[int, int, bytes]] = []
+    requested: list[tuple[int, int, bytes]] = []
 
-    def ask(kind: int, flags: int, body: bytes) -> Any:
-        asked.append((kind, flags, body))
+    def request(kind: int, flags: int, body: bytes) -> Any:
+        requested.append((kind, flags, body))
         yield message
 
-    monkeypatch.setattr(module, "ask", ask)
+    monkeypatch.setattr(module, "request", request)
     assert kind_and_bitrates(7) == expected
-    assert asked == [(18, 4, struct.pack("=BxHiII", 0, 0, 7, 0, 0))]
+    assert requested == [(18, 4, struct.pack("=BxHiII", 0, 0, 7, 0, 0))]
 
 
-def test_the_kernel_itself_is_asked() -> None:
+def test_the_kernel_itself_answers() -> None:
     """The loopback interface is on every machine, and has no kind."""
     assert kind_and_bitrates(socket.if_nametoindex("lo")) == (None, None, None)
     with pytest.raises(OSError, match="No such device") as caught:
@@ -364,11 +366,11 @@ def test_sockets_of_another_device_are_closed_at_once(
     assert open_sockets(bus("can2"), ids)  # without match
 
 
-@pytest.mark.parametrize(("asked", "matched"), [(bus("can0"), False), (bus(serial="1"), True)])
+@pytest.mark.parametrize(("configured", "matched"), [(bus("can0"), False), (bus(serial="1"), True)])
 def test_a_port_knows_whether_its_device_is_named(
-    monkeypatch: pytest.MonkeyPatch, asked: Bus, matched: bool
+    monkeypatch: pytest.MonkeyPatch, configured: Bus, matched: bool
 ) -> None:
     options: dict[str, Any] = {}
     monkeypatch.setattr("canshaper.bus.port.RawPort", lambda *_, **given: options.update(given))
-    open_port("crane", asked, lambda _fault: None)
+    open_port("crane", configured, lambda _fault: None)
     assert options == {"confirms": False, "matched": matched, "fd": None, "brs": False}

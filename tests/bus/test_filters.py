@@ -1,4 +1,4 @@
-"""Which of the sockets of a bus hears a message, by the filters that they are given."""
+"""Which of the sockets of a bus receives a message, by the filters that they are given."""
 
 import socket
 import struct
@@ -12,19 +12,19 @@ from canshaper.machine.routing import BusRoutes
 
 
 class Filtered(socket.socket):
-    """Keeps the filters that it is given, and asks them as net/can/af_can.c and raw.c do."""
+    """Keeps the filters that it is given, and applies them as net/can/af_can.c and raw.c do."""
 
     def setsockopt(self, *arguments: Any) -> None:
         level, option, value = arguments
         assert (level, option) == (socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER)
         self.filters = list(struct.iter_unpack("=II", value))
 
-    def hears(self, word: int, *, join: bool) -> bool:
-        found = []
+    def passes(self, word: int, *, join: bool) -> bool:
+        matches = []
         for can_id, mask in self.filters:
             expected = can_id & ~CAN_INV_FILTER
-            found.append((word & mask == expected & mask) is not bool(can_id & CAN_INV_FILTER))
-        return all(found) if join else any(found)
+            matches.append((word & mask == expected & mask) is not bool(can_id & CAN_INV_FILTER))
+        return all(matches) if join else any(matches)
 
 
 MESSAGES = st.frozensets(
@@ -37,41 +37,41 @@ MESSAGES = st.frozensets(
 )
 
 
-@given(taken=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
+@given(ours=MESSAGES, sent=MESSAGES, known=MESSAGES, others=MESSAGES)
 def test_each_message_is_received_by_the_socket_that_is_for_it(
-    taken: frozenset[tuple[int, bool]],
+    ours: frozenset[tuple[int, bool]],
     sent: frozenset[tuple[int, bool]],
     known: frozenset[tuple[int, bool]],
     others: frozenset[tuple[int, bool]],
 ) -> None:
     """And by no other one, whatever ids of the two widths are alike."""
-    sent -= taken  # checked with the deployment
+    sent -= ours  # checked with the deployment
     with Filtered() as first, Filtered() as second, Filtered() as third:
-        set_filters([first, second, third], BusRoutes(taken, sent, sent, known))
-        everything = taken | sent | known | others
+        set_filters([first, second, third], BusRoutes(ours, sent, sent, known))
+        everything = ours | sent | known | others
         for can_id, extended in everything | {(i & 0x7FF, not e) for i, e in everything}:
             word = can_id | (socket.CAN_EFF_FLAG if extended else 0)
             received = [
-                first.hears(word, join=False),
-                second.hears(word, join=False),
-                third.hears(word, join=True),
+                first.passes(word, join=False),
+                second.passes(word, join=False),
+                third.passes(word, join=True),
             ]
             message = (can_id, extended)
             assert received == [
-                message in taken,
+                message in ours,
                 message in sent,
-                message not in taken | sent | known,
+                message not in ours | sent | known,
             ]
 
 
 def test_more_ids_than_filters_leave_the_known_ones_to_the_reader() -> None:
-    taken = frozenset({(0x110, False)})
+    ours = frozenset({(0x110, False)})
     for size, received in ((MOST_FILTERS - 1, False), (MOST_FILTERS, True)):
         known = frozenset((0x1000 + i, True) for i in range(size))
         with Filtered() as first, Filtered() as second, Filtered() as third:
-            ids = BusRoutes(taken, frozenset(), frozenset(), known)
+            ids = BusRoutes(ours, frozenset(), frozenset(), known)
             set_filters([first, second, third], ids)
             assert len(third.filters) <= MOST_FILTERS
-            assert third.hears(0x1000 | socket.CAN_EFF_FLAG, join=True) is received
-            assert third.hears(0x5000 | socket.CAN_EFF_FLAG, join=True)
-            assert not third.hears(0x110, join=True)
+            assert third.passes(0x1000 | socket.CAN_EFF_FLAG, join=True) is received
+            assert third.passes(0x5000 | socket.CAN_EFF_FLAG, join=True)
+            assert not third.passes(0x110, join=True)

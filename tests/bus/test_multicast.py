@@ -42,7 +42,7 @@ def ports() -> Iterator[dict[str, tuple[Port, Port]]]:
     assert faults == []
 
 
-def test_a_bus_hears_its_own_group_only(ports: dict[str, tuple[Port, Port]]) -> None:
+def test_a_bus_receives_its_own_group_only(ports: dict[str, tuple[Port, Port]]) -> None:
     """The kernel hands a socket the frames of every group that the machine has joined."""
     for name, (sender, _) in ports.items():
         assert sender.send(Frame(name, 0x123, False, name.encode()))

@@ -30,7 +30,7 @@ RAW, SOL = socket.SOL_CAN_RAW, socket.SOL_SOCKET
 
 
 class Made:
-    """A socket that keeps what it is asked for."""
+    """A socket that keeps its options."""
 
     def __init__(self, *arguments: int) -> None:
         self.arguments = arguments
@@ -71,7 +71,7 @@ def options(one: Made, level: int) -> dict[int, Any]:
     return {name: value for where, name, value in one.options if where == level}
 
 
-def test_one_socket_takes_everything(made: list[Made]) -> None:
+def test_one_socket_receives_everything(made: list[Made]) -> None:
     open_sockets(BUS, None)
     (one,) = made
     assert one.arguments == (socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
@@ -82,14 +82,14 @@ def test_one_socket_takes_everything(made: list[Made]) -> None:
 
 
 def test_three_sockets_each_for_its_frames(made: list[Made]) -> None:
-    """Those that are taken; our own back, other senders and errors; those that nobody knows."""
+    """Those that are received; our own back, other senders and errors; those that no one knows."""
     open_sockets(BUS, IDS)
-    taken, sent, unknown = made
+    received, sent, unknown = made
     assert [one.bound for one in made] == [("can0",)] * 3
     assert [(one.blocking, one.closed) for one in made] == [(False, False)] * 3
-    assert options(taken, SOL) == {socket.SO_RCVBUF: 1 << 20}
+    assert options(received, SOL) == {socket.SO_RCVBUF: 1 << 20}
     assert options(sent, SOL) == options(unknown, SOL) == {}
-    assert options(taken, RAW).keys() == {socket.CAN_RAW_FILTER}
+    assert options(received, RAW).keys() == {socket.CAN_RAW_FILTER}
     sent_back = options(sent, RAW)
     assert sent_back.pop(socketcan.CAN_RAW_ERR_FILTER) == 0x1FFFFFFD
     assert sent_back.pop(socket.CAN_RAW_RECV_OWN_MSGS) == 1
@@ -179,7 +179,7 @@ def test_filters_name_ids_in_their_own_width() -> None:
     ]
 
 
-def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() -> None:
+def test_groups_of_j1939_are_received_from_any_address_and_no_other_is_unknown() -> None:
     ids = BusRoutes(
         received=frozenset({(0x0CFDD633, True)}),
         sent=frozenset(),
@@ -190,9 +190,9 @@ def test_groups_of_j1939_are_taken_from_any_address_and_no_other_is_unknown() ->
         j1939=True,
     )
     eff = 0x80000000
-    taken, sent, unknown = filtered(ids)
-    assert (0x0CFDD633 | eff, 0x1FFFFFFF | eff) in taken
-    assert taken == {
+    received, sent, unknown = filtered(ids)
+    assert (0x0CFDD633 | eff, 0x1FFFFFFF | eff) in received
+    assert received == {
         (0x0CFDD633 | eff, 0x1FFFFFFF | eff),
         (0xEE00 << 8 | eff, 0x03FF0000 | eff),  # to a destination, which is no part of the group
     }

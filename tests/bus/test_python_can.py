@@ -18,17 +18,17 @@ FRAME = Frame("crane", 0x110, False, b"\1\2")
 
 
 class Adapter:
-    """An interface that hands out or raises what it is given, and then fails as it is told."""
+    """An interface that hands out or raises what it is given, and then fails as it is set to."""
 
     def __init__(self) -> None:
-        self.found: list[can.Message | Exception] = []
+        self.waiting: list[can.Message | Exception] = []
         self.always: Exception | None = None
         self.options: dict[str, Any] = {}
         self.closed = False
 
     def recv(self, timeout_s: float) -> can.Message | None:
         assert timeout_s == 0  # a tick does not wait
-        one = self.found.pop(0) if self.found else self.always
+        one = self.waiting.pop(0) if self.waiting else self.always
         if isinstance(one, Exception):
             raise one
         return one
@@ -77,7 +77,7 @@ def received(frame: Frame) -> can.Message:
 def test_a_garbled_line_costs_that_line_only(
     adapter: Adapter, port: Port, faults: list[FrameFault], error: Exception
 ) -> None:
-    adapter.found = [received(FRAME), error, received(FRAME)]
+    adapter.waiting = [received(FRAME), error, received(FRAME)]
     assert list(port.frames()) == [FRAME, FRAME]
     assert faults == [FrameFault.BUS_ERROR]
     assert port.state is BusState.UP
@@ -96,7 +96,7 @@ def test_a_bus_that_is_gone_is_a_fault_and_no_error(
     port.close()
     assert adapter.closed
     adapter.always = None
-    adapter.found = [received(FRAME)]
+    adapter.waiting = [received(FRAME)]
     assert list(port.frames()) == [FRAME]
     assert port.send(FRAME)
 
@@ -152,7 +152,7 @@ def test_the_bit_rate_of_the_file_is_that_of_the_adapter(
 def test_a_frame_like_one_of_ours_is_that_of_another_sender(adapter: Adapter, port: Port) -> None:
     """An adapter does not bring back what was sent through it."""
     assert port.send(FRAME)
-    adapter.found = [received(FRAME)]
+    adapter.waiting = [received(FRAME)]
     assert list(port.frames()) == [FRAME]
 
 
@@ -167,7 +167,7 @@ def multicast(adapter: Adapter, monkeypatch: pytest.MonkeyPatch) -> Port:
 
 def test_what_comes_back_is_ours_once(adapter: Adapter, multicast: Port) -> None:
     assert multicast.send(FRAME)
-    adapter.found = [received(FRAME), received(FRAME)]
+    adapter.waiting = [received(FRAME), received(FRAME)]
     assert list(multicast.frames()) == [FRAME]
 
 
@@ -177,7 +177,7 @@ def test_of_what_never_comes_back_no_more_than_a_few_are_kept(
     frames = [FRAME._replace(data=n.to_bytes(2, "big")) for n in range(MOST_ECHOES + 1)]
     for frame in frames:
         assert multicast.send(frame)
-    adapter.found = [received(frame) for frame in frames]
+    adapter.waiting = [received(frame) for frame in frames]
     assert list(multicast.frames()) == frames[:1]
 
 

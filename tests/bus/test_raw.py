@@ -14,11 +14,11 @@ from canshaper.bus import raw
 from canshaper.bus.raw import MOST_FRAMES, MOST_UNKNOWN, PROBE_NS, RawPort
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, VALVE, Line, message
+from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, UNKNOWN, VALVE, Line, message
 
 # -- frames ----------------------------------------------------------------------------------------
 
-# A port that is told its ids has three sockets, one that is not has one.
+# A port that has its ids has three sockets, one that is not has one.
 EITHER = pytest.mark.parametrize("ids", [IDS, None])
 
 
@@ -27,13 +27,13 @@ def test_frames_come_in_order_and_a_call_ends_when_there_is_none(
     make_line: Callable[..., Line], ids: BusRoutes | None
 ) -> None:
     line = make_line(ids)
-    assert line.heard() == []
+    assert line.received() == []
     for length in range(9):
         line.put(message(0x100 + length, bytes(range(1, length + 1))))
     assert list(line.port.frames()) == [
         Frame("crane", 0x100 + n, False, bytes(range(1, n + 1))) for n in range(9)
     ]
-    assert line.heard() == []
+    assert line.received() == []
     assert line.faults == []
 
 
@@ -48,7 +48,7 @@ def test_ids_of_both_widths_both_ways(
     line = make_line(ids)
     line.put(message(can_id, b"\1\2\3", extended=extended))
     frame = Frame("crane", can_id, extended, b"\1\2\3")
-    assert line.heard() == [frame]
+    assert line.received() == [frame]
     assert line.port.send(frame)
     (data,) = line.sent()
     flag = socket.CAN_EFF_FLAG if extended else 0
@@ -56,7 +56,7 @@ def test_ids_of_both_widths_both_ways(
     assert len(data) == 16
 
 
-@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+@pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: int) -> None:
     for can_id, extended in ((0x110, False), (0x110, True)):
         line.put(
@@ -70,7 +70,7 @@ def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: 
     line.far[number].send(build_can_frame(message(0x110, bytes(8)))[:15])
     line.far[number].send(b"")
     line.put(message(0x111), number)
-    assert [f.can_id for f in line.heard()] == [0x111]
+    assert [f.can_id for f in line.received()] == [0x111]
     assert line.faults == [FrameFault.WRONG_LENGTH] * 6
 
 
@@ -82,20 +82,20 @@ def test_an_error_frame_is_none_whatever_its_class_looks_like(
     """The classes of errors stand where the id stands: 0x110 would be a joystick."""
     line = make_line(ids)
     line.error(kind)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.faults == [FrameFault.ERROR_FRAME]
 
 
 def test_a_flood_cannot_hold_up_the_tick_for_ever(line: Line) -> None:
-    """Each frame that is taken is followed by another one."""
-    for number in (TAKEN, SENT_BACK, UNKNOWN):
+    """Each frame that is received is followed by another one."""
+    for number in (RECEIVED, SENT_BACK, UNKNOWN):
         line.put(message(number), number)
     seen: list[int] = []
     for source in (line.port.frames, line.port.background):
         for frame in source():
             seen.append(frame.can_id)
             line.put(message(frame.can_id), frame.can_id)
-    most = [TAKEN] * MOST_FRAMES + [SENT_BACK] * MOST_FRAMES + [UNKNOWN] * MOST_UNKNOWN
+    most = [RECEIVED] * MOST_FRAMES + [SENT_BACK] * MOST_FRAMES + [UNKNOWN] * MOST_UNKNOWN
     assert seen == most
 
 
@@ -109,21 +109,21 @@ def test_what_can_wait_does_not_come_with_the_joysticks(line: Line) -> None:
 
 def test_no_read_waits_for_a_frame(line: Line, monkeypatch: pytest.MonkeyPatch) -> None:
     """A tick has other things to do."""
-    asked: list[int] = []
+    timeouts: list[int] = []
     for number, waiting in enumerate(line.port._waiting):
 
-        def waits(timeout_ms: int, ask: Any = waiting) -> Any:
-            asked.append(timeout_ms)
-            return ask(timeout_ms)
+        def waits(timeout_ms: int, poll: Any = waiting) -> Any:
+            timeouts.append(timeout_ms)
+            return poll(timeout_ms)
 
         line.port._waiting[number] = waits
         line.put(message(0x110), number)
-    assert len(line.heard()) == 3
-    assert asked == [0] * 6
+    assert len(line.received()) == 3
+    assert timeouts == [0] * 6
 
 
-def test_a_gateway_waits_on_the_socket_of_what_is_taken(line: Line) -> None:
-    assert line.port.fileno() == line.near[TAKEN].fileno()
+def test_a_gateway_waits_on_the_socket_of_what_is_received(line: Line) -> None:
+    assert line.port.fileno() == line.near[RECEIVED].fileno()
 
 
 def test_another_deployment_gets_its_own_filters(
@@ -165,7 +165,7 @@ def overflowing(number: int) -> tuple[list[FrameFault], RawPort]:
     return faults, port
 
 
-@pytest.mark.parametrize("number", [TAKEN, SENT_BACK])
+@pytest.mark.parametrize("number", [RECEIVED, SENT_BACK])
 def test_a_queue_that_has_run_over_is_reported_once_for_each_time(number: int) -> None:
     """On UDP, whose queue overflows as that of a CAN socket does."""
     faults: list[FrameFault] = []
@@ -233,19 +233,19 @@ def test_another_error_is_reported_until_a_frame_gets_through(line: Line) -> Non
     line.near[SENT_BACK].fail = None
     assert line.port.send(VALVE)
     line.confirm(VALVE)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.UP
 
 
-@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+@pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 def test_an_error_of_one_socket_keeps_the_others_working(line: Line, number: int) -> None:
     for other in range(3):
         line.put(message(other), other)
     line.near[number].fail = OSError(errno.EINVAL, "other")
-    assert [f.can_id for f in line.heard()] == [n for n in range(3) if n != number]
+    assert [f.can_id for f in line.received()] == [n for n in range(3) if n != number]
     assert line.faults == [FrameFault.BUS_ERROR]
     line.near[number].fail = None
-    assert [f.can_id for f in line.heard()] == [number]
+    assert [f.can_id for f in line.received()] == [number]
 
 
 def test_a_far_end_that_is_gone_is_an_error_as_any_other(make_line: Callable[..., Line]) -> None:

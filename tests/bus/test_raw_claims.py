@@ -1,4 +1,4 @@
-"""Claims of our own node of J1939 that come back to the socket of what is taken."""
+"""Claims of our own node of J1939 that come back to the socket of what is received."""
 
 import errno
 from collections.abc import Callable
@@ -11,7 +11,7 @@ from canshaper.bus.error_frame import CLASS_BUS_OFF
 from canshaper.bus.under_way import MOST_CLAIMS
 from canshaper.codec.frame import BusState, Frame
 from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import IDS, TAKEN, Line, message
+from tests.bus.raw_line import IDS, RECEIVED, Line, message
 
 CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
 NODE = BusRoutes(
@@ -24,8 +24,10 @@ NODE = BusRoutes(
 
 
 def claimed(line: Line, frame: Frame = CLAIM) -> None:
-    """It comes to the socket of what is taken, as every frame of its group does."""
-    line.put(can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data), TAKEN)
+    """It comes to the socket of what is received, as every frame of its group does."""
+    line.put(
+        can.Message(arbitration_id=frame.can_id, is_extended_id=True, data=frame.data), RECEIVED
+    )
 
 
 def test_a_claim_of_ours_that_comes_back_is_no_claim_of_another(
@@ -34,12 +36,12 @@ def test_a_claim_of_ours_that_comes_back_is_no_claim_of_another(
     line = make_line(NODE)
     assert line.port.send(CLAIM)
     claimed(line)
-    assert line.heard() == []
+    assert line.received() == []
     claimed(line)  # ours came back once; this is of one that has our NAME
-    assert line.heard() == [CLAIM]
+    assert line.received() == [CLAIM]
 
 
-def test_a_frame_behind_a_claim_of_ours_is_taken_in_the_same_tick(
+def test_a_frame_behind_a_claim_of_ours_is_received_in_the_same_tick(
     make_line: Callable[..., Line],
 ) -> None:
     line = make_line(NODE)
@@ -56,14 +58,14 @@ def test_a_claim_that_was_lost_with_its_interface_does_not_come_back(
     """Of another node that has our NAME it is the next one."""
     line = make_line(NODE)
     assert line.port.send(CLAIM)
-    line.near[TAKEN].fail = OSError(gone, "lost")
+    line.near[RECEIVED].fail = OSError(gone, "lost")
     line.put(message(0x110))
-    assert line.heard() == []
-    line.near[TAKEN].fail = None
+    assert line.received() == []
+    line.near[RECEIVED].fail = None
     line.now_ns += raw.REOPEN_NS
-    line.heard()
+    line.received()
     claimed(line)
-    assert line.heard() == [CLAIM]
+    assert line.received() == [CLAIM]
 
 
 def test_of_claims_that_do_not_come_back_no_more_than_a_few_are_kept(
@@ -75,7 +77,7 @@ def test_of_claims_that_do_not_come_back_no_more_than_a_few_are_kept(
         assert line.port.send(claim)
     for claim in (first, *others):
         claimed(line, claim)
-    assert line.heard() == [first]
+    assert line.received() == [first]
 
 
 def test_a_claim_that_comes_back_shows_that_the_bus_takes_frames(
@@ -83,12 +85,12 @@ def test_a_claim_that_comes_back_shows_that_the_bus_takes_frames(
 ) -> None:
     line = make_line(NODE)
     line.error(CLASS_BUS_OFF)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.BUS_OFF
     line.now_ns += raw.PROBE_NS
     assert line.port.send(CLAIM)
     claimed(line)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.UP
 
 
@@ -98,4 +100,4 @@ def test_a_claim_of_another_that_comes_before_ours_is_one(make_line: Callable[..
     assert line.port.send(CLAIM)
     claimed(line, other)
     claimed(line)
-    assert line.heard() == [other]
+    assert line.received() == [other]

@@ -30,9 +30,9 @@ RX_PASSIVE, TX_PASSIVE, ACTIVE = 0x10, 0x20, 0x40
 def test_own_frames_are_not_handed_on_but_those_of_another_sender_are(line: Line) -> None:
     line.port.send(VALVE)
     line.confirm(VALVE)
-    assert line.heard() == []
+    assert line.received() == []
     line.put(message(VALVE.can_id, VALVE.data), SENT_BACK)
-    assert line.heard() == [VALVE]
+    assert line.received() == [VALVE]
 
 
 @pytest.mark.parametrize("size", [MARK_AT + 1, SIZE - 1])
@@ -43,7 +43,7 @@ def test_a_confirmation_that_is_not_whole_is_counted_and_confirms_nothing(
         line.now_ns += TICK_NS
         line.port.send(VALVE)
         line.confirm(VALVE, size)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.faults == [FrameFault.WRONG_LENGTH] * 3
     assert line.unconfirmed() == 0
 
@@ -53,7 +53,7 @@ def test_frames_of_another_sender_confirm_nothing(line: Line) -> None:
         line.now_ns += TICK_NS
         line.port.send(VALVE)
         line.put(message(VALVE.can_id, VALVE.data), SENT_BACK)
-        line.heard()
+        line.received()
     assert line.unconfirmed() == 0
     assert line.port.state is BusState.NOT_CONFIRMED
 
@@ -64,7 +64,7 @@ def test_confirmed_frames_can_be_sent_for_ever(line: Line) -> None:
         for frame in (VALVE, OTHER):
             assert line.port.send(frame)
             line.confirm(frame)
-        assert line.heard() == []
+        assert line.received() == []
         assert len(line.sent()) == 2
     assert line.port.state is BusState.UP
     assert line.faults == []
@@ -77,7 +77,7 @@ def test_a_confirmation_may_come_two_ticks_late(line: Line) -> None:
         line.sent()
         if tick >= 2:
             line.confirm(VALVE)
-        assert line.heard() == []
+        assert line.received() == []
     assert line.faults == []
 
 
@@ -89,7 +89,7 @@ def test_a_fast_loop_on_a_slow_bus_is_no_fault(line: Line) -> None:
         line.sent()
         if tick >= 15:
             line.confirm(VALVE)
-        assert line.heard() == []
+        assert line.received() == []
     assert line.faults == []
 
 
@@ -97,7 +97,7 @@ def test_of_several_frames_under_way_a_confirmation_confirms_one(line: Line) -> 
     """Two on their way, one confirmed: only two more may follow the one that is left."""
     assert line.unconfirmed(most=2) == 2
     line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.unconfirmed() == 2
 
 
@@ -119,7 +119,7 @@ def test_a_confirmation_of_another_id_confirms_nothing(line: Line) -> None:
         assert line.port.send(VALVE)
         line.confirm(OTHER)
         line.confirm(extended)
-        line.heard()
+        line.received()
     assert line.unconfirmed() == 1
     assert line.port.state is BusState.NOT_CONFIRMED
 
@@ -128,7 +128,7 @@ def test_confirmations_without_a_frame_are_no_credit(line: Line) -> None:
     """They come for what was sent before it was given up."""
     for _ in range(5):
         line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.unconfirmed() == 3
 
 
@@ -148,7 +148,7 @@ def test_a_probe_that_comes_back_opens_the_bus(line: Line) -> None:
     line.now_ns += PROBE_NS
     assert line.port.send(VALVE)
     line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
     assert line.unconfirmed() == line.unconfirmed(OTHER) + 3 == 3
 
@@ -156,7 +156,7 @@ def test_a_probe_that_comes_back_opens_the_bus(line: Line) -> None:
 def test_a_late_confirmation_opens_the_bus_before_the_next_probe(line: Line) -> None:
     line.unconfirmed()
     line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
     assert line.unconfirmed() == 3
 
@@ -170,10 +170,10 @@ def test_a_status_message_that_starves_holds_up_no_valve(line: Line) -> None:
         assert line.port.send(VALVE)
         line.confirm(VALVE)
         assert not line.port.send(STATUS)  # and no more of them wait
-        line.heard()
+        line.received()
     assert line.port.state is BusState.UP
     line.confirm(STATUS)
-    line.heard()
+    line.received()
     line.now_ns += TICK_NS
     assert line.port.send(STATUS)
 
@@ -200,7 +200,7 @@ def test_another_deployment_begins_without_the_frames_of_the_last(
         assert line.port.send(VALVE)
         line.port.watch("other", IDS)
     line.put(message(0x110))
-    assert [f.bus for f in line.heard()] == ["other"]
+    assert [f.bus for f in line.received()] == ["other"]
 
 
 def test_nor_does_it_count_how_long_those_were_under_way(
@@ -221,7 +221,7 @@ def test_nor_does_it_count_how_long_those_were_under_way(
 
 def test_bus_off_sends_nothing_more(line: Line) -> None:
     line.error(BUS_OFF)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.BUS_OFF
     assert line.faults == [FrameFault.BUS_OFF]
     for _ in range(24):
@@ -233,20 +233,20 @@ def test_bus_off_sends_nothing_more(line: Line) -> None:
 def test_a_restarted_controller_sends_at_once(line: Line, kind: int, data: int) -> None:
     line.error(BUS_OFF)
     line.error(kind, data)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.UP
     assert line.unconfirmed() == 3
 
 
 def test_bus_off_stays_bus_off_while_probes_do_not_come_back(line: Line) -> None:
     line.error(BUS_OFF)
-    line.heard()
+    line.received()
     for _ in range(5):
         line.now_ns += PROBE_NS
         assert line.unconfirmed() == 1
         assert line.port.state is BusState.BUS_OFF
     line.confirm(VALVE)  # the controller was restarted, unseen
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
 
 
@@ -254,15 +254,15 @@ def test_bus_off_stays_bus_off_while_probes_do_not_come_back(line: Line) -> None
 @pytest.mark.parametrize("better", [ACTIVE, TX_WARNING])
 def test_a_passive_controller_still_sends(line: Line, passive: int, better: int) -> None:
     line.error(CONTROLLER, passive)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.PASSIVE
     assert line.faults == [FrameFault.BUS_PASSIVE]
     assert line.port.send(VALVE)
     line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.PASSIVE  # a frame got through all the same
     line.error(CONTROLLER, better)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
 
 
@@ -270,7 +270,7 @@ def test_a_passive_controller_still_sends(line: Line, passive: int, better: int)
 def test_the_state_of_a_controller_counts_in_its_own_class_only(line: Line, kind: int) -> None:
     """In other classes the byte means something else."""
     line.error(kind, TX_PASSIVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
     assert line.faults == [FrameFault.ERROR_FRAME]
 
@@ -284,21 +284,21 @@ def test_a_frame_that_is_received_does_not_show_that_ours_get_through(
     else:
         line.error(*((BUS_OFF,) if state is BusState.BUS_OFF else (CONTROLLER, TX_PASSIVE)))
     line.put(message(0x110))
-    line.heard()
+    line.received()
     line.put(message(0x110))
-    assert len(line.heard()) == 1
+    assert len(line.received()) == 1
     assert line.port.state is state
 
 
 def test_passive_is_less_than_bus_off_and_than_not_confirmed(line: Line) -> None:
-    """A node that is alone on its bus is passive because nobody acknowledges its frames."""
+    """A node that is alone on its bus is passive because no one acknowledges its frames."""
     line.unconfirmed()
     line.error(CONTROLLER, TX_PASSIVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.NOT_CONFIRMED
     line.error(BUS_OFF)
     line.error(CONTROLLER, TX_PASSIVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.BUS_OFF
     assert line.unconfirmed() == 0
 
@@ -312,7 +312,7 @@ def test_an_overflow_of_the_controller_is_no_recovery(
 ) -> None:
     line.unconfirmed()
     line.error(CONTROLLER, data)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.NOT_CONFIRMED
     assert line.faults[-1] is fault
     assert line.unconfirmed() == 0

@@ -11,7 +11,7 @@ from can.interfaces.socketcan.socketcan import build_can_frame, dissect_can_fram
 
 from canshaper.bus.packet import FDF, Packet
 from canshaper.codec.frame import BusState, Frame, FrameFault
-from tests.bus.raw_line import IDS, SENT_BACK, TAKEN, UNKNOWN, Line, message
+from tests.bus.raw_line import IDS, RECEIVED, SENT_BACK, UNKNOWN, Line, message
 
 LONG = Frame("crane", 0x200, False, bytes(range(1, 65)))
 SHORT = Frame("crane", 0x300, False, b"\5\6")
@@ -32,9 +32,9 @@ def line(make_line: Callable[..., Line]) -> Line:
     return make_line(FD_IDS, fd=True)
 
 
-@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+@pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 @pytest.mark.parametrize("extended", [False, True])
-def test_frames_of_both_kinds_are_taken(line: Line, number: int, extended: bool) -> None:
+def test_frames_of_both_kinds_are_received(line: Line, number: int, extended: bool) -> None:
     can_id = 0x1ABCDEF0 if extended else 0x7F0
     for length in (0, 1, 8, 12, 16, 20, 24, 32, 48, 64):
         line.put(fd_message(can_id, bytes(range(length)), extended=extended), number)
@@ -43,7 +43,7 @@ def test_frames_of_both_kinds_are_taken(line: Line, number: int, extended: bool)
     for length in (0, 1, 8, 12, 16, 20, 24, 32, 48, 64):
         expected.append(Frame("crane", can_id, extended, bytes(range(length))))
         expected.append(Frame("crane", 0x111, extended, bytes(range(min(length, 8)))))
-    assert line.heard() == expected
+    assert line.received() == expected
     assert line.faults == []
 
 
@@ -83,7 +83,7 @@ def test_without_ids_the_messages_of_can_fd_are_named(make_line: Callable[..., L
     assert len(sent) == 72
 
 
-def test_a_classical_bus_takes_none(make_line: Callable[..., Line]) -> None:
+def test_a_classical_bus_receives_none(make_line: Callable[..., Line]) -> None:
     """Its sockets are never given one; what is too long is no frame of it."""
     line = make_line(IDS)
     line.put(fd_message(0x110, bytes(12)))
@@ -102,9 +102,9 @@ def test_a_classical_bus_takes_none(make_line: Callable[..., Line]) -> None:
     ],
 )
 def test_what_is_no_frame_of_can_fd(line: Line, packet: bytes) -> None:
-    line.far[TAKEN].send(packet)
+    line.far[RECEIVED].send(packet)
     line.put(fd_message(0x112, bytes(64)))
-    assert [f.can_id for f in line.heard()] == [0x112]
+    assert [f.can_id for f in line.received()] == [0x112]
     assert line.faults == [FrameFault.WRONG_LENGTH]
 
 
@@ -114,7 +114,7 @@ def test_frames_that_come_back_are_confirmed(line: Line) -> None:
         line.now_ns += 20_000_000
         assert line.port.send(LONG)
         line.confirm(fd_message(0x200, LONG.data))
-        assert line.heard() == []
+        assert line.received() == []
     assert line.port.state is BusState.UP
     assert line.unconfirmed(LONG) == 3
     assert line.faults == [FrameFault.NOT_CONFIRMED]

@@ -12,8 +12,8 @@ from canshaper.errors import WrongDeviceError
 from canshaper.machine.routing import BusRoutes
 from tests.bus.raw_line import (
     IDS,
+    RECEIVED,
     SENT_BACK,
-    TAKEN,
     TICK_NS,
     UNKNOWN,
     VALVE,
@@ -27,7 +27,7 @@ def down(line: Line) -> None:
     for near in line.near:
         near.fail = OSError(errno.ENETDOWN, "down")
     line.put(message(0x110))
-    assert line.heard() == []
+    assert line.received() == []
 
 
 def up(line: Line) -> None:
@@ -45,7 +45,7 @@ def test_an_interface_that_is_down_is_reported_once_and_used_again(line: Line) -
     up(line)
     assert line.port.send(VALVE)
     line.confirm(VALVE)
-    line.heard()
+    line.received()
     assert line.port.state is BusState.UP
     assert line.unconfirmed() == 3  # what was in the queue is gone and will not be confirmed
 
@@ -56,12 +56,12 @@ def test_an_interface_on_which_nothing_is_sent_is_up_with_the_first_frame(line: 
     assert line.port.state is BusState.DOWN
     up(line)
     line.put(message(0x111))
-    assert {f.can_id for f in line.heard()} == {0x110, 0x111}
+    assert {f.can_id for f in line.received()} == {0x110, 0x111}
     assert line.port.state is BusState.UP
 
 
 @pytest.mark.parametrize("code", [errno.ENODEV, errno.ENXIO, errno.EBADF])
-@pytest.mark.parametrize("seen", [TAKEN, SENT_BACK, UNKNOWN, "sending"])
+@pytest.mark.parametrize("seen", [RECEIVED, SENT_BACK, UNKNOWN, "sending"])
 def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
     line: Line, seen: int | str, code: int
 ) -> None:
@@ -74,7 +74,7 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
     if seen == "sending":
         assert not line.port.send(VALVE)
     else:
-        assert line.heard() == []
+        assert line.received() == []
     assert line.port.state is BusState.GONE
     assert line.faults[1:] == [FrameFault.BUS_GONE]
     assert [end.fileno() for end in ends] == [-1] * 3
@@ -82,39 +82,39 @@ def test_an_interface_that_is_gone_is_opened_again_as_soon_as_it_is_back(
     line.refuse = OSError(errno.ENODEV, "no such device")
     for _ in range(100):
         line.now_ns += TICK_NS
-        assert line.heard() == []
+        assert line.received() == []
         assert not line.port.send(VALVE)
-    assert len(line.asked) == 1 + 100 * TICK_NS // REOPEN_NS
+    assert len(line.opened_with) == 1 + 100 * TICK_NS // REOPEN_NS
     assert line.faults[2:] == []
     line.refuse = None
     line.now_ns += REOPEN_NS
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.UP
-    assert line.asked == [IDS] * len(line.asked)
+    assert line.opened_with == [IDS] * len(line.opened_with)
     line.put(message(0x110))
-    assert len(line.heard()) == 1
+    assert len(line.received()) == 1
     assert line.unconfirmed() == 3
 
 
 def test_what_was_under_way_when_an_interface_went_is_not_waited_for(line: Line) -> None:
     line.unconfirmed(most=2)
-    line.near[TAKEN].fail = OSError(errno.ENODEV, "gone")
+    line.near[RECEIVED].fail = OSError(errno.ENODEV, "gone")
     line.put(message(0x110))
-    line.heard()
+    line.received()
     assert line.port.state is BusState.GONE
     line.now_ns += REOPEN_NS
-    line.heard()
+    line.received()
     assert line.unconfirmed() == 3
 
 
-@pytest.mark.parametrize("number", [TAKEN, SENT_BACK, UNKNOWN])
+@pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 def test_a_socket_that_was_closed_under_the_port_is_replaced(line: Line, number: int) -> None:
     """The real thing: the kernel answers EBADF."""
     line.near[number].close()
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.GONE
     line.now_ns += REOPEN_NS
-    line.heard()
+    line.received()
     assert line.port.send(VALVE)
     assert len(line.sent()) == 1
 
@@ -140,41 +140,41 @@ def matched(make_line: Callable[..., Line]) -> Line:
 def later(line: Line) -> None:
     """One try to open it again."""
     line.now_ns += REOPEN_NS
-    assert line.heard() == []
+    assert line.received() == []
 
 
 def gone(line: Line) -> None:
     line.put(message(0x110))
-    line.near[TAKEN].fail = OSError(errno.ENODEV, "gone")
-    assert line.heard() == []
+    line.near[RECEIVED].fail = OSError(errno.ENODEV, "gone")
+    assert line.received() == []
 
 
 @pytest.mark.parametrize("away", [gone, down])
 def test_another_device_under_the_name_is_not_used(
     matched: Line, away: Callable[[Line], None]
 ) -> None:
-    """However long it is there: nothing is sent and nothing taken until the right one is back."""
+    """However long it is there: nothing is sent or received until the right one is back."""
     away(matched)
     reported = [FrameFault.BUS_GONE if away is gone else FrameFault.BUS_DOWN]
     assert matched.faults == reported
     matched.refuse = WRONG
     far = matched.far
-    far[TAKEN].setblocking(False)
+    far[RECEIVED].setblocking(False)
     for _ in range(100):
         matched.now_ns += TICK_NS
-        assert matched.heard() == []
+        assert matched.received() == []
         assert not matched.port.send(VALVE)
         assert matched.port.fileno() == -1
     assert matched.port.state is BusState.WRONG_DEVICE
     assert matched.faults == [*reported, FrameFault.BUS_WRONG_DEVICE]
-    assert len(matched.asked) == 1 + 100 * TICK_NS // REOPEN_NS
+    assert len(matched.opened_with) == 1 + 100 * TICK_NS // REOPEN_NS
     matched.refuse = None
     later(matched)
     assert matched.port.state is BusState.UP
     assert matched.port.send(VALVE)
     assert len(matched.sent()) == 1
     matched.put(message(0x110))
-    assert len(matched.heard()) == 1
+    assert len(matched.received()) == 1
     assert matched.faults == [*reported, FrameFault.BUS_WRONG_DEVICE]
 
 
@@ -193,15 +193,15 @@ def test_a_matched_interface_that_is_down_is_opened_again_and_reported_once(matc
     assert matched.port.state is BusState.DOWN
     assert matched.port.send(VALVE)
     matched.confirm(VALVE)
-    matched.heard()
+    matched.received()
     assert matched.port.state is BusState.UP
 
 
 def test_a_matched_interface_is_not_tried_in_every_tick(matched: Line) -> None:
     down(matched)
     matched.now_ns += REOPEN_NS - 1
-    assert matched.heard() == []
-    assert len(matched.asked) == 1
+    assert matched.received() == []
+    assert len(matched.opened_with) == 1
 
 
 def test_a_bus_that_was_blocked_is_tried_at_once_when_it_is_back(matched: Line) -> None:
@@ -236,8 +236,8 @@ def test_a_try_that_fails_for_another_reason_waits_for_the_next(matched: Line) -
     gone(matched)
     matched.refuse = OSError(errno.EMFILE, "too many files")
     later(matched)
-    assert matched.heard() == []
-    assert len(matched.asked) == 2
+    assert matched.received() == []
+    assert len(matched.opened_with) == 2
 
 
 def test_a_wrong_device_at_the_start_is_no_port() -> None:
@@ -252,10 +252,10 @@ def test_a_closed_port_does_nothing_more(line: Line) -> None:
     line.port.close()
     line.port.close()
     line.now_ns += 10 * REOPEN_NS
-    assert line.heard() == []
+    assert line.received() == []
     assert not line.port.send(VALVE)
     assert line.port.fileno() == -1
-    assert len(line.asked) == 1
+    assert len(line.opened_with) == 1
 
 
 def test_an_interface_that_goes_while_another_deployment_begins_is_a_fault(

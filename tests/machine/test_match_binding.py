@@ -159,7 +159,7 @@ def test_the_check_says_whether_it_holds_now(
     devices = FakeDevices(tmp_path / "root")
     devices.add("vcan0", None, driver="vcan", bitrate=None)
     for function in (read_device, whereabouts):
-        monkeypatch.setattr(function, "__defaults__", (devices.root, devices.ask))
+        monkeypatch.setattr(function, "__defaults__", (devices.root, devices.query))
 
     def checked(match: str) -> str:
         result = CliRunner().invoke(app, ["check", str(machine(tmp_path, match, match))])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 from canshaper.bus.device import (
     ROOT,
-    Ask,
     Device,
+    LinkQuery,
     device_fault,
     kind_and_bitrates,
     read_device,
@@ -23,7 +23,7 @@ _REPLACED = re.compile(r"[^0-9A-Za-z#+\-.:=@_]")
 
 
 def device_findings(
-    name: str, bus: Bus, root: Path = ROOT, ask_kernel: Ask = kind_and_bitrates
+    name: str, bus: Bus, root: Path = ROOT, query_kernel: LinkQuery = kind_and_bitrates
 ) -> list[Finding]:
     """Whether the interface of a bus is its device; none where there is no such interface.
 
@@ -31,11 +31,11 @@ def device_findings(
         name: of the bus in the deployment file.
         bus: its section.
         root: of the file system.
-        ask_kernel: for kind and bit rates of the interface with an index.
+        query_kernel: for kind and bit rates of the interface with an index.
     """
     subject = f"{bus.channel} device"
     try:
-        device = read_device(bus.channel, root, ask_kernel)
+        device = read_device(bus.channel, root, query_kernel)
     except OSError as error:
         if error.errno == errno.ENODEV:  # said of the interface itself
             return []
@@ -46,7 +46,7 @@ def device_findings(
         text = f"bus {name} has no match: whatever is called {bus.channel} is driven"
         return [Finding(subject, level, text, to_paste(name, device, root))]
     if fault := device_fault(bus, device):
-        there = whereabouts(bus, root, ask_kernel)
+        there = whereabouts(bus, root, query_kernel)
         remedy = "nothing is sent there: plug it in where it was, or correct names or match"
         return [Finding(subject, Level.BAD, f"{fault}{there}", remedy)]
     return [Finding(subject, Level.OK, f"match of bus {name} holds")]

@@ -14,7 +14,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 
-from canshaper.bus.netlink import ACKNOWLEDGE, DUMP, ask, attribute, attributes
+from canshaper.bus.netlink import ACKNOWLEDGE, DUMP, attribute, attributes, request
 from canshaper.codec.kernel_check import CS_CRC8, CS_XOR
 from canshaper.errors import GatewayError
 from canshaper.protocols.gateway.passing import Pattern
@@ -90,7 +90,7 @@ def rules() -> list[Rule]:
     """
     names: dict[int, str] = {}
     try:
-        bodies = list(ask(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
+        bodies = list(request(GET, DUMP, _RULE.pack(socket.AF_CAN, CAN_TO_CAN, 0)))
         rules = [_read(body, names) for body in bodies if body[0] == socket.AF_CAN]
     except OSError as error:
         raise GatewayError(f"rules of can-gw cannot be listed: {error.strerror}") from error
@@ -118,7 +118,7 @@ def remove(rule: Rule) -> None:
 def _change(kind: int, rule: Rule) -> None:
     try:
         ends = [socket.if_nametoindex(n) for n in (rule.source, rule.destination)]
-        for _ in ask(kind, ACKNOWLEDGE, _message(rule, *ends)):
+        for _ in request(kind, ACKNOWLEDGE, _message(rule, *ends)):
             pass
     except OSError as error:
         why = error.strerror or str(error)

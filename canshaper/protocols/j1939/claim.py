@@ -19,7 +19,7 @@ WAIT_NS = 250_000_000
 STEP_NS = 600_000
 # Claims in answer to claims: two nodes that are set up wrong must not fill the bus.
 LEAST_BETWEEN_NS = 5_000_000
-# Refusals in one tick; who asks for more at once gets no answer, as on a bus that is full.
+# Refusals in one tick; a node that asks for more at once gets no answer, as on a bus that is full.
 MOST_REFUSED = 8
 
 
@@ -40,7 +40,7 @@ class AddressClaim:
         answered: groups (PGN) that are sent on request by others of us.
         cyclic: groups that are sent anyhow; a request for one is answered by the next of them.
         guest: the address may be another's: we ask first, claim it only when no one answers, give
-            it up to whoever claims it, whatever the NAME, and refuse nothing.
+            it up to any node that claims it, whatever its NAME, and refuse nothing.
 
     Attributes:
         state: of our address; nothing but claims may be sent in any other than CLAIMED.
@@ -65,8 +65,8 @@ class AddressClaim:
         self._answered = answered
         self._cyclic = cyclic
         self._guest = guest
-        self._asking = False  # whether anybody has it; nothing is claimed meanwhile
-        self._ask = guest
+        self._requesting = False  # which node has it; nothing is claimed meanwhile
+        self._request_first = guest
         self._delay_ns = config.name.identity_number % 256 * STEP_NS
         self._due_ns: int | None = 0  # when to send a claim, or that there is none
         self._until_ns: int | None = None
@@ -83,7 +83,7 @@ class AddressClaim:
         if before.state is ClaimState.LOST:
             return
         self.state, self.requested = before.state, set(before.requested)
-        self._asking, self._ask = before._asking, before._ask
+        self._requesting, self._request_first = before._requesting, before._request_first
         self._due_ns, self._until_ns = before._due_ns, before._until_ns
         self._again_ns, self._refused = before._again_ns, list(before._refused)
 
@@ -97,7 +97,7 @@ class AddressClaim:
         elif (
             group == REQUEST << 8
             and len(frame.data) == 3
-            # One that is lost is the address of whoever has it now.
+            # One that is lost is the address of the node that has it now.
             and (destination == GLOBAL or (destination == self._address and not lost))
         ):
             pgn = int.from_bytes(frame.data, "little")
@@ -129,8 +129,8 @@ class AddressClaim:
             self._refused.append((pgn, source))
 
     def _claim_at(self, time_ns: int) -> None:
-        """A claim is due; one that is due already is not put off by who asks again."""
-        if self._asking:
+        """A claim is due; one that is due already is not put off by another request."""
+        if self._requesting:
             return
         time_ns = max(time_ns, self._again_ns)
         self._due_ns = time_ns if self._due_ns is None else min(time_ns, self._due_ns)
@@ -139,12 +139,12 @@ class AddressClaim:
         """What is due now: claims, and answers to requests for what we do not have."""
         if self._due_ns is not None and now_ns >= self._due_ns:
             lost = self.state is ClaimState.LOST
-            if self._ask and not lost:
-                self._ask, self._asking, self._due_ns = False, True, now_ns + WAIT_NS
+            if self._request_first and not lost:
+                self._request_first, self._requesting, self._due_ns = False, True, now_ns + WAIT_NS
                 data = CLAIMED.to_bytes(3, "little")
                 yield Frame(self._bus, identifier(REQUEST, NULL), True, data)
                 return
-            self._asking, self._due_ns = False, None
+            self._requesting, self._due_ns = False, None
             self._again_ns = now_ns + LEAST_BETWEEN_NS
             if self._until_ns is None:
                 self._until_ns = now_ns + WAIT_NS
@@ -178,5 +178,5 @@ class AddressClaim:
             self.state = ClaimState.WAITING
             self._until_ns = None
             self._refused.clear()
-            self._ask, self._asking = self._guest, False
+            self._request_first, self._requesting = self._guest, False
             self._claim_at(self._again_ns)

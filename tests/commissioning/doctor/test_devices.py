@@ -30,7 +30,7 @@ def here(tmp_path: Path) -> FakeDevices:
 def finding(here: FakeDevices, channel: str, **match: Any) -> Finding:
     asked = Match(**match) if match else None
     bus = Bus(interface="socketcan", channel=channel, match=asked)
-    (found,) = device_findings("crane", bus, here.root, here.ask)
+    (found,) = device_findings("crane", bus, here.root, here.query)
     return found
 
 
@@ -51,7 +51,7 @@ def test_a_match_that_does_not_hold(here: FakeDevices) -> None:
 
 def test_an_interface_that_is_not_there_is_said_once(here: FakeDevices) -> None:
     bus = Bus(interface="socketcan", channel="can9")
-    assert device_findings("crane", bus, here.root, here.ask) == []
+    assert device_findings("crane", bus, here.root, here.query) == []
 
 
 @pytest.mark.parametrize(
@@ -90,7 +90,7 @@ def test_the_match_to_paste_is_one_that_holds(
     assert key == "in the deployment file, bus crane: "
     assert Match.model_validate(yaml.safe_load(text)) == match
     pasted = Bus(interface="socketcan", channel=channel, match=match)
-    (again,) = device_findings("crane", pasted, here.root, here.ask)
+    (again,) = device_findings("crane", pasted, here.root, here.query)
     assert again.level is Level.OK
 
 
@@ -141,7 +141,7 @@ def test_a_virtual_bus_gets_no_name(here: FakeDevices) -> None:
     ],
 )
 def test_a_name_that_linux_takes(here: FakeDevices, bus: str, name: str) -> None:
-    found = device_findings(bus, Bus(interface="socketcan", channel="can3"), here.root, here.ask)
+    found = device_findings(bus, Bus(interface="socketcan", channel="can3"), here.root, here.query)
     assert f"  Name={name}\n" in found[0].remedy
     assert len(name) <= 15
 
@@ -150,7 +150,7 @@ def test_the_device_is_looked_at_with_the_interface(
     here: FakeDevices, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(interfaces, "kernel_fault", lambda: None)
-    monkeypatch.setattr(device_findings, "__defaults__", (here.root, here.ask))
+    monkeypatch.setattr(device_findings, "__defaults__", (here.root, here.query))
     buses = {"crane": Bus(interface="socketcan", channel="can3")}
     subjects = [one.subject for one in interfaces.bus_findings(buses, 20)]
     assert subjects == ["can3", "can3 device"]

@@ -59,7 +59,7 @@ def test_a_node_that_boots_is_started_at_once_and_again_until_it_works(rig: Cano
     rig.states["slew"] = OPERATIONAL
     rig.run(40)
     assert not rig.commands
-    assert rig.axis("lift") == ("NEUTRAL_WAIT", "NODE_FAULT")  # never heard of, never started
+    assert rig.axis("lift") == ("NEUTRAL_WAIT", "NODE_FAULT")  # never seen, never started
 
 
 def test_a_stopped_node_is_started_too(rig: CanopenRig) -> None:
@@ -265,7 +265,7 @@ def test_release_of_enable_and_a_valve_fault_count_in_a_stop_for_a_node(rig: Can
 
 @pytest.mark.parametrize("can_id", [0x700 + OURS, 0x000])
 def test_a_second_one_of_us_is_reported(rig: CanopenRig, can_id: int) -> None:
-    """Our heartbeat, and the commands of the master, come from nobody else."""
+    """Our heartbeat, and the commands of the master, come from no other node."""
     rig.ready()
     rig.receive(can_id, b"\x05" if can_id else b"\x80\x00")
     assert rig.last_fault == "SECOND_SENDER"

@@ -29,15 +29,15 @@ def rig() -> CanopenRig:
 
 def words(rig: CanopenRig, ticks: int, axis: str = "slew") -> list[tuple[int, int]]:
     """Control words as they change, with the time since the one before."""
-    found: list[tuple[int, int]] = []
+    changes: list[tuple[int, int]] = []
     changed_ns = rig.now_ns
     for _ in range(ticks):
         word = rig.run()[axis]["ControlWord"]
         at_ns = rig.now_ns - TICK_NS
-        if not found or word != found[-1][0]:
-            found.append((word, at_ns - changed_ns))
+        if not changes or word != changes[-1][0]:
+            changes.append((word, at_ns - changed_ns))
             changed_ns = at_ns
-    return found
+    return changes
 
 
 def test_a_valve_is_brought_to_work_in_four_steps_50_ms_apart(rig: CanopenRig) -> None:
@@ -49,7 +49,7 @@ def test_a_valve_is_brought_to_work_in_four_steps_50_ms_apart(rig: CanopenRig) -
 
 def test_the_first_word_is_init_before_and_at_the_first_tick(rig: CanopenRig) -> None:
     for axis in VALVES:
-        rig.status(axis, INIT)  # told before the controller ever ticks
+        rig.status(axis, INIT)  # sent before the controller ever ticks
     first = rig.controller.neutral_frames()
     assert [f.data for f in first] == [bytes((INIT, 0, 0, 0))] * 3
     assert rig.run()["slew"] == {"ControlWord": INIT, "SetPoint": 0}
@@ -95,18 +95,18 @@ def test_a_fault_in_motion_is_neutral_with_the_next_frame(rig: CanopenRig) -> No
     assert rig.run(Slew=30000, Lift=20000)["slew"]["SetPoint"] == 0
     assert rig.axis() == FAULT
     for _ in range(100):
-        told = rig.run(Slew=30000, Lift=20000)
-        assert told["slew"]["SetPoint"] == 0
-    assert told["lift"]["SetPoint"] > 3000  # no business of the other one
+        commands = rig.run(Slew=30000, Lift=20000)
+        assert commands["slew"]["SetPoint"] == 0
+    assert commands["lift"]["SetPoint"] > 3000  # no business of the other one
     assert rig.axis() == FAULT
 
 
 def test_a_fault_is_reset_by_an_edge_of_the_ready_bit_and_the_operator(rig: CanopenRig) -> None:
     rig.moving()
     rig.valves["slew"].fault()
-    found = words(rig, 60)
-    assert [word for word, _ in found] == [RESET, HOLD, ACTIVE]
-    assert min(passed for _, passed in found[1:]) >= STEP_NS
+    changes = words(rig, 60)
+    assert [word for word, _ in changes] == [RESET, HOLD, ACTIVE]
+    assert min(passed for _, passed in changes[1:]) >= STEP_NS
     assert rig.axis() == FAULT  # the valve works again, the axis waits for the operator
     rig.run(Reset=1)
     rig.run(2)
@@ -117,10 +117,10 @@ def test_a_fault_is_reset_by_an_edge_of_the_ready_bit_and_the_operator(rig: Cano
 def test_a_fault_that_stays_is_reset_twice_a_second_and_no_more(rig: CanopenRig) -> None:
     rig.ready()
     rig.valves["slew"].fault(stuck=True)
-    found = [word for word, _ in words(rig, 100)]
+    changes = [word for word, _ in words(rig, 100)]
     assert rig.axis() == NOT_READY
-    assert found.count(RESET) in (4, 5)  # in two seconds
-    assert set(found) == {ACTIVE, RESET, HOLD} or set(found) == {RESET, HOLD}
+    assert changes.count(RESET) in (4, 5)  # in two seconds
+    assert set(changes) == {ACTIVE, RESET, HOLD} or set(changes) == {RESET, HOLD}
 
 
 def test_a_reset_held_while_the_valve_is_not_ready_is_no_press(rig: CanopenRig) -> None:
@@ -139,7 +139,7 @@ def test_a_reset_held_while_the_valve_is_not_ready_is_no_press(rig: CanopenRig) 
 def test_a_valve_that_leaves_active_between_two_ticks_is_seen(rig: CanopenRig) -> None:
     rig.moving()
     rig.status("slew", HOLD)
-    assert rig.run(Slew=30000)["slew"]["SetPoint"] == 0  # which tells ACTIVE again, after HOLD
+    assert rig.run(Slew=30000)["slew"]["SetPoint"] == 0  # which commands ACTIVE again, after HOLD
     assert rig.axis() == FAULT
 
 
@@ -219,12 +219,12 @@ def test_whatever_valve_and_joystick_say_float_is_never_sent(
                 rig.status("slew", state)
             if node is not None:
                 rig.heartbeat("slew", node)
-            told = rig.run(Slew=joystick)["slew"]
-            assert -0x4000 <= told["SetPoint"] <= 0x4000
-            if told["SetPoint"]:
-                assert told["ControlWord"] == ACTIVE
+            command = rig.run(Slew=joystick)["slew"]
+            assert -0x4000 <= command["SetPoint"] <= 0x4000
+            if command["SetPoint"]:
+                assert command["ControlWord"] == ACTIVE
             if state not in (None, ACTIVE) or node not in (None, OPERATIONAL):
-                assert told["SetPoint"] == 0
+                assert command["SetPoint"] == 0
 
 
 def test_a_status_word_that_does_not_count_stops_and_does_not_start() -> None:

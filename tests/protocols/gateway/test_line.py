@@ -217,7 +217,7 @@ def test_ids_that_no_one_knows_are_no_fault_in_the_line(rig: GatewayRig) -> None
 
 
 def test_the_last_frame_is_neutral_where_the_one_before_was_not(rig: GatewayRig) -> None:
-    assert rig.controller.neutral_frames() == []  # no joystick was heard yet
+    assert rig.controller.neutral_frames() == []  # no joystick was received yet
     rig.moving()
     (frame,) = rig.controller.neutral_frames()
     assert (rig.decoded(frame)["Slew"], rig.decoded(frame)["Enable"]) == (0, 0)
@@ -243,8 +243,8 @@ PROTECTED = (
 
 
 def crc(data: bytes) -> int:
-    found: int = Crc8SaeJ1850.calc(data[:6] + data[7:])
-    return found
+    checksum: int = Crc8SaeJ1850.calc(data[:6] + data[7:])
+    return checksum
 
 
 def test_the_checksum_is_made_again(tmp_path: Path) -> None:

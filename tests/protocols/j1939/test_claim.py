@@ -57,12 +57,12 @@ def test_the_name_is_made_of_its_fields() -> None:
     )
     number = int.from_bytes(name_bytes(name), "little")
     widths = (21, 11, 3, 5, 8, 1, 7, 4, 3, 1)
-    found, at = [], 0
+    fields, at = [], 0
     for width in widths:
-        found.append(number >> at & (1 << width) - 1)
+        fields.append(number >> at & (1 << width) - 1)
         at += width
     assert at == 64
-    assert found == [0x1ABCDE & 0x1FFFFF, 0x5A5, 5, 19, 129, 0, 0x55, 9, 2, 0]
+    assert fields == [0x1ABCDE & 0x1FFFFF, 0x5A5, 5, 19, 129, 0, 0x55, 9, 2, 0]
 
 
 def test_a_higher_name_is_answered_by_our_claim_and_changes_nothing(rig: Rig) -> None:
@@ -88,7 +88,7 @@ def test_a_lower_name_and_our_own_take_the_address_and_all_is_silent(
     assert ids(later) == [NO_CLAIM]
     assert later[0].data == rig.name.to_bytes(8, "little")
     assert rig.controller.neutral_frames() == []
-    assert rig.controller.neutral  # so that a reload, which claims anew, is not waited for
+    assert rig.controller.neutral  # so that a reload, which claims again, is not waited for
 
 
 def test_a_claim_is_lost_while_it_is_waited_for(rig: Rig) -> None:
@@ -117,9 +117,7 @@ def test_claims_for_other_addresses_and_cannot_claim_are_none_of_ours(rig: Rig) 
 
 
 @pytest.mark.parametrize("to", [0xFF, OWN])
-def test_our_address_is_sent_to_who_asks_also_while_waiting_and_when_lost(
-    rig: Rig, to: int
-) -> None:
+def test_our_address_is_sent_on_request_also_while_waiting_and_when_lost(rig: Rig, to: int) -> None:
     rig.tick()
     assert ids(rig.tick(request(CLAIMED, to=to))) == [CLAIM]
     rig.claimed()
@@ -131,7 +129,7 @@ def test_our_address_is_sent_to_who_asks_also_while_waiting_and_when_lost(
     assert rig.tick(request(CLAIMED, to=0x44)) == []
 
 
-def test_who_asks_again_and_again_does_not_put_the_answer_off(rig: Rig) -> None:
+def test_repeated_requests_do_not_put_the_answer_off(rig: Rig) -> None:
     rig.claimed().tick(rig.claim(-1))
     rig.run(20)
     answers = [f for _ in range(50) for f in rig.tick(*[request(CLAIMED)] * 5)]
@@ -158,7 +156,7 @@ def test_a_storm_of_claims_is_answered_once_a_tick_at_most(rig: Rig) -> None:
         assert flow(sent) > 20.0
 
 
-def test_unknown_groups_are_refused_only_when_we_are_asked_by_name(rig: Rig) -> None:
+def test_unknown_groups_are_refused_only_when_requested_of_us_alone(rig: Rig) -> None:
     rig.claimed()
     assert NACK not in ids(rig.tick(request(0xFEE5)))
     assert NACK not in ids(rig.tick(request(0xFEE5, to=0x44)))
@@ -182,8 +180,8 @@ def test_no_refusal_under_an_address_that_is_lost_in_the_same_tick(rig: Rig) -> 
 def test_malformed_claims_and_requests_are_passed_over(rig: Rig) -> None:
     rig.moving()
     short = Frame("crane", CLAIM, True, bytes(7))
-    asked = Frame("crane", 0x18EAFF21, True, b"\x00\xee")
-    sent = rig.tick(short, asked, Frame("crane", 0x18EAFF21, True, b""))
+    requested = Frame("crane", 0x18EAFF21, True, b"\x00\xee")
+    sent = rig.tick(short, requested, Frame("crane", 0x18EAFF21, True, b""))
     assert CLAIM not in ids(sent)
     assert flow(sent) > 50.0
 

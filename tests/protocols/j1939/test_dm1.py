@@ -14,20 +14,20 @@ from tests.rigs.j1939 import BROADCAST, DM1, OWN, PACKET, Rig, bjm, ids, request
 MS = 1_000_000
 SECOND_NS = 1_000_000_000
 FIRST = 520192
-# What the operator does, and what leaves us without an address to tell it from.
+# What the operator does, and what leaves us without an address to report it from.
 NO_FAULTS = {"ENABLE_LOST", "EMERGENCY_STOP", "ADDRESS_NOT_CLAIMED", "ADDRESS_LOST"}
 
 
 def codes(data: bytes) -> list[tuple[int, int, int]]:
     """(SPN, FMI, count) by the layout of SAE J1939-73, version 4, read bit by bit."""
-    found = []
+    active = []
     for at in range(2, len(data) - 3, 4):
         number = int.from_bytes(data[at : at + 4], "little")
         spn = number & 0xFFFF | (number >> 21 & 7) << 16
         assert number >> 31 == 0  # the conversion method of version 4
         if number:
-            found.append((spn, number >> 16 & 31, number >> 24 & 127))
-    return found
+            active.append((spn, number >> 16 & 31, number >> 24 & 127))
+    return active
 
 
 class Bus:
@@ -36,7 +36,7 @@ class Bus:
     def __init__(self) -> None:
         self.faults = ActiveFaults("crane", OWN)
         self.now_ns = 0
-        self.heard: list[tuple[int, bytes]] = []
+        self.received: list[tuple[int, bytes]] = []
         self._size = self._count = 0
         self._parts: list[bytes] = []
         self._last_ns = 0
@@ -50,7 +50,7 @@ class Bus:
     def _take(self, can_id: int, data: bytes) -> None:
         assert len(data) == 8
         if can_id == DM1:
-            self.heard.append((self.now_ns, data))
+            self.received.append((self.now_ns, data))
         elif can_id == BROADCAST:
             assert not self._parts
             assert (data[0], data[4], data[5:]) == (32, 0xFF, b"\xca\xfe\x00")
@@ -65,7 +65,7 @@ class Bus:
             if len(self._parts) == self._count:
                 whole = b"".join(self._parts)
                 assert set(whole[self._size :]) <= {0xFF}
-                self.heard.append((self.now_ns, whole[: self._size]))
+                self.received.append((self.now_ns, whole[: self._size]))
                 self._parts = []
 
 
@@ -76,20 +76,20 @@ def bus() -> Bus:
 
 def test_no_fault_is_reported_every_second(bus: Bus) -> None:
     bus.run([], 151)
-    assert [t for t, _ in bus.heard] == [0, SECOND_NS, 2 * SECOND_NS, 3 * SECOND_NS]
-    assert {data for _, data in bus.heard} == {bytes((0, 0xFF, 0, 0, 0, 0, 0xFF, 0xFF))}
+    assert [t for t, _ in bus.received] == [0, SECOND_NS, 2 * SECOND_NS, 3 * SECOND_NS]
+    assert {data for _, data in bus.received} == {bytes((0, 0xFF, 0, 0, 0, 0, 0xFF, 0xFF))}
 
 
 def test_one_fault_is_reported_at_once_with_the_lamp_and_its_end_too(bus: Bus) -> None:
     bus.run([], 20)
     bus.run([(FIRST, 9)])
-    when, data = bus.heard[-1]
+    when, data = bus.received[-1]
     assert when == 400 * MS
     assert data == bytes((0x04, 0xFF, 0x00, 0xF0, 0xE9, 0x01, 0xFF, 0xFF))
     bus.run([(FIRST, 9)], 19)
     bus.run([])
-    assert bus.heard[-1][0] == 800 * MS
-    assert codes(bus.heard[-1][1]) == []
+    assert bus.received[-1][0] == 800 * MS
+    assert codes(bus.received[-1][1]) == []
 
 
 def test_a_fault_that_comes_and_goes_does_not_fill_the_bus_and_is_counted(bus: Bus) -> None:
@@ -97,16 +97,16 @@ def test_a_fault_that_comes_and_goes_does_not_fill_the_bus_and_is_counted(bus: B
         bus.run([(FIRST, 9)])
         bus.run([])
     bus.run([(FIRST, 9)], 60)
-    times = [t for t, _ in bus.heard]
+    times = [t for t, _ in bus.received]
     assert min(b - a for a, b in pairwise(times)) >= 200 * MS
-    assert codes(bus.heard[-1][1]) == [(FIRST, 9, 126)]
+    assert codes(bus.received[-1][1]) == [(FIRST, 9, 126)]
 
 
 @pytest.mark.parametrize("count", [2, 3, 5, 64])
 def test_more_than_one_fault_is_a_broadcast(bus: Bus, count: int) -> None:
     active = [(FIRST + i, i % 32) for i in range(count)]
     bus.run(active, 200)
-    assert codes(bus.heard[0][1]) == [(spn, fmi, 1) for spn, fmi in active]
+    assert codes(bus.received[0][1]) == [(spn, fmi, 1) for spn, fmi in active]
 
 
 def test_a_broadcast_that_was_interrupted_is_not_gone_on_with(bus: Bus) -> None:
@@ -116,10 +116,10 @@ def test_a_broadcast_that_was_interrupted_is_not_gone_on_with(bus: Bus) -> None:
     assert ids(list(bus.faults.frames(active, 400 * MS))) == [BROADCAST]
 
 
-def test_who_asks_gets_it_at_once(bus: Bus) -> None:
+def test_a_request_is_answered_at_once(bus: Bus) -> None:
     bus.run([], 10)
     bus.run([], requested=True)
-    assert bus.heard[-1][0] == 200 * MS
+    assert bus.received[-1][0] == 200 * MS
 
 
 @given(
@@ -149,9 +149,9 @@ def test_the_machine_reports_which_axes_cannot_move_and_why() -> None:
     frames = sent + [f for _ in range(30) for f in rig.tick(bjm("BJM1"))]
     data = b"".join(f.data[1:] for f in frames if f.can_id == PACKET)
     (head,) = [f for f in frames if f.can_id == BROADCAST]
-    found = codes(data[: head.data[1]])
-    # lift is the third axis: joystick lost; its valve and those of the other two are not heard of
-    assert found == [(FIRST + 1, 9, 1), (FIRST + 3, 9, 1), (FIRST + 4, 9, 1), (FIRST + 5, 9, 1)]
+    active = codes(data[: head.data[1]])
+    # lift is the third axis: joystick lost; its valve and those of the other two were not received
+    assert active == [(FIRST + 1, 9, 1), (FIRST + 3, 9, 1), (FIRST + 4, 9, 1), (FIRST + 5, 9, 1)]
 
 
 def test_a_broadcast_begins_again_after_the_address_was_not_ours() -> None:
@@ -169,5 +169,5 @@ def test_a_request_for_dm1_is_answered_also_when_it_came_while_waiting() -> None
     rig.tick(request(0xFECA))
     rig.claimed()
     rig.run(100)
-    asked = rig.tick(bjm("BJM1"), bjm("BJM2"), request(0xFECA))
-    assert {DM1, BROADCAST} & set(ids(asked))
+    answers = rig.tick(bjm("BJM1"), bjm("BJM2"), request(0xFECA))
+    assert {DM1, BROADCAST} & set(ids(answers))

@@ -80,7 +80,7 @@ def test_a_change_of_joysticks_always_stops_however_the_ticks_fall(rig: Rig, gap
 
 @pytest.mark.parametrize("source", [OWN, 0xFE])
 def test_a_second_joystick_without_an_address_of_its_own(rig: Rig, source: int) -> None:
-    """Ours is nobody else's, and FE is that of a node without one: what a DBC has for any."""
+    """Ours is no other node's, and FE is that of a node without one: what a DBC has for any."""
     rig.moving()
     sent = rig.tick(bjm("BJM1", X=100.0), bjm("BJM2"), bjm("BJM1", source, X=-100.0))
     assert rig.fault == "SECOND_SENDER"
@@ -143,7 +143,7 @@ def test_commands_to_valves_that_are_not_ours_are_other_traffic(rig: Rig) -> Non
     assert rig.fault == "FEEDBACK_LOST"
 
 
-def test_valves_at_a_destination_are_contested_at_that_one_only(tmp_path: Path) -> None:
+def test_valves_at_a_destination_conflict_at_that_one_only(tmp_path: Path) -> None:
     """PGN 50176, the general purpose valve command, says which valve it is for."""
     dbc = (ROOT / "dbc" / "j1939-bjm-avc.dbc").read_text(encoding="cp1252")
     addressed = 0x8CC480FE  # to 0x80
@@ -174,8 +174,8 @@ def test_a_joystick_with_a_destination_is_known_whatever_its_priority(
         for _ in range(30):
             rig.tick(Frame("crane", can_id, True, data), bjm("BJM2"))
         assert rig.state() is state
-    taken = rig.deployment.routing.buses["crane"].received
-    assert (can_id, True) in taken  # or the kernel would keep it from us
+    received = rig.deployment.routing.buses["crane"].received
+    assert (can_id, True) in received  # or the kernel would keep it from us
 
 
 def test_other_traffic_of_29_bits_is_no_fault_and_of_11_bits_it_is(rig: Rig) -> None:
@@ -200,7 +200,7 @@ def test_a_bus_that_is_only_listened_to_needs_no_address(tmp_path: Path) -> None
     assert rig.controller.counters.values["UnknownId"] == 0
 
 
-def test_the_joystick_that_counts_is_taken_from_after_an_outage_too(rig: Rig) -> None:
+def test_the_selected_joystick_is_received_after_an_outage_too(rig: Rig) -> None:
     rig.moving()
     for _ in range(200):
         rig.tick(bjm("BJM2"))
