@@ -223,7 +223,7 @@ def test_frames_that_were_not_sent_are_not_sent_again(
 # -- files that are not as they were written ---------------------------------------------------
 
 
-def test_one_bit_that_is_not_the_same_is_found_with_its_time(box: Path, tmp_path: Path) -> None:
+def test_one_bit_that_is_not_the_same_is_reported_with_its_time(box: Path, tmp_path: Path) -> None:
     path = inside(box, tmp_path)
     data = bytearray(path.read_bytes())
     at = data.index(b"\n", len(MAGIC)) + 1

@@ -45,8 +45,8 @@ def kept(name: str, seed: int) -> list[tuple[bytes, bytes]]:
 def test_what_is_played_is_the_same(name: str, tmp_path: Path) -> None:
     seen: Counter[str] = Counter()
     for seed in range(COUNT):
-        for found in kept(name, seed):
-            deployment, box = unpacked(found, tmp_path)
+        for kept_box in kept(name, seed):
+            deployment, box = unpacked(kept_box, tmp_path)
             box.segments = [  # at every third the state is the one that was kept
                 one._replace(follows=one.follows and i % 3 > 0)
                 for i, one in enumerate(box.segments)
@@ -109,8 +109,8 @@ def test_no_function_of_a_state_holds_on_to_another_controller(name: str) -> Non
 def test_a_frame_that_is_too_long_stays_so(tmp_path: Path) -> None:
     """No classical bus has one; an adapter that is broken might, and it is refused in both."""
     lengths: set[int] = set()
-    for found in kept("forwarder-robust", 12):
-        deployment, box = unpacked(found, tmp_path)
+    for kept_box in kept("forwarder-robust", 12):
+        deployment, box = unpacked(kept_box, tmp_path)
         lengths |= {r.length for one in box.segments for r in records(one.records)}
         with patch.object(play, "Controller", Unrefused):
             played = list(play.Player(box, deployment).run(lambda part: None))

@@ -91,8 +91,8 @@ def test_a_frame_is_sealed_as_by_the_reference(
     clear = (word & ~own).to_bytes(8, "little")
     rest = place.others(data) if CHECKSUMS[kind].bits > 4 else clear
     size = (CHECKSUMS[kind].bits + 7) // 8
-    found = int.from_bytes(protected[place.byte : place.byte + size], place.order) >> place.shift
-    assert found & (1 << CHECKSUMS[kind].bits) - 1 == REFERENCE[kind](can_id, rest, 8)
+    value = int.from_bytes(protected[place.byte : place.byte + size], place.order) >> place.shift
+    assert value & (1 << CHECKSUMS[kind].bits) - 1 == REFERENCE[kind](can_id, rest, 8)
     assert place.verify(protected)
 
 
@@ -169,8 +169,8 @@ def packages(monkeypatch: pytest.MonkeyPatch) -> Any:
     monkeypatch.setattr(module, "_SHA256", {})
 
     def declare(**entries: str) -> None:
-        found = [EntryPoint(name, value, module.GROUP) for name, value in entries.items()]
-        monkeypatch.setattr(module, "entry_points", lambda group: found)
+        points = [EntryPoint(name, value, module.GROUP) for name, value in entries.items()]
+        monkeypatch.setattr(module, "entry_points", lambda group: points)
         module._packages.cache_clear()
 
     yield declare

@@ -262,7 +262,7 @@ def test_every_flipped_bit_of_profile_2_is_seen(ids: list[int], data: bytes, cou
 def test_a_frame_for_another_data_id_is_refused(
     mode: str, mine: int, other: int, data: bytes
 ) -> None:
-    """Where the mode tells the IDs apart; of 16 bits in 8 some must coincide (see below)."""
+    """Where the mode distinguishes the IDs; of 16 bits in 8 some must coincide (see below)."""
     if mode == "both":
         other = mine & 0xFF00 | other & 0xFF
     differs = mine != other if mode in ("both", "nibble") else mine & 0xFF != other & 0xFF
@@ -274,7 +274,7 @@ def test_a_frame_for_another_data_id_is_refused(
 
 @pytest.mark.parametrize("mine", range(16))
 def test_the_part_of_the_data_id_that_is_sent_is_compared(mine: int) -> None:
-    """The CRC covers it, so only that tells it from another sender's."""
+    """The CRC covers it, so only that distinguishes it from another sender's."""
     for other in range(16):
         frame = Profile1(other << 8 | 0x42, "nibble").protect(bytes(8), 3)
         assert Profile1(mine << 8 | 0x42, "nibble").verify(frame) is (mine == other)
@@ -314,7 +314,7 @@ def test_the_profiles_do_not_take_each_other() -> None:
 
 
 @pytest.mark.parametrize(
-    ("check", "counts", "found"),
+    ("check", "counts", "expected"),
     [
         (Profile1(1, "both"), [12, 13, 14, 0, 1], [GOOD] * 5),
         (Profile1(1, "both"), [13, 1, 4, 8], [GOOD, GOOD, GOOD, JUMP]),
@@ -326,11 +326,11 @@ def test_the_profiles_do_not_take_each_other() -> None:
     ],
 )
 def test_the_counter_is_that_of_the_header(
-    check: E2e, counts: list[int], found: list[FrameFault]
+    check: E2e, counts: list[int], expected: list[FrameFault]
 ) -> None:
-    """Whatever else is told as the counter."""
+    """With any other value as the counter."""
     checker = made(check)
-    assert [checker.check(check.protect(bytes(8), c), 99) for c in counts] == found
+    assert [checker.check(check.protect(bytes(8), c), 99) for c in counts] == expected
 
 
 def test_qualification_counts_good_headers() -> None:

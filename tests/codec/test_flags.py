@@ -98,9 +98,9 @@ def read(flags: tuple[int, int, int], position: float, message: str = "BJM1") ->
     ],
 )
 def test_position_and_flags(flags: tuple[int, int, int], raw: int, command: float | Reason) -> None:
-    found = read(flags, raw)
-    assert type(found) is type(command)
-    assert found == pytest.approx(command)
+    result = read(flags, raw)
+    assert type(result) is type(command)
+    assert result == pytest.approx(command)
 
 
 def test_only_one_direction_alone_moves_and_only_its_way() -> None:

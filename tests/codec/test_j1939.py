@@ -1,4 +1,4 @@
-"""Identifiers of J1939, and what a deployment may ask of them."""
+"""Identifiers of J1939, and what a deployment may say of them."""
 
 import errno
 import re
@@ -208,7 +208,7 @@ def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
     assert machine.load().emergency_stop is not None
 
 
-# -- our claims on the socket that hears others' ---------------------------------------------------
+# -- our claims on the socket that receives others' -----------------------------------------------
 
 
 CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
@@ -236,13 +236,13 @@ def come(line: Line, frame: Frame) -> None:
     line.put(message(frame.can_id, frame.data, extended=True))
 
 
-def test_our_own_claim_seen_back_is_taken_in_and_that_of_a_twin_is_not(line: Line) -> None:
+def test_our_own_claim_seen_back_is_accepted_and_that_of_a_twin_is_not(line: Line) -> None:
     for _ in range(5):
         assert line.port.send(CLAIM)
         come(line, CLAIM)
-        assert line.heard() == []
+        assert line.received() == []
     come(line, CLAIM)  # six, and we have sent five: a node that was set up alike
-    assert line.heard() == [CLAIM]
+    assert line.received() == [CLAIM]
     assert line.faults == []
 
 
@@ -251,7 +251,7 @@ def test_the_claim_of_another_name_is_handed_out(line: Line) -> None:
     other = CLAIM._replace(data=bytes(8))
     come(line, other)
     come(line, CLAIM)
-    assert line.heard() == [other]
+    assert line.received() == [other]
 
 
 def test_a_blocked_bus_is_up_again_when_a_claim_got_through(line: Line) -> None:
@@ -260,10 +260,10 @@ def test_a_blocked_bus_is_up_again_when_a_claim_got_through(line: Line) -> None:
     assert line.port.state is BusState.NOT_CONFIRMED
     line.now_ns += 600_000_000
     assert line.port.send(CLAIM)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.NOT_CONFIRMED
     come(line, CLAIM)
-    assert line.heard() == []
+    assert line.received() == []
     assert line.port.state is BusState.UP
 
 
@@ -273,7 +273,7 @@ def test_claims_emptied_from_the_queue_do_not_hide_a_twin(line: Line) -> None:
     assert not line.port.send(CLAIM)
     line.near[1].fail = None
     come(line, CLAIM)
-    assert line.heard() == [CLAIM]
+    assert line.received() == [CLAIM]
 
 
 def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:

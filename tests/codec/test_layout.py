@@ -24,15 +24,15 @@ Bits = list[tuple[int, int]]  # (byte, bit)
 
 def walk(order: str, free: set[tuple[int, int]], at: tuple[int, int]) -> Bits:
     """The free bits that a signal from this start can have, as DBC files number them."""
-    found = []
+    bits = []
     byte, bit = at
     while (byte, bit) in free:
-        found.append((byte, bit))
+        bits.append((byte, bit))
         if order == "little_endian":
             byte, bit = (byte, bit + 1) if bit < 7 else (byte + 1, 0)
         else:
             byte, bit = (byte, bit - 1) if bit > 0 else (byte + 1, 7)
-    return found
+    return bits
 
 
 @st.composite
@@ -83,7 +83,7 @@ def judge_decode(message: Message, data: bytes) -> Any:
     return message.decode(data, decode_choices=False, scaling=False)
 
 
-def told(values: dict[str, Any]) -> dict[str, str]:
+def shown(values: dict[str, Any]) -> dict[str, str]:
     """Values with their kind: 1 is not 1.0, and a NaN is one."""
     return {name: repr(value) for name, value in values.items()}
 
@@ -91,7 +91,7 @@ def told(values: dict[str, Any]) -> dict[str, str]:
 @given(message=messages(), data=st.binary(min_size=8, max_size=8))
 def test_every_frame_decodes_as_by_cantools(message: Message, data: bytes) -> None:
     data = data[: message.length]
-    assert told(Layout(message).decode(data)) == told(judge_decode(message, data))
+    assert shown(Layout(message).decode(data)) == shown(judge_decode(message, data))
 
 
 @given(message=messages(), data=st.data())
@@ -99,7 +99,7 @@ def test_every_set_of_values_encodes_as_by_cantools(message: Message, data: st.D
     raw = raw_values(data, message)
     frame = Layout(message).encode(raw)
     assert frame == judge_encode(message, raw)
-    assert told(Layout(message).decode(frame)) == told(raw)
+    assert shown(Layout(message).decode(frame)) == shown(raw)
 
 
 @given(message=messages(), data=st.data())

@@ -46,7 +46,7 @@ def test_a_frame_whose_checksum_is_wrong_is_not_qualified(kind: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("bits", "max_step", "counts", "found"),
+    ("bits", "max_step", "counts", "expected"),
     [
         (8, 1, [7, 8, 9, 10], [GOOD] * 4),
         (8, 3, [7, 10, 11, 13], [GOOD] * 4),  # some were lost
@@ -66,12 +66,12 @@ def test_a_frame_whose_checksum_is_wrong_is_not_qualified(kind: str) -> None:
     ],
 )
 def test_steps_of_the_counter(
-    bits: int, max_step: int, counts: list[int], found: list[FrameFault]
+    bits: int, max_step: int, counts: list[int], expected: list[FrameFault]
 ) -> None:
-    assert faults(made(bits, max_step), *counts) == found
+    assert faults(made(bits, max_step), *counts) == expected
 
 
-def test_without_a_counter_every_frame_is_news() -> None:
+def test_without_a_counter_every_frame_is_new() -> None:
     checker = made(bits=0)
     assert faults(checker, 0, 0, 0) == [GOOD] * 3
     assert checker.qualified
@@ -83,7 +83,7 @@ def test_two_senders_with_counters_of_their_own_are_never_trusted() -> None:
     assert faults(checker, *counts) == [GOOD] + [JUMP] * 99
 
 
-def test_a_frozen_counter_is_no_news_however_often_its_sender_was_silent() -> None:
+def test_a_frozen_counter_is_never_new_however_often_its_sender_was_silent() -> None:
     checker = made()
     faults(checker, 7)
     for _ in range(5):
@@ -99,7 +99,7 @@ def test_after_silence_any_counter_but_the_last_begins_again_once() -> None:
         checker.resync()
         first, second = faults(checker, restart, (restart + 50) % 256)
         assert first is (REPEATED if restart == 100 else GOOD)
-        # what was repeated has not begun anew yet
+        # what was repeated has not begun again yet
         assert second is (GOOD if restart == 100 else JUMP)
 
 
@@ -225,8 +225,8 @@ def test_a_sequence_goes_on_where_its_protection_is_the_same(after: Protection, 
     assert before.check(b"\0\0", 5) is FrameFault.NONE
     checker.copy_state(before)
     assert checker.qualified is not good
-    found = checker.check(b"\0\0", 5)
-    assert found is (FrameFault.NONE if good else FrameFault.COUNTER_REPEATED)
+    fault = checker.check(b"\0\0", 5)
+    assert fault is (FrameFault.NONE if good else FrameFault.COUNTER_REPEATED)
 
 
 def test_a_jump_from_one_deployment_to_the_next_is_one() -> None:
@@ -236,7 +236,7 @@ def test_a_jump_from_one_deployment_to_the_next_is_one() -> None:
     assert checker.check(b"\0\0", 9) is FrameFault.COUNTER_JUMP
 
 
-def test_frames_in_a_row_count_on_up_to_the_number_that_is_asked_for_now() -> None:
+def test_frames_in_a_row_count_on_up_to_the_number_that_is_required_now() -> None:
     before = SequenceChecker(SAME, 3, 2)
     for count in (1, 2):
         before.check(b"\0\0", count)
@@ -271,7 +271,7 @@ def test_a_counter_that_we_send_goes_on_where_it_is_the_same(
 
 
 class Encoded:
-    """A layout that nobody looks at."""
+    """A layout that no one looks at."""
 
     def encode(self, _raw: dict[str, Any]) -> bytes:
         return b""

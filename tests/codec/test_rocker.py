@@ -106,7 +106,7 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
 
 
 @pytest.mark.parametrize(
-    ("new", "told"),
+    ("new", "expected"),
     [
         (
             "signal: RotateLeft, negative: RotateLeft",
@@ -126,8 +126,8 @@ def problems(folder: Path, *changes: tuple[str, str]) -> str:
          "positive: C }", "expected one of flags and negative, got both"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_reported(tmp_path: Path, new: str, told: str) -> None:
-    assert told in problems(tmp_path, ("signal: RotateLeft, negative: RotateRight", new))
+def test_what_cannot_be_is_reported(tmp_path: Path, new: str, expected: str) -> None:
+    assert expected in problems(tmp_path, ("signal: RotateLeft, negative: RotateRight", new))
 
 
 def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:

@@ -170,8 +170,8 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
     ],
 )
 def test_what_does_not_fit_is_reported(machine: Machine, valve: str, says: str) -> None:
-    found = with_valves(machine, ("Slew", f"message: AVC0, timeout_ms: 200, {valve}")).problems()
-    assert any(says in problem for problem in found), found
+    problems = with_valves(machine, ("Slew", f"message: AVC0, timeout_ms: 200, {valve}")).problems()
+    assert any(says in problem for problem in problems), problems
 
 
 def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Machine) -> None:
@@ -180,8 +180,8 @@ def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Ma
     )
     text = DBC.replace("0|8@1+ (0.4,0)", "0|8@1+ (0.1,0)")
     (machine.directory / "valves.dbc").write_text(text, encoding="cp1252")
-    (found,) = broken.problems()
-    assert found == (
+    (problem,) = broken.problems()
+    assert problem == (
         "valves.dbc:5: AVC0: PortFlow cannot reach its range [0|100] with 8 bits at 0.1 per bit"
     )
 
@@ -265,5 +265,5 @@ def test_no_signal_serves_two(machine: Machine, old: str, new: str, says: str) -
         says = "alive_counter: expected the same as the other axes of Block, got another"
     else:
         machine.in_yaml(old, new)
-    found = machine.problems()
-    assert any(says in problem for problem in found), found
+    problems = machine.problems()
+    assert any(says in problem for problem in problems), problems

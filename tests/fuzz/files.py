@@ -20,14 +20,14 @@ _BREAK = re.compile("\r\n|[\n\r\x85\u2028\u2029]")
 
 
 class Files:
-    """A deployment file and a DBC file in a directory, written anew for every try."""
+    """A deployment file and a DBC file in a directory, written again for every try."""
 
     def __init__(self, directory: Path) -> None:
         self.yaml = directory / "machine.yaml"
         self.dbc = directory / "machine.dbc"
 
     def load(self, yaml: bytes, dbc: bytes) -> Deployment | None:
-        """Load and, where that goes well, run; None where there are problems, well told.
+        """Load and, where that goes well, run; None where there are problems, well reported.
 
         Raises:
             Exception: anything but a ``ConfigError`` with proper problems is a fault.
@@ -61,7 +61,7 @@ class Files:
 
 
 def runs(deployment: Deployment) -> None:
-    """A deployment that was found good has to work: ticks, all its inputs, its last frames."""
+    """A deployment that was accepted has to work: ticks, all its inputs, its last frames."""
     controller = Controller(deployment)
     now_ns = 0
     tick_ns = deployment.config.tick_ms * 1_000_000

@@ -91,9 +91,9 @@ class Bytes:
         return self._at < len(self._data)
 
     def take(self, count: int = 1) -> bytes:
-        found = self._data[self._at : self._at + count]
+        data = self._data[self._at : self._at + count]
         self._at += count
-        return found + bytes(count - len(found))
+        return data + bytes(count - len(data))
 
     def number(self, count: int = 1) -> int:
         return int.from_bytes(self.take(count), "little")

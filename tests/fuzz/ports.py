@@ -49,18 +49,18 @@ def _step(line: Line, source: Bytes) -> None:
         assert line.port.send((VALVE, OTHER, STATUS)[number % 3]) in (True, False)
         line.sent()
     else:
-        _hear(line)
+        _receive(line)
 
 
 def _put(line: Line, number: int, data: bytes) -> None:
     try:
         line.far[number % len(line.far)].send(data)
     except OSError:  # the queue is full, or the port has closed its end
-        _hear(line)
+        _receive(line)
 
 
-def _hear(line: Line) -> None:
-    for frame in line.heard():
+def _receive(line: Line) -> None:
+    for frame in line.received():
         _check(frame)
 
 

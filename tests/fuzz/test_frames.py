@@ -1,4 +1,4 @@
-"""Whatever comes from the buses, whenever: no exception, and no move that no operator asked for.
+"""Whatever comes from the buses, whenever: no exception, and no move that no operator commanded.
 
 The judge is that of the random drives with faults; here the frames are anything at all.
 """
@@ -9,12 +9,12 @@ from hypothesis import strategies as st
 from tests.faults.variants import NAMES
 from tests.fuzz import frames
 
-# Kinds of steps that the first byte of each tells apart (``frames.run``).
+# Kinds of steps that the first byte of each distinguishes (``frames.run``).
 TICK, JOYSTICK, HEALTHY, MISSED, LATE, NOT_SENT, OURS, ANY = 0, 80, 110, 170, 180, 190, 200, 225
 
 
 def step(kind: int, *parts: st.SearchStrategy[bytes]) -> st.SearchStrategy[bytes]:
-    return st.tuples(*parts).map(lambda found: bytes([kind]) + b"".join(found))
+    return st.tuples(*parts).map(lambda drawn: bytes([kind]) + b"".join(drawn))
 
 
 def some(count: int) -> st.SearchStrategy[bytes]:

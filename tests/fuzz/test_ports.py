@@ -9,8 +9,8 @@ from canshaper.codec.frame import BusState
 from tests.bus.raw_line import MARK_AT, SENT_BACK
 from tests.fuzz import ports
 
-# Kinds of steps that the first byte of each tells apart (``ports.run``).
-ANY, FRAME, TIME, FAIL, SEND, HEAR = 0, 80, 150, 171, 190, 220
+# Kinds of steps that the first byte of each distinguishes (``ports.run``).
+ANY, FRAME, TIME, FAIL, SEND, RECEIVE = 0, 80, 150, 171, 190, 220
 # linux/can/error.h: bus-off, restarted, state of the controller, no acknowledgement
 WORDS = st.sampled_from([0x20000040, 0x20000100, 0x20000004, 0x20000020, 0x200, 0x80000200])
 
@@ -33,7 +33,7 @@ steps = st.one_of(
     step(FAIL),
     step(FAIL + 1),
     step(SEND),
-    step(HEAR),
+    step(RECEIVE),
 )
 machines = st.sampled_from([b"\0", b"\1"])
 
@@ -43,11 +43,11 @@ def put(kind: int, number: int, data: bytes = b"") -> bytes:
 
 
 def error(word: int, controller: int) -> bytes:
-    """An error frame to the socket that hears them."""
+    """An error frame to the socket that receives them."""
     return put(FRAME, 1, struct.pack("<I", word) + bytes([0, controller]) + bytes(6))
 
 
-GONE = put(FAIL, 0) + put(HEAR, 0)
+GONE = put(FAIL, 0) + put(RECEIVE, 0)
 # One of our own frames comes back, and not whole.
 CUT_SHORT = put(ANY + 15, SENT_BACK, bytes(MARK_AT) + b"\1" + bytes(9))
 
@@ -55,8 +55,8 @@ CUT_SHORT = put(ANY + 15, SENT_BACK, bytes(MARK_AT) + b"\1" + bytes(9))
 @settings(max_examples=300)
 @given(name=machines, script=st.lists(steps, max_size=60))
 @example(name=b"\0", script=[])
-@example(name=b"\1", script=[CUT_SHORT, put(HEAR, 0)])
-def test_any_bytes_from_the_sockets_are_taken(name: bytes, script: list[bytes]) -> None:
+@example(name=b"\1", script=[CUT_SHORT, put(RECEIVE, 0)])
+def test_any_bytes_from_the_sockets_are_accepted(name: bytes, script: list[bytes]) -> None:
     for state in ports.run(name + b"".join(script)):
         event(state.value)
 
@@ -64,8 +64,8 @@ def test_any_bytes_from_the_sockets_are_taken(name: bytes, script: list[bytes]) 
 def test_the_bytes_can_make_every_state() -> None:
     confirmed = b"\1" + put(SEND, 0) * 3
     scripts = {
-        BusState.PASSIVE: b"\1" + error(0x20000004, 0x10) + put(HEAR, 0),
-        BusState.BUS_OFF: b"\1" + error(0x20000040, 0) + put(HEAR, 0),
+        BusState.PASSIVE: b"\1" + error(0x20000004, 0x10) + put(RECEIVE, 0),
+        BusState.BUS_OFF: b"\1" + error(0x20000040, 0) + put(RECEIVE, 0),
         BusState.NOT_CONFIRMED: confirmed + (put(TIME, 0, b"\xff\xff\xff\x01") + put(SEND, 0)) * 2,
         BusState.DOWN: b"\1" + put(FAIL, 3) + put(SEND, 0),
         BusState.GONE: b"\1" + GONE,

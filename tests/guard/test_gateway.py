@@ -22,7 +22,7 @@ def test_each_axis_of_a_frame_is_looked_at(axis: str) -> None:
     assert why == f"axis={axis} limit=asked speed=0.300 allowed=0.200"
 
 
-def test_flags_tell_the_direction_there_too(tmp_path: Path) -> None:
+def test_flags_give_the_direction_there_too(tmp_path: Path) -> None:
     flags = variants.VARIANTS["flags"]
     yaml = [(old, new) for old, new in flags.yaml.items() if old.startswith("signal:")]
     rig = GatewayRig(tmp_path, tuple(yaml), tuple(flags.dbc.items()))

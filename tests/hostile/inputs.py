@@ -1,4 +1,4 @@
-"""Files that nobody means well with, each with the command that reads it."""
+"""Files that are meant to harm, each with the command that reads it."""
 
 import gzip
 import json
@@ -51,7 +51,7 @@ def filled(head: str, row: str) -> Make:
 
 
 def pipe(folder: Path) -> list[str]:
-    """A pipe that nobody writes to."""
+    """A pipe that no one writes to."""
     os.mkfifo(folder / "machine.yaml")
     return ["check", str(folder / "machine.yaml")]
 

@@ -25,7 +25,7 @@ def stop(changed_rig: Callable[..., Any]) -> tuple[EmergencyStopInput, Machine]:
 def test_a_press_out_of_sequence_holds_until_a_free_frame_in_sequence(
     stop: tuple[EmergencyStopInput, Machine],
 ) -> None:
-    """An axis asks once a tick; what it was told once it is told until somebody frees the stop."""
+    """An axis asks once a tick; what was reported once is reported until the stop is freed."""
     entry, sender = stop
     assert entry.receive(sender.stop(0).data, 0) is FrameFault.NONE
     assert entry.stop(0, 0) is None

@@ -1,4 +1,4 @@
-"""Does a valve do what it is told? Its feedback against the commands."""
+"""Does a valve do what it is sent? Its feedback against the commands."""
 
 import pytest
 
@@ -16,7 +16,7 @@ def rig() -> Rig:
 
 
 def run(rig: Rig, ticks: int, left: float, opening: float | None, **options: int) -> list[str]:
-    """Slew commanded, and a valve that stands so far open; what was told of it."""
+    """Slew commanded, and a valve that stands so far open; what was reported of it."""
     rig.events.clear()
     for i in range(ticks):
         reported = [] if opening is None or i % 5 else [avef(0, opening, **options)]
@@ -40,7 +40,7 @@ def test_a_valve_that_stands_open_without_a_command(rig: Rig, opening: float) ->
 def test_a_valve_that_goes_the_other_way_or_not_at_all(rig: Rig) -> None:
     run(rig, 50, 0.0, 0.0)
     assert run(rig, 150, 100.0, 0.0) == [NOT]
-    assert rig.state() is State.ACTIVE  # it is told, and does not stop the axis
+    assert rig.state() is State.ACTIVE  # it is reported, and does not stop the axis
     assert NOT in run(rig, 10, 100.0, -80.0) or run(rig, 50, 100.0, -80.0) == []
 
 

@@ -149,7 +149,7 @@ def test_so_many_good_frames_are_needed_after_a_wrong_one(changed_rig: Make, qua
 
 @pytest.mark.parametrize("silent", [True, False])
 def test_silence_is_not_distrust(rig: Rig, silent: bool) -> None:
-    """The reason tells whom to ask: nothing comes, or what comes is wrong."""
+    """The reason says where to look: nothing comes, or what comes is wrong."""
     rig.run(5)
     frozen = rig.joystick()
     for _ in range(FRESH_TICKS + 2):

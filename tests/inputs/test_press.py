@@ -1,4 +1,4 @@
-"""What is no press of reset or enable: nobody touched a switch, and a trip must stay."""
+"""What is no press of reset or enable: no one touched a switch, and a trip must stay."""
 
 from collections.abc import Callable
 
@@ -38,7 +38,7 @@ def test_a_reset_that_was_pressed_in_silence(rig: Rig) -> None:
 
 
 def test_an_enable_that_was_off_in_one_frame_out_of_sequence(rig: Rig) -> None:
-    """A glitch, or somebody else with the joystick's id."""
+    """A glitch, or another sender with the joystick's id."""
     tripped(rig)
     count = rig.counts["JoystickLeft"]
     rig.counts["JoystickLeft"] = (count + 100) % 256
@@ -77,7 +77,7 @@ def test_an_enable_that_was_off_out_of_sequence_and_on_again_in_one_tick(rig: Ri
 def test_an_enable_that_was_off_in_a_frame_after_which_the_counter_goes_on_in_its_tick(
     rig: Rig,
 ) -> None:
-    """Frames of a sender that starts anew: the first is out of sequence, the next ones are not."""
+    """Frames of a sender that starts again: the first is out of sequence, the next ones are not."""
     tripped(rig)
     rig.counts["JoystickLeft"] = (rig.counts["JoystickLeft"] + 100) % 256
     rig.receive(rig.joystick("JoystickLeft", Enable=0))

@@ -47,7 +47,7 @@ def test_a_radius_has_scale_and_offset_and_the_ends_of_its_range(
 
 
 @pytest.mark.parametrize("raw", [5000, 5001, 29501, 65535])
-def test_a_code_or_a_value_out_of_range_is_no_radius_and_no_news(
+def test_a_code_or_a_value_out_of_range_is_no_radius_and_not_new(
     changed_rig: Make, raw: int
 ) -> None:
     radius, message = bound(changed_rig)

@@ -77,7 +77,7 @@ def test_a_radius_for_another_data_id_is_none(tip: Tip) -> None:
     assert tip.known_m is None
 
 
-def test_a_repeated_radius_is_no_news_and_gets_old(tip: Tip) -> None:
+def test_a_repeated_radius_is_not_new_and_gets_old(tip: Tip) -> None:
     tip.send(4000)
     for _ in range(5):
         tip.now_ns += TICK_NS
@@ -87,7 +87,7 @@ def test_a_repeated_radius_is_no_news_and_gets_old(tip: Tip) -> None:
     assert tip.known_m is None
 
 
-def test_a_radius_after_a_jump_is_not_taken_the_next_is(tip: Tip) -> None:
+def test_a_radius_after_a_jump_is_not_accepted_the_next_is(tip: Tip) -> None:
     tip.send(4000)
     assert tip.send(5000, step=3) is FrameFault.NONE
     assert tip.send(6000, step=4) is FrameFault.COUNTER_JUMP

@@ -67,7 +67,7 @@ def test_with_a_broken_joystick_and_the_enable_released_a_trip_is_still_reported
 
 
 def test_it_stays_released_while_the_frames_after_it_cannot_be_trusted(rig: Rig) -> None:
-    """A counter that stands still says nothing new, and least of all that somebody enabled."""
+    """A counter that stands still says nothing new, and least of all that someone enabled."""
     rig.run(5)
     rig.receive(rig.joystick(Enable=0), rig.joystick("JoystickRight"))
     rig.tick()

@@ -12,7 +12,7 @@ LARGEST = sys.float_info.max
 
 
 @pytest.mark.parametrize(
-    ("low", "high", "found"),
+    ("low", "high", "expected"),
     [
         (-100.0, 100.0, (-100.0002, 100.0002)),  # decimals are rounded
         (0.0, 50.0, (-0.00005, 50.00005)),
@@ -24,8 +24,8 @@ LARGEST = sys.float_info.max
     ],
 )
 def test_the_range_of_the_dbc_where_it_says_one_and_never_infinity(
-    low: float | None, high: float | None, found: tuple[float, float]
+    low: float | None, high: float | None, expected: tuple[float, float]
 ) -> None:
     conversion = BaseConversion.factory(1, 0)
     signal = Signal("Flow", 0, 16, conversion=conversion, minimum=low, maximum=high)
-    assert measurable(signal) == pytest.approx(found, rel=1e-12)
+    assert measurable(signal) == pytest.approx(expected, rel=1e-12)

@@ -62,19 +62,19 @@ def test_objects_of_blf_of_every_kind_and_cut_at_containers(tmp_path: Path) -> N
             blf_object(73, bytes(32), last),
         )
     )
-    wanted = [TimedFrame(ns, "2", 0x123, True, b"abc") for ns in (70_000, 70_001, 70_002)] + [
+    expected = [TimedFrame(ns, "2", 0x123, True, b"abc") for ns in (70_000, 70_001, 70_002)] + [
         TimedFrame(70_003, "2", 0x124, False, b"abcdefghijkl"),
         TimedFrame(70_003, "2", 0x125, True, b"abcdefghijkl"),
         TimedFrame(70_003, "2", 0x126, False, b"abcd" + bytes(8)),
     ]
     for cut in range(len(objects)):
         file = LogFile(blf_file(tmp_path / "b.blf", start, objects[:cut], objects[cut:]))
-        assert [f._replace(time_ns=f.time_ns % 10**6) for f in file] == wanted, cut
+        assert [f._replace(time_ns=f.time_ns % 10**6) for f in file] == expected, cut
         assert file.left_out == {"remote": 2, "error": 1}
     with can.BLFReader(tmp_path / "b.blf") as reader:  # which knows no third version either
         theirs = [m for m in reader if not m.is_remote_frame and not m.is_error_frame]
     assert [(m.arbitration_id, m.is_extended_id, bytes(m.data)) for m in theirs] == [
-        frame[2:] for frame in wanted
+        frame[2:] for frame in expected
     ]
 
 

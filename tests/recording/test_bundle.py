@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.fixture
 def machine(tmp_path: Path) -> Path:
-    """A deployment in a tree of its own, its DBC file beside the folder of the file."""
+    """A deployment in a tree of its own, its DBC file next to the folder of the file."""
     (tmp_path / "here" / "config").mkdir(parents=True)
     (tmp_path / "here" / "dbc").mkdir()
     shutil.copy(ROOT / "dbc" / "forwarder.dbc", tmp_path / "here" / "dbc")
@@ -80,7 +80,7 @@ def test_without_status_the_history_is_empty(machine: Path) -> None:
     assert history_lines(History(load_deployment(machine))) == []
 
 
-def test_what_is_no_bundle_is_told(tmp_path: Path) -> None:
+def test_what_is_no_bundle_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "x.zip"
     path.write_bytes(b"PK no zip")
     with pytest.raises(LogError, match=r"x.zip: not a bundle: .*, got BadZipFile"):
@@ -103,7 +103,7 @@ def damaged(bundle: Path, signature: bytes, at: int, value: bytes) -> Path:
 
 
 @pytest.mark.parametrize(
-    ("damage", "found"),
+    ("damage", "got"),
     [
         ((b"PK\x01\x02", 8, b"\x01"), "RuntimeError .* is encrypted"),
         ((b"PK\x01\x02", 10, b"\x63"), "NotImplementedError"),
@@ -111,15 +111,15 @@ def damaged(bundle: Path, signature: bytes, at: int, value: bytes) -> Path:
     ],
     ids=["encrypted", "compressed in an unknown way", "damaged"],
 )
-def test_a_member_that_cannot_be_read_is_told(
-    machine: Path, tmp_path: Path, damage: tuple[bytes, int, bytes], found: str
+def test_a_member_that_cannot_be_read_is_reported(
+    machine: Path, tmp_path: Path, damage: tuple[bytes, int, bytes], got: str
 ) -> None:
     bundle = damaged(packed(machine, tmp_path), *damage)
-    with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: .*, got {found}"):
+    with pytest.raises(LogError, match=f"bundle.zip: history.txt: not a bundle: .*, got {got}"):
         unpack(bundle, tmp_path / "there")
 
 
-def test_a_bundle_damaged_anywhere_is_told(machine: Path, tmp_path: Path) -> None:
+def test_a_bundle_damaged_anywhere_is_reported(machine: Path, tmp_path: Path) -> None:
     bundle = packed(machine, tmp_path)
     content, dice = bundle.read_bytes(), random.Random(1)
     for _ in range(300):
@@ -138,7 +138,7 @@ def test_a_bundle_damaged_anywhere_is_told(machine: Path, tmp_path: Path) -> Non
         shutil.rmtree(tmp_path / "there", ignore_errors=True)
 
 
-def test_a_bundle_without_its_log_is_told(tmp_path: Path) -> None:
+def test_a_bundle_without_its_log_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "x.zip"
     with zipfile.ZipFile(path, "w") as bundle:
         bundle.writestr("about.json", json.dumps({"log": "a.log", "deployment": "a.yaml"}))

@@ -41,7 +41,7 @@ def test_what_the_command_line_says_goes_first(one: Deployment, two: Deployment)
     assert bus_of_channel(two, {"1", "2"}, {"crane": "2", "joy": "1"}) == {"2": "crane", "1": "joy"}
 
 
-def test_a_bus_without_a_channel_is_told_with_what_there_is(
+def test_a_bus_without_a_channel_is_reported_with_what_there_is(
     one: Deployment, two: Deployment
 ) -> None:
     with pytest.raises(
@@ -67,7 +67,7 @@ def test_what_a_frame_is_to_the_daemon(one: Deployment) -> None:
         0x300: Kind.SENT,  # a status
         0x310: Kind.SENT,
         0x400: Kind.IGNORED,  # known to the DBC file, and nothing to the daemon
-        0x123: Kind.OTHER,  # unknown: read when the valves have been told
+        0x123: Kind.OTHER,  # unknown: read when the valves have their frames
     }
     assert {i: sorter.kind(("crane", i, False)) for i in kinds} == kinds
     assert sorter.kind(("crane", 0x110, True)) is Kind.OTHER

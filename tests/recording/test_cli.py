@@ -90,7 +90,7 @@ def test_part_of_a_drive(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_a_log_that_cannot_be_used_is_told(tmp_path: Path, rows: str, text: str) -> None:
+def test_a_log_that_cannot_be_used_is_reported(tmp_path: Path, rows: str, text: str) -> None:
     log = tmp_path / "x.log"
     log.write_text(rows)
     arguments = [log, "--config", "forwarder.yaml", "--out", tmp_path / "out"]

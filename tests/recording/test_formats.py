@@ -75,11 +75,13 @@ TRC = {
 def test_every_version_of_trc(tmp_path: Path, version: str) -> None:
     file = LogFile(kept(tmp_path, "drive.trc", TRC[version]))
     begin_ns = round(-25_569 * DAY_NS + 2.5 * DAY_NS)
-    wanted = [frame._replace(time_ns=frame.time_ns + begin_ns) for frame in FRAMES]
+    expected = [frame._replace(time_ns=frame.time_ns + begin_ns) for frame in FRAMES]
     if version == "1.0":  # whole milliseconds, from the start of the log
-        wanted = [f._replace(time_ns=f.time_ns // 10**6 * 10**6) for f in FRAMES]
-    wanted += [wanted[1]._replace(time_ns=wanted[1].time_ns + 10**6)] * (version == "2.0")  # FB
-    assert list(file) == wanted
+        expected = [f._replace(time_ns=f.time_ns // 10**6 * 10**6) for f in FRAMES]
+    expected += [expected[1]._replace(time_ns=expected[1].time_ns + 10**6)] * (
+        version == "2.0"
+    )  # FB
+    assert list(file) == expected
     assert file.left_out["remote"] == 1
     assert file.left_out["error"] == (version == "1.1")
 

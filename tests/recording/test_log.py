@@ -1,4 +1,4 @@
-"""Every format gives the same frames; what is wrong with a log is told with its place."""
+"""Every format gives the same frames; what is wrong with a log is reported with its place."""
 
 import gzip
 import tracemalloc
@@ -45,9 +45,9 @@ def prefix(path: Path) -> tuple[list[TimedFrame], LogError | None]:
 
 
 def error_of(path: Path) -> str:
-    found = prefix(path)[1]
-    assert found is not None
-    return str(found)
+    error = prefix(path)[1]
+    assert error is not None
+    return str(error)
 
 
 # -- formats -----------------------------------------------------------------------------------
@@ -61,14 +61,14 @@ def test_every_format_gives_the_frames_that_were_written(
     tmp_path: Path, suffix: str, first: int
 ) -> None:
     path = written(tmp_path / f"drive.{suffix}", messages(FRAMES, first))
-    wanted = FRAMES
+    expected = FRAMES
     if suffix == "log":
-        wanted = [f._replace(channel=f"can{f.channel}") for f in FRAMES]
+        expected = [f._replace(channel=f"can{f.channel}") for f in FRAMES]
     if suffix in ("csv", "db"):
-        wanted = [f._replace(channel="") for f in FRAMES]
+        expected = [f._replace(channel="") for f in FRAMES]
     if suffix in ("asc", "blf"):  # python-can's begin with their first frame
-        wanted = [f._replace(time_ns=f.time_ns - FRAMES[0].time_ns) for f in FRAMES]
-    assert list(read_log(path)) == wanted
+        expected = [f._replace(time_ns=f.time_ns - FRAMES[0].time_ns) for f in FRAMES]
+    assert list(read_log(path)) == expected
 
 
 @pytest.mark.parametrize("suffix", ["log", "asc", "blf", "csv"])
@@ -191,12 +191,12 @@ def test_a_text_cut_off_anywhere_gives_whole_frames_and_says_so(
     cut = tmp_path / f"cut.{suffix}"
     for size in range(1, len(content)):
         cut.write_bytes(content[:size])
-        found, error = prefix(cut)
-        assert found == frames[: len(found)]
+        before, error = prefix(cut)
+        assert before == frames[: len(before)]
         if content[size - 1] != ord("\n"):
             assert isinstance(error, CutOffError), content[:size]
             assert f"{cut}:" in str(error)
-        elif found:
+        elif before:
             assert error is None
 
 
@@ -212,8 +212,8 @@ def test_a_blf_cut_off_anywhere_gives_whole_frames_and_says_so(tmp_path: Path) -
     ends = 0
     for size in range(144, len(content)):
         cut.write_bytes(content[:size])
-        found, error = prefix(cut)
-        assert found == frames[: len(found)]
+        before, error = prefix(cut)
+        assert before == frames[: len(before)]
         ends += not isinstance(error, CutOffError)
     # Only just behind one of its parts is it whole; a byte of padding may still follow that.
     assert ends <= 4 * len(content) // 100
@@ -223,9 +223,9 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
     path = tmp_path / "a.log.gz"
     content = gzip.compress("".join(LINES * 1).encode())
     path.write_bytes(content[:-4])
-    found, error = prefix(path)
+    before, error = prefix(path)
     assert isinstance(error, CutOffError)
-    assert len(found) == len(FRAMES)
+    assert len(before) == len(FRAMES)
     path.write_bytes(content[:20] + b"\x00\xff\x00" + content[23:])
     assert "damaged" in error_of(path) or "expected" in error_of(path)
 
@@ -315,7 +315,7 @@ def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
         ),
     ],
 )
-def test_what_is_no_log_is_told_with_its_place(
+def test_what_is_no_log_is_reported_with_its_place(
     tmp_path: Path, name: str, content: str, text: str
 ) -> None:
     message = error_of(log(tmp_path, content, name=name))
@@ -373,8 +373,8 @@ def test_a_time_that_no_clock_can_have(
     start = HEADER if name == "a.csv" else "base hex timestamps absolute\n" * (name == "a.asc")
     start += line.format(1) * before
     path = log(tmp_path, start, line.format("9" * digits), line.format(2), name=name)
-    found, error = prefix(path)
-    assert len(found) == before
+    result, error = prefix(path)
+    assert len(result) == before
     assert f"{path}:{len(start.splitlines()) + 1}: expected a" in str(error)
     assert "mixed clocks" not in str(error)
 
@@ -422,7 +422,7 @@ def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: 
     assert f"{path}: {text}" in str(error.value)
 
 
-def test_a_clock_that_was_set_is_told_with_its_place(tmp_path: Path) -> None:
+def test_a_clock_that_was_set_is_reported_with_its_place(tmp_path: Path) -> None:
     back = log(tmp_path, "(100.5) can0 110#\n", "(100.4) can0 110#\n")
     assert error_of(back) == (
         f"{back}:2: expected one clock for the whole log (split it here), got mixed"

@@ -23,7 +23,7 @@ from canshaper.recording.bundle import unpack
 from canshaper.recording.listen import Listener
 from canshaper.recording.record import Recording
 
-# Of this process alone: two runs of the tests on one machine must not hear each other.
+# Of this process alone: two runs of the tests on one machine must not receive each other's frames.
 GROUP = f"239.74.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
 BUS = ("--interface", "udp_multicast", "--channel", GROUP)
 ANSWER_S = 120.0
@@ -50,7 +50,7 @@ def test_what_a_daemon_does_is_recorded(tmp_path: Path) -> None:
 
     def going(so_far: Recording) -> bool:
         assert time.monotonic() < until
-        ready = any("state=READY" in told.text for told in so_far.history.changes)
+        ready = any("state=READY" in change.text for change in so_far.history.changes)
         return not ready or so_far.frames[""] <= 20
 
     with running("run", log=tmp_path / "run"), running("operator", log=tmp_path / "operator"):
@@ -158,34 +158,34 @@ def test_only_zip_and_log(tmp_path: Path) -> None:
     assert "expected .zip or .log, got " in result.output
 
 
-def test_a_listener_hears_everything_and_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_listener_receives_everything_and_sends_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     sent: list[can.Message] = []
     bus_type = can.interfaces.udp_multicast.UdpMulticastBus
     really = bus_type.send
     monkeypatch.setattr(bus_type, "send", lambda self, m, timeout=None: sent.append(m))
     listener = Listener(loader("forwarder.yaml", "udp_multicast", [GROUP])().config.buses.items())
     other = LocalMulticastBus(GROUP)
-    wanted = [
+    messages = [
         can.Message(arbitration_id=0x110, is_extended_id=False, data=b"\x01\x02"),
         can.Message(arbitration_id=0x1ABCDEF0, data=b""),
         can.Message(arbitration_id=0x111, is_extended_id=False, is_remote_frame=True, dlc=0),
     ]
     try:
-        for message in wanted:
+        for message in messages:
             really(other, message)
-        heard = []
-        while len(heard) < len(wanted):
+        received = []
+        while len(received) < len(messages):
             assert select.select([other.fileno()], [], [], ANSWER_S)[0]
-            heard += listener.frames()
+            received += listener.frames()
     finally:
         listener.close()
         other.shutdown()
-    assert [(h.can_id, h.extended, h.data, h.kind) for h in heard] == [
+    assert [(h.can_id, h.extended, h.data, h.kind) for h in received] == [
         (0x110, False, b"\x01\x02", ""),
         (0x1ABCDEF0, True, b"", ""),
         (0x111, False, b"", "remote"),
     ]
-    assert [h.line().split(" ", 1)[1] for h in heard] == [
+    assert [h.line().split(" ", 1)[1] for h in received] == [
         f"{GROUP} 110#0102\n",
         f"{GROUP} 1ABCDEF0#\n",
         f"{GROUP} 111#R\n",

@@ -34,7 +34,7 @@ def written(tmp_path: Path, rows: list[str]) -> Path:
     return path
 
 
-def test_a_log_without_joystick_frames_is_told_with_what_it_has(tmp_path: Path) -> None:
+def test_a_log_without_joystick_frames_is_reported_with_what_it_has(tmp_path: Path) -> None:
     rows = [row.replace(" 110#", " 123#").replace(" 111#", " 123#") for row in drive()]
     replay = replayed(written(tmp_path, rows))
     with pytest.raises(

@@ -28,7 +28,7 @@ def test_what_both_read_is_equal(log: Path, capsys: pytest.CaptureFixture[str]) 
 
 
 @pytest.mark.parametrize("fault", ["lost", "changed", "late", "invented"])
-def test_a_difference_is_found(log: Path, monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
+def test_a_difference_is_reported(log: Path, monkeypatch: pytest.MonkeyPatch, fault: str) -> None:
     def wrong(path: Path) -> tuple[list[samples.Timed], str]:
         rows, refused = samples.theirs(path)
         time_s, (can_id, extended, data) = rows[7]
