@@ -17,7 +17,7 @@ from tests.faults.judge import Violation
 from tests.faults.sequence import Sequence
 from tests.faults.shipped import NAMES
 
-# Sequences after which a line tells how far it is.
+# Sequences after which a line says how far it is.
 PROGRESS = 500
 
 

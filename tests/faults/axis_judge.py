@@ -5,7 +5,7 @@
     STOP     the input was lost or invalid in motion: to zero, within stop_s
     LATCHED  neutral at once, until enable or reset is pressed with the joystick in neutral
 
-Never faster than was asked within the tail, never against the joystick, never quicker than the
+Never faster than was commanded within the tail, never against the joystick, never quicker than the
 valve's rates, all on the grid of the valve's frame.
 """
 
@@ -47,13 +47,13 @@ class AxisJudge:
         self.mode = WAIT
         self.raw = 0
         self.low = self.high = 0.0
-        self.asked = self.was_asked = False
+        self.commanded = self.was_commanded = False
         self.command = 0.0
         self.causes: set[int] = set()  # of neutral at once, since the last frame of the valve
-        self.contested_ns = LONG_AGO
+        self.foreign_ns = LONG_AGO
         self.state = 0
         self.reasons: set[int] = set()  # of a stop or trip that hold now
-        self._asks: deque[tuple[int, float]] = deque()
+        self._commands: deque[tuple[int, float]] = deque()
         self._range = (0.0, 0.0)
         self._end = 0
         self._releases = self._presses = self._resets = self._disagreements = 0
@@ -62,7 +62,7 @@ class AxisJudge:
         self._must_fall = False
         self._pressed_since = False
         self._pressed_again = False  # and released between two frames of the valve
-        self._told: dict[str, Any] = {}
+        self._status: dict[str, Any] = {}
 
     # -- may it move? ---------------------------------------------------------------------------
 
@@ -80,8 +80,9 @@ class AxisJudge:
         alone, released, pressed = self._switches(now_ns)
         causes, self.causes = self.causes, set()
         self._pressed_since = pressed or (self._pressed_since and not causes)
-        in_motion = self.state in MOVING  # as it told last; ``agrees`` holds that against the valve
-        if now_ns - self.contested_ns <= FOREIGN_NS:
+        # As it reported last; ``agrees`` holds that against the valve.
+        in_motion = self.state in MOVING
+        if now_ns - self.foreign_ns <= FOREIGN_NS:
             causes.add(received.SECOND_SENDER)
         if not in_motion:
             causes.discard(received.SEND_FAILED)
@@ -91,14 +92,14 @@ class AxisJudge:
         self.reasons = causes | faults | ({received.LOOP_OVERRUN} if overrun else set())
         if released:
             self.reasons.add(received.ENABLE_LOST)
-        told = self._told.get("State", self.state)
+        reported = self._status.get("State", self.state)
         began = self.mode
 
         if causes & ALWAYS_LATCHED or ((causes or released) and in_motion):
             self._go(LATCHED)
         elif self.mode == LATCHED:
             # A press among frames that say nothing else, or with enable off, may count later.
-            late = self._pressed_since and told == 0 and not faults and not causes
+            late = self._pressed_since and reported == 0 and not faults and not causes
             if (pressed and centred) or (
                 late and abs(joystick.joysticks[axis.name][0]) <= axis.band
             ):
@@ -108,13 +109,13 @@ class AxisJudge:
         elif self.mode == FREE and faults:
             self._go(STOP if in_motion else WAIT)
             self._end = index + axis.stop
-        elif self.mode == STOP and (index >= self._end or told not in MOVING):
+        elif self.mode == STOP and (index >= self._end or reported not in MOVING):
             self._go(WAIT)
-        elif self.mode == FREE and overrun and told in (0, STOPPING):
+        elif self.mode == FREE and overrun and reported in (0, STOPPING):
             # It may stop for late ticks; then it has to wait for neutral like after any stop.
-            self._go(WAIT if told == 0 else STOP)
+            self._go(WAIT if reported == 0 else STOP)
             self._end = index + axis.stop
-        if told == TRIPPED:  # latched is latched, whatever for
+        if reported == TRIPPED:  # latched is latched, whatever for
             self._go(LATCHED)
         self._pressed_again = released and pressed and self.mode == LATCHED
         if self.mode == began == WAIT and centred:
@@ -138,24 +139,24 @@ class AxisJudge:
     def _go(self, mode: int) -> None:
         self.mode = mode
         if mode in (WAIT, LATCHED):
-            self._asks.clear()
+            self._commands.clear()
             self._range = (0.0, 0.0)
-            self.asked = False
+            self.commanded = False
 
     def _settled(self) -> bool:
         return self._steady >= SETTLED.get(self.axis.filter, SETTLED_OTHERS)
 
     def _bounds(self, index: int, command: float, slewing: bool) -> None:
         axis = self.axis
-        before, self.asked = self.asked, False
-        self.was_asked = before
+        before, self.commanded = self.commanded, False
+        self.was_commanded = before
         self.low = self.high = 0.0
         self.command = 0.0
         if self.mode in (WAIT, LATCHED):
             return
         self.command = command if self.mode == FREE else 0.0
-        low, high = self._range = self._asked_within(index - axis.tail, index)
-        self.asked = low < 0.0 or high > 0.0
+        low, high = self._range = self._range_since(index - axis.tail, index)
+        self.commanded = low < 0.0 or high > 0.0
         if axis.allow_faster:
             low, high = -float(low < 0.0), float(high > 0.0)
         if axis.allow_reverse:
@@ -163,25 +164,25 @@ class AxisJudge:
         elif not axis.brake_shaped:
             low = low if self.command <= 0.0 else 0.0
             high = high if self.command >= 0.0 else 0.0
-        added = axis.largest_added and (before or self.asked or slewing) and self.mode == FREE
+        added = axis.largest_added and (before or self.commanded or slewing) and self.mode == FREE
         if added and not self.joystick.bypasses():
-            # Where its operator asked for nothing and holds nothing against it, another one may.
+            # Where its operator commands nothing and holds nothing against it, another one may.
             if not self._range[0] and self.command <= 0.0:
                 low = -axis.largest_added
             if not self._range[1] and self.command >= 0.0:
                 high = axis.largest_added
         self.low, self.high = max(low, -axis.maximum), min(high, axis.maximum)
 
-    def _asked_within(self, first: int, index: int) -> tuple[float, float]:
+    def _range_since(self, first: int, index: int) -> tuple[float, float]:
         """Smallest and largest command since a deadline, zero included, with the one of now."""
-        asks, (low, high), command = self._asks, self._range, self.command
-        asks.append((index, command))
+        recent, (low, high), command = self._commands, self._range, self.command
+        recent.append((index, command))
         gone = False
-        while asks[0][0] < first:
-            old = asks.popleft()[1]
+        while recent[0][0] < first:
+            old = recent.popleft()[1]
             gone = gone or (old != 0.0 and old in (low, high))
         if gone:
-            commands = [c for _, c in asks]
+            commands = [c for _, c in recent]
             return min(0.0, *commands), max(0.0, *commands)
         return min(low, command), max(high, command)
 
@@ -228,7 +229,7 @@ class AxisJudge:
             fallen = -axis.rise * max(0.0, 1.0 - own / axis.fall) - slack
         else:
             fallen = own - axis.fall - slack if own else -axis.rise - slack
-        if most:  # where it went against what is left, that is faster, as far as it was asked for
+        if most:  # where it went against what is left, that is faster, as far as it was commanded
             grown = max(grown, min(high + slack, grown + most))
             fallen = min(fallen, max(low - slack, before - most - axis.rise - slack))
         if not fallen - edge <= now <= grown + edge:
@@ -239,11 +240,11 @@ class AxisJudge:
 
     def read(self, frame: Frame) -> None:
         """Take the status frame of this tick."""
-        self._told = self.axis.status(frame.data)
+        self._status = self.axis.status(frame.data)
 
-    def told(self) -> str:
+    def wrong_status(self) -> str:
         """What is wrong with the status frame of this tick, if there is one."""
-        values, self._told = self._told, {}
+        values, self._status = self._status, {}
         if not values:
             return ""
         before, self.state = self.state, values["State"]
@@ -259,7 +260,7 @@ class AxisJudge:
         return ""
 
     def agrees(self) -> str:
-        """What the state told so far says against the frame sent."""
+        """What the state reported so far says against the frame sent."""
         if self.raw and self.state not in MOVING:
             return f"moves in state {self.state}"
         if self.mode == LATCHED and self.state != TRIPPED:

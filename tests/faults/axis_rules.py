@@ -20,14 +20,14 @@ class AxisRules:
         self.velocity = 0.0
         self.raw = 0
         self.causes: set[str] = set()  # of neutral at once, since it was decided last
-        self.contested_ns = LONG_AGO
+        self.foreign_ns = LONG_AGO
         self.armed = self.latched = False
         self._tick_ns = tick_ns
         self._stop_until_ns: int | None = None
-        self._asks: deque[tuple[int, float, bool]] = deque()
+        self._commands: deque[tuple[int, float, bool]] = deque()
         self._moved = False  # since it was armed
         self._low = self._high = self._command = 0.0
-        self._asks_down = self._asks_up = False
+        self._commanded_down = self._commanded_up = False
         self._why = ""
         self._releases = self._disagreements = 0
         self._presses = self._resets = 0
@@ -59,7 +59,7 @@ class AxisRules:
         elif joystick.disagree(now_ns):
             self.may_stop(now_ns)
         self._disagreements = joystick.disagreements
-        if now_ns - self.contested_ns < FOREIGN_NS - 2 * self._tick_ns:
+        if now_ns - self.foreign_ns < FOREIGN_NS - 2 * self._tick_ns:
             causes.add("another sender")
         presses, resets = joystick.presses[axis.name] + joystick.resets, joystick.resets
         pressed = presses > self._presses or self._pressed_again
@@ -88,7 +88,7 @@ class AxisRules:
             self.armed = True  # a stop that is not at rest goes on, whatever the joystick does
         self._why = ", ".join(sorted(causes))
         usable = healthy and self.armed and not self.latched and abs(deflection) > axis.band
-        self._ask(now_ns, deflection if usable else 0.0)
+        self._follow_command(now_ns, deflection if usable else 0.0)
         if self._stop_until_ns is not None:  # in a stop the joystick does not count
             self._command = 0.0
 
@@ -98,22 +98,23 @@ class AxisRules:
             stop_ns = (self.axis.stop * self.axis.period_ticks + 1) * self._tick_ns
             self._stop_until_ns = now_ns + stop_ns + SLACK_NS
 
-    def _ask(self, now_ns: int, command: float) -> None:
-        axis, asks = self.axis, self._asks
+    def _follow_command(self, now_ns: int, command: float) -> None:
+        axis, recent = self.axis, self._commands
         self._command = command
         # The daemon may not have been ready in the tick in which it was armed here.
         self._moved = self.armed and (self._moved or self.raw != 0)
-        asks.append((now_ns, command, self._moved))
+        recent.append((now_ns, command, self._moved))
         tail_ns = (axis.tail + 2) * axis.period_ticks * self._tick_ns + SLACK_NS
-        # What was asked until the next entry counts up to there.
-        while len(asks) > 1 and asks[1][0] < now_ns - tail_ns:
-            asks.popleft()
-        commands = [c for _, c, _ in asks]
+        # What was commanded until the next entry counts up to there.
+        while len(recent) > 1 and recent[1][0] < now_ns - tail_ns:
+            recent.popleft()
+        commands = [c for _, c, _ in recent]
         self._low, self._high = min(0.0, *commands), max(0.0, *commands)
         # And what it counts for certain: an added part waits until this is nothing.
         certain_ns = tail_ns - 4 * axis.period_ticks * self._tick_ns - 2 * SLACK_NS
-        still = [c for since_ns, c, sure in asks if sure and since_ns >= now_ns - certain_ns]
-        self._asks_down, self._asks_up = min((0.0, *still)) < 0.0, max((0.0, *still)) > 0.0
+        still = [c for since_ns, c, sure in recent if sure and since_ns >= now_ns - certain_ns]
+        self._commanded_down = min((0.0, *still)) < 0.0
+        self._commanded_up = max((0.0, *still)) > 0.0
 
     def silenced(self) -> None:
         """Nothing is sent any more, and the valve closes by itself; from neutral after that."""
@@ -177,10 +178,10 @@ class AxisRules:
         elif not axis.brake_shaped:
             low = low if self._command <= 0.0 else 0.0
             high = high if self._command >= 0.0 else 0.0
-        # Where its operator asked for nothing and holds nothing against it, another one may.
-        if axis.largest_added and not self._asks_down and self._command <= 0.0:
+        # Where its operator commands nothing and holds nothing against it, another one may.
+        if axis.largest_added and not self._commanded_down and self._command <= 0.0:
             low = min(low, -axis.largest_added)
-        if axis.largest_added and not self._asks_up and self._command >= 0.0:
+        if axis.largest_added and not self._commanded_up and self._command >= 0.0:
             high = max(high, axis.largest_added)
         fall = ticks * axis.fall - slack
         low, high = max(low, -axis.maximum), min(high, axis.maximum)

@@ -56,7 +56,7 @@ class BenchPort:
     def _read(self, waiting: deque[tuple[Frame, int]]) -> Iterator[Frame]:
         while waiting:
             frame, arrived_ns = waiting.popleft()
-            self._bench.tell(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
+            self._bench.note(f"  in {frame} of {arrived_ns / 1e6:.2f} ms")
             self._bench.rules.receive(frame, arrived_ns)
             self.arrived_ns = BEGIN_NS + arrived_ns  # by the clock of the daemon
             if (seen := self._bench.incoming(frame)) is not None:
@@ -92,9 +92,9 @@ class Loader:
             raise ConfigError("machine.yaml:1: this is no deployment")
         if self.file not in self._read:
             self._read[self.file] = pickle.dumps(load_deployment(self.file))
-        found = pickle.loads(self._read[self.file])
-        assert isinstance(found, Deployment)
-        return found
+        deployment = pickle.loads(self._read[self.file])
+        assert isinstance(deployment, Deployment)
+        return deployment
 
 
 class Bench:
@@ -150,8 +150,8 @@ class Bench:
         self._hold("asleep")
         return [1], [], []
 
-    def tell(self, text: str) -> None:
-        """A line for whoever looks on."""
+    def note(self, text: str) -> None:
+        """A line of the trace."""
         if self.trace:
             self.trace(f"{self.world.now_ns / 1e6:9.2f} ms {text}")
 
@@ -175,7 +175,7 @@ class Bench:
         if self.fails(frame[:3]):
             self.rules.failed(frame, self.world.now_ns)
             return False
-        self.tell(f"     out {frame} {self.rules.words()}")
+        self.note(f"     out {frame} {self.rules.words()}")
         self.rules.sent(frame, self.world.now_ns)
         self.world.sent(frame)
         self._hold("between two frames")
@@ -192,7 +192,7 @@ class Bench:
         for hold in self.holds:
             if hold[1] == where and hold[0] <= self.world.now_ns:
                 self.holds.remove(hold)
-                self.tell(f"stands still {where} for {hold[2] / 1e6:.1f} ms")
+                self.note(f"stands still {where} for {hold[2] / 1e6:.1f} ms")
                 self.world.advance(hold[2])
                 return
 

@@ -23,8 +23,8 @@ from tests.faults.variants import NAMES, machine
 
 # Most of a drive's ticks lie under faults; the rest is the way back to normal work.
 BODY_TICKS = (50, 110)
-# Within so many ticks an axis moves that is asked to: a filter that still damps the last swing may
-# hold it for a part of a swing of 2.4 s, never against the joystick.
+# Within so many ticks an axis moves that is commanded: a filter that still damps the last swing
+# may hold it for a part of a swing of 2.4 s, never against the joystick.
 MOVES_WITHIN = 75
 # Punctual ticks after which an overrun of the loop is over.
 OVERRUN_TICKS = 55
@@ -118,7 +118,7 @@ class Drive:
                 switches = {n: self._switches(v, last) for n, v in self.machine.joysticks.items()}
                 self._take(joysticks, switches, active)
             if stalled:
-                self._tell("stood still")
+                self._trace("stood still")
                 self.judge.stalled()
                 self.controller.stalled()
             self._step(missed, active)
@@ -134,8 +134,8 @@ class Drive:
         """How the loop does.
 
         Returns:
-            (ticks that pass before the next call, ticks told as missed, whether it stood still for
-            too long).
+            (ticks that pass before the next call, ticks reported as missed, whether it stood still
+            for too long).
         """
         if self._untold:
             missed, self._untold = self._untold, 0
@@ -152,7 +152,7 @@ class Drive:
                 fault.memory["done"] = True
                 missed = fault.rng.randint(1, limit - 1)
                 return 1 + missed, missed, False
-            if fault.kind == "loop: late, told later":
+            if fault.kind == "loop: late, reported later":
                 # A loop that was held up in its sleep learns of it after the next body.
                 fault.memory["done"] = True
                 late = fault.rng.randint(2, limit)
@@ -206,7 +206,7 @@ class Drive:
         """One body of the loop."""
         now_ns = self.now_ns
         for frame in self._waiting:
-            self._tell(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
+            self._trace(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
             self.judge.receive(frame, now_ns)
             self.controller.receive(frame, now_ns)
         self._waiting = []
@@ -236,7 +236,7 @@ class Drive:
         patient = rng.random() < (0.5 if machine.rest_ticks < 70 else 0.05)
         if patient:
             self._healthy(machine.rest_ticks, enable=1)
-        if kinds & {"loop: late once", "loop: late often", "loop: late, told later"}:
+        if kinds & {"loop: late once", "loop: late often", "loop: late, reported later"}:
             self._healthy(OVERRUN_TICKS, enable=1)
         if "others: our valve" in kinds:
             self._healthy(FOREIGN_NS // machine.tick_ns, enable=1)
@@ -283,9 +283,9 @@ class Drive:
             if axis.sent(frames[key].data)[0] != 0:
                 raise Violation(f"{axis.name}: the last frame is not neutral")
 
-    # -- told to a reader -------------------------------------------------------------------------
+    # -- trace for a reader ------------------------------------------------------------------------
 
-    def _tell(self, text: str) -> None:
+    def _trace(self, text: str) -> None:
         if self._trace:
             self._trace(text)
 
@@ -294,7 +294,7 @@ class Drive:
     ) -> None:
         names = ", ".join(f.kind for f in active)
         late = f" missed {missed}" if missed else ""
-        self._tell(f"{self.tick_number:4d} {self.now_ns // 1_000_000:6d} ms{late} {names}")
+        self._trace(f"{self.tick_number:4d} {self.now_ns // 1_000_000:6d} ms{late} {names}")
         for frame in sent:
             lost = " not sent" if frame in failed else ""
-            self._tell(f"  out {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}{lost}")
+            self._trace(f"  out {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}{lost}")

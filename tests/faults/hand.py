@@ -12,7 +12,7 @@ def path(rng: random.Random, ticks: int, full: int, band: int) -> list[int]:
         full: raw value of full deflection.
         band: raw value up to which the joystick counts as neutral.
     """
-    if rng.random() < 0.2:  # nobody touches this one, or it rests a little beside neutral
+    if rng.random() < 0.2:  # no one touches this one, or it rests a little off neutral
         return [rng.choice((0, 0, band, -band))] * ticks
     values: list[int] = []
     # One in ten is deflected before anything else.

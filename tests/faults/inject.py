@@ -31,9 +31,9 @@ def _foreign(fault: Fault) -> list[Frame]:
     rng, machine = fault.rng, fault.machine
     bus, can_id, extended = fault.joystick.key
     data = rng.randbytes(rng.choice([0, 2, 8]))
-    taken = {*machine.inputs, *machine.valves, *machine.statuses, machine.service}
+    used = {*machine.inputs, *machine.valves, *machine.statuses, machine.service}
     if machine.radius:
-        taken.add(machine.radius[0])
+        used.add(machine.radius[0])
     frames = [
         Frame(bus, rng.randrange(1 << 11), False, data),
         Frame(bus, rng.randrange(1 << 29), True, data),
@@ -41,7 +41,7 @@ def _foreign(fault: Fault) -> list[Frame]:
         Frame(next((b for b in machine.buses if b != bus), bus), can_id, extended, data),
         Frame(bus, 0x401, False, data),
     ]
-    return [f for f in rng.sample(frames, 2) if f[:3] not in taken]
+    return [f for f in rng.sample(frames, 2) if f[:3] not in used]
 
 
 def _second_sender(fault: Fault) -> list[Frame]:
@@ -64,7 +64,7 @@ EXTRA: dict[str, Callable[[Fault], list[Frame]]] = {
 LOOP = (
     "loop: late once",
     "loop: late often",
-    "loop: late, told later",
+    "loop: late, reported later",
     "loop: stands still",
     "loop: valve not sent",
     "loop: status not sent",

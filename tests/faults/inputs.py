@@ -62,8 +62,8 @@ class Input:
         if self.checksum is None:
             return data
         at = self.checksum_byte
-        found = self.checksum(data[:at] + data[at + 1 :]) ^ spoiled
-        return data[:at] + bytes([found]) + data[at + 1 :]
+        checksum = self.checksum(data[:at] + data[at + 1 :]) ^ spoiled
+        return data[:at] + bytes([checksum]) + data[at + 1 :]
 
     def whole(self, data: bytes) -> bool:
         """Whether the checksum is right, or there is none."""

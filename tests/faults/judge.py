@@ -85,7 +85,7 @@ class Judge:
         elif key in self._ours:
             fault = ""
             if axis := self._by_valve.get(key):
-                axis.contested_ns = now_ns
+                axis.foreign_ns = now_ns
                 axis.causes.add(received.SECOND_SENDER)  # however old it is when it is read
         else:
             fault = "" if key[1:] in self._others else "UnknownId"
@@ -93,7 +93,7 @@ class Judge:
             self.counts[fault] += 1
 
     def stalled(self) -> None:
-        """The loop tells that it stood still."""
+        """The loop reports that it stood still."""
         self._stood_still = True
         self._before = {n: (h.resets, dict(h.presses)) for n, h in self.joysticks.items()}
         for axis in self.axes.values():
@@ -107,7 +107,7 @@ class Judge:
 
         Args:
             sent: the frames that it gave, in order.
-            failed: those of them that did not go out, which it was told at once.
+            failed: those of them that did not go out, which was reported to it at once.
             now_ns: time of the tick.
             missed: deadlines missed since the last one.
 
@@ -117,7 +117,7 @@ class Judge:
         last, now = self._last, self._last + 1 + missed
         self._last = now
         if self._stood_still:
-            self._forget()
+            self._resync()
         self.counts["MissedDeadlines"] += missed
         self.counts["SendFailures"] += len(failed)
         if missed:
@@ -136,7 +136,8 @@ class Judge:
         for judge in due:
             other = self._other.get(judge.axis.name)
             slewing = other is not None and other.mode in (FREE, STOP)
-            slewing = slewing and (other.asked or other.was_asked)  # it follows with the next tick
+            # It follows with the next tick.
+            slewing = slewing and (other.commanded or other.was_commanded)
             index = now // judge.axis.period_ticks
             judge.decide(now_ns, index, overrun, slewing)
             if wrong := judge.check(valves[judge.axis.valve_key]):
@@ -152,14 +153,14 @@ class Judge:
             if axis := self._by_valve.get(frame[:3]):
                 axis.causes.add(received.SEND_FAILED)
 
-    def _forget(self) -> None:
+    def _resync(self) -> None:
         """Of what waited while the loop stood still only a stop, a release or another sender count.
 
         A press that came back with it does not: it may be over by now.
         """
         self._stood_still = False
         for entry in self._inputs.values():
-            entry.forget()
+            entry.resync()
         for name, joystick in self.joysticks.items():
             joystick.resets, joystick.presses = self._before[name]
 
@@ -187,7 +188,7 @@ class Judge:
     def _status(self, frames: list[Frame]) -> None:
         for axis in self.axes.values():
             before = axis.state
-            if wrong := axis.told():
+            if wrong := axis.wrong_status():
                 raise Violation(f"{axis.axis.name}: {wrong}")
             if before != axis.state and axis.state in (STOPPING, TRIPPED):
                 self.stats["stops" if axis.state == STOPPING else "trips"] += 1
@@ -197,6 +198,6 @@ class Judge:
                 shown: Any = self.machine.service_message.decode(frame.data)
                 for name, most in COUNTERS.items():
                     if shown[name] != min(self.counts[name], most):
-                        raise Violation(f"{name} is told as {shown[name]}: {self.counts[name]}")
+                        raise Violation(f"{name} is reported as {shown[name]}: {self.counts[name]}")
             elif frame[:3] not in self._by_status:
-                raise Violation(f"frame {frame} that nobody asked for")
+                raise Violation(f"frame {frame} that no one asked for")

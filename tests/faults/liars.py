@@ -38,8 +38,8 @@ class Honest:
 
     def joystick(self, frame: Frame) -> Joystick | None:
         """The joystick whose frame this is."""
-        found = self.machine.inputs.get(frame[:3])
-        return found if isinstance(found, Joystick) and len(frame.data) == found.length else None
+        source = self.machine.inputs.get(frame[:3])
+        return source if isinstance(source, Joystick) and len(frame.data) == source.length else None
 
     def steps(self, frame: Frame, change: Any) -> Frame:
         """The frame with its command changed, if it is one of a valve."""
@@ -144,7 +144,7 @@ class OneTickLate(Honest):
 
 
 class LittleTooFast(Honest):
-    """Two steps more than asked, wherever something moves."""
+    """Two steps more than commanded, wherever something moves."""
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
         def more(raw: int, _axis: Any) -> int:
@@ -195,7 +195,7 @@ class FrameLeftOut(Honest):
 
 
 class TripUntold(Honest):
-    """Stops as it should and does not tell that it has tripped."""
+    """Stops as it should and does not report that it has tripped."""
 
     def tick(self, now_ns: int, missed: int = 0) -> list[Frame]:
         return [f for f in super().tick(now_ns, missed) if not self._trip(f)]

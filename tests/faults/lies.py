@@ -15,8 +15,8 @@ JOYSTICKS = "forwarder"
 
 
 def _joystick(machine: Machine, frame: Frame) -> Joystick | None:
-    found = machine.inputs.get(frame[:3])
-    return found if isinstance(found, Joystick) and len(frame.data) == found.length else None
+    source = machine.inputs.get(frame[:3])
+    return source if isinstance(source, Joystick) and len(frame.data) == source.length else None
 
 
 def _incoming(change: Callable[[Machine, Frame], Frame | None]) -> Callable[[Sequence], None]:

@@ -122,13 +122,13 @@ class Machine:
         self, data: dict[str, Any], messages: dict[str, Message]
     ) -> dict[Key, SensorMessage]:
         """Messages of sway sensors; their axes know how they swing."""
-        found: dict[Key, SensorMessage] = {}
+        sensors: dict[Key, SensorMessage] = {}
         for name, axis in self.axes.items():
             if (section := data["axes"][name].get("sway_sensor")) is None:
                 continue
             message = messages[section["message"]]
             key = key_of(section["bus"], message, section.get("source"))
-            sensor = found.setdefault(key, SensorMessage(key, message))
+            sensor = sensors.setdefault(key, SensorMessage(key, message))
             if node := section.get("node"):
                 sensor.node = self.nodes[section["bus"], node].number
             if e2e := section.get("e2e"):
@@ -141,7 +141,7 @@ class Machine:
             axis.period_s = sway.get("period_s") or 2.0 * math.pi * math.sqrt(
                 sway["length_m"] / GRAVITY_M_S2
             )
-        return found
+        return sensors
 
     def _sent(self, bus: str, message: Message) -> Key:
         return key_of(bus, message, self.addresses.get(bus))

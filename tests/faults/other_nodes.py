@@ -18,7 +18,7 @@ class NodeRules:
         self.node = node
         self._state: int | None = None
         self._emergency = False
-        self._heard_ns = LONG_AGO
+        self._received_ns = LONG_AGO
         self._since: set[str] = set()
         self._limit_ns = node.timeout_ns + 3 * tick_ns
 
@@ -27,7 +27,7 @@ class NodeRules:
         if frame.bus != self.node.bus or frame.extended:
             return
         if frame.can_id == 0x700 + self.node.number and len(frame.data) == 1:
-            self._state, self._heard_ns = frame.data[0] & 0x7F, now_ns
+            self._state, self._received_ns = frame.data[0] & 0x7F, now_ns
             if self._state != OPERATIONAL:
                 self._since.add("the node is not operational")
             if self._state == BOOT_UP:
@@ -40,20 +40,20 @@ class NodeRules:
 
     def seen(self, now_ns: int) -> set[str]:
         """What is wrong with it, or was since it was looked at."""
-        found = set(self._since)
+        causes = set(self._since)
         if self._state != OPERATIONAL:
-            found.add("the node is not operational")
+            causes.add("the node is not operational")
         if self._emergency:
-            found.add("the node has an emergency")
-        if now_ns - self._heard_ns > self._limit_ns:
-            found.add("no heartbeat")
-        return found
+            causes.add("the node has an emergency")
+        if now_ns - self._received_ns > self._limit_ns:
+            causes.add("no heartbeat")
+        return causes
 
     causes = seen
 
     def may_be_lost(self, now_ns: int) -> bool:
         """Whether the daemon may already take it for silent."""
-        return now_ns - self._heard_ns > self.node.timeout_ns
+        return now_ns - self._received_ns > self.node.timeout_ns
 
     def looked_at(self) -> None:
         """Every axis knows of it."""
@@ -66,7 +66,7 @@ class WordRules:
     def __init__(self, words: Words, tick_ns: int) -> None:
         self.words = words
         self._state: int | None = None
-        self._heard_ns = LONG_AGO
+        self._received_ns = LONG_AGO
         self._left = False
         self._limit_ns = words.timeout_ns + 2 * tick_ns
 
@@ -74,16 +74,16 @@ class WordRules:
         """A frame was read."""
         if frame[:3] == self.words.key and len(frame.data) == self.words.length:
             word = self.words.status.get(int.from_bytes(frame.data, "little"))
-            self._state, self._heard_ns = word & STATE_BITS, now_ns
+            self._state, self._received_ns = word & STATE_BITS, now_ns
             self._left |= self._state != ACTIVE
 
     def causes(self, now_ns: int) -> set[str]:
         """Why the valve has to be neutral."""
         left, self._left = self._left, False
-        found = {"the valve is not active"} if left or self._state != ACTIVE else set()
-        if now_ns - self._heard_ns > self._limit_ns:
-            found.add("no status word")
-        return found
+        causes = {"the valve is not active"} if left or self._state != ACTIVE else set()
+        if now_ns - self._received_ns > self._limit_ns:
+            causes.add("no status word")
+        return causes
 
 
 class AddressRules:

@@ -34,7 +34,7 @@ class Received:
         source = self.source
         if len(data) != source.length:
             return "WrongLength"
-        if now_ns - self._whole_ns > source.timeout_ns:  # the sender was away, or started anew
+        if now_ns - self._whole_ns > source.timeout_ns:  # the sender was away, or started again
             self._any_step = True
             self._in_a_row = 0
         if not source.whole(data):
@@ -77,7 +77,7 @@ class Received:
         """Whether the last good frame says something."""
         return True
 
-    def forget(self) -> None:
+    def resync(self) -> None:
         """The loop stood still: what was received is too old."""
         self.good_ns = self._whole_ns = LONG_AGO
 
@@ -224,18 +224,18 @@ class ReceivedJoystick(Received):
     def faults(self, axis: Axis, now_ns: int) -> set[int]:
         """Every reason why the joystick of this axis cannot be used now; empty when it can."""
         if not self.fresh(now_ns):
-            found = {JOYSTICK_TIMEOUT}
+            faults = {JOYSTICK_TIMEOUT}
             if now_ns - self.refused_ns <= self.source.timeout_ns:
-                found = {JOYSTICK_UNTRUSTED}
-            return found
+                faults = {JOYSTICK_UNTRUSTED}
+            return faults
         joystick, why = self.joysticks[axis.name]
-        found = {why} if why else set()
+        faults = {why} if why else set()
         if self.enable() not in (0, 1):
-            found.add(SWITCH_INVALID)
+            faults.add(SWITCH_INVALID)
         still_ns = now_ns - self._still_ns[axis.name]
-        if not found and still_ns > self.joystick.frozen_ns and abs(joystick) > axis.band:
-            found.add(JOYSTICK_FROZEN)
-        return found
+        if not faults and still_ns > self.joystick.frozen_ns and abs(joystick) > axis.band:
+            faults.add(JOYSTICK_FROZEN)
+        return faults
 
     def enable(self) -> int:
         """The enable switch in the last good frame."""

@@ -4,11 +4,11 @@ It knows the deployment file, the DBC and every frame that the daemon has read o
 the daemon's states nor what they are called. For every axis, in every frame of its valve:
 
     no motion unless an enabled, valid joystick was seen in neutral since start, fault or trip
-    neutral while enable is off, the valve or its node has a fault, somebody else commands it, or
+    neutral while enable is off, the valve or its node has a fault, another sender commands it, or
     our address is another's; and, where it moved, until a press with the joystick in neutral
     neutral and latched after a standstill of the loop
     neutral within ``stop_s`` after the input is lost or invalid
-    never faster than asked within the tail, never against the joystick, or on the way back
+    never faster than commanded within the tail, never against the joystick, or on the way back
     no jump: never quicker than the valve's rates, but to neutral
     the alive counter goes on by one
 
@@ -69,14 +69,14 @@ class Rules:
     # -- what comes in ----------------------------------------------------------------------------
 
     def commanded(self, frame: Frame) -> list[AxisRules]:
-        """The axes whose valve this frame of somebody else commands."""
+        """The axes whose valve this frame of another sender commands."""
         if frame.bus in self.addresses and frame.extended:
             group = frame.can_id & 0x03FFFF00
             return [
                 one
-                for (bus, can_id, _), found in self._by_valve.items()
+                for (bus, can_id, _), axes in self._by_valve.items()
                 if bus == frame.bus and can_id & 0x03FFFF00 == group
-                for one in found
+                for one in axes
             ]
         return self._by_valve.get(frame[:3], [])
 
@@ -89,7 +89,7 @@ class Rules:
         if entry := self._inputs.get(frame[:3]):
             entry.receive(frame.data, arrived_ns)
         for one in self.commanded(frame):
-            one.contested_ns = arrived_ns
+            one.foreign_ns = arrived_ns
             one.causes.add("another sender")
         for node in self._nodes.values():
             node.receive(frame, arrived_ns)
@@ -148,16 +148,16 @@ class Rules:
         for address in self.addresses.values():
             if wrong := address.sent(frame, now_ns):
                 raise Violation(wrong)
-        found = self._by_valve.get(frame[:3])
-        if not found:
+        axes = self._by_valve.get(frame[:3])
+        if not axes:
             return
         self.frames += 1
         self._last[frame[:3]] = frame, now_ns
         ticks, self._ticks[frame[:3]] = self._ticks[frame[:3]], 0
         old_ns = now_ns - self._ticked_ns
-        if wrong := found[0].count(frame, late=old_ns > self._oldest_ns):
-            raise Violation(f"{found[0].axis.name}: {wrong}")
-        for one in found:
+        if wrong := axes[0].count(frame, late=old_ns > self._oldest_ns):
+            raise Violation(f"{axes[0].axis.name}: {wrong}")
+        for one in axes:
             if wrong := one.check(frame, ticks):
                 raise Violation(f"{one.axis.name}: {wrong}")
             if one.raw and old_ns > self._oldest_ns:

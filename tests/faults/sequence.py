@@ -232,7 +232,7 @@ class Sequence:
         for node in world.nodes.values():
             at_ns = round(end_s * 1e9) + 2 * self.machine.tick_ns
             world.at(at_ns, lambda node=node: node.emergency(0, 0))
-        # Whatever runs on has come to rest, and nobody else has sent our frames for a second.
+        # Whatever runs on has come to rest, and no other node has sent our frames for a second.
         settle_s = max(settle_s, self.machine.rest_ticks * self.machine.tick_ns / 1e9)
         for after_s, healthy in (
             (settle_s, (0, 0, 0.0)),

@@ -80,12 +80,12 @@ def _ranges(machine: Machine) -> dict[str, tuple[float, float]]:
 
     Profiles choose the numbers of an axis that has some.
     """
-    found: dict[str, tuple[float, float]] = {}
+    ranges: dict[str, tuple[float, float]] = {}
     for name, axis in machine.axes.items():
         if load_config(CONFIG / f"{machine.name}.yaml")[0].axes[name].profiles:
             continue
-        found[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
+        ranges[f"axes.{name}.limits.rise_per_s"] = (2.0, 5.0)
         if axis.filter == "gff":
-            found[f"axes.{name}.filter.a1"] = (0.6, 0.8)
-            found[f"axes.{name}.filter.a2"] = (0.08, 0.16)
-    return found
+            ranges[f"axes.{name}.filter.a1"] = (0.6, 0.8)
+            ranges[f"axes.{name}.filter.a2"] = (0.08, 0.16)
+    return ranges

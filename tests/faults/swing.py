@@ -1,4 +1,4 @@
-"""The tool of a machine with sway sensors: it swings as its valves were told, and is disturbed.
+"""The tool of a machine with sway sensors: it swings as its valves are commanded, and is disturbed.
 
 One pendulum an axis, at the file's own length or another one; a model of this folder's own.
 """
@@ -31,13 +31,13 @@ class Swing:
         period_s = axis.period_s * rng.choice((1.0, 1.0, rng.uniform(0.8, 1.25)))
         self._omega = 2.0 * math.pi / period_s
         self._damping = rng.uniform(0.01, 0.08)
-        self._asked = self._speed = 0.0
+        self._commanded = self._speed = 0.0
         self._time_ns = 0
         self.angle, self.rate = rng.choice((0.0, 0.0, rng.uniform(-0.2, 0.2))), 0.0
 
-    def asked(self, data: bytes) -> None:
+    def command(self, data: bytes) -> None:
         """The valve was sent this frame."""
-        self._asked = self.axis.velocity(self.axis.sent(data)[0]) * self.axis.full_speed_m_s
+        self._commanded = self.axis.velocity(self.axis.sent(data)[0]) * self.axis.full_speed_m_s
 
     def advance(self, now_ns: int, active: "Iterable[Fault]") -> None:
         """Swing until now, disturbed by the faults that act on this axis."""
@@ -47,7 +47,7 @@ class Swing:
             self.rate += PUSH_RAD_S
         while self._time_ns < now_ns:
             self._time_ns += round(STEP_S * 1e9)
-            tip_m_s2 = (self._asked - self._speed) / VALVE_LAG_S
+            tip_m_s2 = (self._commanded - self._speed) / VALVE_LAG_S
             self._speed += STEP_S * tip_m_s2
             fall = 2.0 * self._damping * omega * self.rate + omega**2 * math.sin(self.angle)
             self.rate += STEP_S * (omega**2 / GRAVITY_M_S2 * tip_m_s2 - fall)

@@ -76,9 +76,9 @@ def test_bits_are_read_as_cantools_reads_them(name: str) -> None:
     driven, deployment = machine(name)
     for source in driven.inputs.values():
         message = next(
-            found[1]
-            for found in map(deployment.messages.find, _message_names(deployment))
-            if not isinstance(found, str) and found[1].frame_id == source.key[1]
+            entry[1]
+            for entry in map(deployment.messages.find, _message_names(deployment))
+            if not isinstance(entry, str) and entry[1].frame_id == source.key[1]
         )
         for _ in range(50):
             data = rng.randbytes(source.length)

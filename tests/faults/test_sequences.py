@@ -54,16 +54,16 @@ def test_every_fault_is_among_them_often() -> None:
 @pytest.mark.parametrize("lie", LIES)
 def test_the_rules_catch(lie: str) -> None:
     """Each is one thing wrong; in the same sequence without it nothing is."""
-    name, tell = LIES[lie]
-    seed = _caught(name, tell)
+    name, apply = LIES[lie]
+    seed = _caught(name, apply)
     Sequence(name, seed).run()
 
 
-def _caught(name: str, tell: Callable[[Sequence], None]) -> int:
+def _caught(name: str, apply: Callable[[Sequence], None]) -> int:
     """The first sequence in which it is seen."""
     for seed in range(MOST):
         sequence = Sequence(name, seed)
-        tell(sequence)
+        apply(sequence)
         try:
             sequence.run()
         except Violation:

@@ -196,7 +196,7 @@ class World:
             self.put(Frame(*sensor.key, data))
 
     def _others(self) -> None:
-        """What somebody else sends in each tick of a fault."""
+        """What another sender sends in each tick of a fault."""
         for fault in self.active():
             if extra := inject.EXTRA.get(fault.kind):
                 for frame in extra(fault):
@@ -207,7 +207,7 @@ class World:
     def sent(self, frame: Frame) -> None:
         """A frame of the daemon is on its bus."""
         if swing := self._by_valve.get(frame[:3]):
-            swing.asked(frame.data)
+            swing.command(frame.data)
         status = self.machine.statuses.get(frame[:3])
         if status and status.period_s:
             self.sensed[status.sensor_state(frame.data)] += 1

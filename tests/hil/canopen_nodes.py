@@ -196,7 +196,7 @@ class Drive(Unit):
 
 
 class Valve(Unit):
-    """CiA 408: follows its set point in the state ACTIVE, which it is told to step by step."""
+    """CiA 408: follows its set point in the state ACTIVE, which it is commanded to step by step."""
 
     stuck = False
 
@@ -206,7 +206,7 @@ class Valve(Unit):
         super().boot()
 
     def fault(self, code: int) -> None:
-        """The spool goes to neutral, the ready bit away, and it is told."""
+        """The spool goes to neutral, the ready bit away, and that is reported."""
         self.state, self.spool = FAULT_HOLD, 0
         self.node.emcy.send(code, 0x81)
         self.send()

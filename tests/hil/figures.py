@@ -17,7 +17,7 @@ class Stop(NamedTuple):
     """A stop of the process in motion.
 
     Attributes:
-        stop_ms: how long it was asked to be.
+        stop_ms: how long it was set to be.
         gap_ms: between two frames of the valve, the longest one.
         neutral: the first frame after the gap was.
         latched: so was every later one.
@@ -91,18 +91,18 @@ def write(stops: Sequence[Stop], silences: Sequence[Silence], *, rewrite: bool) 
     Returns:
         0 where all is right.
     """
-    found = table(stops, silences)
-    print(found)
+    text = table(stops, silences)
+    print(text)
     wrong = wrong_stops(stops) + wrong_silences(silences)
     for line in wrong:
         print(line)
     if rewrite and not wrong:
-        PAGE.write_text(in_page(PAGE.read_text("utf-8"), found), "utf-8")
+        PAGE.write_text(in_page(PAGE.read_text("utf-8"), text), "utf-8")
     return 1 if wrong else 0
 
 
-def in_page(page: str, found: str) -> str:
+def in_page(page: str, text: str) -> str:
     """The page with another table."""
     pattern = re.compile(re.escape(BEGIN) + ".*?" + re.escape(END), re.DOTALL)
     assert pattern.search(page), f"no {BEGIN.strip()} in the page"
-    return pattern.sub(lambda _: BEGIN + found + END, page)
+    return pattern.sub(lambda _: BEGIN + text + END, page)

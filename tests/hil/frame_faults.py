@@ -18,7 +18,7 @@ class Fault:
     """A fault of the frames.
 
     Attributes:
-        make: makes it; the frames that tell of it carry the mark of ``begins``.
+        make: makes it; the frames that report it carry the mark of ``begins``.
         begins: whether a logged frame is the first that is not as it should be.
         reason: what the axis must say.
         named: what the service must say, None where no frame is wrong.

@@ -68,7 +68,7 @@ def drive(bus: can.BusABC, joysticks: "Joysticks", faster_than: float = 30.0) ->
     raise AssertionError(f"slew never above {faster_than} %")
 
 
-def wait_for_one(bus: can.BusABC, wanted: dict[str, Accept]) -> tuple[str, dict]:
+def wait_for_one(bus: can.BusABC, expected: dict[str, Accept]) -> tuple[str, dict]:
     """The first message of these names that is accepted: its name and its decoded signals."""
     until = time.monotonic() + ANSWER_S
     last: dict[str, dict] = {}
@@ -78,11 +78,11 @@ def wait_for_one(bus: can.BusABC, wanted: dict[str, Accept]) -> tuple[str, dict]
         except can.CanError:  # once, when the interface goes down
             continue
         name = message_name(message) if message is not None else None
-        if message is not None and name in wanted:
+        if message is not None and name in expected:
             last[name] = dict(DBC.decode_message(name, message.data))
-            if wanted[name](last[name]):
+            if expected[name](last[name]):
                 return name, last[name]
-    raise AssertionError(f"none of {list(wanted)} within {ANSWER_S:g} s; the last were {last}")
+    raise AssertionError(f"none of {list(expected)} within {ANSWER_S:g} s; the last were {last}")
 
 
 class Joysticks(threading.Thread):
@@ -190,10 +190,10 @@ def candump(log: Path, channel: str) -> Iterator[None]:
             process.wait(ANSWER_S)
 
 
-def _greet(bus: can.BusABC, probe: can.Message, log: Path, wanted: int) -> None:
+def _greet(bus: can.BusABC, probe: can.Message, log: Path, expected: int) -> None:
     """Send probes until candump has written so many of them: what came before is in the log."""
     until = time.monotonic() + ANSWER_S
-    while log.read_text(errors="replace").count("7FE#") < wanted:
+    while log.read_text(errors="replace").count("7FE#") < expected:
         assert time.monotonic() < until, "candump writes nothing"
         bus.send(probe)
         time.sleep(0.02)

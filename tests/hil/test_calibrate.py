@@ -35,9 +35,9 @@ def moving(message: can.Message) -> bool:
 
 
 def last_of_each(log: Path) -> list[int]:
-    """The last command that each valve was told."""
-    found = {m.arbitration_id: m.data[0] for m in logged(log) if m.arbitration_id in VALVES}
-    return [found[valve] for valve in sorted(VALVES)]
+    """The last command that each valve was sent."""
+    commands = {m.arbitration_id: m.data[0] for m in logged(log) if m.arbitration_id in VALVES}
+    return [commands[valve] for valve in sorted(VALVES)]
 
 
 def moves(bus: can.BusABC, running: Service) -> bool:
@@ -113,6 +113,6 @@ def test_it_asks_before_anything_moves(file: Path, tmp_path: Path) -> None:
         candump(log, "vcan0"),
         service(tmp_path / "calibrate.log", "calibrate", str(file), *QUICK[:-1]) as running,
     ):
-        assert running.process.wait() == 1  # nobody answers
+        assert running.process.wait() == 1  # no one answers
     assert "will move by itself" in running.text()
     assert not any(m.arbitration_id in VALVES for m in logged(log))

@@ -181,12 +181,12 @@ def test_frames_of_can_fd_pass_a_gateway_in_both_directions(tmp_path: Path) -> N
         ]
         for here, there in ((near, far), (far, near)):
             drain(there)
-            found: list[can.Message] = []
+            received: list[can.Message] = []
             for message in messages:
                 here.send(message)
-            while len(found) < len(messages) and (one := there.recv(ANSWER_S)):
+            while len(received) < len(messages) and (one := there.recv(ANSWER_S)):
                 if one.arbitration_id >= 0x700:
-                    found.append(one)
-            assert [(m.data, m.is_fd, m.bitrate_switch) for m in found] == [
+                    received.append(one)
+            assert [(m.data, m.is_fd, m.bitrate_switch) for m in received] == [
                 (m.data, m.is_fd, m.bitrate_switch) for m in messages
             ]

@@ -119,17 +119,17 @@ def reset(machine: Machine) -> None:
 
 def commands(log: Path, can_id: int = SLEW_COMMAND) -> list[tuple[float, int, int]]:
     """Time, control word and set point of each frame."""
-    found = []
+    points = []
     for message in logged(log):
         if message.arbitration_id == can_id:
             raw = DBC.decode_message(can_id, message.data, decode_choices=False, scaling=False)
-            found.append((message.timestamp, raw["ControlWord"], raw["SetPoint"]))
-    return found
+            points.append((message.timestamp, raw["ControlWord"], raw["SetPoint"]))
+    return points
 
 
-def changes(found: list[tuple[float, int, int]]) -> list[int]:
+def changes(points: list[tuple[float, int, int]]) -> list[int]:
     """The control words in their order."""
-    return [word for word, _ in groupby(word for _, word, _ in found)]
+    return [word for word, _ in groupby(word for _, word, _ in points)]
 
 
 def test_nodes_are_started_and_the_set_point_follows_the_joystick(
@@ -148,11 +148,11 @@ def test_nodes_are_started_and_the_set_point_follows_the_joystick(
         assert daemon.end() == 0
         assert "fault=" not in daemon.text()
     assert machine.valves["slew"].words == [INIT, DISABLED, HOLD, ACTIVE, HOLD]
-    found = commands(log)
-    assert changes(found) == [INIT, DISABLED, HOLD, ACTIVE, HOLD]
-    assert all(-0x4000 <= point <= 0x4000 for _, _, point in found)
-    assert all(point == 0 for _, word, point in found if word != ACTIVE)
-    assert found[-1][1:] == (HOLD, 0)
+    points = commands(log)
+    assert changes(points) == [INIT, DISABLED, HOLD, ACTIVE, HOLD]
+    assert all(-0x4000 <= point <= 0x4000 for _, _, point in points)
+    assert all(point == 0 for _, word, point in points if word != ACTIVE)
+    assert points[-1][1:] == (HOLD, 0)
     messages = logged(log)
     started = {m.data[1] for m in messages if m.arbitration_id == 0}
     assert started == {0x10, 0x11, 0x20, 0x21, 0x22}
@@ -248,11 +248,11 @@ def test_a_lost_heartbeat_in_motion(machine: Machine, daemon: Service, tmp_path:
         daemon.wait_log(r"node=slew state=lost")
         machine.valves["slew"].dead = False
         reset(machine)
-    found = commands(log)
-    last = max(i for i, (_, _, point) in enumerate(found) if point)
-    assert found[last][1] == ACTIVE
-    assert found[last + 1][1:] == (INIT, 0)  # and then from the beginning
-    assert changes(found[last + 1 :]) == [INIT, DISABLED, HOLD, ACTIVE]
+    points = commands(log)
+    last = max(i for i, (_, _, point) in enumerate(points) if point)
+    assert points[last][1] == ACTIVE
+    assert points[last + 1][1:] == (INIT, 0)  # and then from the beginning
+    assert changes(points[last + 1 :]) == [INIT, DISABLED, HOLD, ACTIVE]
 
 
 def test_a_node_that_restarts_in_motion(machine: Machine, daemon: Service, tmp_path: Path) -> None:
@@ -264,7 +264,7 @@ def test_a_node_that_restarts_in_motion(machine: Machine, daemon: Service, tmp_p
         reset(machine)
         machine.joysticks["left"].x = 32767
         until(lambda: machine.valves["slew"].spool > 8000, "the spool follows again")
-    # What it was told since it booted, the frame that was under way left out.
+    # What it was sent since it booted, the frame that was under way left out.
     words = machine.valves["slew"].words
     assert words[-4:] == [INIT, DISABLED, HOLD, ACTIVE]
     boots = [m.timestamp for m in logged(log) if m.arbitration_id == 0x720 and m.data[0] == 0]
@@ -288,7 +288,9 @@ def test_a_second_one_with_our_heartbeat_is_named(machine: Machine, daemon: Serv
     wait_state("READY")
 
     def named() -> bool:
-        machine.network.send_message(0x77E, [5])  # again: the log tells the last fault of a second
+        machine.network.send_message(
+            0x77E, [5]
+        )  # again: the log reports the last fault of a second
         return "fault=SECOND_SENDER" in daemon.text()
 
     until(named, "the second one is named")

@@ -52,7 +52,7 @@ def test_demo_on_vcan0_and_its_candump_log_decodes(tmp_path: Path) -> None:
         seen.add(name)
         if name == "TipVelocity":
             fastest = max(fastest, values["RadialSpeed"])
-    # this crane has no joints to tell of
+    # this crane has no joints to report
     messages = cantools.database.load_file(ROOT / "dbc" / "forwarder.dbc").messages
     assert seen == {m.name for m in messages if not m.name.startswith("Joint")}
     assert fastest == pytest.approx(1.0, abs=0.03)

@@ -1,4 +1,4 @@
-"""A bus is a device: names change hands under the daemon, and the other crane hears nothing.
+"""A bus is a device: names change hands under the daemon, and the other crane receives nothing.
 
 Our crane is a CAN controller with a place on the PCI bus. The other crane is vcan1: what gets the
 name of ours. candump on it is the witness.

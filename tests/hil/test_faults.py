@@ -145,12 +145,12 @@ def test_fault(name: str, bus: can.BusABC, hand: Hand, daemon: Service, tmp_path
 
 
 def mark(bus: can.BusABC) -> None:
-    """Write into the log that the fault has been made, by a message that nobody here listens to."""
+    """Write into the log that the fault has been made, by a message that no one here listens to."""
     bus.send(can.Message(arbitration_id=MARK.frame_id, is_extended_id=False, data=bytes(4)))
 
 
 def moving_after_mark(log: Path, axis: str) -> int:
-    """Valve frames that moved after the mark, which stands where the first frame cannot tell."""
+    """Valve frames that moved after the mark, which stands where the first frame cannot show it."""
     messages = logged(log)
     (at,) = [i for i, m in enumerate(messages) if m.arbitration_id == MARK.frame_id]
     return moving(messages[at:], axis)
@@ -234,7 +234,7 @@ def test_a_second_sender_of_a_valve_trips_it(
 def test_a_flood_of_foreign_frames_changes_nothing(
     bus: can.BusABC, hand: Hand, daemon: Service, tmp_path: Path
 ) -> None:
-    """More than a bus of 250 kbit/s can carry: 2000 frames a second of ids nobody knows."""
+    """More than a bus of 250 kbit/s can carry: 2000 frames a second of ids no one knows."""
     ready(bus, hand, "Slew")
     drive(bus, hand, "Slew")
     with open_bus("vcan1"):

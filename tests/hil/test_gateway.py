@@ -76,17 +76,17 @@ def in_the_line(folder: Path, *changes: tuple[str, str]) -> Iterator[tuple[Servi
 def foreign(count: int, seed: int) -> list[can.Message]:
     """Frames that are not ours, of 11 and of 29 bits, of every length but 0."""
     source = random.Random(seed)
-    found = []
+    rules = []
     for i in range(count):
         extended = source.random() < 0.5
         can_id = source.randrange(0x20000000) if extended else source.randrange(0x7F0)
         if not extended and can_id in OURS:
             can_id += 0x20
         data = bytes((i % 256, seed)) + source.randbytes(source.randrange(7))
-        found.append(
+        rules.append(
             can.Message(arbitration_id=can_id, is_extended_id=extended, data=data[: 1 + i % 8])
         )
-    return found
+    return rules
 
 
 def key(message: can.Message) -> tuple[int, bool, bytes]:
@@ -97,18 +97,18 @@ def exchanged(
     here: can.BusABC, there: can.BusABC, messages: list[can.Message]
 ) -> list[tuple[int, bool, bytes]]:
     """Send these, a few at a time; what of frames that are not ours comes on the other side."""
-    found: list[tuple[int, bool, bytes]] = []
+    keys: list[tuple[int, bool, bytes]] = []
     until = time.monotonic() + ANSWER_S
     for i in range(0, len(messages), BATCH):
         batch = messages[i : i + BATCH]
         for message in batch:
             here.send(message)
-        while not found or found[-1] != key(batch[-1]):
-            assert time.monotonic() < until, f"{len(found)} of {i + len(batch)} came"
+        while not keys or keys[-1] != key(batch[-1]):
+            assert time.monotonic() < until, f"{len(keys)} of {i + len(batch)} came"
             message = there.recv(1.0)
             if message and (message.is_extended_id or message.arbitration_id not in OURS):
-                found.append(key(message))
-    return found
+                keys.append(key(message))
+    return keys
 
 
 @pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
@@ -286,7 +286,7 @@ def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
 
 
 def test_a_fallback_that_is_left_in_place_is_reported_and_moves_nothing(tmp_path: Path) -> None:
-    """Two senders of one message: whoever started the daemon by hand is to see it."""
+    """Two senders of one message: the user who started the daemon by hand is to see it."""
     file = write(tmp_path)
     rules(file, "away")
     with (
@@ -304,7 +304,7 @@ def test_missing_rules_are_reported(tmp_path: Path) -> None:
 
 
 def test_rules_are_set_up_shown_and_removed(tmp_path: Path) -> None:
-    """A rule of somebody else between both interfaces goes, one elsewhere stays."""
+    """A rule of another program between both interfaces goes, one elsewhere stays."""
     file = write(tmp_path)
     elsewhere = ["-s", "vxcan0", "-d", "vxcan1", "-e"]
     subprocess.run(["modprobe", "can-gw"], check=False)
@@ -331,7 +331,7 @@ def test_pass_lets_the_joystick_through_while_the_daemon_is_away(tmp_path: Path)
 
 @pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
 def test_an_interface_that_was_removed(tmp_path: Path, who: tuple[str, str]) -> None:
-    """Back again the daemon passes on; rules of the kernel went with it, which is told."""
+    """Back again the daemon passes on; rules of the kernel went with it, which is reported."""
     with in_the_line(tmp_path, who, STOP) as (daemon, file):
         subprocess.run(["ip", "link", "del", FAR], check=True)
         try:

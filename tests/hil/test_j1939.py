@@ -87,10 +87,10 @@ def is_claim(message: can.Message) -> bool:
 
 def after_the_claim_of(name: int, log: Path) -> list[can.Message]:
     """What came under our address after that node had claimed it."""
-    found = ours(log)
+    messages = ours(log)
     data = name.to_bytes(8, "little")
-    at = next(i for i, m in enumerate(found) if is_claim(m) and m.data == data)
-    return found[at + 1 :]
+    at = next(i for i, m in enumerate(messages) if is_claim(m) and m.data == data)
+    return messages[at + 1 :]
 
 
 def moving(daemon: Service, joysticks: Joysticks) -> None:
@@ -109,8 +109,8 @@ def moving(daemon: Service, joysticks: Joysticks) -> None:
 
 
 def slew_state(daemon: Service) -> str:
-    found = re.findall(r"axis=slew state=(\w+)", daemon.text())
-    return found[-1] if found else "NEUTRAL_WAIT"
+    states = re.findall(r"axis=slew state=(\w+)", daemon.text())
+    return states[-1] if states else "NEUTRAL_WAIT"
 
 
 def wait_for_command(accept: Callable[[bytearray], bool]) -> None:
@@ -160,7 +160,7 @@ def kernel_has_j1939() -> None:
         pytest.skip(f"this kernel has no J1939: {error}")
 
 
-def test_the_kernels_stack_takes_our_commands_our_name_and_our_faults(
+def test_the_kernels_stack_receives_our_commands_our_name_and_our_faults(
     joysticks: Joysticks, daemon: Service
 ) -> None:
     kernel_has_j1939()
@@ -228,7 +228,7 @@ def test_of_twins_with_the_same_name_one_gives_way(
     moving(daemon, joysticks)
     log = tmp_path / "twins.log"
     with candump(log, "vcan0"), service(tmp_path / "twin.log", "run", str(FILE)) as twin:
-        # He who hears the other's claim: the first of us, or the twin when we claim anew.
+        # The one that receives the other's claim: the first of us, or the twin when we claim again.
         wait_until(lambda: "state=lost" in daemon.text() + twin.text())
         assert "Traceback" not in twin.text()
     name = NAME.to_bytes(8, "little")
@@ -252,7 +252,7 @@ def test_j1939acd_with_a_lower_name_holds_the_address_until_it_ends_and_we_reloa
             held = len(daemon.text())
             holder.send_signal(signal.SIGTERM)
             holder.wait(ANSWER_S)
-            # It lets go of its address with a claim by nobody; that gives us nothing back.
+            # It lets go of its address by a claim of the null address; we get nothing back by that.
             assert "state=claimed" not in daemon.text()[held:]
             time.sleep(0.5)
             marker = can.Message(arbitration_id=0x7FD, is_extended_id=False)
@@ -275,7 +275,7 @@ def test_j1939acd_with_a_higher_name_does_not_get_the_address(
     moving(daemon, joysticks)
     log = tmp_path / "kept.log"
     with candump(log, "vcan0"), j1939acd(NAME + 1, tmp_path / "acd.log"), open_bus("vcan0") as bus:
-        # It asks who is there before it claims, and hears us.
+        # It requests who is there before it claims, and receives us.
         wait_for_claim(bus, NAME)
         wait_for_command(lambda _data: True)
     claims = [int.from_bytes(m.data, "little") for m in ours(log) if is_claim(m)]

@@ -80,7 +80,7 @@ def ready(bus: can.BusABC, joysticks: Joysticks) -> None:
     until = time.monotonic() + 60.0
     while time.monotonic() < until:
         joysticks.switches["Reset"] ^= 1
-        while bus.recv(0):  # what was sent while nobody read says nothing of now
+        while bus.recv(0):  # what was sent while no one read says nothing of now
             pass
         for _ in range(3):
             status = wait_for(bus, "SlewStatus", lambda s: True)

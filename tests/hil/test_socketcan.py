@@ -56,7 +56,7 @@ def test_controllers_share_one_bus(can_pair: tuple[str, str]) -> None:
         assert one.recv(FRAME.size) == frame
 
 
-def test_python_can_hears_cansend(bus: can.BusABC) -> None:
+def test_python_can_receives_from_cansend(bus: can.BusABC) -> None:
     subprocess.run([tool("cansend"), "vcan0", "0CFE5A27#0102030405060708"], check=True)
     message = bus.recv(ANSWER_S)
     assert message is not None
@@ -64,7 +64,7 @@ def test_python_can_hears_cansend(bus: can.BusABC) -> None:
     assert bytes(message.data) == bytes(range(1, 9))
 
 
-def test_candump_hears_python_can(bus: can.BusABC) -> None:
+def test_candump_receives_from_python_can(bus: can.BusABC) -> None:
     hello = can.Message(arbitration_id=0x7FF, is_extended_id=False)
     expected = can.Message(arbitration_id=0x321, data=[0xDE, 0xAD], is_extended_id=False)
     quiet_ms = str(int(ANSWER_S * 1000))  # candump ends after so long without a frame

@@ -30,7 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
             say(f"the last it said:\n{error.log}")
         say(error)
         return error.status
-    except BrokenPipeError:  # nobody reads our output any more
+    except BrokenPipeError:  # no one reads our output any more
         os.dup2(os.open(os.devnull, os.O_WRONLY), 1)
         return OUTPUT_CLOSED
     except KeyboardInterrupt:  # while nothing ran yet
@@ -39,14 +39,14 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _machine_needed_for(options: argparse.Namespace) -> str | None:
     """Return the option that only a machine of its own can fulfil, if there is one."""
-    asked = {
+    special = {
         "--systemd": options.systemd,
         "--bench": options.bench,
         "--steady": options.steady,
         "--kernel rt": options.kernel == "rt",
         "--append": options.append,
     }
-    return next((option for option, value in asked.items() if value), None)
+    return next((option for option, value in special.items() if value), None)
 
 
 def _parser() -> argparse.ArgumentParser:
@@ -105,7 +105,7 @@ def _job(parser: argparse.ArgumentParser, options: argparse.Namespace) -> Job:
 
 
 def _obstacles(options: argparse.Namespace) -> dict[str, str | None]:
-    """Return for every lane why it cannot be taken, or None if it can."""
+    """Return for every lane why it cannot be used, or None if it can."""
     needed_for = _machine_needed_for(options)
     native_obstacle = f"{needed_for} needs a machine" if needed_for else native.obstacle()
     return {"native": native_obstacle, "tcg": machine.obstacle(options.kernel, options.systemd)}

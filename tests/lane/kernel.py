@@ -56,8 +56,10 @@ def cached(flavour: str) -> Kernel | None:
         for image in cache().glob("kernels/[0-9]*/vmlinu[xz]")
         for modules in image.parent.glob("lib/modules/*")
     )
-    found = [kernel for kernel in kernels if kernel.flavour == flavour]
-    return max(found, key=lambda k: [int(n) for n in re.findall(r"\d+", k.version)], default=None)
+    candidates = [kernel for kernel in kernels if kernel.flavour == flavour]
+    return max(
+        candidates, key=lambda k: [int(n) for n in re.findall(r"\d+", k.version)], default=None
+    )
 
 
 def obtain(flavour: str) -> Kernel:
@@ -96,14 +98,14 @@ def _concrete_packages(metas: Sequence[str]) -> list[str]:
             todo = CONCRETE.findall(output("apt-cache", "depends", meta))
         except NoLane:
             continue
-        found: list[str] = []
+        packages: list[str] = []
         while todo:
             package = todo.pop()
-            if package not in found:
-                found.append(package)
+            if package not in packages:
+                packages.append(package)
                 todo += CONCRETE.findall(output("apt-cache", "depends", package))
-        if found:
-            return sorted(found)
+        if packages:
+            return sorted(packages)
     raise NoLane(f"apt knows none of the packages {', '.join(metas)}")
 
 

@@ -164,12 +164,12 @@ class Machine:
         if name == "CTL":
             *lines, self._control = (self._control + data).split(b"\n")
             for line in lines:
-                self._hear(line.split(), watch)
+                self._on_line(line.split(), watch)
         else:
             _write(DESTINATION[name], data)
         return bool(data)
 
-    def _hear(self, words: list[bytes], watch: Watch) -> None:
+    def _on_line(self, words: list[bytes], watch: Watch) -> None:
         match words:
             case [b"READY", _uptime]:
                 self.ready_at = time.monotonic()

@@ -221,8 +221,8 @@ def test_kernels_of_both_flavours_lie_side_by_side(
         folder = packages.cache() / "kernels" / version
         (folder / "lib/modules" / version).mkdir(parents=True)
         (folder / "vmlinux").touch()
-    found = {flavour: kernel.cached(flavour) for flavour in kernel.META_PACKAGES}
-    versions = {flavour: image.version for flavour, image in found.items() if image}
+    images = {flavour: kernel.cached(flavour) for flavour in kernel.META_PACKAGES}
+    versions = {flavour: image.version for flavour, image in images.items() if image}
     assert versions == {"std": "6.1.0-50-amd64", "rt": "6.1.0-56-rt-amd64"}
 
 

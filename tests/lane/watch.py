@@ -57,14 +57,14 @@ class Watch:
             self._deadline = None
             self._limited = True
             say(f"time limit of {self._timeout_s:g} s: ending the command")
-            self._ask(signal.SIGTERM, TIME_LIMIT)
+            self._request_end(signal.SIGTERM, TIME_LIMIT)
         return self._ending if now >= self._force_at else None
 
     def status(self, command: int) -> int:
         """Return the lane's exit status for a command that ended with this one."""
         return TIME_LIMIT if self._limited else command
 
-    def _ask(self, number: signal.Signals, ending: int) -> None:
+    def _request_end(self, number: signal.Signals, ending: int) -> None:
         self._ending = ending
         self._force_at = time.monotonic() + self._grace_s
         if self._deliver is not None:
@@ -72,7 +72,7 @@ class Watch:
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if self._deliver is not None and self._ending is None:
-            self._ask(signal.Signals(number), 128 + number)
+            self._request_end(signal.Signals(number), 128 + number)
         else:
             self._ending = self._ending or 128 + number
             self._force_at = 0.0

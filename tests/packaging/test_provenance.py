@@ -24,18 +24,18 @@ HASH = re.compile(r"^    --hash=sha256:[0-9a-f]{64}( \\)?$")
 
 def pins(name: str) -> dict[str, str]:
     """Version of every package of a lock; each line is a pin, a hash or a comment."""
-    found: dict[str, str] = {}
+    pins: dict[str, str] = {}
     hashes = 1
     for line in (ROOT / "tools" / name).read_text(encoding="utf-8").splitlines():
         if pin := PIN.match(line):
-            assert hashes, f"{list(found)[-1]} has no hash"
-            found[pin[1]], hashes = pin[2], 0
+            assert hashes, f"{list(pins)[-1]} has no hash"
+            pins[pin[1]], hashes = pin[2], 0
         elif HASH.match(line):
             hashes += 1
         else:
             assert line.startswith("#"), line
     assert hashes
-    return found
+    return pins
 
 
 @pytest.mark.parametrize("name", LOCKS)
@@ -52,8 +52,8 @@ def test_the_lock_fits_the_dependencies(name: str, extras: tuple[str, ...]) -> N
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     optional = [text for extra in extras for text in project["optional-dependencies"][extra]]
     for text in (*project["dependencies"], *optional):
-        wanted = Requirement(text)
-        assert wanted.specifier.contains(locked[canonicalize_name(wanted.name)]), text
+        requirement = Requirement(text)
+        assert requirement.specifier.contains(locked[canonicalize_name(requirement.name)]), text
 
 
 def test_the_package_is_built_from_the_locks_only() -> None:

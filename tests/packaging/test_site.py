@@ -34,10 +34,10 @@ def opened(context: "BrowserContext", page: Path, faults: list[str]) -> "Page":
     tab = context.new_page()
     tab.on("console", lambda m: faults.append(m.text) if m.type in ("error", "warning") else None)
     tab.on("pageerror", lambda error: faults.append(str(error)))
-    tab.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url}"))
+    tab.on("requestfailed", lambda request: faults.append(f"failed: {request.url}"))
 
-    def inside(asked: object) -> None:
-        url = str(getattr(asked, "url", ""))
+    def inside(request: object) -> None:
+        url = str(getattr(request, "url", ""))
         if not url.startswith((SITE.as_uri(), "data:", "blob:")):
             faults.append(f"asks for {url}")
 
@@ -62,7 +62,7 @@ def test_the_reference_has_every_public_name_and_every_verb(site: Path) -> None:
         assert f'id="canshaper-{verb}"' in commands
 
 
-def test_no_page_asks_for_anything_outside_of_it(offline: "BrowserContext") -> None:
+def test_no_page_requests_anything_outside_of_it(offline: "BrowserContext") -> None:
     faults: list[str] = []
     pages = sorted(SITE.rglob("*.html"))
     assert len(pages) > 40

@@ -27,7 +27,7 @@ def main() -> int:
     file, plant = write_files(folder)
     log = folder / "bus.log"
     wrong: list[str] = []
-    begin = told = time.monotonic()
+    begin = reported = time.monotonic()
     with (
         log.open("wb") as written,
         candump_into(written),
@@ -46,10 +46,10 @@ def main() -> int:
             except WrongMove as error:
                 wrong.append(str(error))
                 print("WRONG", error, flush=True)
-            if time.monotonic() - told > 60.0:
-                told = time.monotonic()
+            if time.monotonic() - reported > 60.0:
+                reported = time.monotonic()
                 memory.append(_memory_kib(daemon.process.pid))
-                minutes = (told - begin) / 60.0
+                minutes = (reported - begin) / 60.0
                 print(
                     f"{minutes:.0f} min, {soak.counts['sequences']} sequences, "
                     f"{soak.counts['sequences with faults of the sensor']} of the sensor, "

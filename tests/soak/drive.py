@@ -61,7 +61,7 @@ class Witness:
         message = can.Message(arbitration_id=MARK, is_extended_id=False, data=data)
         try:
             self._bus.send(message)
-        except can.CanError:  # told once, from the time when the interface was down
+        except can.CanError:  # reported once, from the time when the interface was down
             self._bus.send(message)
 
     def until_mark(self) -> list[Logged]:
@@ -168,7 +168,7 @@ class Soak:
         judge.read_all(held)
         if not judge.follows():
             given = f"{judge.velocity:.3f} for {judge.command:.3f}"
-            judge.wrong.append(f"{judge.sensor}, and not what the joystick asks: {given}")
+            judge.wrong.append(f"{judge.sensor}, and not what the joystick commands: {given}")
         judge.read_all(rest)
         if missing := NAMED.get(kind, set()) - {*judge.said}:
             judge.wrong.append(f"{missing} is not reported, only {dict(judge.said)}")

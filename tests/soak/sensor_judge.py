@@ -52,7 +52,7 @@ class SlewJudge:
         self.stood_still = False
         self._came_s: dict[int, float] = {}
         self.velocity = 0.0
-        self._asked: list[float] = []  # at each frame of the valve
+        self._commands: list[float] = []  # at each frame of the valve
         self.command = 0.0
         self._trusted = 0  # the valve's frame at which it was so last
 
@@ -84,8 +84,8 @@ class SlewJudge:
 
     def _valve(self, raw: int) -> None:
         self.valves += 1
-        self._asked.append(self.command)
-        recent = self._asked[-TAIL - SLACK :]
+        self._commands.append(self.command)
+        recent = self._commands[-TAIL - SLACK :]
         low, high = min(0.0, *recent), max(0.0, *recent)
         if min(recent[-SLACK:]) > 0.0:  # not against the joystick
             low = 0.0
@@ -101,10 +101,10 @@ class SlewJudge:
         if abs(now - before) > RATE + 1.5 * STEP:
             self.wrong.append(f"{now:.3f} after {before:.3f}: quicker than the rates")
         if raw and not any(recent):
-            self.wrong.append(f"moves by {raw} with nothing asked within the tail")
+            self.wrong.append(f"moves by {raw} with nothing commanded within the tail")
 
     def follows(self) -> bool:
-        """Whether the valve is sent what the joystick asks, where no sensor moves it any more."""
-        if self.valves - self._trusted < FADED or len({*self._asked[-FADED:]}) > 2:
+        """Whether the valve gets the joystick command where no sensor moves it any more."""
+        if self.valves - self._trusted < FADED or len({*self._commands[-FADED:]}) > 2:
             return True
         return abs(self.velocity - self.command) <= 3.0 * STEP

@@ -32,7 +32,7 @@ def log(
 
 RISE = [RATE * k for k in range(11)]
 PULSE = [*RISE, *[1.0] * 150, *RISE[::-1], *[0.0] * 150]
-ASKED = [*[1.0] * 160, *[0.0] * 162]
+COMMANDED = [*[1.0] * 160, *[0.0] * 162]
 
 
 def judged(frames: list[Logged]) -> SlewJudge:
@@ -42,7 +42,7 @@ def judged(frames: list[Logged]) -> SlewJudge:
 
 
 def test_a_drive_within_the_limits_passes() -> None:
-    judge = judged(log(PULSE, ASKED))
+    judge = judged(log(PULSE, COMMANDED))
     assert not judge.wrong
     assert judge.follows()
     assert not judge.stood_still
@@ -53,12 +53,12 @@ def test_a_drive_within_the_limits_passes() -> None:
 @pytest.mark.parametrize(
     ("frames", "what"),
     [
-        (log(PULSE, ASKED, state=TRIPPED), "TRIPPED for reason 0"),
-        (log([-v for v in PULSE], ASKED), "allowed"),
-        (log(PULSE, [0.5 * c for c in ASKED]), "allowed"),
-        (log([0.0, *PULSE[5:]], ASKED[: len(PULSE) - 4]), "quicker than the rates"),
-        (log(PULSE, [0.0] * len(PULSE)), "nothing asked within the tail"),
-        (log([*PULSE, 0.1], [*ASKED, 0.0]), "nothing asked within the tail"),
+        (log(PULSE, COMMANDED, state=TRIPPED), "TRIPPED for reason 0"),
+        (log([-v for v in PULSE], COMMANDED), "allowed"),
+        (log(PULSE, [0.5 * c for c in COMMANDED]), "allowed"),
+        (log([0.0, *PULSE[5:]], COMMANDED[: len(PULSE) - 4]), "quicker than the rates"),
+        (log(PULSE, [0.0] * len(PULSE)), "nothing commanded within the tail"),
+        (log([*PULSE, 0.1], [*COMMANDED, 0.0]), "nothing commanded within the tail"),
     ],
     ids=["tripped", "against", "faster", "jump", "alone", "after the tail"],
 )
@@ -74,4 +74,4 @@ def test_what_the_sensor_still_moves_though_it_is_not_trusted_is_reported() -> N
 
 
 def test_frames_that_came_late_are_seen() -> None:
-    assert judged(log(PULSE, ASKED, late_s=0.08)).stood_still
+    assert judged(log(PULSE, COMMANDED, late_s=0.08)).stood_still

@@ -71,9 +71,9 @@ def test_no_suspend_while_an_instance_runs(forwarder: Unit) -> None:
 
 def test_exposure_of_the_loaded_unit(forwarder: Unit) -> None:
     verdict = run("systemd-analyze", "security", "--no-pager", forwarder.name).stdout
-    found = re.search(r"Overall exposure level for \S+: ([0-9.]+)", verdict)
-    assert found, verdict
-    assert float(found[1]) <= MOST_EXPOSURE
+    exposure = re.search(r"Overall exposure level for \S+: ([0-9.]+)", verdict)
+    assert exposure, verdict
+    assert float(exposure[1]) <= MOST_EXPOSURE
 
 
 def test_joystick_moves_the_valve_and_the_status_reports(
@@ -190,7 +190,7 @@ def test_reload_of_a_wrong_file_fails_and_changes_nothing(
     try:
         forwarder.systemctl("reload", status=None)
         assert forwarder.priority(f"forwarder.yaml:{line}: nonsense", cursor) == {"3"}
-        assert "reload=" not in forwarder.text(cursor)  # the daemon has not even heard of it
+        assert "reload=" not in forwarder.text(cursor)  # the daemon has not even received it
         cursor = forwarder.cursor()
         forwarder.systemctl("kill", "--signal=HUP")  # past the check: the daemon's own one
         forwarder.wait_journal(rf"reload=refused .*forwarder.yaml:{line}: nonsense", cursor)

@@ -51,10 +51,10 @@ class Unit:
         until = time.monotonic() + ANSWER_S
         while True:
             meanwhile()
-            found = {name: self.show(name) for name in properties}
-            if all(re.fullmatch(p, found[n]) for n, p in properties.items()):
+            now = {name: self.show(name) for name in properties}
+            if all(re.fullmatch(p, now[n]) for n, p in properties.items()):
                 return
-            assert time.monotonic() < until, f"{found}, not {properties}\n{self.text()}"
+            assert time.monotonic() < until, f"{now}, not {properties}\n{self.text()}"
             time.sleep(0.2)
 
     def wait_restart(self, before: int) -> None:
@@ -92,8 +92,8 @@ class Unit:
         """Wait until the journal has a message like this after the cursor."""
         until = time.monotonic() + ANSWER_S
         while not re.search(pattern, self.text(cursor)):
-            assert time.monotonic() < until, f"no {pattern!r}: {self._told(cursor)}"
+            assert time.monotonic() < until, f"no {pattern!r}: {self._log(cursor)}"
             time.sleep(0.2)
 
-    def _told(self, cursor: str) -> str:
+    def _log(self, cursor: str) -> str:
         return f"{self.show('ActiveState')}, {self.show('StatusText')}\n{self.text(cursor)}"
