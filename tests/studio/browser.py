@@ -75,14 +75,14 @@ def opened(
         if message.type == "error":
             faults.append(message.text)
 
-    def request(asked: Any) -> None:
-        if not re.match(rf"(http|ws)://{re.escape(host)}/|blob:|data:", asked.url):
-            faults.append(f"asks for {asked.url}")
+    def on_request(request: Any) -> None:
+        if not re.match(rf"(http|ws)://{re.escape(host)}/|blob:|data:", request.url):
+            faults.append(f"asks for {request.url}")
 
     page.on("console", console)
     page.on("pageerror", lambda error: faults.append(str(error)))
-    page.on("request", request)
-    page.on("requestfailed", lambda asked: faults.append(f"failed: {asked.url}"))
+    page.on("request", on_request)
+    page.on("requestfailed", lambda request: faults.append(f"failed: {request.url}"))
     page.on("response", lambda a: faults.append(f"{a.status} {a.url}") if a.status > 399 else None)
     page.goto(url)
     expect(page.locator("#link")).to_have_text(shown, timeout=WAIT_MS)

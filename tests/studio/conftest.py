@@ -70,19 +70,19 @@ class Studio:
         )
         assert self.process.stdout
         self.first_line = self.process.stdout.readline()
-        found = re.search(r"open (http://([^/]+):(\d+)/\S*)", self.first_line)
-        assert found, self.first_line + self.process.stdout.read()
-        self.url, self.port = found[1], int(found[3])
+        opened = re.search(r"open (http://([^/]+):(\d+)/\S*)", self.first_line)
+        assert opened, self.first_line + self.process.stdout.read()
+        self.url, self.port = opened[1], int(opened[3])
         self.host = f"127.0.0.1:{self.port}"
 
     def children(self, verb: str | None = None) -> list[int]:
         """Its processes, those that run a verb."""
         path = f"/proc/{self.process.pid}/task"
-        found = []
+        children = []
         for task in Path(path).iterdir():
             with suppress(FileNotFoundError):  # a thread that has just ended
-                found += [int(pid) for pid in (task / "children").read_text().split()]
-        return sorted(pid for pid in found if verb is None or verb in command_of(pid))
+                children += [int(pid) for pid in (task / "children").read_text().split()]
+        return sorted(pid for pid in children if verb is None or verb in command_of(pid))
 
     @contextmanager
     def page(self, **options: Any) -> Iterator["Page"]:
@@ -158,10 +158,10 @@ class Page:
     def for_s(self, duration_s: float) -> list[dict[str, Any]]:
         """Every picture of so long, by the clock of the studio."""
         end = self.shown["t"] + duration_s
-        found = []
+        pictures = []
         while self.shown["t"] < end:
-            found.append(self.look())
-        return found
+            pictures.append(self.look())
+        return pictures
 
     def drive(self) -> None:
         """Take the joysticks and press enable, with the axes ready."""
@@ -235,10 +235,10 @@ class Listener:
 
     def frames(self) -> list[Frame]:
         """What has come since the last look."""
-        found: list[Frame] = []
+        frames: list[Frame] = []
         while some := list(self.port.frames()):
-            found += some
-        return found
+            frames += some
+        return frames
 
 
 @pytest.fixture

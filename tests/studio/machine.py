@@ -42,9 +42,9 @@ class Machine:
 
     def in_file(self, key: str) -> float:
         """A number of the file, of the first axis."""
-        found = re.search(rf"{key}: ([0-9.]+)", self.file.read_text(encoding="utf-8"))
-        assert found
-        return float(found[1])
+        match = re.search(rf"{key}: ([0-9.]+)", self.file.read_text(encoding="utf-8"))
+        assert match
+        return float(match[1])
 
     def stop(self) -> None:
         """End both."""

@@ -63,7 +63,7 @@ def test_other_origins_are_refused(origin: str | None) -> None:
     assert LOCAL.origin_fault("127.0.0.1:8377", origin)
 
 
-def test_our_own_origin_is_taken() -> None:
+def test_our_own_origin_is_accepted() -> None:
     assert LOCAL.origin_fault("127.0.0.1:8377", "http://127.0.0.1:8377") is None
 
 

@@ -24,7 +24,7 @@ DAEMON_SILENT = re.compile("daemon silent: shaped")
 
 
 @pytest.mark.parametrize("scheme", ["dark", "light"])
-def test_it_loads_without_an_error_and_asks_nobody_else(
+def test_it_loads_without_an_error_and_requests_nothing_elsewhere(
     shared: Studio, tab: Callable[..., Page], scheme: str
 ) -> None:
     page = tab(shared, color_scheme=scheme, viewport={"width": 1024, "height": 700})
@@ -239,7 +239,7 @@ def test_the_page_is_back_when_the_daemon_is_back_and_when_the_studio_is(
     expect(page.locator("#banner")).to_be_hidden()
     enabled(page)
     assert time.monotonic() < limit
-    # The browser tells every connection that was refused meanwhile, and nothing else.
+    # The browser reports every connection that was refused meanwhile, and nothing else.
     assert all("ERR_CONNECTION_REFUSED" in fault for fault in faults)
     page.context.close()
 

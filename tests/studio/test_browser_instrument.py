@@ -45,7 +45,7 @@ def test_a_chart_is_stopped_and_goes_on(shared: Studio, tab: Callable[..., Page]
     assert drawn(page) != before
 
 
-def test_the_cursor_tells_values(shared: Studio, tab: Callable[..., Page]) -> None:
+def test_the_cursor_shows_values(shared: Studio, tab: Callable[..., Page]) -> None:
     page = tab(shared)
     page.wait_for_timeout(1500)
     box = page.locator("#chart-sway").bounding_box()
@@ -73,7 +73,7 @@ HISTORY = """async () => {
 }"""
 
 
-def test_the_charts_forget_what_is_too_old_or_too_much(
+def test_the_charts_drop_what_is_too_old_or_too_much(
     shared: Studio, tab: Callable[..., Page]
 ) -> None:
     """Ten rows, 6 s: of rows a second apart 6 s are kept, of rows 0.1 s apart ten."""
@@ -154,8 +154,8 @@ def test_at_200_percent_zoom_in_forced_colors_everything_is_there(
                 one.scroll_into_view_if_needed()
                 box = one.bounding_box()
                 assert box and box["x"] >= 0 and box["x"] + box["width"] <= 640, name
-    found = Axe().run(page).response["violations"]
-    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+    violations = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 @pytest.mark.parametrize("width", [390, 1280])
@@ -168,14 +168,14 @@ def test_axe_finds_nothing(
         if driving:
             enabled(page)
         expect(page.locator("#fps")).not_to_have_text("0")
-        found = Axe().run(page).response["violations"]
-        assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+        violations = Axe().run(page).response["violations"]
+        assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 def test_states_and_events_stand_on_the_time_axis(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
-    """A lane for each crane; the cursor tells the state then, and the event of a mark."""
+    """A lane for each crane; the cursor shows the state then, and the event of a mark."""
     page = tab(own())
 
     def drive() -> None:

@@ -42,12 +42,14 @@ def in_language(tab: Callable[..., Page], studio: Studio, language: str) -> Page
 def english_said(page: Page, language: str) -> list[str]:
     """What the page says in English although its language has a text of its own."""
     english, own = texts(ENGLISH), texts(language)
-    said, found = page.evaluate(SAID), []
+    said, untranslated = page.evaluate(SAID), []
     for key, text in english.items():
         if text != own[key]:
             pattern = re.compile(".+".join(re.escape(part) for part in PLACE.split(text)))
-            found += [one for one in said if pattern.fullmatch(one) and one not in own.values()]
-    return found
+            untranslated += [
+                one for one in said if pattern.fullmatch(one) and one not in own.values()
+            ]
+    return untranslated
 
 
 def is_good(page: Page, language: str) -> None:
@@ -56,8 +58,8 @@ def is_good(page: Page, language: str) -> None:
         assert english_said(page, language) == []
     assert page.evaluate("document.documentElement.scrollWidth <= innerWidth")
     assert page.evaluate(CUT_OFF) == []
-    found = Axe().run(page).response["violations"]
-    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+    violations = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 @pytest.mark.parametrize("language", [ENGLISH, *OTHERS])

@@ -20,7 +20,7 @@ def machine(tmp_path: Path) -> Iterator[Machine]:
     one.stop()
 
 
-def test_numbers_are_set_compared_taken_back_and_written(
+def test_numbers_are_set_compared_undone_and_written(
     machine: Machine, tab: Callable[..., Page]
 ) -> None:
     page = tab(machine.studio)
@@ -69,8 +69,8 @@ def test_axe_finds_nothing(machine: Machine, tab: Callable[..., Page]) -> None:
     page.get_by_label(f"Another value of {PERIOD}").fill("2.5")
     page.click("#numbers .set")
     expect(page.locator(".changes li")).to_have_count(1)
-    found = Axe().run(page).response["violations"]
-    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+    violations = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 def test_a_machine_that_is_only_listened_to_has_none(

@@ -135,8 +135,8 @@ def test_nothing_is_cut_off(log: Opened, tab: Callable[..., Page], width: int, h
 @pytest.mark.parametrize("scheme", ["dark", "light"])
 def test_axe_finds_nothing(log: Opened, tab: Callable[..., Page], scheme: str) -> None:
     page = tab(log, color_scheme=scheme)
-    found = Axe().run(page).response["violations"]
-    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+    violations = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 @pytest.mark.parametrize("language", OTHERS)

@@ -45,7 +45,7 @@ def is_fresh(page: Page) -> None:
     expect(page.locator("body")).not_to_have_class("stale")
 
 
-def test_a_network_that_swallows_every_byte_is_told(
+def test_a_network_that_swallows_every_byte_is_reported(
     own: Callable[..., Studio], chromium: Browser
 ) -> None:
     """No side closes anything, as when a cable is pulled."""
@@ -75,7 +75,7 @@ def test_a_network_that_is_slow_to_connect_is_no_lost_one(
         page.context.close()
 
 
-def test_a_studio_that_stands_still_is_told(
+def test_a_studio_that_stands_still_is_reported(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     studio = own()
@@ -164,7 +164,7 @@ def test_without_webgl_there_is_a_view_from_the_side_and_it_is_said(
     assert faults == []
 
 
-def test_measured_sway_and_that_of_the_model_are_told_apart(
+def test_measured_sway_and_that_of_the_model_are_distinguished(
     own: Callable[..., Studio], tab: Callable[..., Page]
 ) -> None:
     studio = own()

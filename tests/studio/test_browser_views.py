@@ -84,8 +84,8 @@ def test_axe_finds_nothing(shared: Studio, tab: Callable[..., Page], view: str) 
     page = tab(shared)
     page.click(view)
     page.wait_for_timeout(1000)
-    found = Axe().run(page).response["violations"]
-    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in found] == []
+    violations = Axe().run(page).response["violations"]
+    assert [(one["id"], [n["target"] for n in one["nodes"]]) for one in violations] == []
 
 
 # Cranes in a pose, drawn for a while: where the grapples are then, in halves of the picture.

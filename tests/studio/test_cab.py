@@ -25,8 +25,8 @@ class Seat:
     """A cab with a driver whose joystick was seen in neutral, enabled."""
 
     def __init__(self) -> None:
-        self.told: list[str] = []
-        self.cab = Cab(AXES, self.told.append)
+        self.reported: list[str] = []
+        self.cab = Cab(AXES, self.reported.append)
         self.cab.take(1, 0.9)
         self.cab.joysticks(1, NEUTRAL, 0.9)
         self.cab.press_enable(1, True, 0.9)
@@ -37,7 +37,7 @@ def seat() -> Seat:
     return Seat()
 
 
-def test_nobody_drives_at_the_start() -> None:
+def test_no_one_drives_at_the_start() -> None:
     cab = Cab(AXES, print)
     cab.joysticks(1, {"slew": 1.0}, 0.0)
     cab.press_enable(1, True, 0.0)
@@ -85,7 +85,7 @@ def test_a_silent_page_lets_go_then_enable_is_released(seat: Seat) -> None:
     assert seat.cab.held(silent + RELEASE_S - 0.01).enable
     held = seat.cab.held(silent + RELEASE_S)
     assert (deflected(held), held.enable) == ({}, False)
-    assert seat.told == ["page 1 is silent; joysticks in neutral", "enable released"]
+    assert seat.reported == ["page 1 is silent; joysticks in neutral", "enable released"]
 
 
 def test_a_page_that_is_back_in_time_keeps_enable_but_not_its_joystick(seat: Seat) -> None:
@@ -163,11 +163,11 @@ def test_reset_is_held_for_a_moment(seat: Seat) -> None:
     assert not seat.cab.held(1.0 + RESET_S).reset
 
 
-def test_anti_sway_is_switched_and_told_once(seat: Seat) -> None:
+def test_anti_sway_is_switched_and_reported_once(seat: Seat) -> None:
     seat.cab.switch_anti_sway(1, False)
     seat.cab.switch_anti_sway(1, False)
     assert not seat.cab.held(0.0).anti_sway
-    assert seat.told == ["anti-sway switched off"]
+    assert seat.reported == ["anti-sway switched off"]
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,7 @@ from canshaper.studio.server import Guard, listening, server
 from tests.studio.conftest import ROOT, WAIT_S
 
 pytestmark = pytest.mark.processes
-Ask = Callable[..., Any]
+Request = Callable[..., Any]
 
 
 @pytest.fixture
@@ -34,11 +34,11 @@ def machine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 @pytest.fixture
-def served(machine: Path) -> Iterator[Callable[..., Ask]]:
+def served(machine: Path) -> Iterator[Callable[..., Request]]:
     """Starts a server of a commissioning; what it gives asks it."""
     ends: list[Callable[[], None]] = []
 
-    def serve(path: Path | None = machine, *, shadow: bool = False) -> Ask:
+    def serve(path: Path | None = machine, *, shadow: bool = False) -> Request:
         one = listening("127.0.0.1", 0)
         host = f"127.0.0.1:{one.getsockname()[1]}"
         commission = Commission(path, [], machine=shadow)
@@ -54,7 +54,7 @@ def served(machine: Path) -> Iterator[Callable[..., Ask]]:
 
         ends.append(end)
 
-        def ask(path: str, method: str = "GET", *, origin: str | None = None) -> Any:
+        def request(path: str, method: str = "GET", *, origin: str | None = None) -> Any:
             headers = {"Origin": origin or f"http://{host}"}
             request = urllib.request.Request(
                 f"http://{host}/commission{path}", headers=headers, method=method
@@ -66,7 +66,7 @@ def served(machine: Path) -> Iterator[Callable[..., Ask]]:
                 return error.code, error.read().decode()
             return json.loads(data) if answer.headers["Content-Type"].endswith("json") else data
 
-        return ask
+        return request
 
     yield serve
     for end in ends:
@@ -78,63 +78,63 @@ def step(shown: Any, name: str) -> Any:
 
 
 @pytest.mark.long
-def test_page_and_terminal_have_one_state(machine: Path, served: Callable[..., Ask]) -> None:
-    before, ask = machine.read_bytes(), served()
-    assert b"<title>Commissioning" in ask("")
-    assert {one["status"] for one in ask("/state")["steps"]} == {"open"}
-    found = ask("/run/check", "POST")
-    assert found["error"] == ""
-    assert step(found, "check")["proposed"]
-    assert "+" in step(found, "check")["diff"]
-    assert "max_pct: 40" in step(found, "check")["diff"]
-    assert ask("/files/check.png").startswith(b"\x89PNG")
-    done = ask("/accept/check", "POST")
+def test_page_and_terminal_have_one_state(machine: Path, served: Callable[..., Request]) -> None:
+    before, request = machine.read_bytes(), served()
+    assert b"<title>Commissioning" in request("")
+    assert {one["status"] for one in request("/state")["steps"]} == {"open"}
+    state = request("/run/check", "POST")
+    assert state["error"] == ""
+    assert step(state, "check")["proposed"]
+    assert "+" in step(state, "check")["diff"]
+    assert "max_pct: 40" in step(state, "check")["diff"]
+    assert request("/files/check.png").startswith(b"\x89PNG")
+    done = request("/accept/check", "POST")
     assert step(done, "check")["status"] == "done"
     assert "max_pct: 40" in Path("machine.rehearsal.yaml").read_text()
     assert machine.read_bytes() == before
     words = ["commission", "machine.yaml", "--simulated", "--step", "buses", "--yes"]
     assert CliRunner().invoke(app, words).exit_code == 0
-    shown = ask("/state")
+    shown = request("/state")
     assert step(shown, "buses")["status"] == step(shown, "check")["status"] == "done"
-    assert step(ask("/skip/swing", "POST"), "swing")["status"] == "skipped"
+    assert step(request("/skip/swing", "POST"), "swing")["status"] == "skipped"
 
 
 @pytest.mark.long
-def test_what_cannot_be_done_is_said(machine: Path, served: Callable[..., Ask]) -> None:
-    ask = served()
-    assert ask("/accept/check", "POST")["error"] == "check: nothing to accept; run it first"
-    assert "--step: expected one of buses" in ask("/run/nonsense", "POST")["error"]
+def test_what_cannot_be_done_is_said(machine: Path, served: Callable[..., Request]) -> None:
+    request = served()
+    assert request("/accept/check", "POST")["error"] == "check: nothing to accept; run it first"
+    assert "--step: expected one of buses" in request("/run/nonsense", "POST")["error"]
     with Files(Path("machine.rehearsal.yaml")).locked():
-        assert "another commissioning of it is under way" in ask("/run/buses", "POST")["error"]
-    found = ask("/run/buses", "POST")
-    assert step(found, "buses")["proposed"]
+        assert "another commissioning of it is under way" in request("/run/buses", "POST")["error"]
+    state = request("/run/buses", "POST")
+    assert step(state, "buses")["proposed"]
     copy = Path("machine.rehearsal.yaml")
     copy.write_text(copy.read_text() + "# a note of mine\n")
-    assert "changed by someone else meanwhile" in ask("/accept/buses", "POST")["error"]
+    assert "changed by someone else meanwhile" in request("/accept/buses", "POST")["error"]
     machine.write_text("version: 1\n")
-    assert "machine.yaml" in ask("/run/buses", "POST")["error"]
+    assert "machine.yaml" in request("/run/buses", "POST")["error"]
 
 
-def test_no_other_page_and_no_other_file(machine: Path, served: Callable[..., Ask]) -> None:
-    ask = served()
-    code, text = ask("/run/buses", "POST", origin="http://elsewhere.example")
+def test_no_other_page_and_no_other_file(machine: Path, served: Callable[..., Request]) -> None:
+    request = served()
+    code, text = request("/run/buses", "POST", origin="http://elsewhere.example")
     assert (code, "expected the page of this studio" in text) == (403, True)
-    assert ask("/delete/buses", "POST")[0] == 404
-    assert ask("/run/buses")[0] == 405
+    assert request("/delete/buses", "POST")[0] == 404
+    assert request("/run/buses")[0] == 405
     for name in ("machine.yaml", "..%2Fmachine.yaml", "None", "report.html"):
-        assert ask(f"/files/{name}")[0] == 404
+        assert request(f"/files/{name}")[0] == 404
     assert not Path("machine.rehearsal.yaml").exists()
 
 
-def test_that_of_a_machine_is_only_shown(machine: Path, served: Callable[..., Ask]) -> None:
-    ask = served(shadow=True)
-    shown = ask("/state")
+def test_that_of_a_machine_is_only_shown(machine: Path, served: Callable[..., Request]) -> None:
+    request = served(shadow=True)
+    shown = request("/state")
     assert (shown["file"], shown["machine"]) == ("machine.yaml", True)
-    assert ask("/run/buses", "POST")[0] == 409
+    assert request("/run/buses", "POST")[0] == 409
     assert not Path("machine.commission").exists()
 
 
-def test_a_shipped_file_has_none(served: Callable[..., Ask]) -> None:
-    ask = served(None)
-    assert ask("/state")["steps"] == []
-    assert ask("/run/buses", "POST")["steps"] == []
+def test_a_shipped_file_has_none(served: Callable[..., Request]) -> None:
+    request = served(None)
+    assert request("/state")["steps"] == []
+    assert request("/run/buses", "POST")["steps"] == []

@@ -30,10 +30,10 @@ def texts(language: str) -> dict[str, str]:
 
 
 def test_there_are_the_languages_that_the_page_offers() -> None:
-    found = {path.stem for path in (STATIC / "languages").iterdir()}
-    assert found == {ENGLISH, *OTHERS}
+    languages = {path.stem for path in (STATIC / "languages").iterdir()}
+    assert languages == {ENGLISH, *OTHERS}
     offered = re.search(r"LANGUAGES = \{(.*?)\}", (STATIC / "language.js").read_text())
-    assert offered and set(re.findall(r"(\w+):", offered[1])) == found
+    assert offered and set(re.findall(r"(\w+):", offered[1])) == languages
 
 
 @pytest.mark.parametrize("language", OTHERS)
@@ -51,19 +51,19 @@ def test_states_and_reasons_are_those_of_the_daemon() -> None:
     assert terms == {words: words for words in daemon}
 
 
-def asked_for(path: Path) -> set[str]:
+def keys_of(path: Path) -> set[str]:
     """Keys of texts in a page or script."""
-    found = {one or other for one, other in KEY.findall(path.read_text())}
-    return {key for key in found if not NOT_TEXTS.search(key)}
+    used = {one or other for one, other in KEY.findall(path.read_text())}
+    return {key for key in used if not NOT_TEXTS.search(key)}
 
 
-def test_the_page_asks_for_every_text_and_for_no_other() -> None:
+def test_the_page_uses_every_text_and_no_other() -> None:
     keys = set(texts(ENGLISH))
-    found: set[str] = set()
+    used: set[str] = set()
     for path in (*STATIC.glob("*.js"), *STATIC.glob("*.html")):
-        found |= asked_for(path)
-    assert found <= keys
-    assert [key for key in keys - found if not key.startswith(COMPOSED)] == []
+        used |= keys_of(path)
+    assert used <= keys
+    assert [key for key in keys - used if not key.startswith(COMPOSED)] == []
 
 
 def test_the_studio_says_every_text_that_there_is_for_it_and_no_other() -> None:
@@ -90,16 +90,16 @@ class Words(HTMLParser):
 
     def __init__(self) -> None:
         super().__init__()
-        self.found: set[str] = set()
+        self.texts: set[str] = set()
         self._key = False
 
     def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
         self._key = tag == "kbd"
-        self.found |= {value for name, value in attrs if name in ("title", "aria-label") and value}
+        self.texts |= {value for name, value in attrs if name in ("title", "aria-label") and value}
 
     def handle_data(self, data: str) -> None:
         if re.search(r"[A-Za-z]", data) and not self._key:
-            self.found.add(data.strip())
+            self.texts.add(data.strip())
         self._key = False
 
 
@@ -107,7 +107,7 @@ class Words(HTMLParser):
 def test_the_page_itself_has_names_only(page: str) -> None:
     words = Words()
     words.feed((STATIC / page).read_text())
-    assert words.found <= NAMES
+    assert words.texts <= NAMES
 
 
 def test_every_step_of_the_commissioning_has_its_title() -> None:

@@ -41,7 +41,7 @@ class Hand:
             self.look()
         pytest.fail(f"not within 20 s: {self.numbers}, refused {self.page.refused}")
 
-    def ask(self, what: Any, **more: Any) -> None:
+    def request(self, what: Any, **more: Any) -> None:
         self.page.send(numbers=what, who=self.who, **more)
 
     def change(self, **values: float) -> None:
@@ -49,7 +49,7 @@ class Hand:
 
     def change_of(self, values: dict[str, float]) -> None:
         seen = {key: self.now(key) for key in values}
-        self.ask({"change": values, "seen": seen})
+        self.request({"change": values, "seen": seen})
 
     def now(self, key: str) -> float:
         return float(self.numbers["table"][key]["now"])
@@ -58,23 +58,23 @@ class Hand:
         return [(one["who"], one["numbers"]) for one in self.numbers["changes"]]
 
 
-def test_a_number_is_changed_taken_back_and_compared_with_the_one_before(machine: Machine) -> None:
+def test_a_number_is_changed_undone_and_compared_with_the_one_before(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "Aino")
         before = machine.now(PERIOD)
         hand.change(period=2.5)
         hand.until(lambda: hand.now(PERIOD) == 2.5)
         assert machine.now(PERIOD) == 2.5
-        for wanted in (before, 2.5, before):  # A, B, A
-            hand.ask("swap")
-            hand.until(lambda wanted=wanted: hand.now(PERIOD) == wanted)
-            assert machine.now(PERIOD) == wanted
-        for wanted in (2.5, before, 2.5, before):  # every change is taken back
-            hand.ask("undo")
-            hand.until(lambda wanted=wanted: hand.now(PERIOD) == wanted)
+        for value in (before, 2.5, before):  # A, B, A
+            hand.request("swap")
+            hand.until(lambda value=value: hand.now(PERIOD) == value)
+            assert machine.now(PERIOD) == value
+        for value in (2.5, before, 2.5, before):  # every change is undone
+            hand.request("undo")
+            hand.until(lambda value=value: hand.now(PERIOD) == value)
         assert machine.now(PERIOD) == before
         assert hand.numbers["undo"] == 0
-        hand.ask("undo")
+        hand.request("undo")
         hand.until(lambda: page.refused)
         assert page.refused == ["there is no change to take back"]
         assert hand.changes()[0] == ("Aino", {PERIOD: [before, 2.5]})
@@ -82,13 +82,13 @@ def test_a_number_is_changed_taken_back_and_compared_with_the_one_before(machine
         assert f"{PERIOD} {before:g} -> 2.5 (Aino)" in page.texts()
 
 
-def test_who_comes_second_is_told_who_was_first(machine: Machine) -> None:
+def test_the_second_writer_gets_the_name_of_the_first(machine: Machine) -> None:
     with machine.studio.page() as one, machine.studio.page() as two:
         first, second = Hand(one, "Aino"), Hand(two, "Björn")
         before = first.now(PERIOD)
         first.change(period=2.5)
         first.until(lambda: first.now(PERIOD) == 2.5)
-        second.ask({"change": {PERIOD: 2.6}, "seen": {PERIOD: before}})
+        second.request({"change": {PERIOD: 2.6}, "seen": {PERIOD: before}})
         second.until(lambda: two.refused)
         assert two.refused == [f"{PERIOD}: is 2.5 by now, changed by Aino; look again"]
         assert machine.now(PERIOD) == 2.5
@@ -109,12 +109,12 @@ def test_what_is_not_allowed_changes_nothing(machine: Machine) -> None:
             {"change": {PERIOD: "1"}, "seen": {}},
         ):
             page.refused.clear()
-            hand.ask(nonsense)
+            hand.request(nonsense)
             hand.until(lambda: page.refused)
             assert "numbers: expected" in page.refused[-1]
         hand.change(period=2.5)
         hand.until(hand.changes)
-        assert hand.changes()[-1][0] == f"page {page.hello['page']}"  # who names nobody
+        assert hand.changes()[-1][0] == f"page {page.hello['page']}"  # who gives no name
 
 
 def test_what_others_change_is_seen(machine: Machine) -> None:
@@ -134,30 +134,30 @@ def test_the_file_gets_what_is_in_force_once_its_difference_was_seen(machine: Ma
         hand = Hand(page, "Aino")
         hand.change(period=2.5)
         hand.until(lambda: hand.now(PERIOD) == 2.5)
-        hand.ask("difference")
+        hand.request("difference")
         hand.until(lambda: hand.difference)
         lines = hand.difference["text"].splitlines()
         assert [line for line in lines if line[0] == "+" and "2.5" in line]
         assert machine.file.read_text() == before
         machine.file.write_text(before + "# by another editor\n")
-        hand.ask("write", hash=hand.difference["hash"])
+        hand.request("write", hash=hand.difference["hash"])
         hand.until(lambda: page.refused)
         assert "changed by someone else meanwhile; nothing was written" in page.refused[-1]
         assert machine.file.read_text() == before + "# by another editor\n"
         hand.difference = {}
-        hand.ask("difference")
+        hand.request("difference")
         hand.until(lambda: hand.difference)
-        hand.ask("write", hash=hand.difference["hash"])
+        hand.request("write", hash=hand.difference["hash"])
         hand.until(lambda: any("Aino wrote" in text for text in page.texts()))
         assert machine.in_file("period_s") == 2.5
         assert machine.file.read_text().endswith("# by another editor\n")
         hand.difference = {}
-        hand.ask("difference")
+        hand.request("difference")
         hand.until(lambda: hand.difference)
         assert hand.difference["text"] == ""
 
 
-def test_a_daemon_that_is_gone_is_told_and_its_return_too(machine: Machine) -> None:
+def test_a_daemon_that_is_gone_is_reported_and_its_return_too(machine: Machine) -> None:
     with machine.studio.page() as page:
         hand = Hand(page, "Aino")
         machine.daemon.terminate()

@@ -72,7 +72,7 @@ def test_a_log_of_joysticks_alone_has_no_recorded_crane(tmp_path: Path) -> None:
     assert list(opened(log, "forwarder.yaml")[1]) == ["forwarder"]
 
 
-def test_a_black_box_is_played_as_it_was_with_another_one_beside_it(
+def test_a_black_box_is_played_as_it_was_next_to_another_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     box = black_box(tmp_path, monkeypatch)
@@ -90,7 +90,7 @@ def test_a_black_box_is_played_as_it_was_with_another_one_beside_it(
         assert any("slew: tripped: neutral" in text for text in texts(playback, name))
 
 
-def test_of_a_pause_there_are_no_pictures_and_nobody_is_silent_in_it(tmp_path: Path) -> None:
+def test_of_a_pause_there_are_no_pictures_and_no_silence_is_reported_in_it(tmp_path: Path) -> None:
     rows = recorded(tmp_path / "all.log").read_text().splitlines(keepends=True)
     rows = [row for row in rows if " 110#" in row or " 111#" in row]
     later = [row.replace("(17000000", "(17000010") for row in rows]
@@ -145,7 +145,7 @@ def test_the_worst_drives_of_a_campaign_can_be_chosen(tmp_path: Path) -> None:
     assert choices[0].load().title in choices[0].title
 
 
-def test_what_cannot_be_opened_is_told(tmp_path: Path) -> None:
+def test_what_cannot_be_opened_is_reported(tmp_path: Path) -> None:
     log = recorded(tmp_path / "drive.log", without=frozenset((0x110, 0x111)))
     (tmp_path / "none").mkdir()
 
@@ -167,7 +167,7 @@ def test_what_cannot_be_opened_is_told(tmp_path: Path) -> None:
     assert "No such file" in missing
 
 
-def test_each_drive_is_made_when_it_is_asked_for() -> None:
+def test_each_drive_is_made_when_it_is_requested() -> None:
     studio = Opened("forwarder.yaml", "--seed", "3", "--seed", "4")
 
     def got(path: str) -> Any:

@@ -35,9 +35,9 @@ def test_what_is_printed_on_a_terminal_can_be_opened_and_is_a_qr_code() -> None:
         while "▀▀▀▀▀" not in text and "segno" not in text:
             text += os.read(master, 65536).decode(errors="replace")
         try:
-            found = re.search(r"open (http://\S+) in a browser", text.replace("\r\n", ""))
-            assert found, text
-            url = found[1]
+            match = re.search(r"open (http://\S+) in a browser", text.replace("\r\n", ""))
+            assert match, text
+            url = match[1]
             assert "0.0.0.0" not in url
             web = build_opener(HTTPCookieProcessor(CookieJar()))
             assert b"canshaper studio" in web.open(url, timeout=WAIT_S).read()

@@ -42,8 +42,8 @@ def test_an_axis_with_several_filters_has_no_curve() -> None:
 def test_the_page_gets_those_of_the_sliders(shared: Studio) -> None:
     def slew() -> dict[str, Any]:
         with urlopen(f"http://{shared.host}/residuals.json", timeout=WAIT_S) as answer:
-            found: dict[str, Any] = json.load(answer)["slew"]
-            return found
+            residuals: dict[str, Any] = json.load(answer)["slew"]
+            return residuals
 
     before = slew()
     with shared.page() as page:

@@ -158,7 +158,7 @@ def test_a_slider_changes_the_daemon_in_motion(own: Callable[..., Studio]) -> No
         assert page.look()["sliders"]["calm"] == 2.0
 
 
-def test_without_a_driver_nobody_moves_the_sliders(shared: Studio) -> None:
+def test_without_a_driver_no_one_moves_the_sliders(shared: Studio) -> None:
     with shared.page() as page:
         page.send(slide="calm", to=2.0)
         page.until(lambda _: any("only the page that drives" in text for text in page.refused))
@@ -187,7 +187,7 @@ def test_bytes_are_nonsense(shared: Studio) -> None:
         page.until(lambda _: "expected JSON, got bytes" in page.refused)
 
 
-def test_nonsense_of_the_driver_takes_its_joysticks_to_neutral(shared: Studio) -> None:
+def test_nonsense_of_the_driver_brings_its_joysticks_to_neutral(shared: Studio) -> None:
     with shared.page() as page:
         page.drive()
         assert page.joysticks is not None
@@ -287,7 +287,7 @@ def test_a_page_that_is_closed_leaves_the_joysticks_in_neutral(shared: Studio) -
         other.until(lambda s: not s["enable"], "enable released")
 
 
-def test_pages_beyond_the_most_are_told_so(shared: Studio) -> None:
+def test_pages_beyond_the_most_are_refused_with_the_reason(shared: Studio) -> None:
     with ExitStack() as stack:
         for _ in range(MOST_PAGES):
             stack.enter_context(shared.page())
@@ -331,7 +331,7 @@ def test_nothing_but_the_page_is_served(shared: Studio, path: str) -> None:
         assert answer.code == 404
 
 
-def test_a_request_that_is_none_harms_nobody(shared: Studio) -> None:
+def test_a_request_that_is_none_does_no_harm(shared: Studio) -> None:
     for data in (
         b"\0\xff" * 100,
         b"GET / HTTP/9.9\r\n\r\n",
@@ -357,7 +357,7 @@ def test_the_page_may_load_from_here_only(shared: Studio) -> None:
     assert "//" not in text.replace("<!doctype", "")
 
 
-def test_a_daemon_that_ends_is_told_and_starts_again(own: Callable[..., Studio]) -> None:
+def test_a_daemon_that_ends_is_reported_and_starts_again(own: Callable[..., Studio]) -> None:
     studio = own()
     with studio.page() as page:
         page.drive()
@@ -440,7 +440,7 @@ def test_a_channel_of_a_real_machine_is_refused() -> None:
     assert "would move a real machine" in done.stderr
 
 
-def test_a_port_in_use_is_told(shared: Studio) -> None:
+def test_a_port_in_use_is_reported(shared: Studio) -> None:
     command = [sys.executable, "-m", "canshaper", "studio", "--port", str(shared.port)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 1
@@ -479,7 +479,7 @@ def test_of_two_cranes_the_named_one_is_driven(own: Callable[..., Studio]) -> No
         (("--seed", "5", "--control", "x"), "--shadow, --adjust, --control: expected with a"),
     ],
 )
-def test_a_wrong_wish_for_two_cranes_is_told(options: tuple[str, ...], says: str) -> None:
+def test_a_wrong_request_for_two_cranes_is_reported(options: tuple[str, ...], says: str) -> None:
     command = [sys.executable, "-m", "canshaper", "studio", "two-cranes.yaml", *options]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
     assert done.returncode == 2

@@ -18,10 +18,10 @@ FILES = sorted(path.name for path in CONFIG.glob("*.yaml") if "axes:" in path.re
 
 
 def test_calm_moves_the_poles_along_their_rays() -> None:
-    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
-    before, after = values(found, CALM, 1.0), values(found, CALM, 1.5)
+    offered = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    before, after = values(offered, CALM, 1.0), values(offered, CALM, 1.5)
     place = "axes.slew.filter"
-    assert before == {n.key: n.value for n in found[CALM]}
+    assert before == {n.key: n.value for n in offered[CALM]}
     old = poles_from_denominator(before[f"{place}.a1"], before[f"{place}.a2"])
     new = poles_from_denominator(after[f"{place}.a1"], after[f"{place}.a2"])
     for one, other in zip(sorted(old), sorted(new), strict=True):
@@ -29,8 +29,8 @@ def test_calm_moves_the_poles_along_their_rays() -> None:
 
 
 def test_length_is_that_of_the_pendulum() -> None:
-    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
-    after = values(found, LENGTH, 2.0)
+    offered = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    after = values(offered, LENGTH, 2.0)
     assert after["axes.slew.sway.period_s"] == pytest.approx(2.356 * math.sqrt(2.0))
     assert after["axes.near_far.sway.length_m"] == pytest.approx(2.4)
     assert len(after) == 2
@@ -41,9 +41,9 @@ def test_length_is_that_of_the_pendulum() -> None:
     [("calm", 2.1), ("calm", 0.4), ("calm", math.nan), ("calm", 10**400), ("speed", 1.0)],
 )
 def test_what_is_no_position_of_a_slider_is_refused(name: str, factor: float) -> None:
-    found = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
+    offered = sliders(load_deployment(CONFIG / "forwarder.yaml").config)
     with pytest.raises(ValueError, match="expected"):
-        values(found, name, factor)
+        values(offered, name, factor)
 
 
 @pytest.mark.parametrize("file", FILES)
@@ -54,9 +54,9 @@ def test_the_copy_of_every_shipped_file_is_a_deployment(file: str, tmp_path: Pat
     assert path.parent == tmp_path
     same = {"dbc": original.config.dbc, "control": original.config.control}
     assert copy.config.model_copy(update=same) == original.config
-    wanted = adjustable(sliders(original.config))
+    numbers = adjustable(sliders(original.config))
     allowed = copy.config.control.adjustable if copy.config.control else {}
-    assert wanted.items() <= allowed.items()
+    assert numbers.items() <= allowed.items()
 
 
 def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
@@ -76,12 +76,12 @@ def test_a_control_section_of_the_file_is_kept(tmp_path: Path) -> None:
 def test_the_daemon_takes_both_ends(name: str, tmp_path: Path) -> None:
     _, deployment = copied(CONFIG / "forwarder.yaml", tmp_path)
     adjuster = Adjuster(Controller(deployment))
-    found = sliders(deployment.config)
+    offered = sliders(deployment.config)
     for factor in (*RANGES[name], 1.0):
-        wanted = values(found, name, factor)
-        adjuster.change(wanted)
+        numbers = values(offered, name, factor)
+        adjuster.change(numbers)
         table = adjuster.table()
-        assert {key: table[key]["now"] for key in wanted} == pytest.approx(wanted)
+        assert {key: table[key]["now"] for key in numbers} == pytest.approx(numbers)
 
 
 def test_an_axis_with_feels_has_no_sliders() -> None:

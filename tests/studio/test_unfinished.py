@@ -32,13 +32,13 @@ def sent(address: tuple[str, int], *parts: bytes) -> bytes:
     with socket.create_connection(address, WAIT_S) as one:
         for part in parts:
             one.sendall(part)
-        found = b""
+        received = b""
         try:
             while data := one.recv(4096):
-                found += data
+                received += data
         except ConnectionResetError:
             pass
-    return found
+    return received
 
 
 @pytest.mark.parametrize(

@@ -26,12 +26,14 @@ FILES = ["forwarder", "forwarder-joints", "j1939-forwarder", "j1939-profiles", "
 
 
 class Watched:
-    """A view and what it told."""
+    """A view and what it reported."""
 
     def __init__(self, name: str = "forwarder") -> None:
         self.deployment: Deployment = load_deployment(CONFIG / f"{name}.yaml")
-        self.told: list[tuple[str, str]] = []
-        self.view = CraneView(self.deployment, lambda text, level: self.told.append((text, level)))
+        self.reported: list[tuple[str, str]] = []
+        self.view = CraneView(
+            self.deployment, lambda text, level: self.reported.append((text, level))
+        )
 
     def take(self, frames: list[Frame], now_s: float = 0.0) -> dict[str, Any]:
         for frame in frames:
@@ -71,8 +73,8 @@ def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     watched = Watched(name)
     joysticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0, -0.75), strict=False))
     shown = watched.take(Hand(watched.deployment).frames(0, Held(joysticks)))
-    found = {axis: values["joystick"] for axis, values in shown["axes"].items()}
-    assert found == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in found}, abs=0.005)
+    given = {axis: values["joystick"] for axis, values in shown["axes"].items()}
+    assert given == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in given}, abs=0.005)
 
 
 @pytest.mark.parametrize("name", FILES)
@@ -103,11 +105,11 @@ def test_states_are_words_and_changes_are_events(watched: Watched) -> None:
     shown = watched.take([watched.status(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)])
     assert shown["axes"]["slew"]["state"] == "waiting for neutral"
     assert shown["axes"]["slew"]["reason"] == "enable is off"
-    assert watched.told == []
+    assert watched.reported == []
     watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)] * 3)
     watched.take([watched.status(State.STOPPING, Reason.JOYSTICK_TIMEOUT)])
     watched.take([watched.status(State.TRIPPED, Reason.ENABLE_LOST)])
-    assert watched.told == [
+    assert watched.reported == [
         ("slew: ready — joystick in neutral", "info"),
         ("slew: stopping — no joystick message", "warn"),
         ("slew: tripped: neutral — enable released in motion", "bad"),
@@ -136,7 +138,9 @@ def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -
     assert watched.take(watched.sway(1.0))["measured"]
 
 
-def test_a_daemon_that_falls_silent_is_told_and_its_states_are_forgotten(watched: Watched) -> None:
+def test_a_daemon_that_falls_silent_is_reported_and_its_states_are_cleared(
+    watched: Watched,
+) -> None:
     watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)], 0.0)
     watched.view.report_lateness(120)
     watched.view.check(0.0)
@@ -149,10 +153,10 @@ def test_a_daemon_that_falls_silent_is_told_and_its_states_are_forgotten(watched
     assert shown["axes"]["slew"]["state"] is None
     watched.take([watched.status(State.NEUTRAL_WAIT, Reason.START)], 2.0)
     watched.view.check(2.0)
-    assert [level for _, level in watched.told] == ["info", "bad", "info"]
+    assert [level for _, level in watched.reported] == ["info", "bad", "info"]
 
 
-def test_a_crane_that_falls_silent_is_told_and_its_sway_is_measured_no_more(
+def test_a_crane_that_falls_silent_is_reported_and_its_sway_is_measured_no_more(
     watched: Watched,
 ) -> None:
     watched.take(watched.sway(20.0), 0.0)
@@ -163,10 +167,10 @@ def test_a_crane_that_falls_silent_is_told_and_its_sway_is_measured_no_more(
     assert not shown["crane"] and not shown["measured"]
     assert shown["sway"] is shown["swing"] is None
     assert shown["pose"] is not None
-    assert [level for _, level in watched.told] == ["bad"]
+    assert [level for _, level in watched.reported] == ["bad"]
 
 
-def test_faults_are_told_once(watched: Watched) -> None:
+def test_faults_are_reported_once(watched: Watched) -> None:
     codec = watched.deployment.status
     assert codec
     counters = Counters()
@@ -174,7 +178,7 @@ def test_faults_are_told_once(watched: Watched) -> None:
     frame = codec.frame({"LastFault": int(counters.last_fault), **counters.values})
     shown = watched.take([frame, frame])
     assert shown["fault"] == "counter jump"
-    assert watched.told == [("fault: counter jump", "warn")]
+    assert watched.reported == [("fault: counter jump", "warn")]
 
 
 def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
