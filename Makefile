@@ -81,13 +81,15 @@ drawing:
 
 # J1939, CANopen, CAN FD, a valve being measured, a gateway, a commissioning: foreign counterparts on real SocketCAN.
 test-machines: .venv/test-ready
-	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_j1939.py tests/hil/test_canopen.py \
-		tests/hil/test_canopen_shipped.py tests/hil/test_canfd.py tests/hil/test_calibrate.py \
-		tests/hil/test_gateway.py tests/hil/test_commission.py
+	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_j1939.py tests/hil/test_j1939_read.py \
+		tests/hil/test_canopen.py tests/hil/test_canopen_shipped.py tests/hil/test_canfd.py \
+		tests/hil/test_calibrate.py tests/hil/test_gateway.py tests/hil/test_gateway_rules.py \
+		tests/hil/test_commission.py
 
 # Every fault of docs/safety.md on real SocketCAN: some ten minutes in an emulated machine.
 test-faults: .venv/test-ready
-	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_faults.py tests/hil/test_process_faults.py
+	.venv/bin/python -m tests.lane.hil --steady tests/hil/test_faults.py tests/hil/test_process_faults.py \
+		tests/hil/test_interface_faults.py
 
 # The package and its units under a real systemd.
 test-service: .venv/test-ready

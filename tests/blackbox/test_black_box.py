@@ -3,20 +3,17 @@
 import json
 import logging
 import pickle
-import tracemalloc
 import zipfile
 import zlib
 from collections.abc import Callable
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
 
-from canshaper.blackbox import keeper, ring, write
+from canshaper.blackbox import keeper, write
 from canshaper.blackbox.file import HEAD, MAGIC, read_box
 from canshaper.blackbox.records import RECORD, Kind, records
-from canshaper.blackbox.ring import BLOCK, Ring
 from canshaper.blackbox.state import States
 from canshaper.cli.app import app
 from canshaper.codec.frame import BusState
@@ -25,39 +22,15 @@ from canshaper.controller.guarded import Guarded
 from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
+from tests.blackbox.driven import SECOND, TRIP, drive
 from tests.daemon.test_reload import Bench, FakePort
 from tests.rigs.forwarder import ROOT
-
-SECOND = 50  # ticks
-TRIP = 3 * SECOND
-
-
-@pytest.fixture
-def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
-    return Bench(tmp_path, monkeypatch)
 
 
 @pytest.fixture
 def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     caplog.set_level(logging.INFO, "canshaper")
     return lambda: [r.getMessage() for r in caplog.records if "black-box" in r.getMessage()]
-
-
-def drive(bench: Bench, folder: Path | None, ticks: int, trips: tuple[int, ...] = (TRIP,)) -> None:
-    """A drive in which the driver lets go of the enable switch, for a tenth of a second each."""
-
-    def script(number: int) -> None:
-        held = all(not trip <= number < trip + 5 for trip in trips)
-        reset = any(trip + 20 <= number < trip + 25 for trip in trips)
-        centred = any(trip <= number < trip + 40 for trip in trips) or number < 10
-        bench.joysticks(
-            Slew=0 if centred else 500 + number % 300, Enable=int(held), Reset=int(reset)
-        )
-        if number == ticks:
-            bench.stop()
-
-    bench.script = script
-    Daemon(lambda: load_deployment(bench.file), folder).run()
 
 
 def replayed(*arguments: object, code: int = 0) -> str:
@@ -220,9 +193,6 @@ def test_frames_that_were_not_sent_are_not_sent_again(
     assert len(off) == 20
 
 
-# -- files that are not as they were written ---------------------------------------------------
-
-
 def test_one_bit_that_is_not_the_same_is_reported_with_its_time(box: Path, tmp_path: Path) -> None:
     path = inside(box, tmp_path)
     data = bytearray(path.read_bytes())
@@ -298,90 +268,3 @@ def test_a_state_can_call_nothing_of_its_own(tmp_path: Path) -> None:
     ):
         with pytest.raises(StateError):
             states.load(bad)
-
-
-# -- the ring ----------------------------------------------------------------------------------
-
-
-def filled(ring_: Ring, count: int, first: int = 0) -> None:
-    for number in range(first, first + count):
-        ring_.put(Kind.RX, 0, 8, False, number, 10 * number, b"12345678")
-
-
-def test_the_ring_takes_no_more_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    a_block = BLOCK // RECORD.size
-    one = Ring(most_blocks=4)
-    filled(one, 3)  # nowhere: nothing has begun
-    assert one.segments == ()
-    for number in range(20):
-        one.begin(b"%d" % number, number * 10**9, follows=True)
-        filled(one, a_block * 3 // 2, number)
-        blocks = {id(block) for segment in one.segments for block in segment.blocks}
-        assert len(blocks) <= 4
-    last, newest = one.segments[-2:]
-    assert [last.state, newest.state] == [b"18", b"19"]
-    read = [record.number for record in records(newest.data())]
-    assert read == list(range(19, 19 + a_block * 3 // 2))
-
-
-def test_what_is_more_than_all_of_it_is_cut_off() -> None:
-    a_block = BLOCK // RECORD.size
-    one = Ring(most_blocks=2)
-    one.begin(b"", 0, follows=True)
-    filled(one, 5 * a_block)
-    (segment,) = one.segments
-    assert segment.cut_off
-    assert len(segment.data()) == 2 * BLOCK
-    one.begin(b"", 10**9, follows=True)
-    filled(one, 3)
-    assert not one.segments[-1].follows
-    assert [r.number for r in records(one.segments[-1].data())] == [0, 1, 2]
-
-
-def test_what_is_held_is_not_written_over() -> None:
-    a_block = BLOCK // RECORD.size
-    one = Ring(most_blocks=2)
-    one.begin(b"", 0, follows=True)
-    filled(one, a_block)
-    (held,) = one.segments
-    held.held = True
-    before = held.data()
-    for number in range(4):
-        one.begin(b"", (100 + number) * 10**9, follows=True)
-        filled(one, a_block, 10**6)
-    assert held.data() == before
-    assert held not in one.segments
-
-
-def test_a_steady_ring_takes_no_more_memory() -> None:
-    one = Ring(most_blocks=3)
-    one.begin(b"", 0, follows=True)
-    filled(one, 3 * BLOCK // RECORD.size)
-    one.begin(b"", 100 * 10**9, follows=True)
-    tracemalloc.start()
-    try:
-        before = tracemalloc.get_traced_memory()[0]
-        filled(one, 2000)
-        assert tracemalloc.get_traced_memory()[0] - before < 2000
-    finally:
-        tracemalloc.stop()
-    assert ring.KEPT_NS == 60 * 10**9
-
-
-@pytest.mark.parametrize(("tick_ms", "states"), [(20, 10), (2, 1)])
-def test_a_short_tick_keeps_a_state_only_while_nothing_moves(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, tick_ms: int, states: int
-) -> None:
-    monkeypatch.setattr(keeper, "STATE_NS", 10**9)
-    deployment = load_deployment(bench.file)
-    config = deployment.config.model_copy(update={"tick_ms": tick_ms})
-    deployment = replace(deployment, config=config)
-    black_box = keeper.BlackBox(None)
-    controller = Controller(deployment)
-    black_box.around(Guarded(controller), controller)
-    black_box.begin(0)
-    for tick in range(1, 500):
-        black_box.after_tick(tick * 20_000_000, (), neutral=False)
-    assert len(black_box._ring.segments) == states
-    black_box.after_tick(10**10, (), neutral=True)
-    assert len(black_box._ring.segments) == states + 1

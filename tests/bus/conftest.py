@@ -1,11 +1,17 @@
-"""A port on raw sockets whose time is that of its line."""
+"""Ports on raw sockets with the time of their line; clocks, sockets and devices of a test."""
 
+import socket
 from collections.abc import Callable, Iterator
+from pathlib import Path
 from typing import Any
 
 import pytest
 
-from canshaper.bus import raw
+from canshaper.bus import raw, socketcan
+from canshaper.bus.device import read_device, whereabouts
+from tests.bus.clocks import Clocks
+from tests.bus.fake_devices import HUB, PCI, USB, FakeDevices
+from tests.bus.fake_sockets import Made
 from tests.bus.raw_line import Line
 
 
@@ -28,3 +34,41 @@ def make_line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Callable[..., Line]]:
 def line(make_line: Callable[..., Line]) -> Line:
     """One as it is by default."""
     return make_line()
+
+
+@pytest.fixture
+def made(monkeypatch: pytest.MonkeyPatch) -> list[Made]:
+    opened: list[Made] = []
+
+    def make(*arguments: int) -> Made:
+        opened.append(Made(*arguments))
+        return opened[-1]
+
+    monkeypatch.setattr(socket, "socket", make)
+    monkeypatch.setattr(socketcan, "check_device", lambda *_: None)
+    return opened
+
+
+@pytest.fixture
+def clocks(monkeypatch: pytest.MonkeyPatch) -> Clocks:
+    made = Clocks()
+    made.replace(monkeypatch)
+    return made
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeDevices:
+    """Two channels of one USB adapter, another adapter like it, a PCI card and a virtual bus."""
+    devices = FakeDevices(tmp_path)
+    devices.add("can0", USB, dev_port="0")
+    devices.add("can1", USB, dev_port="1")
+    devices.serial("pci0000:00/0000:00:14.0/usb1", "0000:00:14.0")  # that of the controller
+    devices.serial("pci0000:00/0000:00:14.0/usb1/1-3", "0A17")
+    devices.add("can2", HUB)
+    devices.serial("platform/soc/3f980000.usb/usb1/1-1/1-1.2", "0B99")
+    devices.add("can3", PCI, driver="kvaser_pci", bitrate=500_000)
+    devices.add("vcan0", None, driver="vcan", bitrate=None)
+    defaults = (devices.root, devices.query)
+    for function in (read_device, whereabouts):
+        monkeypatch.setattr(function, "__defaults__", defaults)
+    return devices

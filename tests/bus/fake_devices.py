@@ -2,6 +2,9 @@
 
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
+
+from canshaper.config.bus import Bus, Match
 
 PCI = "pci0000:00/0000:00:04.0"
 USB = "pci0000:00/0000:00:14.0/usb1/1-3/1-3:1.0"
@@ -85,3 +88,8 @@ def _subsystem(part: str) -> str | None:
     if part.startswith("usb") or "-" in part:
         return "usb"
     return None if part.startswith("pci") or part == "platform" else "platform"
+
+
+def bus(channel: str = "can0", bitrate: int | None = None, **match: Any) -> Bus:
+    expected = Match(**match) if match else None
+    return Bus(interface="socketcan", channel=channel, bitrate=bitrate, match=expected)

@@ -10,7 +10,7 @@ from canshaper.bus import python_can
 from canshaper.bus.port import open_port
 from canshaper.codec.frame import Frame, FrameFault
 from canshaper.config.bus import Bus
-from tests.bus.test_open_sockets import IDS
+from tests.bus.fake_sockets import IDS
 
 
 class Adapter:

@@ -8,7 +8,6 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
-import can
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -16,41 +15,12 @@ from hypothesis import strategies as st
 from canshaper.bus import arrival, raw
 from canshaper.bus.arrival import SO_TIMESTAMPNS, Arrivals, stamp_ns
 from canshaper.bus.clock import boottime_ns
-from canshaper.bus.port import ListeningPort, Port, open_port
-from canshaper.bus.python_can import MOST_FAILURES, PythonCanPort
-from canshaper.bus.raw import MOST_FRAMES, REOPEN_NS
-from canshaper.codec.frame import Frame
-from canshaper.config.bus import Bus
+from canshaper.bus.port import ListeningPort
+from canshaper.bus.raw import REOPEN_NS
+from tests.bus.clocks import START_NS, WALL_NS, Clocks, arrivals_of
 from tests.bus.raw_line import IDS, RECEIVED, TICK_NS, Line, message
 
 MS = 1_000_000
-START_NS = 10**12
-WALL_NS = 1_763_750_000_000_000_000  # what the wall clock is ahead of the loop's
-
-
-class Clocks:
-    """Both clocks of a machine; they run only when the test lets them."""
-
-    def __init__(self) -> None:
-        self.now_ns = START_NS
-        self.ahead_ns = WALL_NS
-
-    def boottime_ns(self) -> int:
-        return self.now_ns
-
-    def time_ns(self) -> int:
-        return self.now_ns + self.ahead_ns
-
-    def replace(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(arrival, "time", self)
-        monkeypatch.setattr(arrival, "boottime_ns", self.boottime_ns)
-
-
-@pytest.fixture
-def clocks(monkeypatch: pytest.MonkeyPatch) -> Clocks:
-    made = Clocks()
-    made.replace(monkeypatch)
-    return made
 
 
 # -- stamps ----------------------------------------------------------------------------------------
@@ -170,11 +140,6 @@ def stamped(line: Line, *stamps: int | None) -> None:
     line.port._receive = recvmsg
 
 
-def arrivals_of(port: Port) -> list[int]:
-    """Of all frames that wait, after the start of the test."""
-    return [port.arrived_ns - START_NS for _ in port.frames()]
-
-
 def test_each_frame_has_its_own_arrival(line: Line, clocks: Clocks) -> None:
     stamped(line, *(WALL_NS + START_NS + after * MS for after in (3, 5, 9)))
     for number in range(3):
@@ -235,73 +200,3 @@ def test_a_port_that_listens_hands_the_arrival_through(line: Line, clocks: Clock
     line.put(message(0x100))
     clocks.now_ns += TICK_NS
     assert arrivals_of(ListeningPort(line.port, IDS)) == [4 * MS]
-
-
-# -- ports of python-can ---------------------------------------------------------------------------
-
-
-class Adapter:
-    """An interface whose frames come when the test puts them; an exception is raised."""
-
-    def __init__(self) -> None:
-        self.waiting: list[can.Message | Exception] = []
-
-    def recv(self, _timeout: float) -> can.Message | None:
-        one = self.waiting.pop(0) if self.waiting else None
-        if isinstance(one, Exception):
-            raise one
-        return one
-
-    def put(self, frames: int = 1) -> None:
-        # Its own time is of whatever clock, and not looked at.
-        self.waiting += [can.Message(arbitration_id=0x110, timestamp=9e9)] * frames
-
-
-@pytest.fixture
-def adapter(clocks: Clocks, monkeypatch: pytest.MonkeyPatch) -> Adapter:
-    made = Adapter()
-    monkeypatch.setattr(can, "Bus", lambda **_options: made)
-    return made
-
-
-@pytest.fixture
-def port(adapter: Adapter) -> Port:
-    made = open_port("crane", Bus(interface="virtual", channel="x"), lambda _fault: None)
-    assert isinstance(made, PythonCanPort)
-    return made
-
-
-def test_a_frame_of_python_can_arrived_right_after_the_read_before(
-    adapter: Adapter, port: Port, clocks: Clocks
-) -> None:
-    """The first after the opening of the port, then each after the last one that found no more."""
-    before = 0
-    for passed_ns in (3 * TICK_NS, TICK_NS, 5 * TICK_NS):
-        adapter.put(2)
-        clocks.now_ns += passed_ns
-        assert arrivals_of(port) == [before] * 2
-        before += passed_ns
-    clocks.now_ns += TICK_NS
-    assert arrivals_of(port) == []
-    adapter.put()
-    assert arrivals_of(port) == [before + TICK_NS]
-
-
-def test_python_can_that_was_not_read_to_its_end_was_not_empty(
-    adapter: Adapter, port: Port, clocks: Clocks
-) -> None:
-    adapter.put(MOST_FRAMES + 1)
-    for count in (MOST_FRAMES, 1):
-        clocks.now_ns += TICK_NS
-        assert arrivals_of(port) == [0] * count
-    adapter.waiting = [OSError("gone")] * MOST_FAILURES
-    clocks.now_ns += TICK_NS
-    assert arrivals_of(port) == []
-    adapter.put()
-    clocks.now_ns += TICK_NS
-    assert arrivals_of(port) == [2 * TICK_NS]
-
-
-def test_the_frame_itself_is_as_before(adapter: Adapter, port: Port) -> None:
-    adapter.put()
-    assert list(port.frames()) == [Frame("crane", 0x110, True, b"")]

@@ -1,8 +1,6 @@
 """The sockets of an interface as they are opened: without CAN."""
 
-import errno
 import socket
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -10,61 +8,16 @@ from typing import Any
 import pytest
 
 from canshaper.bus import port as bus_module
-from canshaper.bus import python_can, socketcan
+from canshaper.bus import socketcan
 from canshaper.bus.device import check_mtu
 from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets, set_filters
-from canshaper.codec.frame import FrameFault
 from canshaper.config.bus import Bus
-from canshaper.errors import BusError, WrongBusError, WrongDeviceError
+from canshaper.errors import BusError
 from canshaper.machine.routing import BusRoutes
+from tests.bus.fake_sockets import BUS, IDS, Made
 
-BUS = Bus(interface="socketcan", channel="can0", bitrate=250000)
-IDS = BusRoutes(
-    received=frozenset({(0x110, False)}),
-    sent=frozenset({(0x200, False), (0x300, False)}),
-    valves=frozenset({(0x200, False)}),
-    known=frozenset({(0x110, False), (0x200, False), (0x300, False), (0x400, False)}),
-)
 RAW, SOL = socket.SOL_CAN_RAW, socket.SOL_SOCKET
-
-
-class Made:
-    """A socket that keeps its options."""
-
-    def __init__(self, *arguments: int) -> None:
-        self.arguments = arguments
-        self.options: list[tuple[int, int, Any]] = []
-        self.bound: tuple[str, ...] = ()
-        self.blocking = True
-        self.closed = False
-
-    def setblocking(self, blocking: bool) -> None:
-        self.blocking = blocking
-
-    def setsockopt(self, *option: Any) -> None:
-        self.options.append(option)
-
-    def bind(self, address: tuple[str, ...]) -> None:
-        if address == ("none",):
-            raise OSError(errno.ENODEV, "No such device")
-        self.bound = address
-
-    def close(self) -> None:
-        self.closed = True
-
-
-@pytest.fixture
-def made(monkeypatch: pytest.MonkeyPatch) -> list[Made]:
-    opened: list[Made] = []
-
-    def make(*arguments: int) -> Made:
-        opened.append(Made(*arguments))
-        return opened[-1]
-
-    monkeypatch.setattr(socket, "socket", make)
-    monkeypatch.setattr(socketcan, "check_device", lambda *_: None)
-    return opened
 
 
 def options(one: Made, level: int) -> dict[int, Any]:
@@ -228,93 +181,3 @@ def test_more_filters_than_the_kernel_takes_are_left_to_the_reader(
         made = [Made(), Made(), Made()]
         set_filters(made, replace(many(known), **kinds))  # type: ignore[arg-type]
         assert len(options(made[2], RAW)[socket.CAN_RAW_FILTER]) == 8 * used
-
-
-def test_what_was_opened_is_closed_when_the_interface_is_not_there(made: list[Made]) -> None:
-    with pytest.raises(OSError, match="No such device"):
-        open_sockets(Bus(interface="socketcan", channel="none"), IDS)
-    assert [one.closed for one in made] == [True] * 3
-
-
-def test_what_was_opened_is_closed_when_the_device_is_another(
-    made: list[Made], monkeypatch: pytest.MonkeyPatch
-) -> None:
-    def wrong(*_: object) -> None:
-        raise WrongDeviceError("another one")
-
-    monkeypatch.setattr(socketcan, "check_device", wrong)
-    with pytest.raises(WrongDeviceError):
-        open_sockets(BUS, None)
-    assert made[0].closed
-
-
-def test_a_kernel_without_can_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(*_: int) -> None:
-        raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
-
-    monkeypatch.setattr(socket, "socket", none)
-    with pytest.raises(BusError) as error:
-        open_port("crane", BUS, lambda _: None, IDS)
-    assert str(error.value) == (
-        "bus crane: cannot open socketcan channel can0: this kernel has no CAN, or its module"
-        " can_raw is not loaded"
-    )
-
-
-def test_a_system_without_socketcan_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.delattr(socket, "AF_CAN")
-    monkeypatch.setattr(sys, "platform", "darwin")
-    with pytest.raises(BusError) as error:
-        open_port("crane", BUS, lambda _: None, IDS)
-    assert str(error.value) == (
-        "bus crane: cannot open socketcan channel can0: it needs Linux, got darwin; python-can has"
-        " other interfaces"
-    )
-    other = Bus(interface="slcan", channel="/dev/none")
-    with pytest.raises(BusError) as error:  # in its own words
-        open_port("crane", other, lambda _: None, IDS)
-    assert "Linux" not in str(error.value)
-
-
-def test_a_port_of_another_device_says_which_bus_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
-    def wrong(*_: object) -> None:
-        raise WrongDeviceError("expected serial number 1, found 2")
-
-    monkeypatch.setattr(bus_module, "open_sockets", wrong)
-    with pytest.raises(WrongBusError) as error:
-        open_port("crane", BUS, lambda _: None, IDS)
-    assert error.value.bus == "crane"
-    assert error.value.why.startswith("expected serial number 1, found 2")
-    assert str(error.value) == f"bus crane: {error.value.why}"
-
-
-@pytest.mark.parametrize("ids", [IDS, None])
-def test_a_port_of_socketcan_has_the_name_the_messages_and_the_faults_of_its_bus(
-    monkeypatch: pytest.MonkeyPatch, ids: BusRoutes | None
-) -> None:
-    opened: list[tuple[Bus, BusRoutes | None]] = []
-    pair = socket.socketpair()
-    faults: list[FrameFault] = []
-
-    def opens(bus: Bus, ids: BusRoutes | None) -> list[socket.socket]:
-        opened.append((bus, ids))
-        return [pair[0]]
-
-    monkeypatch.setattr(bus_module, "open_sockets", opens)
-    port = open_port("crane", BUS, faults.append, ids)
-    assert opened == [(BUS, ids)]
-    assert port.name == "crane"
-    pair[1].send(b"too short")
-    assert list(port.frames()) == []
-    assert faults == [FrameFault.WRONG_LENGTH]
-    for one in pair:
-        one.close()
-
-
-def test_an_error_without_words_is_reported_by_its_kind(monkeypatch: pytest.MonkeyPatch) -> None:
-    def none(*_: object) -> None:
-        raise ValueError
-
-    monkeypatch.setattr(python_can, "open_python_can", none)
-    with pytest.raises(BusError, match="cannot open slcan channel ttyS0: ValueError"):
-        open_port("crane", Bus(interface="slcan", channel="ttyS0"), lambda _: None)

@@ -1,8 +1,6 @@
-"""Codecs of joysticks, valves and status, judged by plain cantools."""
+"""Codecs of joysticks and valves, judged by plain cantools."""
 
-import pickle
 import struct
-from pathlib import Path
 from typing import Any
 
 import cantools
@@ -12,17 +10,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.codec.codecs import JoystickCodec, Sender
-from canshaper.codec.frame import Frame, FrameFault
+from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.signals import VelocitySignal
-from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, StatusCodec
 from canshaper.codec.valve import ValveCodec, ValveMessage
 from canshaper.errors import WrongLengthError
-from canshaper.shaping.states import Reason, State
-from tests.rigs.reports import report
-
-SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
-shipped: Any = cantools.database.load_file(SHIPPED)
+from canshaper.shaping.states import Reason
 
 # One message of every kind of signal: J1939's 10 bits with an offset, big-endian, float, falling.
 DBC = """VERSION ""
@@ -299,84 +292,3 @@ def test_start_values_beyond_the_bits_are_held_within() -> None:
     text = DBC.replace("SG_ 3 Unused 255", "SG_ 3 Unused 99999")
     message = cantools.database.load_string(text, "dbc").get_message_by_name("Offset")
     assert Sender("b", message).frame({}).data[2] == 255
-
-
-# -- status ----------------------------------------------------------------------------------------
-
-
-def axis_status(*values: Any) -> dict[str, Any]:
-    message = shipped.get_message_by_name("SlewStatus")
-    frame = StatusCodec(Sender("b", message), AXIS_STATUS).frame(report(*values))
-    decoded = message.decode(frame.data, decode_choices=False)
-    assert isinstance(decoded, dict)
-    return decoded
-
-
-def test_status_carries_what_it_gets() -> None:
-    decoded = axis_status(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, -0.25, 12.34)
-    assert decoded == pytest.approx(
-        {
-            "State": 2,
-            "ActiveSet": 0,
-            "Reason": 2,
-            "RawCommand": 50,
-            "ShapedCommand": -25,
-            "PredictedSway": 12.34,
-        }
-    )
-
-
-@pytest.mark.parametrize(("sway", "shown"), [(1e9, 327.67), (-1e9, -327.68), (327.68, 327.67)])
-def test_status_beyond_its_bits_stays_at_the_end(sway: float, shown: float) -> None:
-    assert axis_status(State.READY, Reason.START, 0.0, 0.0, sway)["PredictedSway"] == shown
-
-
-def test_counters_stop_at_their_largest_value() -> None:
-    message = shipped.get_message_by_name("ShaperStatus")
-    codec = StatusCodec(Sender("b", message), SERVICE_STATUS)
-    names = [one.name for one in SERVICE_STATUS]
-    decoded = message.decode(codec.frame({**dict.fromkeys(names, 10**6), "LastFault": 7}).data)
-    assert isinstance(decoded, dict)
-    assert decoded.pop("MissedDeadlines") == 65535
-    assert str(decoded.pop("LastFault")) == "BUS_ERROR"
-    assert set(decoded.values()) == {255}
-
-
-def test_a_status_is_decoded_as_it_was_encoded() -> None:
-    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
-    values = codec.decode(
-        codec.frame(report(State.ACTIVE, Reason.JOYSTICK_MOVED, 0.5, 0.25, 1.5, active_set=3)).data
-    )
-    assert values == {
-        "State": State.ACTIVE,
-        "Reason": Reason.JOYSTICK_MOVED,
-        "RawCommand": 50.0,
-        "ShapedCommand": 25.0,
-        "PredictedSway": 1.5,
-        "ActiveSet": 3,
-    }
-    assert codec.decode(b"") is None
-
-
-def test_a_status_can_be_sent_to_another_process() -> None:
-    for table in (AXIS_STATUS, SERVICE_STATUS, IDENTITY):
-        assert [one.name for one in pickle.loads(pickle.dumps(table))] == [o.name for o in table]
-
-
-def test_a_code_of_another_version_is_shown_by_its_number() -> None:
-    codec = StatusCodec(Sender("b", shipped.get_message_by_name("SlewStatus")), AXIS_STATUS)
-    values = codec.decode(codec.frame(report(State.READY, 254)).data)
-    assert values is not None
-    assert values["Reason"] == 254
-    shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
-    assert (shown["State"], shown["Reason"]) == ("READY", "unknown (254)")
-
-
-def test_tables_of_the_dbc_are_the_numbers_of_the_program() -> None:
-    for name in ("SlewStatus", "NearFarStatus", "LiftStatus"):
-        message = shipped.get_message_by_name(name)
-        for field, enum in (("State", State), ("Reason", Reason)):
-            table = {n: str(text) for n, text in signal(message, field).choices.items()}
-            assert table == {int(m): m.name for m in enum}
-    faults = signal(shipped.get_message_by_name("ShaperStatus"), "LastFault").choices
-    assert {n: str(text) for n, text in faults.items()} == {int(m): m.name for m in FrameFault}

@@ -1,18 +1,13 @@
 """Identifiers of J1939, and what a deployment may say of them."""
 
-import errno
 import re
-from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.bus.socketcan import MOST_FILTERS, set_filters
 from canshaper.checksums.kinds import Checksum
-from canshaper.codec.frame import BusState, Frame
 from canshaper.codec.identifier import (
     group_mask,
     group_of,
@@ -25,14 +20,12 @@ from canshaper.codec.j1939 import CLAIMED, DM1, claims_of
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import BusRoutes
-from tests.bus.raw_line import IDS, VALVE, Line, message
 
 ROOT = Path(__file__).parents[2]
 CONFIG = ROOT / "config" / "j1939-forwarder.yaml"
 DBC = ROOT / "dbc" / "j1939-bjm-avc.dbc"
-OWN = 0x9C
 BJM1 = "2365445886"
+OWN = 0x9C
 BYTE = st.integers(0, 255)
 
 
@@ -206,91 +199,6 @@ def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
     assert problem.startswith(f"machine.yaml:{line}: emergency_stop.source: missing: in the DBC")
     machine.yaml = machine.yaml.replace("message: BJM3,", "message: BJM3, source: 0x40,")
     assert machine.load().emergency_stop is not None
-
-
-# -- our claims on the socket that receives others' -----------------------------------------------
-
-
-CLAIM = Frame("crane", 0x18EEFF9C, True, bytes(range(8)))
-CLAIMING = BusRoutes(
-    IDS.received,
-    IDS.sent,
-    IDS.valves,
-    IDS.known,
-    received_groups=frozenset((CLAIMED << 8,)),
-    claims=frozenset((i, True) for i in claims_of(OWN)),
-    j1939=True,
-)
-
-
-@pytest.fixture
-def line(monkeypatch: pytest.MonkeyPatch) -> Iterator[Line]:
-    opened = Line(CLAIMING)
-    monkeypatch.setattr("canshaper.bus.raw.time.monotonic_ns", opened.monotonic_ns)
-    yield opened
-    opened.end()
-    opened.port.close()
-
-
-def come(line: Line, frame: Frame) -> None:
-    line.put(message(frame.can_id, frame.data, extended=True))
-
-
-def test_our_own_claim_seen_back_is_accepted_and_that_of_a_twin_is_not(line: Line) -> None:
-    for _ in range(5):
-        assert line.port.send(CLAIM)
-        come(line, CLAIM)
-        assert line.received() == []
-    come(line, CLAIM)  # six, and we have sent five: a node that was set up alike
-    assert line.received() == [CLAIM]
-    assert line.faults == []
-
-
-def test_the_claim_of_another_name_is_handed_out(line: Line) -> None:
-    assert line.port.send(CLAIM)
-    other = CLAIM._replace(data=bytes(8))
-    come(line, other)
-    come(line, CLAIM)
-    assert line.received() == [other]
-
-
-def test_a_blocked_bus_is_up_again_when_a_claim_got_through(line: Line) -> None:
-    """While the address is not ours, claims are all that is sent."""
-    assert line.unconfirmed(VALVE) < 10
-    assert line.port.state is BusState.NOT_CONFIRMED
-    line.now_ns += 600_000_000
-    assert line.port.send(CLAIM)
-    assert line.received() == []
-    assert line.port.state is BusState.NOT_CONFIRMED
-    come(line, CLAIM)
-    assert line.received() == []
-    assert line.port.state is BusState.UP
-
-
-def test_claims_emptied_from_the_queue_do_not_hide_a_twin(line: Line) -> None:
-    assert line.port.send(CLAIM)
-    line.near[1].fail = OSError(errno.ENETDOWN, "")
-    assert not line.port.send(CLAIM)
-    line.near[1].fail = None
-    come(line, CLAIM)
-    assert line.received() == [CLAIM]
-
-
-def test_more_groups_and_ids_than_the_kernel_has_filters_for() -> None:
-    class Options:
-        def __init__(self) -> None:
-            self.filters = b""
-
-        def setsockopt(self, _level: int, _name: int, value: bytes) -> None:
-            self.filters = value
-
-    known = frozenset((i, False) for i in range(505)) | frozenset((i, True) for i in range(600))
-    sockets: Any = [Options() for _ in range(3)]
-    groups = frozenset(0xFE0000 + (i << 8) for i in range(20))
-    ids = BusRoutes(frozenset(), frozenset(), frozenset(), known, groups, groups, j1939=True)
-    set_filters(sockets, ids)
-    for one in sockets:
-        assert len(one.filters) // 8 <= MOST_FILTERS
 
 
 def test_a_checksum_over_the_id_needs_a_known_source(machine: Machine) -> None:

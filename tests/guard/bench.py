@@ -3,10 +3,19 @@
 from dataclasses import replace
 from typing import Any
 
+import pytest
+
 from canshaper.codec.frame import Frame
 from canshaper.guard.output import OutputGuard
+from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper_sim.hand import Hand, Held
+from tests.faults import shipped
+
+TICK_NS = 20_000_000
+# timeout_ms, the longest standstill and three periods
+LATE_NS = (100 + 100 + 60) * 1_000_000
+signs = pytest.mark.parametrize("sign", [1, -1])
 
 
 def limited(deployment: Deployment, axis: str, **limits: Any) -> Deployment:
@@ -74,3 +83,10 @@ class Bench:
         sign = 1 if steps > 0 else -1
         for size in [*range(10, abs(steps), 10), *[abs(steps)] * 10]:
             assert not self.sends(sign * size, **joysticks)
+
+
+def bench(**limits: Any) -> Bench:
+    """The forwarder with other limits of near-far, which without them are no limits."""
+    free = {"deadband_pct": 0.0, "rise_per_s": 100.0, "fall_per_s": 100.0}
+    deployment = load_deployment(shipped.CONFIG / "forwarder.yaml")
+    return Bench(limited(deployment, "near_far", **(free | limits)), "near_far")

@@ -1,9 +1,22 @@
 """Tests on real SocketCAN: they run inside a lane and are skipped elsewhere."""
 
 import os
+import shutil
+import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
+import can
 import pytest
+
+from tests.hil.machine import (
+    FILE,
+    Joysticks,
+    Service,
+    joysticks_on,
+    open_bus,
+    service,
+)
 
 HERE = Path(__file__).parent
 
@@ -37,3 +50,30 @@ def _controllers() -> list[tuple[str, str]]:
     if len(names) < 2:
         pytest.skip("this lane has no CAN controllers, only vcan (--lane tcg has them)")
     return list(zip(names[::2], names[1::2], strict=True))
+
+
+@pytest.fixture
+def no_rules() -> Iterator[None]:
+    if shutil.which("cangw") is None:
+        pytest.skip("cangw not found (Debian package can-utils)")
+    yield
+    subprocess.run(["cangw", "-F"], check=False, capture_output=True)
+
+
+@pytest.fixture
+def joysticks() -> Iterator[Joysticks]:
+    with joysticks_on("vcan0") as running:
+        yield running
+
+
+@pytest.fixture
+def bus() -> Iterator[can.BusABC]:
+    with open_bus("vcan0") as opened:
+        yield opened
+
+
+@pytest.fixture
+def daemon(tmp_path: Path) -> Iterator[Service]:
+    with service(tmp_path / "daemon.log", "run", str(FILE)) as running:
+        running.wait_log("started file=")
+        yield running

@@ -12,8 +12,8 @@ import cantools
 import pytest
 from crccheck.crc import Crc8Autosar
 
+from tests.hil.gateway import DAEMON, FAR, NEAR, STOP, drain, in_the_line
 from tests.hil.machine import ANSWER_S, ROOT, candump, logged, service
-from tests.hil.test_gateway import DAEMON, FAR, NEAR, STOP, drain, in_the_line
 
 FILE = ROOT / "config" / "canfd-forwarder.yaml"
 DBC = cantools.database.load_file(ROOT / "dbc" / "canfd.dbc")

@@ -20,8 +20,8 @@ from tests.hil.canopen_nodes import (
     machine_on,
 )
 from tests.hil.j1939_drive import set_points
+from tests.hil.j1939_nodes import Joysticks
 from tests.hil.machine import ANSWER_S, ROOT, Service, candump, logged, service
-from tests.hil.test_j1939 import Joysticks
 
 SHIPPED = {
     "canopen-sensor": Parts(VALVE, inclinometer=0x30),

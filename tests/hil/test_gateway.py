@@ -2,113 +2,48 @@
 
 import itertools
 import random
-import shutil
 import signal
-import subprocess
-import sys
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import can
 import pytest
 
-from canshaper.checksums.kinds import CHECKSUMS
-from tests.codec.checksum_reference import REFERENCE
-from tests.hil.machine import ANSWER_S, DBC, FILE, Service, joysticks_on, open_bus, service
+from tests.hil.gateway import (
+    DAEMON,
+    FAR,
+    KERNEL,
+    NEAR,
+    OURS,
+    STOP,
+    cangw,
+    drain,
+    exchanged,
+    in_the_line,
+    key,
+    rules,
+)
+from tests.hil.machine import ANSWER_S, DBC, joysticks_on, open_bus, service
 from tests.hil.machine import wait_for as wait
 
-GATEWAY = FILE.with_name("gateway-forwarder.yaml")
-NEAR, FAR = "vcan0", "vcan1"
-OURS = {0x110, 0x111, 0x300, 0x301, 0x302, 0x310, 0x311}  # joysticks and status messages
 LAST = 0x7FD
-BATCH = 40  # a bus carries so many in 20 ms, a receive queue some more
-
-
-@pytest.fixture(autouse=True)
-def _no_rules() -> Iterator[None]:
-    if shutil.which("cangw") is None:
-        pytest.skip("cangw not found (Debian package can-utils)")
-    yield
-    subprocess.run(["cangw", "-F"], check=False, capture_output=True)
-
-
-def write(folder: Path, *changes: tuple[str, str], base: Path = GATEWAY) -> Path:
-    text = base.read_text().replace("../dbc", str(FILE.parents[1] / "dbc"))
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new)
-    file = folder / "gateway.yaml"
-    file.write_text(text)
-    return file
-
-
-def rules(file: Path, state: str, code: int = 0) -> str:
-    command = [sys.executable, "-m", "canshaper", "gateway", str(file), state]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == code, done.stderr + done.stdout
-    return done.stdout
-
-
-def cangw() -> list[str]:
-    """What the foreign tool sees."""
-    # Its exit code is a length.
-    done = subprocess.run(["cangw", "-L"], capture_output=True, text=True, check=False)
-    return [line.partition(" #")[0] for line in done.stdout.splitlines()]
-
-
-KERNEL = ("forwarding: kernel", "forwarding: kernel")
-DAEMON = ("forwarding: kernel", "forwarding: daemon")
-STOP = ("fallback: neutral", "fallback: stop")
-
-
-@contextmanager
-def in_the_line(folder: Path, *changes: tuple[str, str]) -> Iterator[tuple[Service, Path]]:
-    """The daemon at work between both buses."""
-    file = write(folder, *changes)
-    rules(file, "running")
-    with service(folder / "log", "run", str(file)) as daemon:
-        daemon.wait_log("started")
-        yield daemon, file
+pytestmark = pytest.mark.usefixtures("no_rules")
 
 
 def foreign(count: int, seed: int) -> list[can.Message]:
     """Frames that are not ours, of 11 and of 29 bits, of every length but 0."""
     source = random.Random(seed)
-    rules = []
+    messages = []
     for i in range(count):
         extended = source.random() < 0.5
         can_id = source.randrange(0x20000000) if extended else source.randrange(0x7F0)
         if not extended and can_id in OURS:
             can_id += 0x20
         data = bytes((i % 256, seed)) + source.randbytes(source.randrange(7))
-        rules.append(
+        messages.append(
             can.Message(arbitration_id=can_id, is_extended_id=extended, data=data[: 1 + i % 8])
         )
-    return rules
-
-
-def key(message: can.Message) -> tuple[int, bool, bytes]:
-    return message.arbitration_id, message.is_extended_id, bytes(message.data)
-
-
-def exchanged(
-    here: can.BusABC, there: can.BusABC, messages: list[can.Message]
-) -> list[tuple[int, bool, bytes]]:
-    """Send these, a few at a time; what of frames that are not ours comes on the other side."""
-    keys: list[tuple[int, bool, bytes]] = []
-    until = time.monotonic() + ANSWER_S
-    for i in range(0, len(messages), BATCH):
-        batch = messages[i : i + BATCH]
-        for message in batch:
-            here.send(message)
-        while not keys or keys[-1] != key(batch[-1]):
-            assert time.monotonic() < until, f"{len(keys)} of {i + len(batch)} came"
-            message = there.recv(1.0)
-            if message and (message.is_extended_id or message.arbitration_id not in OURS):
-                keys.append(key(message))
-    return keys
+    return messages
 
 
 @pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
@@ -126,11 +61,6 @@ def test_frames_of_others_pass_in_both_directions(tmp_path: Path, who: tuple[str
         assert exchanged(near, far, out) == [key(m) for m in out]
         drain(near)
         assert exchanged(far, near, back) == [key(m) for m in back]
-
-
-def drain(bus: can.BusABC) -> None:
-    while bus.recv(0) is not None:
-        pass
 
 
 @pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
@@ -253,98 +183,3 @@ def test_a_lost_joystick_ends_in_a_shaped_stop_and_silence(tmp_path: Path) -> No
         wait(far, "SlewStatus", lambda v: v["State"] == "NEUTRAL_WAIT")
         drain(far)
         silent(far, {0x110, 0x111})
-
-
-@pytest.mark.parametrize("kind", [kind for kind, row in CHECKSUMS.items() if row.kernel])
-def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
-    """Reckoned by crccheck at both ends; the kernel does it between."""
-    dbc = (FILE.parents[1] / "dbc" / "forwarder.dbc").read_text()
-    # In the last byte, with the counter before it.
-    counter = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273'
-    moved = ' SG_ AliveCounter : 48|8@1+ (1,0) [0|255] "" SHAPER\n'
-    moved += ' SG_ Checksum : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273'
-    assert counter in dbc
-    (tmp_path / "gateway.dbc").write_text(dbc.replace(counter, moved))
-    checksum = f"checksum: {{ signal: Checksum, kind: {kind} }}"
-    file = write(
-        tmp_path,
-        ("left:\n    bus: joysticks", f"left:\n    {checksum}\n    bus: joysticks"),
-        ("signal: Slew, timeout_ms: 200,", f"signal: Slew, timeout_ms: 200, {checksum},"),
-        ("signal: NearFar, timeout_ms: 200,", f"signal: NearFar, timeout_ms: 200, {checksum},"),
-        (f"{FILE.parents[1] / 'dbc'}/forwarder.dbc", "gateway.dbc"),
-    )
-    rules(file, "away")
-    with open_bus(NEAR) as near, open_bus(FAR) as far:
-        for count in range(50):
-            data = bytes((0x34, 0x12, 0xFF, 0x7F, 0x01, 0, count))
-            near.send(can.Message(arbitration_id=0x110, is_extended_id=False,
-                                  data=data + bytes([REFERENCE[kind](0, data, 8)])))  # fmt: skip
-            passed = far.recv(ANSWER_S)
-            assert passed is not None
-            assert bytes(passed.data[:7]) == bytes((0, 0, 0, 0, 1, 0, count))
-            assert passed.data[7] == REFERENCE[kind](0, bytes(passed.data[:7]), 8)
-
-
-def test_a_fallback_that_is_left_in_place_is_reported_and_moves_nothing(tmp_path: Path) -> None:
-    """Two senders of one message: the user who started the daemon by hand is to see it."""
-    file = write(tmp_path)
-    rules(file, "away")
-    with (
-        joysticks_on(NEAR),
-        open_bus(FAR) as far,
-        service(tmp_path / "log", "run", str(file)) as daemon,
-    ):
-        daemon.wait_log("gateway=rules-too-many")
-        wait(far, "SlewStatus", lambda v: v["Reason"] == "SECOND_SENDER")
-
-
-def test_missing_rules_are_reported(tmp_path: Path) -> None:
-    with service(tmp_path / "log", "run", str(write(tmp_path))) as daemon:
-        daemon.wait_log("gateway=rules-missing 40 of 40")
-
-
-def test_rules_are_set_up_shown_and_removed(tmp_path: Path) -> None:
-    """A rule of another program between both interfaces goes, one elsewhere stays."""
-    file = write(tmp_path)
-    elsewhere = ["-s", "vxcan0", "-d", "vxcan1", "-e"]
-    subprocess.run(["modprobe", "can-gw"], check=False)
-    subprocess.run(["cangw", "-A", *elsewhere], check=True)
-    subprocess.run(["cangw", "-A", "-s", NEAR, "-d", FAR, "-e", "-f", "110:7FF"], check=True)
-    assert "others" in rules(file, "show", code=1)
-    assert f"removed {NEAR} -> {FAR} 110:7ff" in rules(file, "running")
-    assert "40 rules, running" in rules(file, "show")
-    assert rules(file, "running") == f"{NEAR} {FAR}: running, 0 rules added, 0 removed\n"
-    assert all("-l 1" in line for line in cangw() if "vcan" in line)
-    assert "42 rules, away" in [rules(file, "away"), rules(file, "show")][1]
-    rules(file, "down")
-    assert cangw() == ["cangw -A -s vxcan0 -d vxcan1 -e"]
-    assert "0 rules, down" in rules(file, "show", code=1)
-
-
-def test_pass_lets_the_joystick_through_while_the_daemon_is_away(tmp_path: Path) -> None:
-    file = write(tmp_path, ("fallback: neutral", "fallback: pass"))
-    rules(file, "away")
-    with joysticks_on(NEAR) as joysticks, open_bus(FAR) as far:
-        joysticks.values["Slew"] = 80.0
-        wait(far, "JoystickLeft", lambda v: v["Slew"] == 80.0)
-
-
-@pytest.mark.parametrize("who", [KERNEL, DAEMON], ids=["kernel", "daemon"])
-def test_an_interface_that_was_removed(tmp_path: Path, who: tuple[str, str]) -> None:
-    """Back again the daemon passes on; rules of the kernel went with it, which is reported."""
-    with in_the_line(tmp_path, who, STOP) as (daemon, file):
-        subprocess.run(["ip", "link", "del", FAR], check=True)
-        try:
-            daemon.wait_log("bus=machine state=gone")
-        finally:
-            subprocess.run(["ip", "link", "add", FAR, "type", "vcan"], check=True)
-            subprocess.run(["ip", "link", "set", FAR, "mtu", "72", "up"], check=True)
-        daemon.wait_log("bus=machine state=up")
-        if who == KERNEL:
-            daemon.wait_log("gateway=rules-missing 40 of 40")
-            rules(file, "running")
-            daemon.wait_log("rules-right(.|\n)*rules-missing(.|\n)*rules-right")
-        with joysticks_on(NEAR), open_bus(NEAR) as near, open_bus(FAR) as far:
-            wait(far, "JoystickLeft", lambda v: v["Enable"] == "On")
-            message = can.Message(arbitration_id=0x7E1, is_extended_id=False, data=[1])
-            assert exchanged(near, far, [message]) == [key(message)]

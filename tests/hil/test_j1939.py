@@ -4,63 +4,23 @@ import re
 import signal
 import socket
 import subprocess
-import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import suppress
 from pathlib import Path
 
 import can
 import j1939
 import pytest
 
-from tests.hil.j1939_drive import FILE, as_wireshark_sees, drive, not_decoded, set_points
+from tests.hil.j1939_drive import FILE
+from tests.hil.j1939_nodes import NAME, Joysticks, another_ecu, j1939acd, kernel_has_j1939, ours
 from tests.hil.machine import ANSWER_S, Service, candump, logged, open_bus, service
 from tests.protocols.j1939.test_dm1 import codes
-from tests.rigs.j1939 import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT, bjm
+from tests.rigs.j1939 import CLAIM, NO_CLAIM, OWN, WHO_HAS_IT
 
-# Industry group 2, function 129, manufacturer 2047, serial number 1: as the file has it.
-NAME = 0x20008100FFE00001
 AVC0 = 0x0CFE3000 | OWN
 FIRST_SPN = 520192
-DM1 = 0xFECA
-# Address claim, request, transport: the kernel keeps them for itself, or their destination varies.
-TRANSPORT = {0xEEFF, 0xEAFF, 0xECFF, 0xEBFF}
-SHIPPED = (
-    "j1939-forwarder",
-    "j1939-profiles",
-    "j1939-rollers",
-    "j1939-sensor",
-    "js6000-forwarder",
-    "pvedcc-forwarder",
-    "remote-forwarder",
-)
-OTHER_VALVES = ("pvedcc-forwarder", "remote-forwarder")  # of 11 bits
-# Set points on the way to full speed and back: a filter makes tens of them, its limits alone ten.
-SHAPED = 20
-
-
-class Joysticks(threading.Thread):
-    """Both joysticks, sent every 20 ms."""
-
-    def __init__(self) -> None:
-        super().__init__(daemon=True)
-        self._bus = open_bus("vcan0")
-        self._ended = threading.Event()
-        self.x = 0.0
-        self.reset = False
-
-    def run(self) -> None:
-        while not self._ended.wait(0.02):
-            for frame in (bjm("BJM1", X=self.x, Button2=int(self.reset)), bjm("BJM2")):
-                message = can.Message(arbitration_id=frame.can_id, data=frame.data)
-                with suppress(can.CanError):  # the interface may be down
-                    self._bus.send(message)
-
-    def end(self) -> None:
-        self._ended.set()
-        self.join()
-        self._bus.shutdown()
 
 
 @pytest.fixture
@@ -75,10 +35,6 @@ def joysticks() -> Iterator[Joysticks]:
 def daemon(tmp_path: Path) -> Iterator[Service]:
     with service(tmp_path / "daemon.log", "run", str(FILE)) as running:
         yield running
-
-
-def ours(log: Path) -> list[can.Message]:
-    return [m for m in logged(log) if m.is_extended_id and m.arbitration_id & 0xFF == OWN]
 
 
 def is_claim(message: can.Message) -> bool:
@@ -121,43 +77,6 @@ def wait_for_command(accept: Callable[[bytearray], bool]) -> None:
             if message and message.arbitration_id == AVC0 and accept(message.data):
                 return
     raise AssertionError("no such command")
-
-
-@contextmanager
-def another_ecu(name: int) -> Iterator[j1939.ControllerApplication]:
-    """A node of can-j1939 that claims our address, and has no other."""
-    ecu = j1939.ElectronicControlUnit()
-    ecu.connect(interface="socketcan", channel="vcan0")
-    application = j1939.ControllerApplication(j1939.Name(value=name), OWN)
-    ecu.add_ca(controller_application=application)
-    application.start()
-    try:
-        yield application
-    finally:
-        ecu.disconnect()
-        ecu.stop()
-
-
-@contextmanager
-def j1939acd(name: int, log: Path) -> Iterator[subprocess.Popen[bytes]]:
-    """The address claiming daemon of can-utils, with our address as its only one."""
-    kernel_has_j1939()
-    command = ["j1939acd", "-v", "-r", str(OWN), f"{name:016x}", "vcan0"]
-    with log.open("wb") as file:
-        process = subprocess.Popen(command, stdout=file, stderr=file)
-    try:
-        yield process
-    finally:
-        process.terminate()
-        process.wait(ANSWER_S)
-
-
-def kernel_has_j1939() -> None:
-    subprocess.run(["modprobe", "can_j1939"], check=False, capture_output=True)
-    try:
-        socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939).close()
-    except OSError as error:
-        pytest.skip(f"this kernel has no J1939: {error}")
 
 
 def test_the_kernels_stack_receives_our_commands_our_name_and_our_faults(
@@ -317,63 +236,6 @@ def first_words(daemon: Service) -> list[can.Message]:
                 if message and message.is_extended_id and message.arbitration_id & 0xFF == OWN:
                     came.append(message)
     return came
-
-
-class Kernel(threading.Thread):
-    """A socket of the kernel's J1939 for all: NAME and group of what comes from our address."""
-
-    def __init__(self) -> None:
-        super().__init__(daemon=True)
-        kernel_has_j1939()
-        self.seen: set[tuple[int, int]] = set()
-        self._ended = threading.Event()
-        self._socket = socket.socket(socket.AF_CAN, socket.SOCK_DGRAM, socket.CAN_J1939)
-        self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_BROADCAST, 1)
-        nothing = socket.J1939_NO_NAME, socket.J1939_NO_PGN, socket.J1939_NO_ADDR
-        self._socket.bind(("vcan0", *nothing))
-        self._socket.settimeout(0.5)  # how often it looks whether it is to end
-
-    def run(self) -> None:
-        while not self._ended.is_set():
-            with suppress(TimeoutError):
-                _, (_, name, group, source) = self._socket.recvfrom(2000)
-                if source == OWN:
-                    self.seen.add((name, group))
-
-    def end(self) -> None:
-        self._ended.set()
-        self.join()
-        self._socket.close()
-
-
-@pytest.mark.parametrize("name", SHIPPED)
-def test_a_drive_is_read_by_cantools_by_tshark_and_by_the_kernel(tmp_path: Path, name: str) -> None:
-    file = FILE.with_name(f"{name}.yaml")
-    kernel = Kernel()
-    kernel.start()
-    try:
-        logs = drive(tmp_path, file=file)
-    finally:
-        kernel.end()
-    points = set_points(logs, file, "near_far")
-    assert len(set(points)) > SHAPED, sorted(set(points))
-    assert points[0] == points[-1] == 0
-    assert not any(set_points(logs, file, "slew"))
-    log = logs["vcan0"]
-    assert not_decoded(log, file) == []
-    sent = {m.arbitration_id >> 8 & 0x3FFFF for m in ours(log)} - TRANSPORT
-    valves = {0xFE30, 0xFE31, 0xFE32}
-    assert sent >= (valves | {DM1} if name not in OTHER_VALVES else {DM1})
-    assert {(NAME, group) for group in sent} <= kernel.seen
-    seen = as_wireshark_sees(log)
-    if seen is None:
-        pytest.skip("no tshark here; cantools and the kernel have read every frame")
-    counts, errors = seen
-    assert errors == []
-    groups = {(int(group), int(source)) for group, source in counts if group}
-    assert groups >= {(0xFDD6, 0x33), *((group, OWN) for group in sent)}
-    assert counts["60928", str(OWN)] >= 1
-    assert counts["65226", str(OWN)] >= 5  # DM1, once a second
 
 
 def wait_until(condition: Callable[[], bool]) -> None:

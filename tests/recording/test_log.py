@@ -1,54 +1,15 @@
-"""Every format gives the same frames; what is wrong with a log is reported with its place."""
+"""Every format gives the same frames; clocks that are set, and large logs."""
 
 import gzip
 import tracemalloc
-from itertools import islice
 from pathlib import Path
 
 import can
 import pytest
 
-from canshaper.errors import CutOffError, LogError
 from canshaper.recording.log import LogFile, TimedFrame, read_log
+from tests.recording.lines import FRAMES, HEADER, LINES, error_of, log, prefix
 from tests.recording.writing import messages, written
-
-FRAMES = [
-    TimedFrame(1_000_000_000, "1", 0x110, False, bytes(range(8))),
-    TimedFrame(1_000_250_000, "1", 0x110, True, b"\x01"),
-    TimedFrame(1_019_999_000, "2", 0x1ABCDEF0, True, b""),
-    TimedFrame(1_020_000_000, "1", 0x7FF, False, b"\xff\x00\xfe"),
-    TimedFrame(2_500_001_000, "2", 0x0, False, b"\x80" * 8),
-]
-LINES = [
-    "(1.000000) can0 110#0001020304050607\n",
-    "(1.000250) can0 00000110#01\n",
-    "(1.019999) can1 1ABCDEF0#\n",
-    "(1.020000) can0 7FF#FF00FE\n",
-    "(2.500001) can1 000#8080808080808080\n",
-]
-
-
-def log(tmp_path: Path, *lines: str, name: str = "a.log") -> Path:
-    path = tmp_path / name
-    path.write_text("".join(lines), encoding="utf-8", newline="")
-    return path
-
-
-def prefix(path: Path) -> tuple[list[TimedFrame], LogError | None]:
-    """Frames of a log until it ends or is wrong."""
-    frames: list[TimedFrame] = []
-    try:
-        frames.extend(read_log(path))  # keeps what came before the error
-    except LogError as error:
-        return frames, error
-    return frames, None
-
-
-def error_of(path: Path) -> str:
-    error = prefix(path)[1]
-    assert error is not None
-    return str(error)
-
 
 # -- formats -----------------------------------------------------------------------------------
 
@@ -179,180 +140,6 @@ def test_what_is_no_data_frame_is_left_out_and_counted(tmp_path: Path) -> None:
     assert file.left_out == {"error": 1, "remote": 1}
 
 
-# -- logs that are wrong -----------------------------------------------------------------------
-
-
-@pytest.mark.parametrize("suffix", ["log", "asc", "csv"])
-def test_a_text_cut_off_anywhere_gives_whole_frames_and_says_so(
-    tmp_path: Path, suffix: str
-) -> None:
-    whole = written(tmp_path / f"a.{suffix}", messages(FRAMES))
-    content, frames = whole.read_bytes(), list(read_log(whole))
-    cut = tmp_path / f"cut.{suffix}"
-    for size in range(1, len(content)):
-        cut.write_bytes(content[:size])
-        before, error = prefix(cut)
-        assert before == frames[: len(before)]
-        if content[size - 1] != ord("\n"):
-            assert isinstance(error, CutOffError), content[:size]
-            assert f"{cut}:" in str(error)
-        elif before:
-            assert error is None
-
-
-def test_a_blf_cut_off_anywhere_gives_whole_frames_and_says_so(tmp_path: Path) -> None:
-    whole = tmp_path / "a.blf"
-    with can.BLFWriter(whole, compression_level=0) as writer:
-        writer.max_container_size = 100
-        later = [f._replace(time_ns=f.time_ns + i * 10**10) for i in range(3) for f in FRAMES]
-        for message in messages(later):
-            writer.on_message_received(message)
-    content, frames = whole.read_bytes(), prefix(whole)[0]
-    cut = tmp_path / "cut.blf"
-    ends = 0
-    for size in range(144, len(content)):
-        cut.write_bytes(content[:size])
-        before, error = prefix(cut)
-        assert before == frames[: len(before)]
-        ends += not isinstance(error, CutOffError)
-    # Only just behind one of its parts is it whole; a byte of padding may still follow that.
-    assert ends <= 4 * len(content) // 100
-
-
-def test_a_packed_log_that_is_cut_off(tmp_path: Path) -> None:
-    path = tmp_path / "a.log.gz"
-    content = gzip.compress("".join(LINES * 1).encode())
-    path.write_bytes(content[:-4])
-    before, error = prefix(path)
-    assert isinstance(error, CutOffError)
-    assert len(before) == len(FRAMES)
-    path.write_bytes(content[:20] + b"\x00\xff\x00" + content[23:])
-    assert "damaged" in error_of(path) or "expected" in error_of(path)
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "text"),
-    [
-        (
-            "a.log",
-            LINES[0] + "  can0  110   [2]  01 02\n",
-            "a.log:2: expected times before the frames: candump -L, or candump -t a, got"
-            " '  can0  110   [2]",
-        ),
-        ("a.log", "(1.0) can0 110#012\n", "expected a line of candump -L, such as ("),
-        ("a.log", "(1.0) can0 110#010203040506070809\n", "expected a line of candump -L, "),
-        (
-            "a.log",
-            "(1.0) can0 FFF#\n",
-            "expected an id of 11 bits in 3 digits, or of 29 in 8, got id 0xfff",
-        ),
-        (
-            "a.log",
-            "",
-            "expected a log with frames, its suffix that of its format, got no frame",
-        ),
-        (
-            "a.log",
-            "(1.0) can0 110#R\n" * 2 + "(1.0) can0 20000080#\n",
-            "expected a data frame, got other frames only: 2 remote, 1 error",
-        ),
-        ("a.log", "x" * 70_000, "65536 bytes without a line end"),
-        ("a.asc", "1.0 1 Joystick Rx d 1 01\n", "expected a line of an ASC log, such as"),
-        ("a.asc", "1.0 1 110 Rx d 3 01 02\n", "expected all of them, got 2 of 3 bytes"),
-        ("a.asc", "1.0 1 110 Rx d 1 1FF\n", "with numbers"),
-        ("a.asc", "1.0 1 900 Rx d 1 1F\n", "got id 0x900"),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d -1 01 02\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d -1 01 02'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d\n",
-            "a.asc:1: expected a line of an ASC log, such as 0.015991 1 110 Rx d 2 01 02, with"
-            " numbers, got '1.0 1 110 Rx d'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d 2 0_1 02\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d 2 0_1 02'",
-        ),
-        (
-            "a.asc",
-            "1.0 1 110 Rx d \u0661 01\n",
-            "a.asc:1: expected ..., got '1.0 1 110 Rx d \u0661 01'",
-        ),
-        (
-            "a.asc",
-            "1.0 CANFD 1 Rx 110 1 0 2 ² 01 02 0 0 0\n",
-            "a.asc:1: expected ..., got '1.0 CANFD 1",
-        ),
-        (
-            "a.asc",
-            "1.0 CANFD 1 Rx 110 1 0 2 2 01 02 0 0 zz\n",
-            "a.asc:1: expected ..., got '1.0 CANFD 1",
-        ),
-        (
-            "a.csv",
-            "time;id;data\n",
-            "expected the header of python-can,"
-            " timestamp,arbitration_id,extended,remote,error,dlc,data, or of GVRET, Time Stamp,ID,"
-            "Extended,Dir,Bus,LEN,D1..., got 'time;id;data'",
-        ),
-        ("a.blf", "LOGG", "expected a BLF log that is whole, got error"),
-        ("a.blf", "x" * 200, "got BLFParseError Unexpected file format"),
-        (
-            "a.txt",
-            "",
-            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, each also with .gz"
-            " behind, got '.txt'",
-        ),
-        (
-            "drive",
-            "",
-            "expected the suffix .log, .asc, .blf, .csv, .db, .mf4, .trc, each also with .gz"
-            " behind, got none",
-        ),
-    ],
-)
-def test_what_is_no_log_is_reported_with_its_place(
-    tmp_path: Path, name: str, content: str, text: str
-) -> None:
-    message = error_of(log(tmp_path, content, name=name))
-    assert all(part in message for part in text.split("..."))
-    assert str(tmp_path / name) in message
-
-
-HEADER = "timestamp,arbitration_id,extended,remote,error,dlc,data\n"
-
-
-@pytest.mark.parametrize(
-    ("row", "text"),
-    [
-        ("1.0,0x110,0,0,0,2,AQI", "a.csv:2: expected a row of timestamp,"),
-        ("1.0,0x110,0,0,0,3,AQI=", "expected all of them, got 2 of 3 bytes"),
-        ("1.0,0x800,0,0,0,2,AQI=", "got id 0x800"),
-        ("1.0.0,0x110,0,0,0,2,AQI=", "a row of timestamp,"),
-        ("1.0,272,0,0,0,2,AQI=", "a row of timestamp,"),
-        ("1e999,0x110,0,0,0,2,AQI=", "a.csv:2: expected ..., got '1e999,0x110"),
-        (f"1.0,0x110,0,0,0,{'1' * 5000},AQI=", "a.csv:2: expected ..., got '1.0,0x110"),
-        (f"1.0,0x{'f' * 5000},0,0,0,2,AQI=", "a.csv:2: expected ..., got '1.0,0xfff"),
-    ],
-)
-def test_a_wrong_row_of_a_table(tmp_path: Path, row: str, text: str) -> None:
-    message = error_of(log(tmp_path, HEADER, row, "\n", name="a.csv"))
-    assert all(part in message for part in text.split("..."))
-
-
-def test_a_file_that_is_not_there(tmp_path: Path) -> None:
-    says = "expected a log that can be read, got "
-    for name in ("no.log", "no.asc", "no.blf", "no.log.gz"):
-        path = tmp_path / name
-        assert error_of(path) == f"{path}: {says}No such file or directory"
-    (tmp_path / "x.log").mkdir()
-    assert f"{says}Is a directory" in error_of(tmp_path / "x.log")
-
-
 # -- clocks ------------------------------------------------------------------------------------
 
 
@@ -377,49 +164,6 @@ def test_a_time_that_no_clock_can_have(
     assert len(result) == before
     assert f"{path}:{len(start.splitlines()) + 1}: expected a" in str(error)
     assert "mixed clocks" not in str(error)
-
-
-@pytest.mark.parametrize(
-    ("at", "value", "text"),
-    [
-        (
-            8,
-            bytes(4),
-            "expected a BLF log that is whole, got ValueError an object of 0 bytes",
-        ),  # its length
-        (
-            24,
-            b"\xff" * 8,
-            "frame 1: expected a date before 2286, or a time from the start of the log, got a time"
-            " further than 10000000000 s",
-        ),  # ns
-        (
-            36,
-            b"\x00\x08\x00\x00",
-            "frame 1: expected a data frame, got other frames only: 1 impossible",
-        ),
-        (
-            45,
-            b"\x00",
-            "frame 1: expected a data frame, got other frames only: 1 impossible",
-        ),  # flags of FD
-    ],
-)
-def test_a_damaged_object_of_a_blf(tmp_path: Path, at: int, value: bytes, text: str) -> None:
-    path = tmp_path / "a.blf"
-    fd = at == 45
-    message = can.Message(
-        timestamp=1.0, arbitration_id=1, is_extended_id=False, is_fd=fd, data=bytes(12 if fd else 8)
-    )
-    with can.BLFWriter(path, compression_level=0) as writer:
-        writer.on_message_received(message)
-    content = bytearray(path.read_bytes())
-    at += content.rindex(b"LOBJ")
-    content[at : at + len(value)] = value
-    path.write_bytes(content)
-    with pytest.raises(LogError) as error:
-        list(islice(read_log(path), 5))  # without end where an object has no length
-    assert f"{path}: {text}" in str(error.value)
 
 
 def test_a_clock_that_was_set_is_reported_with_its_place(tmp_path: Path) -> None:

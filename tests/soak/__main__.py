@@ -13,8 +13,9 @@ from typing import IO
 
 from tests.hil.hand import hand_on
 from tests.hil.machine import open_bus, service
-from tests.soak.drive import Soak, WrongMove, count_frames
+from tests.soak.drive import Soak
 from tests.soak.sensor import relay, write_files
+from tests.soak.witness import WrongMove, count_frames
 
 
 def main() -> int:

@@ -1,6 +1,6 @@
 """One daemon, one plant, one hand: sequences of a drive, a fault, the way back.
 
-The judge is an independent candump log. Marks, frames of an id of their own, divide it.
+The judge is an independent candump log (``witness``).
 """
 
 import random
@@ -17,11 +17,11 @@ import can
 
 from tests.hil.frame_faults import AT_ONCE, FAULTS
 from tests.hil.hand import LEFT, Hand, with_checksum
-from tests.hil.machine import DBC, Service, message_name, wait_for
+from tests.hil.machine import DBC, Service, wait_for
 from tests.soak.sensor import KINDS, NAMED, Relay
 from tests.soak.sensor_judge import FADED, TAIL, Logged, SlewJudge
+from tests.soak.witness import Witness, WrongMove
 
-MARK = 0x7E0
 VALVES = {"Slew": 0x200, "Lift": 0x202}
 STATUSES = {"Slew": "SlewSensedStatus", "Lift": "LiftStatus"}
 # What is waited for; an emulated machine is too slow to read all the rest.
@@ -39,51 +39,6 @@ BROKEN: dict[str, Callable[[bytes, bytes], bool]] = {
     "frozen counter": lambda before, data: data[7] == before[7],
     "jumping counter": lambda before, data: data[7] != (before[7] + 1) % 256,
 }
-
-
-class WrongMove(AssertionError):
-    """A valve frame moved that must not."""
-
-
-class Witness:
-    """The growing log of candump, read from mark to mark."""
-
-    def __init__(self, log: Path, bus: can.BusABC) -> None:
-        self._file = log.open()
-        self._bus = bus
-        self._count = 0
-        self._rest = ""
-
-    def mark(self) -> None:
-        """Put a mark into the log."""
-        self._count += 1
-        data = self._count.to_bytes(4, "big")
-        message = can.Message(arbitration_id=MARK, is_extended_id=False, data=data)
-        try:
-            self._bus.send(message)
-        except can.CanError:  # reported once, from the time when the interface was down
-            self._bus.send(message)
-
-    def until_mark(self) -> list[Logged]:
-        """Frames up to the next mark, which is waited for."""
-        frames: list[Logged] = []
-        until = time.monotonic() + 120.0
-        while True:
-            line = self._file.readline()
-            if not line.endswith("\n"):
-                self._rest += line
-                if time.monotonic() > until:
-                    raise AssertionError("candump writes nothing")
-                time.sleep(0.02)
-                continue
-            line, self._rest = self._rest + line, ""
-            time_s, _, frame = line.split()[:3]
-            key, _, data = frame.partition("#")
-            if len(key) > 3 or data.startswith("R"):  # error frames, remote frames
-                continue
-            if int(key, 16) == MARK:
-                return frames
-            frames.append(Logged(int(key, 16), bytes.fromhex(data), float(time_s[1:-1])))
 
 
 class Soak:
@@ -317,12 +272,3 @@ def _begin(kind: str, frames: list[Logged]) -> int:
         (i for i, (key, data, _) in enumerate(frames) if key == valve and not data[0]), 0
     )
     return max((place for place in shows if place < neutral), default=0)
-
-
-def count_frames(log: Path) -> Counter[str]:
-    """Frames of the whole log by message."""
-    names: Counter[str] = Counter()
-    with can.CanutilsLogReader(log) as reader:
-        for message in reader:
-            names[message_name(message) or "other"] += 1
-    return names

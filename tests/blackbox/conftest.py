@@ -1,0 +1,12 @@
+"""A daemon whose ticks the test makes."""
+
+from pathlib import Path
+
+import pytest
+
+from tests.daemon.test_reload import Bench
+
+
+@pytest.fixture
+def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
+    return Bench(tmp_path, monkeypatch)
