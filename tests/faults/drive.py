@@ -118,7 +118,7 @@ class Drive:
                 switches = {n: self._switches(v, last) for n, v in self.machine.joysticks.items()}
                 self._take(joysticks, switches, active)
             if stalled:
-                self._trace("stood still")
+                self._write_trace("stood still")
                 self.judge.stalled()
                 self.controller.stalled()
             self._step(missed, active)
@@ -206,7 +206,7 @@ class Drive:
         """One body of the loop."""
         now_ns = self.now_ns
         for frame in self._waiting:
-            self._trace(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
+            self._write_trace(f"   in {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}")
             self.judge.receive(frame, now_ns)
             self.controller.receive(frame, now_ns)
         self._waiting = []
@@ -285,7 +285,7 @@ class Drive:
 
     # -- trace for a reader ------------------------------------------------------------------------
 
-    def _trace(self, text: str) -> None:
+    def _write_trace(self, text: str) -> None:
         if self._trace:
             self._trace(text)
 
@@ -294,7 +294,7 @@ class Drive:
     ) -> None:
         names = ", ".join(f.kind for f in active)
         late = f" missed {missed}" if missed else ""
-        self._trace(f"{self.tick_number:4d} {self.now_ns // 1_000_000:6d} ms{late} {names}")
+        self._write_trace(f"{self.tick_number:4d} {self.now_ns // 1_000_000:6d} ms{late} {names}")
         for frame in sent:
             lost = " not sent" if frame in failed else ""
-            self._trace(f"  out {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}{lost}")
+            self._write_trace(f"  out {frame.bus} {frame.can_id:#05x} {frame.data.hex(' ')}{lost}")
