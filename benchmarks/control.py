@@ -94,7 +94,7 @@ def _serve_us(
             begin = time.perf_counter()
             server.serve(answer, now_ns)
             times_us.append(1e6 * (time.perf_counter() - begin))
-            if len(times_us) == 1:  # this one has taken the connection
+            if len(times_us) == 1:  # this one has accepted the connection
                 server.serve(answer, next(TIMES_NS))
             one.recv(MOST_BYTES)
     server.serve(answer, next(TIMES_NS))  # it has gone

@@ -1,7 +1,7 @@
 """Eight axes at 1 kHz on one core: of this machine by its own clock, or in virtual time.
 
 The daemon runs as ``canshaper run`` does, on a multicast group of python-can, or with ``--vcan`` on
-SocketCAN in virtual time; joystick frames come every 20 ms and keep all axes moving. Beside it, on
+SocketCAN in virtual time; joystick frames come every 20 ms and keep all axes moving. Next to it, on
 the same core at the same time, one priority above it, a loop in C that only sleeps until its next
 deadline: what that one misses, the machine has done. "own" are deadlines that the daemon missed
 while the C loop was never late by more than a tenth of a tick. Where real-time priorities may not

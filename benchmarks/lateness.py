@@ -1,6 +1,6 @@
 """How late ticks begin and how long they take, idle and under load, in virtual time.
 
-Beside the daemon, two loops that only sleep until their next deadline, in C and in Python. Load is
+Next to the daemon, two loops that only sleep until their next deadline, in C and in Python. Load is
 cangen without a gap on another interface, candump reading it, two busy loops, a process that writes
 and syncs; with "same", a bus full of foreign frames for the daemon too. Loops have FIFO priority
 40, the joystick 30, everything else none.

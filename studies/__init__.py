@@ -1,1 +1,1 @@
-"""Research beside the product, not in the package."""
+"""Research next to the product, not in the package."""

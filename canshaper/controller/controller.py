@@ -156,7 +156,7 @@ class Controller:
         """Run every axis that is due.
 
         The frames come one by one, each valve's as soon as its axis has moved and all of them
-        before any status, to be sent at once; all have to be taken.
+        before any status, to be sent at once; all have to be accepted.
 
         Args:
             now_ns: monotonic time of this tick.

@@ -48,7 +48,7 @@ class JournalHandler(logging.Handler):
         self.flush()
 
     def flush(self) -> None:
-        """Write lines for as long as they are taken at once; where writing fails, all are lost."""
+        """Write lines while they are accepted at once; where writing fails, all are lost."""
         while self._lines and self._writable():
             line = self._lines[0]
             try:

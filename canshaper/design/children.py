@@ -21,7 +21,7 @@ main()
 def end_with_parent(how: signal.Signals) -> None:
     """Have the kernel send this process a signal when its parent ends (prctl(2)).
 
-    A parent that ended before the call is not seen: whoever calls this looks for it afterwards.
+    A parent that ended before the call is not seen: the caller looks for it afterwards.
     Only Linux has it; elsewhere nothing is done.
 
     Args:

@@ -126,7 +126,7 @@ def _values_of_schedules(config: DeploymentConfig) -> dict[Place, float]:
 
 
 def _check_values(lookup: Lookup, switch: BoundSwitch, values: Mapping[Place, float]) -> None:
-    """A value that the DBC names as an error is never taken, so it can choose nothing."""
+    """A value that the DBC names as an error is never used, so it can choose nothing."""
     signal = find_signal(switch.message, switch.config.signal)
     if signal is None:  # noted with the switch
         return

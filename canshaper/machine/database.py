@@ -150,13 +150,13 @@ def _checked(file: DbcFile, *, named: bool) -> tuple[DbcFile | None, list[Proble
             text = _same_text(entry, other)
             problems.append(Problem(str(file.path), entry.line, entry.name, text))
     faults = [(m, fault) for m in file.messages if (fault := layout_fault(m) or _id_fault(m))]
-    found = [file.problem(*fault) for fault in faults]
+    layout_problems = [file.problem(*fault) for fault in faults]
     if named:
-        return None if faults else file, [*problems, *found]
+        return None if faults else file, [*problems, *layout_problems]
     wrong = {id(message) for message, _ in faults}
     messages = [message for message in file.messages if id(message) not in wrong]
-    warnings = [*file.warnings, *found][:MOST_PROBLEMS]
-    count = file.count + len(found)
+    warnings = [*file.warnings, *layout_problems][:MOST_PROBLEMS]
+    count = file.count + len(layout_problems)
     return replace(file, messages=messages, warnings=warnings, count=count), problems
 
 
@@ -187,8 +187,8 @@ def _entries(messages: list[Message], text: str) -> list[Entry]:
     """Messages of a file that cantools has read as a whole."""
     lines: dict[tuple[int, str], int] = {}
     for line, row in enumerate(text.split("\n"), 1):
-        if found := _DEFINITION.match(row):
-            lines.setdefault((int(found[1]), found[2]), line)
+        if match := _DEFINITION.match(row):
+            lines.setdefault((int(match[1]), match[2]), line)
     numbers = [m.frame_id | (EFF_FLAG if m.is_extended_frame else 0) for m in messages]
     return [
         Entry(m.name, number, lines.get((number, m.name)))
@@ -232,19 +232,19 @@ class Messages:
 
     def warnings(self) -> tuple[int, list[Problem]]:
         """How many faults messages have that are not used, and the first of them."""
-        found = [warning for file in self.files for warning in file.warnings]
-        return sum(file.count for file in self.files), found
+        problems = [warning for file in self.files for warning in file.warnings]
+        return sum(file.count for file in self.files), problems
 
     def find(self, name: str) -> tuple[DbcFile, Message] | str:
         """The message and its file, or why there is none; one that is not loaded is read now."""
-        found = self._files.get(name, [])
-        if not found:
+        holders = self._files.get(name, [])
+        if not holders:
             text = f"expected a message of the DBC files, got {name!r}"
             return text + there_are(name, sorted(self._files))
-        if len(found) > 1:
-            files = ", ".join(str(file.path) for file in found)
+        if len(holders) > 1:
+            files = ", ".join(str(file.path) for file in holders)
             return f"{name!r} stands more than once in the DBC files: {files}"
-        (file,) = found
+        (file,) = holders
         if name not in self._loaded:
             try:
                 message = file.read(name)

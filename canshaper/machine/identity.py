@@ -1,6 +1,7 @@
 """What runs, by content: the deployment file, its DBC files and the program.
 
-Whoever signs a machine off notes these; a changed file or program shows in log, status and bundle.
+They are noted when a machine is signed off; a changed file or program shows in log, status and
+bundle.
 """
 
 import sys

@@ -299,14 +299,14 @@ class Axis:
         largest = self._largest_added if self._added else 0.0
         low, high = range_with_added(command, recent.low, recent.high, target, largest)
         low, high = max(low, -maximum), min(high, maximum)
-        aim = unrounded = target
+        rounded = unrounded = target
         if self._added:
             step = 1.0 / self._grid_steps
             unrounded = within(target + self._added, low, high, 0.0)
-            aim = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
-            if aim:
-                aim = within(aim + within(self._carry, -step, step, 0.0), low, high, 0.0)
-        self._limited = rate_limited(aim, self._limited, self._rise, self._fall)
+            rounded = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
+            if rounded:
+                rounded = within(rounded + within(self._carry, -step, step, 0.0), low, high, 0.0)
+        self._limited = rate_limited(rounded, self._limited, self._rise, self._fall)
         if self._dropped * self._limited < 0.0:  # the way to the other side begins at rest
             self._limited = 0.0
         self._dropped = 0.0

@@ -23,7 +23,7 @@ FADE_S = 0.6
 CONTACT_FADE_S = 0.1
 # How much of the free swing is fed back next to a second mode: that of the first one is not known
 # as well, and a command that follows it drives the second one.
-BESIDE_WEIGHT = 0.75
+SECOND_MODE_WEIGHT = 0.75
 
 # Nothing of these speaks against a grapple that hangs free, and a sensor that shows it.
 HANGING = (Trust.UNPROVED, Trust.TRUSTED)
@@ -53,7 +53,7 @@ class SensedSway:
         self.state = Trust.NO_DATA
         self.weight = 0.0
         self._sway, self._limits = sway, limits
-        self._most = (BESIDE_WEIGHT if limits.second else 1.0) if damps else 0.0
+        self._most = (SECOND_MODE_WEIGHT if limits.second else 1.0) if damps else 0.0
         self._speed_per_angle = 1.0 / sway.mode.angle_per_speed_rad
         self._observer = SwayObserver(sway, timing, limits)
         self._evidence = Evidence(measured, limits.noise, timing.period_s)
@@ -64,7 +64,7 @@ class SensedSway:
         self._tick_s = tick_s
         self._lost_s = timing.lost_s
         self._age_s = 0.0  # since the last measurement
-        self._begun = self._asked = self._commanded = False
+        self._begun = self._command_active = self._commanded = False
         self._needed = PROVED
         # The free swing that is fed back; after trust is lost it swings on as it was.
         self._fading = FreeSwing(measured, [(0.0, 0.0, 0.0)])
@@ -105,7 +105,7 @@ class SensedSway:
             added: what a motion of two axes added.
         """
         self._age_s += self._tick_s
-        self._asked = command != 0.0
+        self._command_active = command != 0.0
         # What another axis makes this one do has bounds of its own.
         own = velocity if self._commanded else 0.0
         if self._restlessness.add(own, command) and self.state is Trust.TRUSTED:
@@ -150,7 +150,7 @@ class SensedSway:
             self._standstill.clear()
             return
         evidence.add(errors)
-        if fault := self._standstill.check(value, bent, asked=self._asked):
+        if fault := self._standstill.check(value, bent, command_active=self._command_active):
             self._doubt(fault, again=True)
         elif fault := evidence.fault(0.0 if trusted else -PROVED):
             self._doubt(fault)

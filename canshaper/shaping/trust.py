@@ -169,17 +169,18 @@ class Standstill:
         self._stuck.clear()
         self._held.clear()
 
-    def check(self, value: float, bent: float, *, asked: bool) -> Trust | None:
+    def check(self, value: float, bent: float, *, command_active: bool) -> Trust | None:
         """What a measurement says.
 
         Args:
             value: the measurement.
             bent: what it changed the rate of the free swing by, rad/s.
-            asked: the operator asks for motion now. Else a swing that turns, of a pendulum that is
-                far shorter than the model, counts for more than a contact: the tail ends.
+            command_active: the operator asks for motion now. Else a swing that turns, of a
+                pendulum that is far shorter than the model, counts for more than a contact: the
+                tail ends.
         """
         stuck, held = self._stuck.check(value, bent), self._held.check(value, bent)
-        return Trust.STUCK if stuck else Trust.CONTACT if held and asked else None
+        return Trust.STUCK if stuck else Trust.CONTACT if held and command_active else None
 
 
 class Still:
@@ -229,17 +230,17 @@ class Restlessness:
         tick_s: time between two ticks.
     """
 
-    __slots__ = ("_asked", "_moved")
+    __slots__ = ("_commanded", "_moved")
 
     def __init__(self, tick_s: float) -> None:
         self._moved = Path(round(RESTLESS_S / tick_s))
         # A filter may run on for as long again.
-        self._asked = Path(round(2.0 * RESTLESS_S / tick_s))
+        self._commanded = Path(round(2.0 * RESTLESS_S / tick_s))
 
     def add(self, velocity: float, command: float) -> bool:
         """A tick with this velocity and this command; whether they differ too much."""
         moved = self._moved.add(velocity)
-        return moved > RESTLESS_SHARE * self._asked.add(command) + RESTLESS_MORE
+        return moved > RESTLESS_SHARE * self._commanded.add(command) + RESTLESS_MORE
 
 
 class Path:

@@ -52,7 +52,7 @@ class Cab:
         self.anti_sway = True
         self._joysticks: dict[str, float] = {}
         self._centred = False  # seen in neutral since they last stopped counting
-        self._heard_s = 0.0
+        self._last_message_s = 0.0
         self._release_at_s: float | None = None
         self._silent = False  # why enable is about to be released
         self._reset_until_s = -math.inf
@@ -66,7 +66,7 @@ class Cab:
             self._report(said("takes", page=page, other=self.driver))
             self._let_go(now_s)
         self.driver = page
-        self._heard_s = now_s
+        self._last_message_s = now_s
         self._centred = False
 
     def leave(self, page: int, now_s: float) -> None:
@@ -91,7 +91,7 @@ class Cab:
         if page != self.driver:
             return
         self._watch(now_s)
-        self._heard_s = now_s
+        self._last_message_s = now_s
         if all(abs(value) <= NEUTRAL for value in joysticks.values()):
             self._centred = True
             if self._silent:
@@ -141,7 +141,7 @@ class Cab:
 
     def _watch(self, now_s: float) -> None:
         """Let go when the driver is silent; release enable when it is time."""
-        silent = self.driver is not None and now_s - self._heard_s > SILENT_S
+        silent = self.driver is not None and now_s - self._last_message_s > SILENT_S
         if silent and self.enable and self._release_at_s is None:
             self._report(said("silent", page=self.driver))
             self._let_go(now_s)

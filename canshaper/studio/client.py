@@ -52,7 +52,7 @@ class Client:
         self._closed = False
         self._allowance = float(BURST)
         self._filled_s = time.monotonic()
-        self._wanted: dict[str, float] = {}
+        self._pending: dict[str, float] = {}
         self._slid = asyncio.Event()
         self._numbers = NumbersChannel(stage.numbers, number) if stage.numbers else None
 
@@ -126,7 +126,7 @@ class Client:
             known = isinstance(name, str) and name in self._stage.sliders
             if not known or not is_number(factor):
                 raise PageMessageError("expected a message that is known, got another")
-            self._wanted[str(name)] = factor
+            self._pending[str(name)] = factor
             self._slid.set()
 
     async def _slide(self) -> None:
@@ -134,9 +134,9 @@ class Client:
         while True:
             await self._slid.wait()
             self._slid.clear()
-            while self._wanted:
-                name = next(iter(self._wanted))
-                factor = self._wanted.pop(name)
+            while self._pending:
+                name = next(iter(self._pending))
+                factor = self._pending.pop(name)
                 if self._stage.snapshot()["driver"] != self._number:
                     self._refusals.append(said("sliders"))
                     continue

@@ -36,7 +36,7 @@ class NumbersChannel:
         Raises:
             PageMessageError: it is none, or too many wait.
         """
-        asked, numbers = message["numbers"], self._numbers
+        request, numbers = message["numbers"], self._numbers
         name = message.get("who")
         who = printable(name)[:MOST_NAME] if isinstance(name, str) and name else ""
         who = who or f"page {self._page}"
@@ -46,11 +46,11 @@ class NumbersChannel:
             "difference": self._look_at_difference,
             "write": lambda: numbers.write(str(message.get("hash")), who),
         }
-        if isinstance(asked, dict):
-            values, seen = _numbers(asked.get("change")), _numbers(asked.get("seen"))
+        if isinstance(request, dict):
+            values, seen = _numbers(request.get("change")), _numbers(request.get("seen"))
             action: Action = lambda: numbers.change(values, seen, who)  # noqa: E731
-        elif isinstance(asked, str) and asked in actions:
-            action = actions[asked]
+        elif isinstance(request, str) and request in actions:
+            action = actions[request]
         else:
             raise PageMessageError(
                 f"numbers: expected a change or one of {', '.join(map(str, actions))}"

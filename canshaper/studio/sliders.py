@@ -42,12 +42,12 @@ def sliders(config: DeploymentConfig) -> dict[str, list[Number]]:
     An axis with a gain schedule or profiles is left out: what is in force there
     changes with the machine.
     """
-    found: dict[str, list[Number]] = {CALM: [], LENGTH: []}
+    by_slider: dict[str, list[Number]] = {CALM: [], LENGTH: []}
     for name, axis in config.axes.items():
         if not axis.gain_schedule and not axis.profiles:
-            found[CALM] += _calm(name, axis)
-            found[LENGTH] += _length(name, axis)
-    return {name: numbers for name, numbers in found.items() if numbers}
+            by_slider[CALM] += _calm(name, axis)
+            by_slider[LENGTH] += _length(name, axis)
+    return {name: numbers for name, numbers in by_slider.items() if numbers}
 
 
 def _calm(name: str, axis: AxisConfig) -> list[Number]:
@@ -67,18 +67,18 @@ def _length(name: str, axis: AxisConfig) -> list[Number]:
 
 
 def _numbers(place: str, section: Any, powers: dict[str, float]) -> list[Number]:
-    found = []
+    numbers = []
     for key, power in powers.items():
         value = getattr(section, key)
         if value is not None:
-            found.append(Number(f"{place}.{key}", float(value), power))
-    return found
+            numbers.append(Number(f"{place}.{key}", float(value), power))
+    return numbers
 
 
-def adjustable(found: dict[str, list[Number]]) -> dict[str, list[float]]:
+def adjustable(by_slider: dict[str, list[Number]]) -> dict[str, list[float]]:
     """The control section's ``adjustable``: the range of every number that a slider changes."""
     ranges = {}
-    for name, numbers in found.items():
+    for name, numbers in by_slider.items():
         for number in numbers:
             ends = sorted(number.at(factor) for factor in RANGES[name])
             room = 1e-6 * abs(number.value)  # the ends are within, however they are rounded

@@ -94,8 +94,8 @@ class CraneView:
                     self._on(key, handler, message, message_name)
 
     def _message(self, name: str) -> Message | None:
-        found = self._deployment.messages.find(name)
-        return None if isinstance(found, str) else found[1]
+        entry = self._deployment.messages.find(name)
+        return None if isinstance(entry, str) else entry[1]
 
     def _on(self, key: tuple[str, int, bool], handler: Any, what: Any, message: str) -> None:
         self._handlers.setdefault(key, []).append((handler, what, message))
@@ -192,13 +192,13 @@ class CraneView:
 
     def _predicted(self) -> tuple[float, float] | None:
         """Sway that the daemon predicts, where none is measured."""
-        found = {ACROSS: 0.0, ALONG: 0.0}
+        predicted = {ACROSS: 0.0, ALONG: 0.0}
         known = False
         for name, axis in self.axes.items():
             if axis.predicted_deg is not None and name in SWAY_OF:
-                found[SWAY_OF[name]] += axis.predicted_deg
+                predicted[SWAY_OF[name]] += axis.predicted_deg
                 known = True
-        return (found[ACROSS], found[ALONG]) if known else None
+        return (predicted[ACROSS], predicted[ALONG]) if known else None
 
     # -- messages ------------------------------------------------------------------------------
 

@@ -134,7 +134,7 @@ class ResolvedRates:
 
 
 def less(bounds: Bounds, used: Sequence[float]) -> Bounds:
-    """What the bounds leave once the rates `used` are taken."""
+    """What the rates `used` leave of the bounds."""
     low, high = bounds
     return Bounds(
         (min(0.0, low[0] - used[0]), min(0.0, low[1] - used[1]), min(0.0, low[2] - used[2])),

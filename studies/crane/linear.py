@@ -2,7 +2,7 @@
 
     (theta5', theta6') = G(s) (theta1', x', z')
 
-at any radius. The linearisation is that of `SwayStateSpace` by CasADi; beside it stand the closed
+at any radius. The linearisation is that of `SwayStateSpace` by CasADi; next to it stand the closed
 forms, worked out by hand, and the tests hold one against the other.
 
 At rest G12 = G13 = G21 = G23 = 0 identically and every G_ij has the DC gain 0. While the crane

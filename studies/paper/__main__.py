@@ -62,16 +62,16 @@ def reproduce(
         raise typer.Exit(EXIT_INTERRUPTED) from None
 
 
-def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
+def _reproduce(out: Path, chosen: list[int], console: Console) -> None:
     from canshaper.errors import ConfigError
     from studies.paper.study import FIGURES, Study, steps
     from studies.paper.table import print_paper_table
 
-    for number in wanted:
+    for number in chosen:
         if number not in FIGURES:
             known = ", ".join(map(str, FIGURES))
             raise fail(ValueError(f"--figure: expected one of {known}, got {number}"))
-    figures = tuple(n for n in FIGURES if n in wanted or not wanted)
+    figures = tuple(n for n in FIGURES if n in chosen or not chosen)
     try:
         out.mkdir(parents=True, exist_ok=True)
     except OSError as error:
@@ -79,7 +79,7 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
     with Progress(
         TextColumn("{task.description}"), BarColumn(), TimeRemainingColumn(), console=console
     ) as progress:
-        count = steps(figures, table=not wanted) + len(figures)
+        count = steps(figures, table=not chosen) + len(figures)
         task = progress.add_task("drives and figures", total=count)
         try:
             # The shipped file itself: numbers of the paper are not those of a user's machine.
@@ -87,7 +87,7 @@ def _reproduce(out: Path, wanted: list[int], console: Console) -> None:
             study = Study(load(), lambda: progress.advance(task))
             # Every number comes before the first file: an interruption leaves no half of a set.
             numbers = {n: study.figure_numbers(n) for n in figures}
-            table = None if wanted else study.table()
+            table = None if chosen else study.table()
         except (ConfigError, ValueError) as error:
             raise fail(error) from None
         drawn: list[tuple[str, Path]] = []

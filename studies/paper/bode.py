@@ -68,7 +68,7 @@ def bode() -> tuple[BodeCurve, BodeCurve]:
     modes = sway_modes(grapple)
     omega = np.geomspace(LOW_RAD_S, HIGH_RAD_S, _POINTS)
     matrix = _response(linearise(grapple, OperatingPoint(RADIUS_M)), omega)
-    found = []
+    curves = []
     # Eq. 12 as printed has the numerators 1/(l1 + l2) and 3/l2 over g/(l1 + l2) and g/l2.
     long, short = grapple.l1_m + grapple.l2_m, grapple.l2_m
     for i, (name, mode, gain, length, damping) in enumerate(
@@ -81,7 +81,7 @@ def bode() -> tuple[BodeCurve, BodeCurve]:
         s = 1j * omega
         twice = damping / (grapple.m2_kg * length**2)
         printed = gain * s**2 / (s**2 + twice * s + GRAVITY_M_S2 / length)
-        found.append(
+        curves.append(
             BodeCurve(
                 name,
                 omega.tolist(),
@@ -92,7 +92,7 @@ def bode() -> tuple[BodeCurve, BodeCurve]:
                 mode.damping_ratio,
             )
         )
-    return found[0], found[1]
+    return curves[0], curves[1]
 
 
 def slewing() -> Slewing:

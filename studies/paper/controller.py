@@ -117,7 +117,7 @@ def _fitted_task(axis: str, require: Requirements) -> Task:
 
 def _pole_distance(on_progress: Callable[[], None]) -> Fact:
     require = Requirements(pole_distance="printed", within_command=False)
-    found: Tuning = tune(_fitted_task("slew", require))
+    optimum: Tuning = tune(_fitted_task("slew", require))
     on_progress()
     needed = min(printed.POLES["slew"]) / 5.0
     return Fact(
@@ -127,19 +127,19 @@ def _pole_distance(on_progress: Callable[[], None]) -> Fact:
         "<= 5 Re P",
         False,
         "the text asks for poles far enough out, the print for near ones; with the print the fitted"
-        f" slew optimum is {found.poles_rad_s[0]:.2f}, {found.poles_rad_s[1]:.2f}, and the printed"
-        f" poles need Re P <= {needed:.2f} rad/s (assumed grapple:"
+        f" slew optimum is {optimum.poles_rad_s[0]:.2f}, {optimum.poles_rad_s[1]:.2f}, and the"
+        f" printed poles need Re P <= {needed:.2f} rad/s (assumed grapple:"
         f" {printed_mode(Grapple()).pole.real:.2f})",
     )
 
 
 def _manual_rule() -> Fact:
-    found = manual(printed_mode(Grapple())).poles_rad_s
+    poles = manual(printed_mode(Grapple())).poles_rad_s
     return Fact(
         "3",
         "Manual rule: 5 Re P, then < 2x",
         "no poles",
-        f"{found[0]:.2f}, {found[1]:.2f}",
+        f"{poles[0]:.2f}, {poles[1]:.2f}",
         None,
         "depends on damping alone: far slower than either printed optimum on the assumed grapple",
     )

@@ -47,9 +47,9 @@ _AVERAGED: Final = CLAIMS[:3]
 
 def reduction_pct(runs: Runs, claim: Claim, plant: str, metric: Metric) -> float:
     """The reduction that a claim is about, percent."""
-    found = runs[claim.axis, claim.poles_of, plant].swing(claim.plane, metric).reduction_pct
-    assert found is not None  # every claim is of a plane that swings
-    return found
+    reduced_pct = runs[claim.axis, claim.poles_of, plant].swing(claim.plane, metric).reduction_pct
+    assert reduced_pct is not None  # every claim is of a plane that swings
+    return reduced_pct
 
 
 def rows(runs: Runs) -> list[dict[str, Any]]:
@@ -148,7 +148,7 @@ def _sentence(row: dict[str, Any], varied: dict[str, Any] | None) -> str:
         f"{METRIC_WORDS[m]} {_where([v[m] > bound for v in varied['by_l2_m'].values()])}"
         for m in METRICS
     )
-    rests = [v for v, found in varied["by_rest_s"].items() if found["rms"] > bound]
+    rests = [v for v, ours in varied["by_rest_s"].items() if ours["rms"] > bound]
     if 0 < len(rests) < len(RESTS_S):
         text += f"; RMS at {Grapple().l2_m:g} m too where the rest is {min(rests):g} s or longer"
     return f"{text}."

@@ -74,9 +74,9 @@ class Run:
         # The residual of the plane that the axis does not drive is kept with the axis it follows.
         owner = self.axis if metric == "residual" else TRACE_OF[plane]
         name = "cross_residual" if across and metric == "residual" else metric
-        found = self.compared[owner]
-        raw, shaped = (getattr(m, f"{name}_deg") or 0.0 for m in (found.raw, found.shaped))
-        return Swing(raw, shaped, getattr(found, f"{name}_reduction_pct"))
+        compared = self.compared[owner]
+        raw, shaped = (getattr(m, f"{name}_deg") or 0.0 for m in (compared.raw, compared.shaped))
+        return Swing(raw, shaped, getattr(compared, f"{name}_reduction_pct"))
 
     def numbers(self) -> dict[str, object]:
         """Everything of the run for JSON: degrees to 0.01, percent to 0.1."""

@@ -112,7 +112,7 @@ class Study:
             for figure in (3, 4)
             for i, plant in enumerate(PLANTS)
         }
-        found = controller.facts(self.curves(), self.turning(), ladders, self._on_progress)
+        facts = controller.facts(self.curves(), self.turning(), ladders, self._on_progress)
         return {
             "paper": "Optimal sway motion reduction in forestry cranes, Front. Robot. AI, 2024",
             "assumed": {"why": PARAMETERS, "grapple": asdict(Grapple())},
@@ -120,7 +120,7 @@ class Study:
             "reductions": rows,
             "in_words": reductions.in_words(rows, varied),
             "assumptions": varied,
-            "others": [asdict(fact) for fact in found],
+            "others": [asdict(fact) for fact in facts],
         }
 
 

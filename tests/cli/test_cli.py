@@ -376,8 +376,8 @@ def test_the_watch_of_heavy_imports_would_see_one() -> None:
 )
 def test_check_names_an_axis_that_slews_in_no_motion(file: str, slews: list[str]) -> None:
     lines = invoke("check", file).stdout.splitlines()
-    found = [line.split()[0] for line in lines if "is in no motion" in line]
-    assert found == slews
+    named = [line.split()[0] for line in lines if "is in no motion" in line]
+    assert named == slews
     assert sum("which joints are not" in line for line in lines) == len(slews)
 
 

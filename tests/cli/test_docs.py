@@ -69,7 +69,7 @@ def test_without_a_site_it_says_where_the_pages_are(monkeypatch: pytest.MonkeyPa
     assert f"read {pages}, or run make docs" in done.output
 
 
-def test_a_port_that_is_taken_is_an_error(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_is_in_use_is_an_error(site: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(verb, "site_directory", lambda: site)
     with verb.ThreadingHTTPServer(("127.0.0.1", 0), verb._Pages) as other:
         done = CliRunner().invoke(app, ["docs", "--port", str(other.server_port)])

@@ -107,9 +107,9 @@ def studio(file: str) -> Iterator[Page]:
     assert process.stdout
     try:
         line = process.stdout.readline()
-        found = re.search(r"open http://([0-9.:]+)/ in", line)
-        assert found, line + process.stdout.read()
-        with connect(f"ws://{found[1]}/ws", origin=f"http://{found[1]}") as page:
+        match = re.search(r"open http://([0-9.:]+)/ in", line)
+        assert match, line + process.stdout.read()
+        with connect(f"ws://{match[1]}/ws", origin=f"http://{match[1]}") as page:
             yield Page(page)
         process.terminate()
         rest, _ = process.communicate(timeout=30)

@@ -37,17 +37,17 @@ def test_a_kernel_that_refuses_is_reported(monkeypatch: pytest.MonkeyPatch) -> N
 
 
 @pytest.mark.parametrize(
-    ("fallback", "told"),
+    ("fallback", "message"),
     [("stop", "no joystick does"), ("neutral", "neutral joysticks do"), ("pass", "WARNING: ")],
 )
-def test_the_check_reports_what_passes(tmp_path: Path, fallback: str, told: str) -> None:
+def test_the_check_reports_what_passes(tmp_path: Path, fallback: str, message: str) -> None:
     text = FILE.read_text().replace("../dbc", str(ROOT / "dbc"))
     file = tmp_path / "machine.yaml"
     file.write_text(text.replace("fallback: neutral", f"fallback: {fallback}"))
     result = invoke("check", str(file))
     assert result.exit_code == 0
     line = "gateway between joysticks and machine: others pass by the kernel, "
-    assert f"{line}{told}" in result.stdout
+    assert f"{line}{message}" in result.stdout
 
 
 def test_the_same_rule_twice_is_one_too_many() -> None:

@@ -261,7 +261,7 @@ def test_a_wrong_answer_is_reported_and_asked_again(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seconds", ["2.2", "85.7"])
 @pytest.mark.parametrize("channel", ["5", "true", "x'y", "a:b", "1e3", "größe"])
-def test_every_answer_that_is_taken_makes_a_good_file(
+def test_every_answer_that_is_accepted_makes_a_good_file(
     tmp_path: Path, channel: str, seconds: str
 ) -> None:
     file = tmp_path / "machine.yaml"

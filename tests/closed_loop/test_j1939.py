@@ -16,8 +16,8 @@ def residual_reduction_pct(file: str) -> dict[str, float]:
     deployment = load_deployment(CONFIG / file)
     script = SCRIPTS["one-by-one"]
     report = compare(drive(deployment, script, bypass=True), drive(deployment, script))
-    found = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
-    return {name: value for name, value in found.items() if value is not None}
+    reductions = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
+    return {name: value for name, value in reductions.items() if value is not None}
 
 
 def test_sway_is_reduced_as_with_messages_of_our_own() -> None:

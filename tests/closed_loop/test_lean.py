@@ -1,4 +1,4 @@
-"""A drive that nobody listens to: fewer frames on the bus, the same at every valve."""
+"""A drive that no one listens to: fewer frames on the bus, the same at every valve."""
 
 from dataclasses import replace
 from pathlib import Path

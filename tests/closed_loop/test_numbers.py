@@ -21,7 +21,7 @@ PAPER_SLEW = (0.42, 0.043)
 
 
 class OrdinaryGff:
-    """Eq. 13 as an ordinary biquad with matched poles and zeros: never told what was sent."""
+    """Eq. 13 as an ordinary biquad with matched poles and zeros: never driven by what was sent."""
 
     def __init__(self, mode: SwayMode, a1: float, a2: float, tick_s: float) -> None:
         zero = cmath.exp(mode.pole * tick_s)

@@ -36,10 +36,10 @@ def travel_s(recording: Recording, axis: str) -> float:
 def test_a_tap_moves_the_crane_once_and_as_far_as_asked(axis: str, level: float) -> None:
     for duration_s in DURATIONS:
         recording = tapped("forwarder-robust.yaml", axis, level, duration_s)
-        asked_s = sum(recording.axes[axis].joystick) * TICK_S
-        assert abs(asked_s) > 0.9 * duration_s * abs(level)
+        commanded_s = sum(recording.axes[axis].joystick) * TICK_S
+        assert abs(commanded_s) > 0.9 * duration_s * abs(level)
         assert movements(recording, axis) == 1, duration_s
-        assert travel_s(recording, axis) == pytest.approx(asked_s, rel=0.05), duration_s
+        assert travel_s(recording, axis) == pytest.approx(commanded_s, rel=0.05), duration_s
         slew, near_far = recording.axes["slew"].sway_deg, recording.axes["near_far"].sway_deg
         assert slew is not None
         assert near_far is not None

@@ -21,23 +21,23 @@ def residual_reduction_pct(file: str, crane: str | None = None) -> dict[str, flo
     script = SCRIPTS["one-by-one"]
     raw = drive(deployment, script, bypass=True, crane=crane)
     report = compare(raw, drive(deployment, script, crane=crane))
-    found = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
-    print(file, crane, found)
-    return {name: value for name, value in found.items() if value is not None}
+    reductions = {name: report[name].residual_reduction_pct for name in ("slew", "near_far")}
+    print(file, crane, reductions)
+    return {name: value for name, value in reductions.items() if value is not None}
 
 
 def test_a_gateway_in_the_line_damps_as_much() -> None:
     """By the joystick's own frames with our velocities in them, a cycle later."""
-    found = residual_reduction_pct("gateway-forwarder.yaml")
-    assert found == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
-    assert min(found.values()) > 90.0
+    reductions = residual_reduction_pct("gateway-forwarder.yaml")
+    assert reductions == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
+    assert min(reductions.values()) > 90.0
 
 
 @pytest.mark.parametrize("crane", ["front", "rear"])
 def test_each_of_two_cranes_damps_as_much(crane: str) -> None:
-    found = residual_reduction_pct("two-cranes.yaml", crane)
-    assert found == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
-    assert min(found.values()) > 90.0
+    reductions = residual_reduction_pct("two-cranes.yaml", crane)
+    assert reductions == pytest.approx(residual_reduction_pct("forwarder.yaml"), abs=1.0)
+    assert min(reductions.values()) > 90.0
 
 
 def test_a_crane_is_the_first_part_of_the_names_of_its_axes() -> None:

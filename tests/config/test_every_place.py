@@ -49,7 +49,7 @@ def whole(annotation: Any, kind: str, metadata: tuple[Any, ...] = ()) -> Any:
 
 
 def one_of(arguments: tuple[Any, ...], kind: str) -> Any:
-    """The only type beside None, or the filter of this kind."""
+    """The only type next to None, or the filter of this kind."""
     some = [a for a in arguments if a is not types.NoneType]
     if len(some) == 1:
         return some[0]
@@ -109,9 +109,9 @@ def test_a_wrong_key_in_every_section(tmp_path: Path, schema: type[Section], kin
     assert sections
     for place in sections:
         put(data, (*place, "wrong"), 1)
-    found = problems(tmp_path, schema, data)
-    assert found.keys() == {where((*place, "wrong")) for place in sections}
-    assert all(p.message.startswith("expected one of the keys ") for p in found.values())
+    problem_at = problems(tmp_path, schema, data)
+    assert problem_at.keys() == {where((*place, "wrong")) for place in sections}
+    assert all(p.message.startswith("expected one of the keys ") for p in problem_at.values())
 
 
 @files
@@ -123,9 +123,9 @@ def test_a_wrong_type_at_every_place(tmp_path: Path, schema: type[Section], kind
         here = {p: v for p, v in places(data) if len(p) == depth and p[-1] != "kind"}
         for place, value in here.items():
             put(data, place, 3 if isinstance(value, dict | list) else ["wrong"])
-        found = problems(tmp_path, schema, data)
+        problem_at = problems(tmp_path, schema, data)
         for place in here:
-            message = found[where(place)].message
+            message = problem_at[where(place)].message
             assert message.startswith("expected ")
             assert message.endswith((", got 3", ", got ['wrong']"))
             assert "Input should" not in message  # which is what pydantic says
@@ -138,9 +138,9 @@ def test_a_wrong_kind_of_every_filter(tmp_path: Path, value: object) -> None:
     assert len(here) == 1 + 2 + 2 * (1 + 2)  # of the axis, its sets, its feels and theirs
     for place in here:
         put(data, place, value)
-    found = problems(tmp_path, DeploymentConfig, data)
+    problem_at = problems(tmp_path, DeploymentConfig, data)
     for place in here:
-        assert "expected one of 'off', 'gff'" in found[where(place)].message
+        assert "expected one of 'off', 'gff'" in problem_at[where(place)].message
 
 
 def test_faults_in_sets_are_reported_as_everywhere(tmp_path: Path) -> None:
@@ -150,7 +150,7 @@ def test_faults_in_sets_are_reported_as_everywhere(tmp_path: Path) -> None:
     axis["gain_schedule"][1]["filter"]["poles_rad_s"] = [-4.0, 4.0]
     del axis["gain_schedule"][1]["sway"]["full_speed_m_s"]
     axis["profiles"]["name1"]["gain_schedule"][1] = {"breakpoint": 1.0}
-    found = problems(tmp_path, DeploymentConfig, data)
+    problem_at = problems(tmp_path, DeploymentConfig, data)
     assert {
         "axes.name0.gain_schedule.0.breakpoint": "expected -1e+06 to 1e+06, got 10000000.0",
         "axes.name0.gain_schedule.1.filter.poles_rad_s.1": ("expected -100 to -0.1 rad/s, got 4.0"),
@@ -158,4 +158,4 @@ def test_faults_in_sets_are_reported_as_everywhere(tmp_path: Path) -> None:
             "missing: speed of the tip at full command, scales the sway shown (m/s)"
         ),
         "axes.name0.profiles.name1.gain_schedule.1.filter": "missing: filter at this value",
-    }.items() <= {place: problem.message for place, problem in found.items()}.items()
+    }.items() <= {place: problem.message for place, problem in problem_at.items()}.items()

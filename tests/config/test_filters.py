@@ -75,8 +75,8 @@ def test_it_loads_with_its_parameters_and_builds(
         left = residual_left(shaper.taps, SwayMode(sway.mode.omega_rad_s, 0.0), TICK_S)
         assert 100.0 * left == pytest.approx(parameters["residual_pct"], abs=1.5)
     for _ in range(2000):  # gain one, whatever the kind
-        sway.step(wanted := shaper.step(0.6))
-    assert wanted == pytest.approx(0.6, abs=1e-6)
+        sway.step(output := shaper.step(0.6))
+    assert output == pytest.approx(0.6, abs=1e-6)
 
 
 @good
@@ -147,18 +147,18 @@ def test_what_is_wrong_is_named_once_or_for_each_entry(
     problems: Problems, shipped: str, text: str, says: str
 ) -> None:
     line = shipped[: shipped.index(SLEW)].count("\n") + 1
-    found = problems(slew_with(shipped, text))
-    assert says in found[0]
-    for problem in found:
+    reported = problems(slew_with(shipped, text))
+    assert says in reported[0]
+    for problem in reported:
         assert problem.startswith(f"machine.yaml:{line}: axes.slew.filter")
     # two bad taps are two problems; all else is one
-    assert len(found) == (2 if "-0.5" in text else 1)
+    assert len(reported) == (2 if "-0.5" in text else 1)
 
 
 def test_too_many_taps_are_one_problem(problems: Problems, shipped: str) -> None:
     taps = ", ".join(["0.0009990009990009990"] * 1001)
-    (found,) = problems(slew_with(shipped, f"kind: robust, tick_ms: 20, taps: [{taps}]"))
-    assert "taps: expected 1000 entries at most, got [0.000" in found
+    (problem,) = problems(slew_with(shipped, f"kind: robust, tick_ms: 20, taps: [{taps}]"))
+    assert "taps: expected 1000 entries at most, got [0.000" in problem
 
 
 @pytest.mark.parametrize("kind", [k.name for k in KINDS.values() if k.needs_sway])
@@ -167,9 +167,9 @@ def test_an_axis_without_sway_data_has_no_filter_that_needs_them(
 ) -> None:
     text = next(g[0] for g in GOOD if g[0].split(",")[0] == f"kind: {kind}")
     assert LIFT in shipped
-    (found,) = problems(shipped.replace(LIFT, f"filter: {{ {text} }}"))
-    assert "axes.lift" in found
-    assert f"expected sway data for filter {kind}, got none" in found
+    (problem,) = problems(shipped.replace(LIFT, f"filter: {{ {text} }}"))
+    assert "axes.lift" in problem
+    assert f"expected sway data for filter {kind}, got none" in problem
 
 
 # -- against the valve's period: canshaper check ---------------------------------------------------
@@ -243,9 +243,9 @@ QUICK = "period_s: 0.31416, damping_ratio: 0"  # 20 rad/s
 def test_a_filter_that_its_valve_cannot_run_is_one_problem(
     tmp_path: Path, text: str, sway: str, says: str
 ) -> None:
-    (found,) = checked(tmp_path, text, sway=sway)
-    assert "axes.slew.filter: " in found
-    assert says in found
+    (problem,) = checked(tmp_path, text, sway=sway)
+    assert "axes.slew.filter: " in problem
+    assert says in problem
 
 
 @pytest.mark.parametrize("text", ["kind: zv", "kind: zvd", "kind: ei", "kind: gff, a1: 1, a2: 0.1"])

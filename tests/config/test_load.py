@@ -240,15 +240,15 @@ def test_all_problems_are_reported_at_once_in_the_order_of_the_file(
         ("status: { bus: crane, message: ShaperStatus }", "staus: 1"),
     ]:
         text, _ = changed(text, old, new)
-    found = problems(text)
-    assert [p.split(": ")[1] for p in found] == [
+    reported = problems(text)
+    assert [p.split(": ")[1] for p in reported] == [
         "tick_ms",
         "joysticks.left.timeout_ms",
         "axes.near_far.command.signal",
         "axes.lift.filter.kind",
         "staus",
     ]
-    lines = [int(p.split(":")[1]) for p in found]
+    lines = [int(p.split(":")[1]) for p in reported]
     assert lines == sorted(lines)
 
 
@@ -260,11 +260,11 @@ def test_empty_file_lacks_everything(problems: Problems, text: str) -> None:
 
 
 @pytest.mark.parametrize(
-    ("text", "found"),
+    ("text", "shown"),
     [("- a\n", "['a']"), ("~\n", "nothing"), ("3\n", "3"), ("hello\n", "'hello'")],
 )
-def test_a_file_that_is_no_mapping(problems: Problems, text: str, found: str) -> None:
-    says = f"machine.yaml:1: expected a section with the keys {TOP}, got {found}"
+def test_a_file_that_is_no_mapping(problems: Problems, text: str, shown: str) -> None:
+    says = f"machine.yaml:1: expected a section with the keys {TOP}, got {shown}"
     assert problems(text) == [says]
 
 
@@ -288,9 +288,9 @@ def test_off_needs_no_quotes(shipped: str, load: Load) -> None:
 
 @pytest.mark.parametrize("word", ["true", "'false'", "no", "0", "null"])
 def test_nothing_else_is_off(shipped: str, problems: Problems, word: str) -> None:
-    (found,) = problems(shipped.replace("kind: off", f"kind: {word}"))
-    assert "axes.lift.filter.kind: expected one of 'off', 'gff', " in found
-    assert ", got " in found
+    (problem,) = problems(shipped.replace("kind: off", f"kind: {word}"))
+    assert "axes.lift.filter.kind: expected one of 'off', 'gff', " in problem
+    assert ", got " in problem
 
 
 def test_numbers_with_an_exponent_are_numbers(shipped: str, load: Load) -> None:

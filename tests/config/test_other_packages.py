@@ -117,17 +117,17 @@ def test_it_drives_an_axis_and_is_compared(packages: Path, tmp_path: Path) -> No
     file, _ = machine(tmp_path, "2")
     done = python(packages, "-c", WORK, str(file))
     assert done.returncode == 0, done.stderr
-    found = json.loads(done.stdout)
+    result = json.loads(done.stdout)
     # The mean over two seconds rises for two seconds, by half a percent of full each tick.
-    sent = found["sent"]
+    sent = result["sent"]
     start = next(i for i, value in enumerate(sent) if value)
     steps = [sent[i + 1] - sent[i] for i in range(start, start + 90)]
     assert sum(steps) / len(steps) == pytest.approx(max(sent) / 100.0, rel=0.05)
     assert max(steps) <= 2.0 * max(sent) / 100.0
-    assert found["rows"] == [["mean over a swing", False, False]]
-    assert found["same"]
-    assert len(found["residual_deg"]) == 1
-    assert found["residual_deg"][0] < 2.0  # off leaves 16 degrees
+    assert result["rows"] == [["mean over a swing", False, False]]
+    assert result["same"]
+    assert len(result["residual_deg"]) == 1
+    assert result["residual_deg"][0] < 2.0  # off leaves 16 degrees
 
 
 @pytest.mark.parametrize(

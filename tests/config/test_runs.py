@@ -35,11 +35,11 @@ def test_a_file_may_have_them(load: Load, shipped: str) -> None:
     "taps", ["[0 x 1, 1]", "[-1 x 1]", "[2 x -0.5]", "[2x 0.5]", "[2 x .5]", "[x 1]", "[99999 x 0]"]
 )
 def test_what_is_no_run_is_no_number(problems: Problems, shipped: str, taps: str) -> None:
-    (found,) = problems(filtered(shipped, taps))
-    assert "axes.slew.filter.taps.0: expected 0 to 1, got '" in found
+    (problem,) = problems(filtered(shipped, taps))
+    assert "axes.slew.filter.taps.0: expected 0 to 1, got '" in problem
 
 
 def test_runs_cannot_make_a_list_without_end(problems: Problems, shipped: str) -> None:
-    (found,) = problems(filtered(shipped, f"[{'9999 x 0, ' * 5000}1]"))
-    assert "axes.slew.filter.taps: expected 1000 entries at most, got [0.0, 0.0" in found
+    (problem,) = problems(filtered(shipped, f"[{'9999 x 0, ' * 5000}1]"))
+    assert "axes.slew.filter.taps: expected 1000 entries at most, got [0.0, 0.0" in problem
     assert len(expanded(["9999 x 0"] * 5000)) < 20_000

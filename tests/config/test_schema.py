@@ -114,20 +114,20 @@ def test_it_refuses_what_loading_refuses(
 
 def test_every_number_has_a_range_and_a_unit(schema: dict[str, Any]) -> None:
     def numbers(node: Any, path: str = "") -> list[tuple[str, dict[str, Any]]]:
-        found = []
+        nodes = []
         if isinstance(node, dict):
             if node.get("type") in ("number", "integer"):
-                found.append((path, node))
+                nodes.append((path, node))
             for key, below in node.items():
-                found += numbers(below, f"{path}/{key}")
+                nodes += numbers(below, f"{path}/{key}")
         elif isinstance(node, list):
             for i, below in enumerate(node):
-                found += numbers(below, f"{path}/{i}")
-        return found
+                nodes += numbers(below, f"{path}/{i}")
+        return nodes
 
-    found = numbers(schema)
-    assert len(found) > 20
-    for path, node in found:
+    nodes = numbers(schema)
+    assert len(nodes) > 20
+    for path, node in nodes:
         assert {"minimum", "maximum", "unit", "description"} <= node.keys(), path
 
 

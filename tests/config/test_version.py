@@ -1,4 +1,4 @@
-"""The version of the file's format: what came before it is told key by key."""
+"""The version of the file's format: what came before it is reported key by key."""
 
 import re
 from pathlib import Path
@@ -93,10 +93,10 @@ def test_other_faults_of_an_old_file_are_reported_with_the_keys_that_moved(
     problems: Problems,
 ) -> None:
     text = OLD.replace("timeout_ms: 100", "timeout_ms: soon").replace("lever: left,", "lever: 3,")
-    found = problems(text)
-    assert len(found) == len(ANSWERS) + 2
-    assert any(p.startswith("machine.yaml:10: joysticks.left.timeout_ms: ") for p in found)
-    assert any(p.startswith("machine.yaml:15: axes.slew.command.joystick: ") for p in found)
+    reported = problems(text)
+    assert len(reported) == len(ANSWERS) + 2
+    assert any(p.startswith("machine.yaml:10: joysticks.left.timeout_ms: ") for p in reported)
+    assert any(p.startswith("machine.yaml:15: axes.slew.command.joystick: ") for p in reported)
 
 
 def test_a_key_with_both_names_is_reported_once(problems: Problems) -> None:
@@ -106,17 +106,17 @@ def test_a_key_with_both_names_is_reported_once(problems: Problems) -> None:
 
 @pytest.mark.parametrize("text", ["version: 2\n", "nonsense: 1\naxes: []\nversion: 2\n"])
 def test_of_a_later_version_one_line_is_said(problems: Problems, text: str) -> None:
-    (found,) = problems(text)
+    (problem,) = problems(text)
     line = text.count("\n")
     says = "expected 1, got 2: the file is for a later release of canshaper"
-    assert found == f"machine.yaml:{line}: version: {says}"
+    assert problem == f"machine.yaml:{line}: version: {says}"
 
 
 @pytest.mark.parametrize("value", ["0", "-1", "1.0", "'1'", "true", "", "[1]", "one"])
 def test_what_is_no_version(problems: Problems, shipped: str, value: str) -> None:
-    (found,) = problems(shipped.replace("version: 1 ", f"version: {value} "))
+    (problem,) = problems(shipped.replace("version: 1 ", f"version: {value} "))
     line = shipped.splitlines().index("version: 1 # of the file's format") + 1
-    assert found.startswith(f"machine.yaml:{line}: version: ")
+    assert problem.startswith(f"machine.yaml:{line}: version: ")
 
 
 @pytest.mark.parametrize("text", ["- levers\n", "levers\n", "levers: 3\naxes: [stick]\n"])

@@ -31,9 +31,9 @@ class Judge:
     joystick: int
     byte: int
     alive: int | None = None
-    heard_ns: int = -(10**12)
+    received_ns: int = -(10**12)
     neutral_seen: bool = False
-    asked: bool = False
+    commanded: bool = False
     released: bool = True
     fastest: int = 0
 
@@ -41,25 +41,27 @@ class Judge:
         place = (frame.bus, frame.can_id, frame.extended, len(frame.data))
         if place != ("crane", self.joystick, False, 8) or frame.data[7] == self.alive:
             return
-        self.alive, self.heard_ns = frame.data[7], now_ns
+        self.alive, self.received_ns = frame.data[7], now_ns
         (joystick,) = struct.unpack_from("<h", frame.data, self.byte)
         enable = frame.data[4] & 3
         self.released = enable == 0
         if enable == 1 and abs(joystick) <= 20:
             self.neutral_seen = True
         if enable == 1 and 20 < abs(joystick) <= 1000 and self.neutral_seen:
-            self.asked = True
+            self.commanded = True
             self.fastest = max(self.fastest, abs(joystick))
 
     def allows(self, raw: int, now_ns: int) -> bool:
         """Whether this raw command of the valve, 0.8 % per bit, may be sent now."""
         if raw == 0:
             return True
-        if self.released or not self.asked or abs(raw) > 125:
+        if self.released or not self.commanded or abs(raw) > 125:
             return False
         # 5 % of the valve's deadband are added; one step for rounding
         fast_enough = abs(raw) <= 125 * (0.05 + 0.95 * self.fastest / 1000) + 1
-        in_time = now_ns - self.heard_ns <= TIMEOUT_NS + STOP_NS + (1 + 2 * MOST_MISSED) * TICK_NS
+        in_time = (
+            now_ns - self.received_ns <= TIMEOUT_NS + STOP_NS + (1 + 2 * MOST_MISSED) * TICK_NS
+        )
         return fast_enough and in_time
 
 
@@ -106,7 +108,7 @@ def drive(script: list[tuple[list[Frame], int, int]]) -> int:
         if missed > MOST_MISSED:  # as the daemon does after more than the timeout
             controller.stalled()
             for judge in judges.values():
-                judge.neutral_seen = judge.asked = False
+                judge.neutral_seen = judge.commanded = False
         for frame in frames:
             controller.receive(frame, now_ns)
             for judge in judges.values():

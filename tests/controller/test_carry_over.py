@@ -263,7 +263,7 @@ def test_a_valve_is_brought_to_active_from_init(canopen: CanopenRig) -> None:
 
 
 def test_another_sender_that_no_tick_has_seen_trips(rig: Rig) -> None:
-    """It is read when the valves of a tick were told, and before the next one comes the reload."""
+    """It is read after a tick sent its commands to the valves, and before the reload comes."""
     rig.run(3)
     rig.receive(FOREIGN)
     reload(rig)

@@ -154,8 +154,8 @@ def test_the_kernel_is_not_left_alone_with_it(installed: Installed, command: str
     line = [row.strip()[:8] for row in file.read_text().splitlines()].index("fallback") + 1
     says = f"{file}:{line}: gateway.fallback: expected stop or pass, got neutral:"
     says += " can-gw of the kernel knows no checksum"
-    found = installed.canshaper(command, file, code=2)
-    assert f"{says} of the kind crc16_id, which JoystickLeft has\n" in found
+    output = installed.canshaper(command, file, code=2)
+    assert f"{says} of the kind crc16_id, which JoystickLeft has\n" in output
     file.write_text(file.read_text().replace("fallback: neutral", "fallback: stop"))
     assert "good" in installed.canshaper("check", file)
 
@@ -169,7 +169,7 @@ def broken(installed: Installed) -> None:
     installed.package()
 
 
-def taken(installed: Installed) -> None:
+def name_taken(installed: Installed) -> None:
     installed.package()
     installed.package("other-can")
 
@@ -183,7 +183,7 @@ def ours(installed: Installed) -> None:
     [
         (broken, "crc16_id", "'crc16_id' of the package acme-can 1.5 cannot be loaded:"
          " RuntimeError: no licence for this PC"),
-        (taken, "crc16_id", "expected one package with the checksum 'crc16_id', got acme-can"
+        (name_taken, "crc16_id", "expected one package with the checksum 'crc16_id', got acme-can"
          " 1.5 and other-can 1.5"),
         (ours, "crc8_sae_j1850", "expected one package with the checksum 'crc8_sae_j1850', got"
          " canshaper and acme-can 1.5"),
@@ -198,7 +198,7 @@ def test_a_package_that_is_wrong_is_one_line_of_the_file(
     change(installed)
     file = installed.machine("forwarder.yaml", ("kind: crc16_id", f"kind: {kind}"))
     line = next(i for i, row in enumerate(file.read_text().splitlines(), 1) if "kind:" in row)
-    found = installed.canshaper("check", file, code=2)
-    assert found == f"{file}:{line}: joysticks.left.checksum.kind: {says}\n1 problem\n"
-    if change in (broken, taken):
+    output = installed.canshaper("check", file, code=2)
+    assert output == f"{file}:{line}: joysticks.left.checksum.kind: {says}\n1 problem\n"
+    if change in (broken, name_taken):
         assert installed.canshaper("config-schema", "--checksums", code=2) == f"{says}\n"

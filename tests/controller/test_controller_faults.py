@@ -224,7 +224,7 @@ def test_status_comes_in_its_cycle_and_with_every_transition(rig: Rig) -> None:
             if event.axis == "slew":
                 assert reported[-1] == (tick, event.transition.new, event.transition.reason)
         assert ("ShaperStatus" in sent) is (tick % 25 == 0)
-        rig.controller.events = [e for e in rig.controller.events if e.axis == "nobody"]
+        rig.controller.events = [e for e in rig.controller.events if e.axis == "none"]
     assert [s for _, s, _ in reported][:1] == [State.READY]
     assert {s for _, s, _ in reported} == {State.READY, State.ACTIVE}
 

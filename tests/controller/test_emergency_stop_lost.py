@@ -1,4 +1,4 @@
-"""The emergency stop on the bus: lost, never heard of, and frames that are none."""
+"""The emergency stop on the bus: lost, never received, and frames that are none."""
 
 import pytest
 

@@ -23,7 +23,7 @@ def any_source() -> Deployment:
 
 @pytest.fixture
 def one_source(tmp_path: Path) -> Deployment:
-    """The left joystick is taken from one address only."""
+    """The left joystick is received from one address only."""
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
     joystick = "    message: BJM1\n"
     assert joystick in text

@@ -24,8 +24,8 @@ def sent(name: str) -> set[int]:
 
 def ids_of(name: str, *messages: str) -> set[int]:
     deployment = load_deployment(ROOT / "config" / name)
-    found = [deployment.messages.find(message) for message in messages]
-    return {one[1].frame_id for one in found if not isinstance(one, str)}
+    entries = [deployment.messages.find(message) for message in messages]
+    return {one[1].frame_id for one in entries if not isinstance(one, str)}
 
 
 def test_of_the_plain_machine_only_status_is_sent() -> None:
@@ -108,14 +108,14 @@ def test_the_address_is_asked_for_before_it_is_claimed() -> None:
     assert sent_ids(rig, 12) == []
     assert sent_ids(rig, 1) == [j1939.CLAIM]
     assert sent_ids(rig, 12) == []
-    found = set(sent_ids(rig, 100, X=100.0))
-    assert found & {i for i, _ in rig.deployment.routing.buses["crane"].sent}  # status
-    assert j1939.DM1 not in found
+    ids = set(sent_ids(rig, 100, X=100.0))
+    assert ids & {i for i, _ in rig.deployment.routing.buses["crane"].sent}  # status
+    assert j1939.DM1 not in ids
 
 
 @pytest.mark.parametrize("difference", [-1, 1])
 @pytest.mark.parametrize("when", [1, 20, 100])
-def test_whoever_has_the_address_keeps_it(difference: int, when: int) -> None:
+def test_the_node_that_has_the_address_keeps_it(difference: int, when: int) -> None:
     rig = guest()
     rig.run(when)
     rig.receive(rig.claim(difference))
@@ -137,5 +137,5 @@ def test_no_fault_is_reported_and_no_request_refused() -> None:
     rig = guest()
     rig.run(100)
     rig.receive(j1939.request(0xFECA), j1939.request(0xFEDA, to=j1939.OWN))
-    found = {i for _ in range(100) for i in j1939.ids(rig.tick())}  # the joysticks are silent
-    assert not found & {j1939.DM1, j1939.BROADCAST, j1939.NACK, 0x18E8FF9C}
+    ids = {i for _ in range(100) for i in j1939.ids(rig.tick())}  # the joysticks are silent
+    assert not ids & {j1939.DM1, j1939.BROADCAST, j1939.NACK, 0x18E8FF9C}

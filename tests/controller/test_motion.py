@@ -121,9 +121,9 @@ def test_it_adds_to_what_the_operator_asks(changed_rig: Make) -> None:
     plain, rig = changed_rig(), moving_as_one(changed_rig)
     for one in (plain, rig):
         one.run(3)
-    asked = near_far(plain, 150, Slew=1000, NearFar=400)
+    alone = near_far(plain, 150, Slew=1000, NearFar=400)
     both = near_far(rig, 150, Slew=1000, NearFar=400)
-    assert sum(both) * TICK_S < sum(asked) * TICK_S - 0.05
+    assert sum(both) * TICK_S < sum(alone) * TICK_S - 0.05
     assert max(both) <= 0.4
     assert min(both) >= 0.0
 

@@ -29,8 +29,8 @@ def test_it_is_bounded_as_configured(changed_rig: Callable[..., Rig], max_pct: f
 
 
 @pytest.mark.parametrize("seed", range(40))
-def test_what_is_owed_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
-    """Joystick and compensation jump about; rates and rounding leave a debt behind."""
+def test_the_quantisation_error_adds_one_step_of_the_frame_and_no_more(seed: int) -> None:
+    """Joystick and compensation jump about; rates and rounding leave an error behind."""
     chance = random.Random(seed)
     most, steps = chance.choice([0.02, 0.05, 0.25]), 125
     limits = OutputLimits(

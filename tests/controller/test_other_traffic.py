@@ -24,7 +24,7 @@ Make = Callable[..., Rig]
 
 @pytest.mark.parametrize("data", [bytes(6), b"", bytes(8)])
 def test_traffic_that_the_dbc_knows_is_no_fault(rig: Rig, data: bytes) -> None:
-    """Nobody here listens to it: neither its length nor its content matters."""
+    """No one here listens to it: neither its length nor its content matters."""
     rig.moving()
     before = dict(rig.controller.counters.values)
     for _ in range(5):

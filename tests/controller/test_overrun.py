@@ -45,7 +45,7 @@ def test_ten_late_ticks_in_a_row_are_an_overrun_and_nine_are_not(rig: Rig, misse
     assert rig.count("MissedDeadlines") == MANY * missed
 
 
-def test_nothing_is_owed_at_the_start(rig: Rig) -> None:
+def test_the_whole_allowance_is_there_at_the_start(rig: Rig) -> None:
     for missed in [1] * 9 + [0, 1]:
         late(rig, missed)
         assert rig.reason() != "LOOP_OVERRUN"

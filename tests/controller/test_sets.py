@@ -1,4 +1,4 @@
-"""Grapple and operator choose sway data and filter, by frames; what does not fit is told."""
+"""Grapple and operator choose sway data and filter, by frames; what does not fit is reported."""
 
 from collections.abc import Callable
 

@@ -65,10 +65,10 @@ def ids_of(file: Path) -> dict[str, int]:
     return {name: axis.valve.message.sender.key[1] for name, axis in axes if axis.valve.message}
 
 
-def received(bus: can.BusABC, wanted: set[int]) -> None:
+def received(bus: can.BusABC, expected: set[int]) -> None:
     """Wait until a frame of each id came."""
     end = time.monotonic() + ANSWER_S
-    left = set(wanted)
+    left = set(expected)
     while left:
         assert time.monotonic() < end, left
         if message := bus.recv(1.0):

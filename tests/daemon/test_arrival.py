@@ -37,13 +37,13 @@ def test_silence_counts_from_the_arrival_of_the_last_frame(rig: Rig, early_ns: i
     port = Waiting()
     arrived_ns = rig.now_ns - early_ns
     port.wait(*both(rig, Slew=1000), arrived_ns=arrived_ns)
-    found_ns = rig.now_ns
+    detected_ns = rig.now_ns
     tick(rig, port)
     while rig.state() is State.ACTIVE:
-        found_ns = rig.now_ns
+        detected_ns = rig.now_ns
         tick(rig, port)
     assert rig.reason() == "JOYSTICK_TIMEOUT"
-    assert LIMIT_NS < found_ns - arrived_ns <= LIMIT_NS + TICK_NS
+    assert LIMIT_NS < detected_ns - arrived_ns <= LIMIT_NS + TICK_NS
 
 
 @pytest.mark.parametrize(("age_ns", "known"), [(LIMIT_NS, True), (LIMIT_NS + 1, False)])

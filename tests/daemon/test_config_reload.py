@@ -33,10 +33,10 @@ def read(load: Callable[[], Deployment]) -> Deployment | str:
 
 def answer(reading: ConfigReload) -> Deployment | str:
     until = time.monotonic() + ANSWER_S
-    while (found := reading.result()) is None:
+    while (result := reading.result()) is None:
         assert time.monotonic() < until
         time.sleep(0.01)
-    return found
+    return result
 
 
 def drive(deployment: Deployment) -> list[Frame]:
@@ -46,9 +46,9 @@ def drive(deployment: Deployment) -> list[Frame]:
     for tick in range(300):
         now_ns = tick * TICK_NS
         for joystick in deployment.config.joysticks.values():
-            found = deployment.messages.find(joystick.message)
-            assert not isinstance(found, str)
-            message = found[1]
+            entry = deployment.messages.find(joystick.message)
+            assert not isinstance(entry, str)
+            message = entry[1]
             values = dict.fromkeys((s.name for s in message.signals), 0)
             joysticks = {a.command.signal for a in deployment.config.axes.values()}
             values |= {name: 900 if 50 < tick < 150 else 0 for name in values if name in joysticks}
@@ -63,11 +63,11 @@ def drive(deployment: Deployment) -> list[Frame]:
 @pytest.mark.parametrize("path", SHIPPED, ids=lambda path: path.name)
 def test_it_is_the_deployment_that_reading_here_gives(path: Path) -> None:
     load = loader(str(path), "virtual", CHANNELS)
-    found, here = read(load), load()
-    assert isinstance(found, Deployment)
-    assert found.config == here.config
-    assert (found.path, found.routing.buses["crane"]) == (here.path, here.routing.buses["crane"])
-    frames = drive(found)
+    result, here = read(load), load()
+    assert isinstance(result, Deployment)
+    assert result.config == here.config
+    assert (result.path, result.routing.buses["crane"]) == (here.path, here.routing.buses["crane"])
+    frames = drive(result)
     assert frames == drive(here)
     assert len({frame.data for frame in frames}) > 100  # something moved
 
@@ -75,11 +75,11 @@ def test_it_is_the_deployment_that_reading_here_gives(path: Path) -> None:
 def test_a_wrong_file_is_refused_with_every_line(tmp_path: Path) -> None:
     path = tmp_path / "wrong.yaml"
     path.write_text("tick_ms: 0\nnonsense: 1\n")
-    found = read(loader(str(path)))
+    result = read(loader(str(path)))
     with pytest.raises(ConfigError) as here:
         loader(str(path))()
-    assert found == str(here.value)
-    assert {f"{path}:1:", f"{path}:2:"} <= {line.split(" ")[0] for line in found.splitlines()}
+    assert result == str(here.value)
+    assert {f"{path}:1:", f"{path}:2:"} <= {line.split(" ")[0] for line in result.splitlines()}
 
 
 def test_nothing_waits_for_it() -> None:

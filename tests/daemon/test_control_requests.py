@@ -89,8 +89,8 @@ def test_what_is_set_is_recorded_for_a_replay(
 
 
 @pytest.fixture
-def asked(monkeypatch: pytest.MonkeyPatch) -> list[BlackBox]:
-    """Black boxes that were asked for."""
+def requested(monkeypatch: pytest.MonkeyPatch) -> list[BlackBox]:
+    """Black boxes that were requested."""
     boxes: list[BlackBox] = []
 
     def ask(box: BlackBox) -> None:
@@ -102,15 +102,15 @@ def asked(monkeypatch: pytest.MonkeyPatch) -> list[BlackBox]:
 
 @pytest.mark.parametrize(("what", "asks"), [("write", 1), ("state", 0)])
 def test_a_black_box_is_written_when_somebody_asks_for_it(
-    bench: Bench, path: Path, asked: list[BlackBox], what: str, asks: int
+    bench: Bench, path: Path, requested: list[BlackBox], what: str, asks: int
 ) -> None:
     """Whatever else is asked of it, the answer says how many there are."""
     assert answered(bench, path, {"black_box": what})["black_box"]["tried"] == 0
-    assert len(asked) == asks
+    assert len(requested) == asks
 
 
 def test_the_log_says_who_asked_for_a_black_box(
-    bench: Bench, path: Path, asked: list[BlackBox], log: Callable[[str], list[str]]
+    bench: Bench, path: Path, requested: list[BlackBox], log: Callable[[str], list[str]]
 ) -> None:
     answered(bench, path, {"black_box": "write"})
     (line,) = log("lack-box=requested")

@@ -30,12 +30,12 @@ class Rig:
         self.path = path
         self.server = ControlServer(path, 0o600)
         self.now_ns = 0
-        self.asked: list[Mapping[str, Any]] = []
+        self.requests: list[Mapping[str, Any]] = []
         self.peers: list[str] = []
         self.reply: dict[str, Any] = {"adjustable": {}}
 
     def answer(self, request: Mapping[str, Any], peer: str) -> Mapping[str, Any]:
-        self.asked.append(request)
+        self.requests.append(request)
         self.peers.append(peer)
         if "bad" in request:
             raise ValueError("no such thing")
@@ -66,7 +66,7 @@ def test_a_request_is_answered_and_says_who_asks(rig: Rig) -> None:
         one.send(b'{"set": {"a": 1, "b": 1e400}}')
         rig.serve()
         assert json.loads(one.recv(MOST_BYTES)) == rig.reply
-    assert rig.asked == [{"set": {"a": 1.0, "b": float("inf")}}]
+    assert rig.requests == [{"set": {"a": 1.0, "b": float("inf")}}]
     assert rig.peers == [f"uid={os.getuid()} pid={os.getpid()}"]
 
 
@@ -102,7 +102,7 @@ def test_requests_come_one_at_a_time_and_not_too_often(rig: Rig) -> None:
         begin = rig.now_ns
         for ms in range(0, 150, 5):
             rig.server.serve(rig.answer, begin + ms * 1_000_000)
-    assert len(rig.asked) == 3
+    assert len(rig.requests) == 3
 
 
 def test_more_clients_than_there_is_room_for_are_sent_away(rig: Rig) -> None:
@@ -156,7 +156,7 @@ def test_who_asks_all_the_time_does_not_keep_others_out(rig: Rig) -> None:
         rig.serve()
         other.send(b'{"who": 2}')
         rig.serve(2)
-    assert [request["who"] for request in rig.asked] == [1, 2, 1]
+    assert [request["who"] for request in rig.requests] == [1, 2, 1]
 
 
 def test_a_client_that_reads_no_answers_is_dropped(rig: Rig) -> None:
@@ -203,7 +203,7 @@ def test_the_socket_of_a_daemon_that_runs_is_left_alone(rig: Rig) -> None:
         ControlServer(rig.path, 0o600)
     with rig.connected() as one:
         one.send(b"{}")
-        rig.serve(4)  # whoever looked whether somebody is there comes first
+        rig.serve(4)  # the one that looked whether somebody is there comes first
         assert one.recv(MOST_BYTES)
 
 

@@ -43,7 +43,7 @@ def test_the_state_of_a_bus_is_logged_when_it_changes(
     ]
 
 
-# Nobody hears us there, or we nobody; and where a bus only has trouble.
+# No one receives us there, or we no one; and where a bus only has trouble.
 OFF = [
     BusState.BUS_OFF,
     BusState.NOT_CONFIRMED,

@@ -36,11 +36,11 @@ clients: list[socket.socket] = []
 
 
 def answered(bench: Bench, path: Path, request: object) -> dict[str, Any]:
-    found: list[bytes] = []
+    replies: list[bytes] = []
     asks = ask(path, request)
-    at(bench, {3: asks, 15: lambda: found.append(clients[0].recv(65536))})
+    at(bench, {3: asks, 15: lambda: replies.append(clients[0].recv(65536))})
     clients[0].close()
-    answer: dict[str, Any] = json.loads(found[0])
+    answer: dict[str, Any] = json.loads(replies[0])
     return answer
 
 

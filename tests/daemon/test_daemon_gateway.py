@@ -16,8 +16,8 @@ from tests.daemon.test_reload import Bench
 from tests.rigs.forwarder import ROOT
 
 
-class Beside:
-    """What a gateway does between its ticks, counted; it has taken joystick frames by then."""
+class CountingGateway:
+    """What a gateway does between its ticks, counted; it has received joystick frames by then."""
 
     def __init__(
         self, bench: Bench, deployment: Deployment, on_fault: Callable[[FrameFault], None]
@@ -54,15 +54,15 @@ class Beside:
 
 
 @pytest.fixture
-def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Beside]:
+def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[CountingGateway]:
     """The bench's machine has a gateway; what stands in its line, one after the other."""
     text = (ROOT / "config" / "gateway-forwarder.yaml").read_text(encoding="utf-8")
     bench.text = text.replace("../dbc", str(ROOT / "dbc"))
     bench.file.write_text(bench.text, encoding="utf-8")
-    lines: list[Beside] = []
+    lines: list[CountingGateway] = []
 
-    def in_line(*arguments: Any) -> Beside:
-        lines.append(Beside(bench, *arguments))
+    def in_line(*arguments: Any) -> CountingGateway:
+        lines.append(CountingGateway(bench, *arguments))
         return lines[-1]
 
     monkeypatch.setattr(module, "InlineGateway", in_line)
@@ -70,7 +70,7 @@ def lines(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> list[Beside]:
 
 
 def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
-    bench: Bench, lines: list[Beside]
+    bench: Bench, lines: list[CountingGateway]
 ) -> None:
     at(bench, {5: bench.reload})
     assert [one.closed for one in lines] == [1, 1]  # the old one, and the last one at the end
@@ -79,7 +79,7 @@ def test_a_gateway_waits_passes_on_and_checks_in_every_tick(
 
 
 def test_a_joystick_frame_leaves_a_gateway_before_the_next_tick(
-    bench: Bench, lines: list[Beside]
+    bench: Bench, lines: list[CountingGateway]
 ) -> None:
     """Half a tick after the one before; it has waited on the first bus until then."""
     left: list[int] = []
@@ -102,14 +102,17 @@ def test_a_joystick_frame_leaves_a_gateway_before_the_next_tick(
 
 
 def test_a_fault_of_a_gateway_is_counted(
-    bench: Bench, lines: list[Beside], log: Callable[[], list[str]]
+    bench: Bench, lines: list[CountingGateway], log: Callable[[], list[str]]
 ) -> None:
     at(bench, {5: lambda: lines[0].on_fault(FrameFault.SEND_FAILED)})
     assert any("fault=SEND_FAILED" in line for line in log())
 
 
 def test_a_line_that_cannot_be_opened_leaves_the_one_before(
-    bench: Bench, lines: list[Beside], monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
+    bench: Bench,
+    lines: list[CountingGateway],
+    monkeypatch: pytest.MonkeyPatch,
+    log: Callable[[], list[str]],
 ) -> None:
     """A port that was opened for it is closed again; those from before are not."""
 

@@ -83,12 +83,12 @@ def test_after_a_standstill_the_processor_knows_before_it_receives(
     port.wait(*[JOYSTICK] * 5, arrived_ns=NOW_NS - MS)
     io_cycle(notes, {"crane": port}, NOW_NS, 49, standstill)
     received = ("receive", 0x110, NOW_NS - MS)
-    asked = ("withhold", 0x200)  # what moves and was computed from before the standstill
+    withheld = ("withhold", 0x200)  # what moves and was computed from before the standstill
     assert notes.calls == [
         ("stalled",),
-        *[received, asked] * 5,
+        *[received, withheld] * 5,
         ("tick", NOW_NS, 49),
-        asked,
+        withheld,
     ]
 
 

@@ -72,7 +72,7 @@ def test_a_joystick_frame_does_not_wait_for_the_tick(rig: GatewayRig, ends: Ends
 def test_nothing_is_passed_on_that_came_while_the_loop_stood_still(
     rig: GatewayRig, ends: Ends, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Whoever sleeps through the deadline leaves it to the tick to find out for how long."""
+    """A wait that sleeps through the deadline leaves it to the tick to find out for how long."""
     ports, others, _ = ends
     frame = rig.joystick()
     others["joysticks"].send(CAN_FRAME.pack(frame.can_id, 8, frame.data))
@@ -99,15 +99,15 @@ def test_what_is_of_no_use_does_not_keep_the_loop_busy(
     ports, others, faults = ends
     for _ in range(2 * MOST_EMPTY):
         others["joysticks"].send(b"no frame")
-    asked: list[int] = []
+    calls: list[int] = []
     select = gateway.select.select
     monkeypatch.setattr(
-        gateway.select, "select", lambda *a: asked.append(1) or select(*a), raising=True
+        gateway.select, "select", lambda *a: calls.append(1) or select(*a), raising=True
     )
     InlineGateway(rig.deployment, ignore).wait(
         WAIT_S, rig.controller, ports, Standstill(rig.deployment)
     )
-    assert len(asked) <= MOST_EMPTY + 1
+    assert len(calls) <= MOST_EMPTY + 1
     assert set(faults) == {FrameFault.WRONG_LENGTH}
 
 
@@ -151,18 +151,18 @@ def test_rules_are_looked_at_while_nothing_moves_and_reported_once(
 ) -> None:
     caplog.set_level(logging.INFO)
     line = InlineGateway(GatewayRig(tmp_path).deployment, ignore)
-    found: list[Rule] = []
-    asked: list[int] = []
-    monkeypatch.setattr(gateway, "rules", lambda: asked.append(1) or list(found))
+    kernel_rules: list[Rule] = []
+    calls: list[int] = []
+    monkeypatch.setattr(gateway, "rules", lambda: calls.append(1) or list(kernel_rules))
     line.check(0, neutral=False)
-    assert asked == []
+    assert calls == []
     line.check(0, neutral=True)
     line.check(1, neutral=True)
-    assert asked == [1]  # not at every tick
-    found += gateway.passing_rules(GatewayRig(tmp_path).deployment)
+    assert calls == [1]  # not at every tick
+    kernel_rules += gateway.passing_rules(GatewayRig(tmp_path).deployment)
     line.check(CHECK_NS, neutral=True)
     line.check(2 * CHECK_NS, neutral=True)
-    found.append(found[0])
+    kernel_rules.append(kernel_rules[0])
     line.check(3 * CHECK_NS, neutral=True)
 
     def refuse() -> list[Rule]:
@@ -173,6 +173,6 @@ def test_rules_are_looked_at_while_nothing_moves_and_reported_once(
     assert [r.message for r in caplog.records] == [
         "gateway=rules-missing 40 of 40",
         "gateway=rules-right",
-        f"gateway=rules-too-many {found[0]}",
+        f"gateway=rules-too-many {kernel_rules[0]}",
         "gateway=rules-not-known no",
     ]

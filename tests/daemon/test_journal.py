@@ -44,7 +44,7 @@ class Pipe:
 
     def read(self) -> str:
         """All that waits."""
-        found = b""
+        data = b""
         while True:
             try:
                 part = os.read(self.reader, PIPE_BYTES)
@@ -52,8 +52,8 @@ class Pipe:
                 break
             if not part:
                 break
-            found += part
-        return found.decode()
+            data += part
+        return data.decode()
 
     def lines(self) -> list[str]:
         return self.read().splitlines()

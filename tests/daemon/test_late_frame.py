@@ -53,7 +53,7 @@ def test_the_tick_after_such_a_stop_sees_how_long_the_valve_has_waited(
     machine.tick(20 * MS)
     machine.tick(0, 3)
     assert (machine.rig.reason() == "LOOP_STALLED") is trips
-    assert (machine.told() == 0) is trips
+    assert (machine.commanded() == 0) is trips
 
 
 def test_neutral_leaves_at_any_time_and_asks_for_no_clock(changed_rig: Make) -> None:
@@ -72,12 +72,12 @@ def test_neutral_leaves_at_any_time_and_asks_for_no_clock(changed_rig: Make) -> 
 def test_a_moving_frame_asks_once(changed_rig: Make) -> None:
     """Status and the frames of the service ask for none."""
     machine = Machine(changed_rig, 20, joysticks_ms=100, valve_ms=200).moving()
-    asked = []
-    machine.standstill.clock = lambda: asked.append(1) or machine.now_ns  # type: ignore[func-returns-value]
+    calls = []
+    machine.standstill.clock = lambda: calls.append(1) or machine.now_ns  # type: ignore[func-returns-value]
     before = len(valves(machine.port))
     for _ in range(30):
         machine.tick(20 * MS)
-    assert len(asked) <= len(valves(machine.port)) - before
+    assert len(calls) <= len(valves(machine.port)) - before
 
 
 def test_a_short_tick_leaves_some_milliseconds(changed_rig: Make) -> None:
@@ -104,7 +104,7 @@ def test_a_late_tick_has_less_time_to_send(changed_rig: Make) -> None:
 
 
 class InGateway:
-    """A gateway in motion, whose clock jumps after a joystick frame was taken."""
+    """A gateway in motion, whose clock jumps after a joystick frame was received."""
 
     def __init__(self, folder: Path, slew: int = 1000) -> None:
         self.rig = GatewayRig(folder, yaml=(("interface: socketcan", "interface: virtual"),))
@@ -120,8 +120,8 @@ class InGateway:
         self.standstill.last_ns = self.last_ns
         self.now_ns = self.last_ns
 
-    def taken(self, after_ms: int, held_ms: int) -> int:
-        """Frames that leave of one that is taken so long after the tick, when it is held up."""
+    def passed(self, after_ms: int, held_ms: int) -> int:
+        """Frames that leave of one that is received so long after the tick, when it is held up."""
         self.now_ns = self.last_ns + after_ms * MS
         self.standstill.clock = lambda: self.now_ns + held_ms * MS
         self.joysticks.wait(self.rig.joystick(Slew=self.slew))
@@ -138,16 +138,16 @@ class InGateway:
 def test_a_joystick_frame_with_velocities_from_before_a_stop_does_not_pass_after_it(
     tmp_path: Path, after_ms: int, held_ms: int, leaves: int
 ) -> None:
-    assert InGateway(tmp_path).taken(after_ms, held_ms) == leaves
+    assert InGateway(tmp_path).passed(after_ms, held_ms) == leaves
 
 
 def test_a_joystick_frame_without_motion_passes_at_any_time(tmp_path: Path) -> None:
-    assert InGateway(tmp_path, slew=0).taken(10, 90) == 1
+    assert InGateway(tmp_path, slew=0).passed(10, 90) == 1
 
 
 def test_after_a_stop_in_a_gateway_its_axes_trip_and_neutral_leaves(tmp_path: Path) -> None:
     gateway = InGateway(tmp_path)
-    assert gateway.taken(10, 91) == 0
+    assert gateway.passed(10, 91) == 0
     gateway.now_ns += 91 * MS
     gateway.standstill.clock = lambda: gateway.now_ns
     controller: Controller = gateway.rig.controller

@@ -46,10 +46,10 @@ class Daemon:
 
     def logged(self, pattern: str) -> str:
         until = time.monotonic() + ANSWER_S
-        while (found := re.search(pattern, self.log())) is None:
+        while (match := re.search(pattern, self.log())) is None:
             assert time.monotonic() < until, self.log()
             assert self.process.poll() is None, self.log()
-        return found[0]
+        return match[0]
 
     def log(self) -> str:
         return self._log.read_text()
@@ -142,11 +142,11 @@ def test_an_option_without_a_section_is_an_error() -> None:
 
 
 def test_one_that_listens_reports_its_status_and_no_valve(tmp_path: Path) -> None:
-    """Beside another controller on the same bus, whose frames have the ids of our valves."""
+    """Next to another controller on the same bus, whose frames have the ids of our valves."""
     deployment = load_deployment(ROOT / "config" / "forwarder.yaml")
     names = ("JoystickLeft", "SlewCommand", "SlewStatus", "ShaperStatus")
-    found = [deployment.messages.find(name) for name in names]
-    joystick, command, status, service = (one[1] for one in found if not isinstance(one, str))
+    entries = [deployment.messages.find(name) for name in names]
+    joystick, command, status, service = (one[1] for one in entries if not isinstance(one, str))
     daemon = Daemon(tmp_path, "--listen-only")
     daemon.logged("listen-only=yes valves=none")
     daemon.logged("started file=")

@@ -181,19 +181,19 @@ def test_deadlines_that_are_moved_are_counted_as_others(
     """Each is a period behind the one before, moved as asked; none is called for twice."""
     clock = Clock(*(us * 1000 for us in late_us))
     steps = iter(steps_us)
-    asked: list[tuple[int, int]] = []
+    steered: list[tuple[int, int]] = []
 
     def steer(deadline_ns: int) -> int:
-        asked.append((deadline_ns, next(steps, 0) * 1000))
-        return asked[-1][1]
+        steered.append((deadline_ns, next(steps, 0) * 1000))
+        return steered[-1][1]
 
     deadline = START_NS
     left = iter(work_ms)
 
     def body(now_ns: int, missed: int, late_ns: int) -> bool:
         nonlocal deadline
-        if asked:
-            before, step = asked[-1]
+        if steered:
+            before, step = steered[-1]
             assert before == deadline + PERIOD_NS
             deadline = before + step
         assert late_ns == now_ns - deadline

@@ -50,7 +50,7 @@ class Manager:
         self._socket.setblocking(False)
         self._socket.bind("\0" + address[1:] if address.startswith("@") else address)
 
-    def heard(self) -> list[str]:
+    def received(self) -> list[str]:
         """Every message since the last call."""
         messages = []
         while True:
@@ -94,7 +94,7 @@ def test_the_life_of_a_service(manager: Manager) -> None:
     service.ready("started, axes slew")
     service.status("slew READY, crane up")
     service.stopping()
-    assert manager.heard() == [
+    assert manager.received() == [
         "READY=1\nSTATUS=started, axes slew",
         "STATUS=slew READY, crane up",
         "STOPPING=1",
@@ -107,7 +107,7 @@ def test_a_reload_begins_with_its_time(manager: Manager) -> None:
     before = time.monotonic_ns() // 1000
     service.reloading()
     after = time.monotonic_ns() // 1000
-    (message,) = manager.heard()
+    (message,) = manager.received()
     first, second = message.split("\n")
     assert first == "RELOADING=1"
     key, _, value = second.partition("=")
@@ -132,7 +132,7 @@ def test_without_a_manager_nothing_is_sent_and_no_socket_made(
 def test_it_is_found_in_the_environment(manager: Manager, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", manager.address)
     ServiceManager().stopping()
-    assert manager.heard() == ["STOPPING=1"]
+    assert manager.received() == ["STOPPING=1"]
 
 
 def test_a_manager_that_hangs_holds_up_nothing(manager: Manager) -> None:
@@ -140,30 +140,30 @@ def test_a_manager_that_hangs_holds_up_nothing(manager: Manager) -> None:
     service = ServiceManager({"NOTIFY_SOCKET": manager.address})
     for number in range(5000):
         service.status(str(number))
-    heard = manager.heard()
-    assert 0 < len(heard) < 5000
-    assert heard == [f"STATUS={n}" for n in range(len(heard))]
+    messages = manager.received()
+    assert 0 < len(messages) < 5000
+    assert messages == [f"STATUS={n}" for n in range(len(messages))]
     service.status("later")
-    assert manager.heard() == ["STATUS=later"]
+    assert manager.received() == ["STATUS=later"]
 
 
 def test_a_manager_that_is_gone_and_comes_back(tmp_path: Path) -> None:
     path = tmp_path / "notify"
     service = ServiceManager({"NOTIFY_SOCKET": str(path)})
-    service.ready("nobody hears")
+    service.ready("unreceived")
     with manager_at(str(path)) as first:
         service.ready("one")
-        assert first.heard() == ["READY=1\nSTATUS=one"]
-    service.ready("refused")  # the address is there, nobody has it
+        assert first.received() == ["READY=1\nSTATUS=one"]
+    service.ready("refused")  # the address is there, no one has it
     path.unlink()
     service.status("none")
     with manager_at(str(path)) as second:
         service.status("two")
-        assert second.heard() == ["STATUS=two"]
+        assert second.received() == ["STATUS=two"]
 
 
 @pytest.mark.parametrize("reload", [False, True])
-def test_what_the_manager_waits_for_is_sent_again_until_it_is_taken(
+def test_what_the_manager_waits_for_is_sent_again_until_it_is_accepted(
     manager: Manager, reload: bool
 ) -> None:
     """Without READY=1 systemd would kill the service after its start or reload."""
@@ -174,12 +174,12 @@ def test_what_the_manager_waits_for_is_sent_again_until_it_is_taken(
     else:
         service.ready("started")
     service.ping(0)
-    assert all(message.startswith("STATUS=") for message in manager.heard())
+    assert all(message.startswith("STATUS=") for message in manager.received())
     service.ping(0)
     first = "RELOADING=1" if reload else "READY=1"
-    assert [message.split("\n")[0] for message in manager.heard()] == [first]
+    assert [message.split("\n")[0] for message in manager.received()] == [first]
     service.ping(0)
-    assert manager.heard() == []
+    assert manager.received() == []
 
 
 def test_the_end_of_a_reload_replaces_its_beginning(manager: Manager) -> None:
@@ -187,9 +187,9 @@ def test_the_end_of_a_reload_replaces_its_beginning(manager: Manager) -> None:
     fill(manager)
     service.reloading()
     service.ready("reload applied")
-    manager.heard()
+    manager.received()
     service.ping(0)
-    assert manager.heard() == ["READY=1\nSTATUS=reload applied"]
+    assert manager.received() == ["READY=1\nSTATUS=reload applied"]
 
 
 # -- watchdog --------------------------------------------------------------------------------------
@@ -199,18 +199,18 @@ def pings(manager: Manager, ticks: int, **environment: str) -> list[int]:
     """Ticks in which a ping came."""
     service = ServiceManager({"NOTIFY_SOCKET": manager.address, **environment})
     start = time.monotonic_ns()
-    found = []
+    sent_at = []
     for tick in range(ticks):
         service.ping(start + tick * TICK_NS)
-        found += [tick] * len(manager.heard())
-    return found
+        sent_at += [tick] * len(manager.received())
+    return sent_at
 
 
 @pytest.mark.parametrize("limit_ms", [100, 1000, 3000])
 def test_pings_come_often_enough_that_two_may_be_lost(manager: Manager, limit_ms: int) -> None:
-    found = pings(manager, 1000, WATCHDOG_USEC=str(limit_ms * 1000))
-    assert found[0] == 0
-    gaps = {(b - a) * 20 for a, b in itertools.pairwise(found)}
+    ticks = pings(manager, 1000, WATCHDOG_USEC=str(limit_ms * 1000))
+    assert ticks[0] == 0
+    gaps = {(b - a) * 20 for a, b in itertools.pairwise(ticks)}
     assert max(gaps) <= limit_ms / 4 + 20
     assert min(gaps) >= limit_ms / 4  # and no more often than needed
 
@@ -241,7 +241,7 @@ def test_a_reload_has_more_time_than_a_tick(manager: Manager) -> None:
     service.ready("reload applied")
     limits = [
         int(value)
-        for message in manager.heard()
+        for message in manager.received()
         for key, _, value in (line.partition("=") for line in message.split("\n"))
         if key == "WATCHDOG_USEC"
     ]
@@ -252,4 +252,4 @@ def test_a_reload_has_more_time_than_a_tick(manager: Manager) -> None:
 def test_a_ping_is_that_and_nothing_else(manager: Manager) -> None:
     service = ServiceManager({"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000"})
     service.ping(time.monotonic_ns())
-    assert manager.heard() == ["WATCHDOG=1"]
+    assert manager.received() == ["WATCHDOG=1"]

@@ -1,4 +1,4 @@
-"""A daemon that is told to read its files again: what it tells its manager, and that it goes on."""
+"""A daemon that reads its files again: what it reports to its manager, and that it goes on."""
 
 import os
 import re
@@ -39,8 +39,8 @@ class Daemon:
                 env={**os.environ, "NOTIFY_SOCKET": str(folder / "notify")},
             )
 
-    def told(self, last: str) -> list[str]:
-        """What the manager is told, until a message with this line; not what is told each second.
+    def received(self, last: str) -> list[str]:
+        """What the manager receives, until a message with this line; not what comes each second.
 
         Lines of a message are separated by ";".
         """
@@ -52,7 +52,7 @@ class Daemon:
         return messages
 
     def goes_on(self) -> bool:
-        """Whether the loop runs: a status that was told from now on."""
+        """Whether the loop runs: a status that was sent from now on."""
         self._socket.setblocking(False)
         try:
             while True:
@@ -96,7 +96,7 @@ class Daemon:
 @pytest.fixture
 def daemon(tmp_path: Path) -> Iterator[Daemon]:
     started = Daemon(tmp_path)
-    assert "READY=1" in started.told("READY=1")[-1]
+    assert "READY=1" in started.received("READY=1")[-1]
     yield started
     started.close()
 
@@ -104,7 +104,7 @@ def daemon(tmp_path: Path) -> Iterator[Daemon]:
 def test_a_good_file_is_a_short_reload(daemon: Daemon) -> None:
     daemon.file.write_text(daemon.text.replace("tick_ms: 20", "tick_ms: 10"), encoding="utf-8")
     daemon.reload()
-    begun, over = daemon.told("READY=1")
+    begun, over = daemon.received("READY=1")
     assert re.fullmatch(r"RELOADING=1;MONOTONIC_USEC=\d+", begun)
     assert over == "READY=1;STATUS=reload applied"
     assert f"reload=applied file={daemon.file}" in daemon.log()
@@ -116,21 +116,21 @@ def test_a_wrong_file_is_refused_and_no_reload(daemon: Daemon) -> None:
     daemon.file.write_text(daemon.text + "nonsense: 1\nmore: 1\n", encoding="utf-8")
     line = daemon.text.count("\n") + 1
     daemon.reload()
-    (told,) = daemon.told("refused")
-    assert told.startswith(f"STATUS=reload refused: {daemon.file}:{line}: nonsense: ")
+    (refusal,) = daemon.received("refused")
+    assert refusal.startswith(f"STATUS=reload refused: {daemon.file}:{line}: nonsense: ")
     refused = re.findall(r"ERROR reload=refused \S+:(\d+): (\w+)", daemon.log())
     assert refused == [(str(line), "nonsense"), (str(line + 1), "more")]
     assert daemon.goes_on()
     daemon.file.write_text(daemon.text, encoding="utf-8")
     daemon.reload()
-    assert len(daemon.told("reload applied")) == 2
+    assert len(daemon.received("reload applied")) == 2
 
 
 def test_a_bus_that_cannot_be_opened_ends_the_reload_as_before(daemon: Daemon) -> None:
     changed = daemon.text.replace("virtual, channel: x", "socketcan, channel: nowhere0")
     daemon.file.write_text(changed, encoding="utf-8")
     daemon.reload()
-    begun, over, why = daemon.told("refused")
+    begun, over, why = daemon.received("refused")
     assert (begun[:11], over[:7]) == ("RELOADING=1", "READY=1")
     assert why.startswith(
         "STATUS=reload refused: bus crane: cannot open socketcan channel nowhere0"
@@ -148,7 +148,7 @@ def test_the_loop_never_waits_for_files(daemon: Daemon) -> None:
     assert daemon.goes_on()
     daemon.file.write_text(daemon.text, encoding="utf-8")
     daemon.reload()
-    assert len(daemon.told("reload applied")) == 2
+    assert len(daemon.received("reload applied")) == 2
     assert daemon.readers() == []
     daemon.file.write_text(slow, encoding="utf-8")
     third = daemon.reader_after_reload()

@@ -47,19 +47,19 @@ class FakePort:
         self._bench = bench
 
     def frames(self) -> Iterator[Frame]:
-        for arrived_ns, frame in self._heard(lambda can_id: can_id < 0x200):
+        for arrived_ns, frame in self._received(lambda can_id: can_id < 0x200):
             self.arrived_ns = arrived_ns
             yield frame
 
     def background(self) -> Iterator[Frame]:
-        yield from (frame for _, frame in self._heard(lambda can_id: can_id >= 0x200))
+        yield from (frame for _, frame in self._received(lambda can_id: can_id >= 0x200))
 
-    def _heard(self, wanted: Callable[[int], bool]) -> list[tuple[int, Frame]]:
+    def _received(self, selects: Callable[[int], bool]) -> list[tuple[int, Frame]]:
         assert not self.closed
         now_ns = self._bench.now_ns
-        found = [(t, f) for t, f in self.waiting if t <= now_ns and wanted(f.can_id)]
-        self.waiting = [(t, f) for t, f in self.waiting if t > now_ns or not wanted(f.can_id)]
-        return [(at, frame._replace(bus=self.name)) for at, frame in found]
+        received = [(t, f) for t, f in self.waiting if t <= now_ns and selects(f.can_id)]
+        self.waiting = [(t, f) for t, f in self.waiting if t > now_ns or not selects(f.can_id)]
+        return [(at, frame._replace(bus=self.name)) for at, frame in received]
 
     def send(self, frame: Frame) -> bool:
         assert not self.closed
@@ -162,7 +162,7 @@ class Bench:
     def joysticks(self, **raw: int) -> None:
         self.put(self.rig.joystick("JoystickLeft", **raw), self.rig.joystick("JoystickRight"))
 
-    def told(self) -> tuple[str, str]:
+    def reported(self) -> tuple[str, str]:
         """What the last status of the slew axis tells: state and reason."""
         message = self.rig.messages["SlewStatus"]
         frame = next(f for f in reversed(self.sent) if f.can_id == message.frame_id)
@@ -170,7 +170,7 @@ class Bench:
         return str(values["State"]), str(values["Reason"])
 
     def moved(self) -> bool:
-        """Whether any valve was ever told to move."""
+        """Whether any valve was ever commanded to move."""
         return any(f.data[0] for f in self.sent if 0x200 <= f.can_id <= 0x202)
 
 
@@ -214,7 +214,7 @@ def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
         if tick < 10:
             bench.joysticks()
         if tick == 9:
-            assert bench.told() == ("READY", "JOYSTICK_NEUTRAL")
+            assert bench.reported() == ("READY", "JOYSTICK_NEUTRAL")
             bench.reload(BUS, SECOND)
         if tick == 100:
             bench.stop()
@@ -223,7 +223,7 @@ def test_frames_that_queued_while_a_reload_was_refused_move_nothing(
     bench.run(script)
     assert "reload=refused bus two: cannot open: no such adapter" in caplog.messages
     assert not bench.moved()
-    assert bench.told() == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")
+    assert bench.reported() == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")
 
 
 def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
@@ -252,7 +252,7 @@ def test_nor_do_those_of_a_reload_that_was_applied(bench: Bench) -> None:
     bench.run(script)
     assert [port.channel for port in bench.ports] == ["vcan0", "vcan1"]
     assert not bench.moved()
-    assert bench.told() == ("NEUTRAL_WAIT", "JOYSTICK_NOT_NEUTRAL")
+    assert bench.reported() == ("NEUTRAL_WAIT", "JOYSTICK_NOT_NEUTRAL")
 
 
 def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -> None:
@@ -267,7 +267,7 @@ def test_a_bus_that_changes_does_not_take_us_for_a_second_sender(bench: Bench) -
 
     bench.run(script)
     assert [(port.channel, port.closed) for port in bench.ports] == [("vcan0", True)] * 2
-    assert bench.told() == ("READY", "JOYSTICK_NEUTRAL")
+    assert bench.reported() == ("READY", "JOYSTICK_NEUTRAL")
 
 
 def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
@@ -281,7 +281,7 @@ def test_a_second_sender_is_seen_after_it_too(bench: Bench) -> None:
 
     bench.run(script)
     assert len(bench.ports) == 2
-    assert bench.told() == ("TRIPPED", "SECOND_SENDER")
+    assert bench.reported() == ("TRIPPED", "SECOND_SENDER")
 
 
 @pytest.mark.parametrize("late", [False, True])
@@ -315,29 +315,29 @@ def test_what_waits_on_a_bus_that_is_opened_again_is_read(
     monkeypatch.setattr(bench, "sleep", sleeping)
     bench.run(script)
     assert len(bench.ports) == 2
-    (told,) = [text for text in caplog.messages if "emergency=0x8003" in text]
-    assert told == "bus=crane node=slew state=lost emergency=0x8003"
+    (line,) = [text for text in caplog.messages if "emergency=0x8003" in text]
+    assert line == "bus=crane node=slew state=lost emergency=0x8003"
 
 
 # -- what was latched ------------------------------------------------------------------------------
 
 
 def test_a_trip_is_still_there_after_a_reload_and_asks_for_a_reset(bench: Bench) -> None:
-    told: list[tuple[str, str]] = []
+    states: list[tuple[str, str]] = []
 
     def script(tick: int) -> None:
         bench.joysticks(Reset=int(tick in (200, 201)))
         if tick == 5:
             bench.put(FOREIGN)
         if tick in (9, 199, 205):
-            told.append(bench.told())
+            states.append(bench.reported())
         if tick == 9:
             bench.reload()
         if tick == 205:
             bench.stop()
 
     bench.run(script)
-    assert told == [("TRIPPED", "SECOND_SENDER")] * 2 + [("READY", "JOYSTICK_NEUTRAL")]
+    assert states == [("TRIPPED", "SECOND_SENDER")] * 2 + [("READY", "JOYSTICK_NEUTRAL")]
 
 
 def test_of_what_was_latched_only_a_lost_address_is_not(rig: Rig) -> None:
@@ -484,8 +484,8 @@ def test_a_filter_that_no_longer_fits_is_reported_in_the_log(
         bench.run(script)
     assert "reload=applied" in caplog.text
     says = "expected a swing of 1.85 to 1.95 s, got 2.20 s; design it again: canshaper tune"
-    told = f"unfit=axes.near_far.filter.designed_for.period_s {says}"
-    assert [text for text in caplog.messages if text.startswith(told)]
+    line = f"unfit=axes.near_far.filter.designed_for.period_s {says}"
+    assert [text for text in caplog.messages if text.startswith(line)]
 
 
 def test_the_program_is_read_before_a_bus_is_open(

@@ -11,13 +11,13 @@ from tests.daemon.test_reload import Bench
 READY = ("READY", "JOYSTICK_NEUTRAL")
 
 
-def told(bench: Bench, last: int) -> Callable[[int], tuple[str, str]]:
+def states_by_tick(bench: Bench, last: int) -> Callable[[int], tuple[str, str]]:
     """State and reason of the slew axis by tick, of a run whose joysticks fall silent at last."""
     states: list[tuple[str, str]] = []
 
     def script(number: int) -> None:
         if number:
-            states.append(bench.told())
+            states.append(bench.reported())
         if number <= last:
             bench.joysticks()
         if number == last:
@@ -47,7 +47,7 @@ def test_a_joystick_frame_that_waits_on_a_bus_that_is_opened_again_is_no_news(
 
     monkeypatch.setattr(bench, "sleep", sleeping)
     bench.opening = opening
-    states = told(bench, 9)
+    states = states_by_tick(bench, 9)
     assert states(8) == READY
     assert states(12) == ("NEUTRAL_WAIT", "JOYSTICK_TIMEOUT")
 
@@ -71,7 +71,7 @@ def test_a_reload_that_takes_long_is_a_standstill(
 
     def script(number: int) -> None:
         if number:
-            states.append(bench.told())
+            states.append(bench.reported())
         if number < 10:
             bench.joysticks()
         if number == 9:

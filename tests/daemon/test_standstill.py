@@ -26,7 +26,7 @@ def test_a_gap_of_an_age_limit_goes_on_and_one_beyond_it_is_a_standstill(
     gap_ns = (T_MS + over_ms) * MS
     machine.tick(gap_ns, gap_ns // machine.tick_ns - 1)
     assert (machine.rig.reason() == "LOOP_STALLED") is bool(over_ms)
-    assert (machine.told() == 0) is bool(over_ms)
+    assert (machine.commanded() == 0) is bool(over_ms)
 
 
 @pytest.mark.parametrize("tick_ms", [1, 20, 50])
@@ -44,7 +44,7 @@ def test_of_a_valve_with_a_slow_message_less_is_left(
     for _ in range(period - 1):  # its turn comes
         machine.tick(machine.tick_ns)
     assert (machine.rig.state() is State.TRIPPED) is bool(over_ms)
-    assert (machine.told() == 0) is bool(over_ms)
+    assert (machine.commanded() == 0) is bool(over_ms)
 
 
 def test_an_emergency_stop_has_an_age_limit_too(changed_rig: Make) -> None:
@@ -90,7 +90,7 @@ def test_a_loop_that_is_held_up_in_its_sleep_trips_by_the_time_that_was(
     run_at_deadlines(20 * MS, body)
     assert calls == [0, (20 + held_ms) * MS]
     assert (machine.rig.reason() == "LOOP_STALLED") is trips
-    assert (machine.told() == 0) is trips
+    assert (machine.commanded() == 0) is trips
 
 
 # -- the clock -------------------------------------------------------------------------------------

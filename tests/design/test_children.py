@@ -44,7 +44,7 @@ time.sleep(1e6)
 
 
 def state_of(pid: int) -> str:
-    """Letter of proc(5); Z is one that has ended and waits for whoever adopts it."""
+    """Letter of proc(5); Z is one that has ended and waits for the process that adopts it."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2][0]
     except (FileNotFoundError, ProcessLookupError):

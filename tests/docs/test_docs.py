@@ -32,8 +32,8 @@ def test_the_drawing_of_the_rooms_is_that_of_the_tree() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])
 def test_links_lead_somewhere(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    found = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
-    local = [link for link in found if "://" not in link]
+    targets = re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text)
+    local = [link for link in targets if "://" not in link]
     assert [link for link in local if not (page.parent / link).exists()] == []
 
 
@@ -74,9 +74,9 @@ def test_commands_and_options_are_there(page: Path) -> None:
 
 def test_troubleshooting_names_real_states_and_reasons() -> None:
     text = (ROOT / "docs" / "troubleshooting.md").read_text(encoding="utf-8")
-    found = set(re.findall(r"\b[A-Z]{2,}(?:_[A-Z]+)+\b|\b(?:TRIPPED|STOPPING|READY|START)\b", text))
-    assert found
-    assert found <= NAMES
+    names = set(re.findall(r"\b[A-Z]{2,}(?:_[A-Z]+)+\b|\b(?:TRIPPED|STOPPING|READY|START)\b", text))
+    assert names
+    assert names <= NAMES
 
 
 @pytest.mark.parametrize("page", PAGES, ids=[str(page.relative_to(ROOT)) for page in PAGES])

@@ -1,4 +1,4 @@
-"""The way of docs/guide.md on a crane whose pendulum nobody has told: by its commands alone.
+"""The way of docs/guide.md on a crane whose pendulum is not known: by its commands alone.
 
 What the guide does on a bus in real time, driving and recording, is done here in lock-step.
 """
@@ -21,7 +21,7 @@ from canshaper_sim.parameters import changed_parameters
 from canshaper_sim.plant import PlantNode
 
 ROOT = Path(__file__).parents[2]
-QUIET_S = 30.0  # after each push, nobody touches anything
+QUIET_S = 30.0  # after each push, no one touches anything
 AXES = ("slew", "near_far")
 
 
@@ -86,7 +86,7 @@ def test_the_guide_leads_to_a_calm_grapple(
         canshaper("robust", "machine.yaml", "--axis", axis, "--write")
     for axis in AXES:
         options = ("--lockstep", "--set", crane, "--script", f"pulse-{axis}")
-        found = demo_report(*options)["axes"][axis]
-        assert found["residual_reduction_pct"] > 90.0, (length, axis, found)
-    found = demo_report("--lockstep", "--set", crane)["crane"]  # both at once
-    assert found["residual_reduction_pct"] > 90.0, (length, found)
+        measures = demo_report(*options)["axes"][axis]
+        assert measures["residual_reduction_pct"] > 90.0, (length, axis, measures)
+    measures = demo_report("--lockstep", "--set", crane)["crane"]  # both at once
+    assert measures["residual_reduction_pct"] > 90.0, (length, measures)

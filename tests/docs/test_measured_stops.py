@@ -45,6 +45,6 @@ def test_the_page_has_a_place_for_what_was_measured() -> None:
     page = PAGE.read_text("utf-8")
     assert page.count(BEGIN) == page.count(END) == 1
     silences = [Silence(101.0, stopped=False), Silence(119.0, stopped=True)]
-    found = table([Stop(120, 121.0, *TRIPPED)], silences)
-    assert "1 of 1 stops, 0 went on" in found
-    assert BEGIN + found + END in in_page(page, found)
+    rows = table([Stop(120, 121.0, *TRIPPED)], silences)
+    assert "1 of 1 stops, 0 went on" in rows
+    assert BEGIN + rows + END in in_page(page, rows)

@@ -7,7 +7,7 @@ from tests.golden.replay import DEPLOYMENTS, DRIVE, difference, golden, margin, 
 
 
 def main(arguments: list[str]) -> int:
-    """Replay the drive, with ``record`` after recording it anew."""
+    """Replay the drive, with ``record`` after recording it again."""
     if arguments not in ([], ["record"]):
         print(__doc__, file=sys.stderr)
         return 2

@@ -131,22 +131,22 @@ class Margin:
 @contextmanager
 def margin() -> Iterator[Margin]:
     """Watch the values that are rounded: the valve's steps and the fields of the status."""
-    found = Margin()
+    least = Margin()
     on_grid, raw = axis.on_grid, FieldSet.raw
 
     def watched_grid(
         velocity: float, low: float, high: float, deadband: float, steps: int, **curve: Any
     ) -> tuple[int, float]:
-        found.see(with_deadband(velocity, deadband) * steps, "valve")
+        least.see(with_deadband(velocity, deadband) * steps, "valve")
         return on_grid(velocity, low, high, deadband, steps, **curve)
 
     def watched_raw(self: FieldSet, name: str, value: float) -> int:
         signal = next(s for s in self.message.signals if s.name == name)
-        found.see((value - signal.offset) / signal.scale, f"{self.message.name}.{name}")
+        least.see((value - signal.offset) / signal.scale, f"{self.message.name}.{name}")
         return raw(self, name, value)
 
     axis.on_grid, FieldSet.raw = watched_grid, watched_raw  # type: ignore[method-assign]
     try:
-        yield found
+        yield least
     finally:
         axis.on_grid, FieldSet.raw = on_grid, raw  # type: ignore[method-assign]

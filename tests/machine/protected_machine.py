@@ -61,7 +61,7 @@ BO_ 1027 Half: 4 JOYSTICKS
 BO_ 1028 Big: 4 JOYSTICKS
  SG_ Radius : 11|12@0+ (0.02,0) [0|60] "m" SHAPER
 
-BO_ 1029 Beside: 4 JOYSTICKS
+BO_ 1029 Apart: 4 JOYSTICKS
  SG_ Radius : 23|16@0+ (0.001,0) [0|60] "m" SHAPER
 
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;

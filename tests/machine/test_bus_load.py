@@ -1,4 +1,4 @@
-"""Load of a bus by its messages, beside the table of frame times and a hand-made bit stuffing."""
+"""Load of a bus by its messages, next to the table of frame times and a hand-made bit stuffing."""
 
 import pytest
 from typer.testing import CliRunner
@@ -113,12 +113,12 @@ def test_a_valve_hears_three_frames_within_its_timeout(
     if fits:
         machine.load()
         return
-    found = machine.problems()
-    assert len(found) == 3
+    problems = machine.problems()
+    assert len(problems) == 3
     assert (
         "axes.slew.valve.timeout_ms: expected 60 ms or more, three cycles of SlewCommand, so that"
         " two"
-        " lost frames do not close it, got 59" in found[0]
+        " lost frames do not close it, got 59" in problems[0]
     )
 
 

@@ -44,9 +44,9 @@ def test_problems_of_the_deployment_have_their_line(
 ) -> None:
     file = write_variant(tmp_path, (old, new))
     line = file.read_text()[: file.read_text().index(new)].count("\n") + 1
-    found = problems(file)
-    assert any(says in one for one in found), found
-    (reported,) = (one for one in found if says in one)
+    reports = problems(file)
+    assert any(says in one for one in reports), reports
+    (reported,) = (one for one in reports if says in one)
     number = int(reported.split("machine.yaml:")[1].split(":")[0])
     assert line <= number <= line + new.count("\n")
 

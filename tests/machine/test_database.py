@@ -63,10 +63,10 @@ def test_a_dbc_file_that_cannot_be_read(machine: Machine, name: str, says: str) 
 
 def test_a_dbc_file_without_messages(machine: Machine) -> None:
     machine.dbc = 'VERSION "1"\n'
-    found = machine.problems()
-    assert len(found) == 10  # each message asked for is missed once
-    assert all("expected a message of the DBC files, got " in p for p in found)
-    assert all(p.endswith("; there are none") for p in found)
+    problems = machine.problems()
+    assert len(problems) == 10  # each message asked for is missed once
+    assert all("expected a message of the DBC files, got " in p for p in problems)
+    assert all(p.endswith("; there are none") for p in problems)
 
 
 @pytest.mark.parametrize(
@@ -137,10 +137,10 @@ def test_one_message_in_two_files(machine: Machine) -> None:
 def test_every_file_is_looked_at(machine: Machine) -> None:
     machine.in_yaml("[machine.dbc]", "[none.dbc, machine.dbc, text.dbc]")
     (machine.directory / "text.dbc").write_text("hello", encoding="cp1252")
-    found = machine.problems()
-    assert len(found) == 2
-    assert found[0].endswith("dbc.0: expected a file, got 'none.dbc': No such file or directory")
-    assert found[1].startswith("text.dbc:1: not a DBC file")
+    problems = machine.problems()
+    assert len(problems) == 2
+    assert problems[0].endswith("dbc.0: expected a file, got 'none.dbc': No such file or directory")
+    assert problems[1].startswith("text.dbc:1: not a DBC file")
 
 
 def test_messages_of_several_files_come_together(machine: Machine) -> None:
@@ -156,9 +156,9 @@ def test_messages_of_several_files_come_together(machine: Machine) -> None:
     other = 'VERSION ""\n\nBU_: PLANT SHAPER\n\nBO_ 1024 GrappleSway' + body
     (machine.directory / "other.dbc").write_text(other, encoding="cp1252")
     machine.in_yaml("[machine.dbc]", "[other.dbc, machine.dbc]")
-    found = machine.load().messages.find("GrappleSway")
-    assert not isinstance(found, str)
-    assert found[0].path.name == "other.dbc"
+    entry = machine.load().messages.find("GrappleSway")
+    assert not isinstance(entry, str)
+    assert entry[0].path.name == "other.dbc"
 
 
 @pytest.mark.parametrize(

@@ -75,12 +75,12 @@ def parts(message: Any) -> list[Any]:
         *("minimum", "maximum", "unit", "raw_initial", "comment", "receivers", "spn"),
         *("is_multiplexer", "multiplexer_ids", "multiplexer_signal"),
     )
-    found: list[Any] = [getattr(message, key) for key in (*keys, "senders", "send_type")]
-    found += [[(group.name, group.signal_names) for group in message.signal_groups or []]]
+    values: list[Any] = [getattr(message, key) for key in (*keys, "senders", "send_type")]
+    values += [[(group.name, group.signal_names) for group in message.signal_groups or []]]
     for signal in message.signals:
         choices = {raw: str(name) for raw, name in (signal.choices or {}).items()}
-        found.append([choices, *(getattr(signal, key) for key in of_signal)])
-    return found
+        values.append([choices, *(getattr(signal, key) for key in of_signal)])
+    return values
 
 
 @pytest.fixture
@@ -295,24 +295,24 @@ def test_check_shows_the_first_of_them(machine: Machine) -> None:
 
 def test_another_message_is_read_when_it_is_asked_for(machine: Machine) -> None:
     messages = machine.load().messages
-    found = messages.find("TipPosition")
-    assert not isinstance(found, str)
-    file, message = found
+    entry = messages.find("TipPosition")
+    assert not isinstance(entry, str)
+    file, message = entry
     path = machine.directory / "machine.dbc"
     assert parts(message) == parts(whole(path).get_message_by_name("TipPosition"))
     assert str(file.problem(message, "x")).endswith(
         f"machine.dbc:{machine.in_dbc('BO_ 1025', 'BO_ 1025')}: TipPosition: x"
     )
     path.unlink()
-    assert messages.find("TipPosition") == found
+    assert messages.find("TipPosition") == entry
     assert messages.find("GrappleSway") == f"{path}: No such file or directory"
 
 
 def test_another_message_that_cannot_be_used(machine: Machine) -> None:
     machine.in_dbc("CM_ ", OTHER.replace("8|8", "9|8") + "\nCM_ ")
-    found = machine.load().messages.find("Other")
-    assert isinstance(found, str)
-    assert "The signal Two does not fit in message Other" in found
+    result = machine.load().messages.find("Other")
+    assert isinstance(result, str)
+    assert "The signal Two does not fit in message Other" in result
 
 
 def test_a_file_that_has_changed_is_not_mixed_with_what_was_read(machine: Machine) -> None:
@@ -328,13 +328,13 @@ SYMBOL = 'BA_ "SystemMessageLongSymbol" BO_ 1'
 
 @pytest.mark.parametrize("symbol", ["a\nb", 'a\\"b'])
 def test_a_long_name_that_is_none(file: Path, symbol: str) -> None:
-    """cantools takes it; nobody can name it."""
+    """cantools takes it; no one can name it."""
     file.write_text(KINDS + f'{SYMBOL} "{symbol}";\n', encoding="cp1252")
     loaded, _ = load_dbc(file, ())
     assert loaded
     assert [e.name for e in loaded.entries] == ["ALongerName", "Short"]
-    found = Messages([loaded]).find("Short")
-    assert found == f"{file}: 'Short' has another name for the parser"
+    result = Messages([loaded]).find("Short")
+    assert result == f"{file}: 'Short' has another name for the parser"
 
 
 def test_an_empty_long_name(file: Path) -> None:
@@ -376,7 +376,7 @@ def test_all_that_can_be_loaded(file: Path) -> None:
     assert ([m.name for m in loaded.messages], loaded.count) == (["Other"], 1)
 
 
-# -- written as nobody expects, and too large -----------------------------------------------------
+# -- written as no one expects, and too large -----------------------------------------------------
 
 
 @pytest.mark.parametrize(

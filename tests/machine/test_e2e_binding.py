@@ -54,10 +54,10 @@ def test_every_message_has_its_protection(tmp_path: Path) -> None:
     ],
 )
 def test_other_profiles(tmp_path: Path, section: str, kind: type[E2e], counts: int) -> None:
-    found = problems(tmp_path, (STOP, section))
+    reported = problems(tmp_path, (STOP, section))
     # The stop lies in byte 2, where profile 5 has its counter.
-    assert len(found) == (kind is Profile5)
-    if not found:
+    assert len(reported) == (kind is Profile5)
+    if not reported:
         stop = load(tmp_path, (STOP, section)).emergency_stop
         assert stop
         assert (type(stop.protection.check), stop.protection.counts) == (kind, counts)
@@ -268,22 +268,20 @@ HEADER = "its header takes the first 12 bits of"
 def test_one_fault_is_reported_with_its_line(
     tmp_path: Path, changes: list[tuple[str, str]], at: str, says: str
 ) -> None:
-    found = problems(tmp_path, *changes)
+    reported = problems(tmp_path, *changes)
     start = f"machine.yaml:{line_of(at)}: " if at else "machine.yaml:"
-    assert any(p.startswith(start) and says in p for p in found), found
+    assert any(p.startswith(start) and says in p for p in reported), reported
 
 
-@pytest.mark.parametrize(
-    ("message", "overlaps"), [("Half", True), ("Big", True), ("Beside", False)]
-)
+@pytest.mark.parametrize(("message", "overlaps"), [("Half", True), ("Big", True), ("Apart", False)])
 def test_one_bit_of_a_signal_in_the_header_is_too_many(
     tmp_path: Path, message: str, overlaps: bool
 ) -> None:
     """In either byte order."""
-    found = problems(tmp_path, ("message: TipPosition", f"message: {message}"))
+    reported = problems(tmp_path, ("message: TipPosition", f"message: {message}"))
     where = f"machine.yaml:{line_of(f'e2e: {RADIUS}')}: motion.crane.radius.e2e: "
     says = f"{HEADER} {message}, where Radius lies, which is signal"
-    assert found == ([where + says] if overlaps else [])
+    assert reported == ([where + says] if overlaps else [])
 
 
 @pytest.mark.parametrize(
@@ -310,8 +308,8 @@ def test_a_valve_message_whose_protection_is_in_the_way(
     tmp_path: Path, protection: str, says: str
 ) -> None:
     old = f"e2e: {VALVES}"
-    found = problems(tmp_path, (old, protection), (old, protection))
-    assert any(says in p for p in found), found
+    reported = problems(tmp_path, (old, protection), (old, protection))
+    assert any(says in p for p in reported), reported
 
 
 def test_a_counter_and_checksum_on_a_shared_valve_message(tmp_path: Path) -> None:

@@ -47,7 +47,7 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("old", "new", "told"),
+    ("old", "new", "message"),
     [
         (
             "[joysticks, machine]", "[joysticks, joysticks]",
@@ -87,9 +87,9 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
          "expected the message of joystick right, or one of no joystick, got 'JoystickLeft'"),
     ],
 )  # fmt: skip
-def test_what_cannot_be_is_reported(tmp_path: Path, old: str, new: str, told: str) -> None:
-    found = problems(tmp_path, (old, new))
-    assert any(told in problem for problem in found), found
+def test_what_cannot_be_is_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
+    reported = problems(tmp_path, (old, new))
+    assert any(message in problem for problem in reported), reported
 
 
 def test_an_ecu_that_waits_for_a_tick_longer_than_we_do_is_enough(tmp_path: Path) -> None:
@@ -130,10 +130,10 @@ def test_neutral_is_refused_where_the_kernel_cannot_protect_it(tmp_path: Path) -
     changes = [("left:\n", f"left:\n    {checksum}\n"), (SLEW, f"{SLEW} {checksum},")]
     changes += [("NearFar, timeout_ms: 200,", f"NearFar, timeout_ms: 200, {checksum},")]
     dbc = ("\nBO_ 273", ' SG_ Checksum : 48|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273')
-    (found,) = problems(tmp_path, *changes, dbc=dbc)
+    (problem,) = problems(tmp_path, *changes, dbc=dbc)
     assert (
         "gateway.fallback: expected stop or pass, got neutral: can-gw of the kernel computes"
-        " crc8_autosar in" in found
+        " crc8_autosar in" in problem
     )
     assert load(tmp_path, *changes, ("fallback: neutral", "fallback: stop"), dbc=dbc)
 
@@ -179,23 +179,23 @@ def test_the_neutral_rule_makes_the_checksum(tmp_path: Path, kind: str, number: 
 def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_path: Path) -> None:
     """Magnitude and flags are ours, the address is the joystick's, who is not on that bus."""
     text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
-    found = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
-    joystick = next(iter(found.config.joysticks))
-    axis = next(a for a in found.config.axes.values() if a.command.joystick == joystick)
+    loaded = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
+    joystick = next(iter(loaded.config.joysticks))
+    axis = next(a for a in loaded.config.axes.values() if a.command.joystick == joystick)
     assert axis.command.flags
     flags = axis.command.flags
-    message = found.joysticks[joystick].message
+    message = loaded.joysticks[joystick].message
     file = tmp_path / "machine.yaml"
     file.write_text(f"""
 version: 1
 buses:
   near: {{ interface: socketcan, channel: vcan0 }}
   far: {{ interface: socketcan, channel: vcan1 }}
-dbc: [{", ".join(str((ROOT / "config" / d).resolve()) for d in found.config.dbc)}]
+dbc: [{", ".join(str((ROOT / "config" / d).resolve()) for d in loaded.config.dbc)}]
 gateway: {{ between: [near, far], fallback: neutral }}
 joysticks:
   left: {{ bus: near, message: {message.name}, timeout_ms: 100, source: 51,
-    enable: {found.config.joysticks[joystick].enable} }}
+    enable: {loaded.config.joysticks[joystick].enable} }}
 axes:
   slew:
     command: {{ joystick: left, signal: {axis.command.signal}, flags: {{ neutral: {flags.neutral},
@@ -214,7 +214,7 @@ axes:
     assert group.mask == 0x03FFFFFF | EFF_FLAG
     assert deployment.routing.buses["far"].sent_groups == set()
     neutral = sent.onto(bytes(8))
-    network = cantools.database.load_file((ROOT / "config" / found.config.dbc[0]).resolve())
+    network = cantools.database.load_file((ROOT / "config" / loaded.config.dbc[0]).resolve())
     values = network.decode_message(message.frame_id, neutral.data, decode_choices=False)
     assert isinstance(values, dict)
     assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (1, 0, 0)

@@ -256,8 +256,8 @@ def test_the_usual_step_suits_every_counter(protected: Machine, counter: str, us
     for step in range(1, bound.protection.counts):
         checker = bound.sequence_checker()
         assert checker.check(b"", 0) is FrameFault.NONE
-        wanted = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
-        assert checker.check(b"", step) is wanted
+        expected = FrameFault.NONE if step <= usual else FrameFault.COUNTER_JUMP
+        assert checker.check(b"", step) is expected
 
 
 @pytest.mark.parametrize(
@@ -272,8 +272,8 @@ def test_a_step_is_at_most_half_of_the_counters_range(
     protected.in_yaml(f"alive_max_step: {most}", f"alive_max_step: {most + 1}")
     (problem,) = protected.problems()
     values = {1: 2, 2: 4, 8: 16, 128: 256}[most]
-    wanted = f"expected up to {most} with a counter of {values} values, got {most + 1}"
-    assert wanted in problem
+    expected = f"expected up to {most} with a counter of {values} values, got {most + 1}"
+    assert expected in problem
 
 
 @pytest.mark.parametrize("key", ["checksum", "alive_counter"])
@@ -286,10 +286,10 @@ def test_a_joystick_that_is_protection_too(protected: Machine, key: str) -> None
         protected.in_yaml(COUNTER, "alive_counter: Check")
     line = protected.in_yaml("signal: Slew,", "signal: Check,")
     problems = protected.problems()
-    wanted = (
+    expected = (
         f"axes.slew.command.signal: expected a free signal, got 'Check', which is {key} already"
     )
-    assert f"machine.yaml:{line}: {wanted}" in problems
+    assert f"machine.yaml:{line}: {expected}" in problems
 
 
 @pytest.mark.parametrize("key", ["enable", "reset", "anti_sway_off"])
@@ -301,8 +301,10 @@ def test_a_switch_that_is_protection_too(protected: Machine, key: str) -> None:
         f" '{signal}', which is {key} already"
     ]
     protected.in_yaml(f"alive_counter: {signal}", f"checksum: {{ signal: {signal}, kind: xor }}")
-    wanted = f"expected a free signal, got '{signal}', which is {key} already"
-    assert f"machine.yaml:{line}: joysticks.left.checksum.signal: {wanted}" in protected.problems()
+    expected = f"expected a free signal, got '{signal}', which is {key} already"
+    assert (
+        f"machine.yaml:{line}: joysticks.left.checksum.signal: {expected}" in protected.problems()
+    )
 
 
 @pytest.mark.parametrize(

@@ -20,10 +20,10 @@ def test_an_interface_without_can_fd() -> None:
     bus = Bus(interface="slcan", channel="/dev/ttyUSB0", fd=True, data_bitrate=2_000_000)
     text = "expected an interface of python-can that takes it, got slcan"
     assert list(option_faults(bus)) == [(("fd",), text), (("data_bitrate",), text)]
-    (found,) = option_faults(Bus(interface="slcan", channel="/dev/ttyUSB0", fd=True))
-    assert found == (("fd",), text)
-    (found,) = option_faults(Bus(interface="virtual", channel="0", options={"fd": True}))
-    assert found[0] == ("options", "fd")  # it stands with the bus
+    (fault,) = option_faults(Bus(interface="slcan", channel="/dev/ttyUSB0", fd=True))
+    assert fault == (("fd",), text)
+    (fault,) = option_faults(Bus(interface="virtual", channel="0", options={"fd": True}))
+    assert fault[0] == ("options", "fd")  # it stands with the bus
 
 
 def faults(interface: str, **options: Any) -> list[tuple[Any, str]]:

@@ -158,9 +158,9 @@ def test_a_slewing_axis_acts_first(machine: Machine) -> None:
 def test_a_radius_needs_a_range(machine: Machine, limits: str, says: str) -> None:
     moving(machine, MEASURED)
     machine.in_dbc(RADIUS, RADIUS.replace("[0|60]", limits))
-    (found,) = machine.problems()
-    assert found.startswith("machine.dbc:")
-    assert says in found
+    (problem,) = machine.problems()
+    assert problem.startswith("machine.dbc:")
+    assert says in problem
 
 
 # -- the radius as it arrives ----------------------------------------------------------------------
@@ -260,9 +260,9 @@ def test_axes_with_names_of_their_own_may_be_of_one_crane(machine: Machine) -> N
 def test_a_radius_that_is_no_length_is_refused(machine: Machine, unit: str) -> None:
     moving(machine, MEASURED)
     line = machine.in_dbc(RADIUS, RADIUS.replace('"m"', f'"{unit}"'))
-    (found,) = machine.problems()
-    assert found.startswith("machine.dbc:")
-    assert f"Radius: expected a radius in m, got a signal in {unit}" in found
+    (problem,) = machine.problems()
+    assert problem.startswith("machine.dbc:")
+    assert f"Radius: expected a radius in m, got a signal in {unit}" in problem
     assert line > 0
 
 
@@ -280,6 +280,6 @@ def test_an_axis_without_sway_data_is_refused(machine: Machine, axis: str) -> No
 def test_a_full_speed_of_the_tip_of_zero_is_refused(machine: Machine) -> None:
     moving(machine, FIXED)
     line = machine.in_yaml("mass_kg: 300, full_speed_m_s: 1.0", "mass_kg: 300, full_speed_m_s: 0")
-    (found,) = machine.problems()
-    assert found.startswith(f"machine.yaml:{line}: axes.near_far.sway.full_speed_m_s: ")
-    assert found.endswith("got 0")
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway.full_speed_m_s: ")
+    assert problem.endswith("got 0")

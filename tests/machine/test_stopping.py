@@ -75,8 +75,8 @@ def test_a_distance_of_an_axis_without_a_speed_says_nothing(machine: Machine) ->
 
 def test_a_long_way_has_to_be_stated(machine: Machine) -> None:
     machine.in_yaml(STATED, "")
-    found = list(unstated(machine.load()))
-    assert found == [
+    axes = list(unstated(machine.load()))
+    assert axes == [
         (
             ("axes", "slew", "limits", "stop_distance_m"),
             "missing: to stop, the limits allow 10.23 m, which is more than 2 m; where that is"

@@ -59,10 +59,10 @@ class Machine:
             self.slew = slew
             for _ in range(ticks * self.period):
                 self.tick(self.tick_ns)
-        assert self.told() > 50
+        assert self.commanded() > 50
         return self
 
-    def told(self) -> int:
+    def commanded(self) -> int:
         """Velocity in the last frame of the slew valve."""
         return next(f.data[0] for f in reversed(self.port.sent) if f.can_id == 0x200)
 

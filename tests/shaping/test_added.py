@@ -23,10 +23,10 @@ LARGEST, TIME_S = 0.25, 1.5
 SHAPERS: list[Callable[[], Shaper]] = [Off, lambda: Fir([0.3, 0.1, 0.0, 0.2, 0.4])]
 
 joysticks = st.sampled_from([0.0, 0.0, 0.021, -0.021, 0.3, -0.3, 1.0, -1.0])
-wishes = st.sampled_from([0.0, 0.01, -0.01, 0.2, -0.2, 1.0, -1.0]) | st.floats(-1.0, 1.0)
+additions = st.sampled_from([0.0, 0.01, -0.01, 0.2, -0.2, 1.0, -1.0]) | st.floats(-1.0, 1.0)
 rates = st.sampled_from([0.3, 1.0, 5.0, 20.0])
 steps = st.lists(
-    st.tuples(joysticks, wishes, st.integers(1, 12), st.sampled_from([0, 0, 0, 1, 3])),
+    st.tuples(joysticks, additions, st.integers(1, 12), st.sampled_from([0, 0, 0, 1, 3])),
     min_size=1,
     max_size=25,
 )
@@ -45,9 +45,9 @@ def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Axis
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 @pytest.mark.parametrize(
-    ("asked", "own", "expected"),
+    ("commands", "own", "expected"),
     [
-        # nobody asked: what may be added to either side
+        # no one asked: what may be added to either side
         ((0.0, 0.0, 0.0), 0.0, (-0.25, 0.25)),
         # held: nothing against it, nothing faster than asked within the tail
         ((0.5, 0.5, 0.0), 0.1, (0.0, 0.5)),
@@ -63,15 +63,15 @@ def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Axis
 )
 def test_the_range_of_both_parts(
     sign: float,
-    asked: tuple[float, float, float],
+    commands: tuple[float, float, float],
     own: float,
     expected: tuple[float, float],
 ) -> None:
     """Asked: now, and most within the tail to either side."""
-    command, forth, back = (sign * value for value in asked)
+    command, forth, back = (sign * value for value in commands)
     low, high = min(forth, back, 0.0), max(forth, back, 0.0)
-    found = range_with_added(command, low, high, sign * own, 0.25)
-    assert found == (expected if sign > 0.0 else (-expected[1], -expected[0]))
+    bounds = range_with_added(command, low, high, sign * own, 0.25)
+    assert bounds == (expected if sign > 0.0 else (-expected[1], -expected[0]))
 
 
 @given(
@@ -90,22 +90,22 @@ def test_whatever_is_asked_speed_and_time_are_bounded(
 ) -> None:
     limits = OutputLimits(rise_per_s=rise, fall_per_s=fall, maximum=maximum, tail_s=0.4)
     one, plain = pair(limits, shaper)
-    asked: list[tuple[int, float]] = []
+    recent_commands: list[tuple[int, float]] = []
     now = alone = 0
-    for command, wish, ticks, missed in inputs:
+    for command, added, ticks, missed in inputs:
         if missed:
             for axis in (one, plain):
                 axis.hold(missed)
             now += missed
         for _ in range(ticks):
             now += 1
-            alone = 0 if one.commanded or not wish or one.raw == 0 else alone + 1
+            alone = 0 if one.commanded or not added or one.raw == 0 else alone + 1
             before = one.sent
-            one.tick(CommandInput(command), wish)
+            one.tick(CommandInput(command), added)
             plain.tick(CommandInput(command))
             if abs(command) > 0.02:
-                asked.append((now, command))
-            recent = [c for at, c in asked if now - at <= 8]
+                recent_commands.append((now, command))
+            recent = [c for at, c in recent_commands if now - at <= 8]
             for sign in (1.0, -1.0):
                 most = max([0.0, *(sign * c for c in recent)])
                 if not most and sign * command > -0.02:

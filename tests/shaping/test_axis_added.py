@@ -53,7 +53,7 @@ anything = st.builds(
 )
 
 
-class AskedByAnother(RuleBasedStateMachine):
+class AddedByAnother(RuleBasedStateMachine):
     """Drives an axis with joystick and added velocity; checks every tick."""
 
     @initialize(setup=st.sampled_from(SETUPS))
@@ -81,10 +81,9 @@ class AskedByAnother(RuleBasedStateMachine):
         self.now = 0
         self.mixed = False  # something was added since the axis was at rest
         self.armed = False
-        self.asked: list[
-            tuple[int, float]
-        ] = []  # when which command was given by a usable joystick
-        self.idle = 0  # ticks for which nobody has asked for anything
+        # when which command was given by a usable joystick
+        self.commanded: list[tuple[int, float]] = []
+        self.idle = 0  # ticks for which no one has asked for anything
         self.keep(2)
 
     @rule(command=joysticks, added=velocities, ticks=durations)
@@ -170,13 +169,13 @@ class AskedByAnother(RuleBasedStateMachine):
 
         # what was asked
         if self.usable and self.armed and not centred:
-            self.asked.append((self.now, joystick.command))
-        self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
+            self.commanded.append((self.now, joystick.command))
+        self.commanded = [(at, c) for at, c in self.commanded if self.now - at <= self.tail]
         if axis.state not in (*DRIVEN, State.STOPPING):  # at rest: it begins from nothing
-            self.asked = []
+            self.commanded = []
         self.armed = self.usable and (self.armed or centred)
         carried = self.added if axis.state is State.ACTIVE and not joystick.bypass else 0.0
-        self.idle = 0 if self.asked or carried else self.idle + 1
+        self.idle = 0 if self.commanded or carried else self.idle + 1
 
         # what may come of it
         if old is State.READY and axis.state in DRIVEN and centred:
@@ -208,9 +207,9 @@ class AskedByAnother(RuleBasedStateMachine):
         assert math.isfinite(self.shadow.angle + self.shadow.rate)
 
     def check_speed(self, carried: float, before: float) -> None:
-        """No faster than joystick, addition and what is owed of it; except while falling."""
+        """No faster than joystick, addition and what is carried of it; except while falling."""
         for sign in (1.0, -1.0):
-            allowed = max([0.0, *(sign * c for _, c in self.asked)])
+            allowed = max([0.0, *(sign * c for _, c in self.commanded)])
             if self.axis.state in DRIVEN and sign * self.axis.command < 0.0:
                 allowed = 0.0
             elif self.mixed and not allowed:
@@ -233,12 +232,12 @@ class AskedByAnother(RuleBasedStateMachine):
             assert spent + max(0.0, abs(sent) - self.slack) / self.rise <= 1.0 + 1e-9
 
 
-AskedByAnother.TestCase.settings = settings(
+AddedByAnother.TestCase.settings = settings(
     max_examples=3 * settings().max_examples,
     stateful_step_count=25,
     suppress_health_check=list(HealthCheck),
 )
-TestAskedByAnother = AskedByAnother.TestCase
+TestAddedByAnother = AddedByAnother.TestCase
 
 
 def axis_with(limits: OutputLimits, steps: int = 125) -> Axis:
@@ -289,11 +288,11 @@ def test_an_addition_below_the_valves_minimum_is_not_sent() -> None:
         axis.tick(CommandInput(), 0.05)
         assert axis.raw == 0
     axis.tick(CommandInput(), 0.2)
-    assert axis.sent == pytest.approx(0.2 + 1 / 125, abs=0.005)  # a step of what is owed
+    assert axis.sent == pytest.approx(0.2 + 1 / 125, abs=0.005)  # a step of what is carried
 
 
 def test_an_addition_of_less_than_half_a_step_is_not_sent() -> None:
-    """What is owed of it waits for a motion: it is no reason to twitch."""
+    """What is carried of it waits for a motion: it is no reason to twitch."""
     axis = axis_with(OutputLimits(rise_per_s=100.0, fall_per_s=100.0))
     for _ in range(50):
         axis.tick(CommandInput(), 0.003)

@@ -1,4 +1,4 @@
-"""What an axis sends: joins without a jump, bounds in time, and what the model is told."""
+"""What an axis sends: joins without a jump, bounds in time, and what the model is driven by."""
 
 import itertools
 import math
@@ -281,15 +281,15 @@ def test_a_joystick_beyond_the_maximum_is_shaped_as_one_at_it(*, bypass: bool) -
     def sent(full: float) -> list[float]:
         sway = SwayModel(SwayMode(2.27, 0.024), 0.02)
         axis = Axis(0.02, limits, sway=sway, shaper=Gff(sway, (-2.0, -2.5)))
-        found = []
+        velocities = []
         for number in range(500):
             if number == 250:
                 new = SwayMode(2.5, 0.03)
                 axis.retune(new, lambda model: Gff(model, (-2.2, -2.7)))
             command = 0.0 if number < 2 else (full, -full, 0.0)[number // 100 % 3]
             axis.tick(CommandInput(command, bypass=bypass))
-            found.append(axis.sent)
-        return found
+            velocities.append(axis.sent)
+        return velocities
 
     assert sent(1.0) == sent(0.4)
 

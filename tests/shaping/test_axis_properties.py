@@ -118,7 +118,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
         # the oracle's memory
         self.now = 0
         self.armed = False  # joystick seen valid, enabled and neutral since it last was not usable
-        self.asked: list[tuple[int, float]] = []  # when which command was given by such a joystick
+        # when which command was given by such a joystick
+        self.commanded: list[tuple[int, float]] = []
         self.overtime = 0  # ticks since the tail after the last of them ended
         self.stop_from = 0
         self.enabled_before = self.reset_before = True
@@ -210,9 +211,9 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def remember(self) -> None:
         """What the operator asked for, by the inputs alone."""
         if self.usable and self.armed and not self.centred:
-            self.asked.append((self.now, self.joystick.command))
-        self.asked = [(at, c) for at, c in self.asked if self.now - at <= self.tail]
-        self.overtime = 0 if self.asked else self.overtime + 1
+            self.commanded.append((self.now, self.joystick.command))
+        self.commanded = [(at, c) for at, c in self.commanded if self.now - at <= self.tail]
+        self.overtime = 0 if self.commanded else self.overtime + 1
         self.armed = self.usable and (self.armed or self.centred)
 
     def check_frame(self) -> None:
@@ -272,8 +273,8 @@ class AxisUnderWatch(RuleBasedStateMachine):
     def check_speed(self, before: float) -> None:
         """Not faster than asked within the tail, not against the joystick, except while falling."""
         limits, sent = self.limits, self.axis.sent
-        high = max([0.0, *(c for _, c in self.asked)])
-        low = max([0.0, *(-c for _, c in self.asked)])
+        high = max([0.0, *(c for _, c in self.commanded)])
+        low = max([0.0, *(-c for _, c in self.commanded)])
         if limits.allow_faster:
             high, low = math.ceil(high), math.ceil(low)
         if limits.allow_reverse:

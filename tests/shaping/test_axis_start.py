@@ -140,7 +140,7 @@ def test_full_speed_may_be_added(drive_with: DriveWith, sign: float) -> None:
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_in_motion_the_edge_of_the_neutral_band_is_neutral(drive: Drive, sign: float) -> None:
-    """As at rest: nobody can hold an axis in motion where nobody could have started it."""
+    """As at rest: no one can hold an axis in motion where no one could have started it."""
     drive.moving(0.8 * sign).tick(CommandInput(0.02 * sign))
     assert drive.axis.command == 0.0
     drive.tick(CommandInput(0.021 * sign))

@@ -23,7 +23,7 @@ Matrix = list[list[Fraction]]
 
 
 def step(gff: Gff, sway: SwayModel, command: float) -> float:
-    """One tick without any limit: what is wanted is sent."""
+    """One tick without any limit: the output is what is sent."""
     sent = gff.step(command)
     sway.step(sent)
     return sent
@@ -181,14 +181,14 @@ def test_ten_million_steps_stay_bounded() -> None:
     linear = Gff(probe, SLEW)
     response = [step(linear, probe, float(k == 0)) for k in range(10_000)]
     bound = sum(map(abs, response))
-    wanted, advance = gff.step, sway.step
+    shape, advance = gff.step, sway.step
     seed, sent = 12345, 0.0
     for _ in range(1000):
         for _ in range(200):
             seed = (seed * 1103515245 + 12345) & 0x7FFFFFFF
             command = seed / 0x40000000 - 1.0
             for _ in range(50):
-                sent = wanted(command)
+                sent = shape(command)
                 advance(sent)
         assert abs(sent) <= bound
         assert abs(sway.angle) <= bound

@@ -106,12 +106,12 @@ def test_a_million_restless_ticks_stay_bounded(mode: SwayMode) -> None:
     for i in range(1_000_000):
         if i % 37 == 0:
             command = source.uniform(-1.0, 1.0)
-        wanted = aware.step(command)
-        step = min(max(wanted - sent, -0.05), 0.05)
+        unlimited = aware.step(command)
+        step = min(max(unlimited - sent, -0.05), 0.05)
         sent = round(125.0 * min(max(sent + step, -0.7), 0.7)) / 125.0
         sway.step(sent)
         # A command that the valve cannot follow may ask for several times full speed, not more.
-        assert abs(wanted) < 6.0
+        assert abs(unlimited) < 6.0
     for _ in range(3000):
         sent = aware.step(0.0)
         sway.step(sent)
@@ -120,15 +120,15 @@ def test_a_million_restless_ticks_stay_bounded(mode: SwayMode) -> None:
 
 
 class Broken:
-    """A shaper that is told to fail."""
+    """A shaper that fails on demand."""
 
     def __init__(self, shaper: Fir) -> None:
         self.shaper = shaper
         self.broken = False
 
     def step(self, command: float) -> float:
-        wanted = self.shaper.step(command)
-        return math.nan if self.broken else wanted
+        unlimited = self.shaper.step(command)
+        return math.nan if self.broken else unlimited
 
 
 def test_after_output_invalid_it_starts_again() -> None:

@@ -157,7 +157,7 @@ def test_the_first_gains_are_those_of_a_kalman_filter_that_knows_next_to_nothing
 
 
 @BOTH
-def test_beside_a_second_mode_the_gains_are_those_of_a_kalman_filter_of_both(
+def test_next_to_a_second_mode_the_gains_are_those_of_a_kalman_filter_of_both(
     measured: Measured,
 ) -> None:
     second = SwayMode(9.0, 0.04)

@@ -30,7 +30,7 @@ COMMANDS = [1.0] * 40 + [-0.4] * 40 + [0.0] * 40
 
 
 def answer(shaper: Shaper, sway: SwayModel, rate_per_tick: float = math.inf) -> list[float]:
-    """What a filter asks for, and a valve of limited rate that the model is told of."""
+    """What a filter asks for, and a valve of limited rate that the model knows of."""
     out, sent = [], 0.0
     for command in COMMANDS:
         out.append(shaper.step(command))
@@ -170,8 +170,8 @@ def test_settings_are_those_of_the_comparison_in_its_order() -> None:
     """With these names and numbers the tables in docs/comparison.md were made."""
     mode = SwayMode.from_period(8.0, 0.0)
     omega = math.pi / 4.0
-    found = [row for kind in BUILT_IN for row in kind.settings(mode, 0.6).items()]
-    assert found == [
+    rows = [row for kind in BUILT_IN for row in kind.settings(mode, 0.6).items()]
+    assert rows == [
         ("off", {}),
         ("G_FF slew poles", {"a1": 0.42, "a2": 0.043}),
         ("G_FF near-far poles", {"a1": 0.708, "a2": 0.12}),

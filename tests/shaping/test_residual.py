@@ -121,7 +121,7 @@ def test_residual_swing_behind_a_real_valve(length_m: float) -> None:
 
 @pytest.mark.parametrize("length_m", [0.6, 1.0, 1.5])
 def test_without_limits_both_realisations_are_one_filter(length_m: float) -> None:
-    """The peer is a fair one: it differs by nothing but what it is told."""
+    """The peer is a fair one: it differs by nothing but its input."""
     mode = SwayMode(math.sqrt(GRAVITY_M_S2 / length_m), DAMPING)
     model = SwayModel(mode, TICK_S)
     aware, ordinary = Gff(model, PAPER_SLEW), OrdinaryGff(mode, PAPER_SLEW)

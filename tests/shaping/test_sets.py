@@ -38,17 +38,17 @@ def test_values_beyond_the_ends_are_the_ends(value: float, steps: int) -> None:
 
 @given(st.floats(-100, 1000))
 def test_a_value_is_met_within_a_step(value: float) -> None:
-    found = at_position(SETS, position(SETS, value))
-    assert abs(found.at - min(max(value, 0.0), 800.0)) <= 800.0 / STEPS_BETWEEN / 2 + 1e-9
+    sway_set = at_position(SETS, position(SETS, value))
+    assert abs(sway_set.at - min(max(value, 0.0), 800.0)) <= 800.0 / STEPS_BETWEEN / 2 + 1e-9
 
 
 @given(st.integers(0, STEPS_BETWEEN))
 def test_between_two_sets_everything_lies_between(steps: int) -> None:
-    found = at_position(SETS, steps)
+    sway_set = at_position(SETS, steps)
     share = steps / STEPS_BETWEEN
-    assert found.mode.period_s == pytest.approx(2.0 + 0.8 * share)
-    assert found.mode.damping_ratio == pytest.approx(0.03 + 0.02 * share)
-    shaper = build_shaper("gff", TICK_S, SwayModel(found.mode, TICK_S), **found.parameters)
+    assert sway_set.mode.period_s == pytest.approx(2.0 + 0.8 * share)
+    assert sway_set.mode.damping_ratio == pytest.approx(0.03 + 0.02 * share)
+    shaper = build_shaper("gff", TICK_S, SwayModel(sway_set.mode, TICK_S), **sway_set.parameters)
     assert isinstance(shaper, Gff)
     assert all(pole < 0.0 for pole in shaper.poles_rad_s)
 
@@ -61,8 +61,8 @@ def test_the_ends_are_the_sets_themselves() -> None:
 def test_a_measured_period_is_met_exactly() -> None:
     """Two sets whose value is their period: between them every period is itself."""
     sets = [ParameterSet(p, SwayMode.from_period(p, 0.04), "zv", {}) for p in (1.5, 3.0)]
-    found = at_position(sets, position(sets, 2.25))
-    assert found.mode.period_s == pytest.approx(2.25)
+    sway_set = at_position(sets, position(sets, 2.25))
+    assert sway_set.mode.period_s == pytest.approx(2.25)
 
 
 @pytest.mark.parametrize(
@@ -101,9 +101,9 @@ def test_a_mode_between_is_never_an_error_nor_quicker_than_both(
 
 
 def test_the_mode_between_is_that_of_its_period_to_the_last_bit() -> None:
-    found = EMPTY.towards(FULL, 0.375)
+    mode = EMPTY.towards(FULL, 0.375)
     period_s = EMPTY.period_s + 0.375 * (FULL.period_s - EMPTY.period_s)
-    assert found == SwayMode.from_period(period_s, 0.03 + 0.375 * (0.05 - 0.03))
+    assert mode == SwayMode.from_period(period_s, 0.03 + 0.375 * (0.05 - 0.03))
 
 
 def test_taps_stay_taps() -> None:
@@ -131,9 +131,9 @@ def test_among_three_sets_the_two_around_a_value_count() -> None:
     assert position(sets, 800.0) == STEPS_BETWEEN
     assert position(sets, 900.0) == STEPS_BETWEEN + STEPS_BETWEEN // 2
     assert position(sets, 1000.0) == position(sets, 1e6) == 2 * STEPS_BETWEEN
-    found = at_position(sets, position(sets, 900.0))
-    assert (found.at, found.kind) == (900.0, "gff")
-    assert found.mode.period_s == pytest.approx(3.1)
+    sway_set = at_position(sets, position(sets, 900.0))
+    assert (sway_set.at, sway_set.kind) == (900.0, "gff")
+    assert sway_set.mode.period_s == pytest.approx(3.1)
     lower = at_position(sets, position(sets, 400.0))
     assert (lower.at, lower.mode.period_s) == (400.0, pytest.approx(2.4))
 

@@ -76,9 +76,9 @@ def movements(sent: list[float]) -> int:
 def test_a_tap_is_one_movement_of_its_length(level: float, sign: float) -> None:
     for duration_s in DURATIONS:
         sent = tapped(axis_with(), sign * level, duration_s)
-        asked_s = sign * level * round(duration_s / TICK_S) * TICK_S
+        commanded_s = sign * level * round(duration_s / TICK_S) * TICK_S
         assert movements(sent) == 1, duration_s
-        assert sum(sent) * TICK_S == pytest.approx(asked_s, rel=0.05), duration_s
+        assert sum(sent) * TICK_S == pytest.approx(commanded_s, rel=0.05), duration_s
         assert all(velocity * sign >= 0.0 for velocity in sent)
         assert max(map(abs, sent)) <= level
 
@@ -105,9 +105,9 @@ def test_so_it_is_on_other_valves(
 ) -> None:
     sent = tapped(axis_with(limits, steps), level, duration_s)
     least = least_velocity(limits, steps) * TICK_S
-    asked_s = level * round(duration_s / TICK_S) * TICK_S
+    commanded_s = level * round(duration_s / TICK_S) * TICK_S
     assert movements(sent) == 1
-    assert sum(sent) * TICK_S == pytest.approx(asked_s, rel=0.05, abs=least)
+    assert sum(sent) * TICK_S == pytest.approx(commanded_s, rel=0.05, abs=least)
 
 
 def test_the_valve_rests_between_taps_and_each_is_a_movement_of_its_own() -> None:

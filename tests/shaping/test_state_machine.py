@@ -42,8 +42,8 @@ def test_every_change_of_state_is_declared(
         assert new is machine.state
         if new is not old:
             assert machine.reason in TRANSITIONS[old, new]
-            asked = joystick.trip or joystick.fault
-            assert new is not State.TRIPPED or machine.reason in (asked, Reason.ENABLE_LOST)
+            input_reason = joystick.trip or joystick.fault
+            assert new is not State.TRIPPED or machine.reason in (input_reason, Reason.ENABLE_LOST)
 
 
 def in_state(state: State) -> StateMachine:
@@ -72,7 +72,7 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
         for reset in (True, False)
         for trip in (None, *TRIPS)
     ]
-    found: dict[tuple[State, State], set[Reason]] = {}
+    reasons_of: dict[tuple[State, State], set[Reason]] = {}
     for state in State:
         for joystick in joysticks:
             for added, at_rest in ((0.0, False), (0.0, True), (0.1, False)):
@@ -87,9 +87,9 @@ def test_every_declared_reason_is_one_that_an_input_gives() -> None:
                     never = (Reason.EMERGENCY_STOP_LOST, Reason.LOOP_OVERRUN)
                     assert machine.reason in (Reason.ENABLE_LOST, *never), (state, joystick)
                 if new is not state:
-                    found.setdefault((state, new), set()).add(machine.reason)
+                    reasons_of.setdefault((state, new), set()).add(machine.reason)
     for way, reasons in TRANSITIONS.items():
-        assert reasons <= found[way], way
+        assert reasons <= reasons_of[way], way
 
 
 def test_a_change_that_is_not_declared_ends_neutral_and_latched() -> None:

@@ -109,11 +109,13 @@ def test_a_jump_grows_with_the_time_between_two_measurements(
     assert math.degrees(largest_jump(measured, NOISE, period_s)) == pytest.approx(deg)
 
 
-def still(values: list[float], bent_deg: float, *, asked: bool = True) -> list[Trust | None]:
+def still(
+    values: list[float], bent_deg: float, *, command_active: bool = True
+) -> list[Trust | None]:
     """What each measurement says; degrees, and degrees per second a measurement."""
     one = Standstill(Measured.ANGLE, NOISE, TICK_S, SWING_S)
     bent = math.radians(bent_deg)
-    return [one.check(math.radians(value), bent, asked=asked) for value in values]
+    return [one.check(math.radians(value), bent, command_active=command_active) for value in values]
 
 
 def test_the_same_value_while_the_model_bends_is_stuck_after_an_eighth_of_a_second() -> None:
@@ -121,7 +123,7 @@ def test_the_same_value_while_the_model_bends_is_stuck_after_an_eighth_of_a_seco
     assert still([4.0] * 7, 0.36) == [None] * 6 + [Trust.STUCK]
     assert still([4.0] * 7, -0.36)[-1] is Trust.STUCK
     assert still([4.0] * 7, 0.35)[-1] is None
-    assert still([4.0] * 7, 0.36, asked=False)[-1] is Trust.STUCK
+    assert still([4.0] * 7, 0.36, command_active=False)[-1] is Trust.STUCK
 
 
 def test_a_value_that_stays_is_contact_while_the_operator_asks() -> None:
@@ -129,7 +131,7 @@ def test_a_value_that_stays_is_contact_while_the_operator_asks() -> None:
     wavy = [4.0, 4.64] * 6
     assert still(wavy, 0.42) == [None] * 11 + [Trust.CONTACT]
     assert still(wavy, 0.41)[-1] is None
-    assert still(wavy, 0.42, asked=False)[-1] is None
+    assert still(wavy, 0.42, command_active=False)[-1] is None
     assert set(still([4.0, 4.66] * 20, 1.0)) == {None}
 
 
@@ -141,14 +143,14 @@ def test_while_it_stays_longer_what_it_would_have_bent_adds_up() -> None:
 def test_what_has_moved_is_forgotten() -> None:
     one = Standstill(Measured.ANGLE, NOISE, TICK_S, SWING_S)
     for value in [0.0, 0.1, 0.2, *[0.3] * 6]:
-        assert one.check(value, 0.1, asked=True) is None
-    assert one.check(0.3, 0.1, asked=True) is Trust.STUCK
+        assert one.check(value, 0.1, command_active=True) is None
+    assert one.check(0.3, 0.1, command_active=True) is Trust.STUCK
     one.clear()
     for _ in range(6):
-        assert one.check(0.3, 0.1, asked=True) is None
+        assert one.check(0.3, 0.1, command_active=True) is None
 
 
-def test_a_command_that_goes_to_and_fro_is_told_from_the_operators() -> None:
+def test_a_velocity_that_goes_to_and_fro_is_distinguished_from_the_operators() -> None:
     one = Restlessness(TICK_S)
     # Full speed and back, twice: a path of 4; the operator's is as long: up to 7 is calm.
     path = [1.0, 0.0, -1.0, 0.0]

@@ -52,14 +52,14 @@ def convolved(
 
 
 def sway_numbers(states: Sequence[CraneState], residual_from_s: float) -> dict[str, float]:
-    found = {}
+    sway = {}
     for name, index in (("5", 7), ("6", 8)):
         angles = [abs(math.degrees(state[index])) for state in states]
         late = [a for a, s in zip(angles, states, strict=True) if s[0] >= residual_from_s - 1e-9]
-        found["peak" + name] = max(angles)
-        found["rms" + name] = math.sqrt(sum(a * a for a in angles) / len(angles))
-        found["res" + name] = max(late)
-    return found
+        sway["peak" + name] = max(angles)
+        sway["rms" + name] = math.sqrt(sum(a * a for a in angles) / len(angles))
+        sway["res" + name] = max(late)
+    return sway
 
 
 @pytest.mark.parametrize("shaper", ["unshaped", "paperNF"])
@@ -91,10 +91,10 @@ def test_sway_of_the_pulse(
     commands = pulse()
     if shaper == "paper_nf":
         commands = filtered(commands, **reference["filter_paper_nf_matched_50hz"])
-    found = sway_numbers(drive(Crane(all_valves(valve)), axis, commands), 3.5 + 2.5)
+    sway = sway_numbers(drive(Crane(all_valves(valve)), axis, commands), 3.5 + 2.5)
     expected = reference["sway_section_5"][f"{axis}|{name}|{shaper}"]
     # Taken every 5 ms here, every 1 ms in the reference, whose rate limiter is 0.4 ms early.
-    assert found == pytest.approx(expected, abs=2e-3 if name == "linear" else 4e-3)
+    assert sway == pytest.approx(expected, abs=2e-3 if name == "linear" else 4e-3)
 
 
 @pytest.mark.parametrize("factor", [0.7, 0.85, 1.0, 1.15, 1.3])
@@ -104,13 +104,13 @@ def test_sway_of_input_shapers_at_a_real_valve(
 ) -> None:
     commands = pulse() if shaper == "none" else convolved(pulse(), *reference["shapers"][shaper])
     crane = Crane(all_valves(REAL, grapple=Grapple(l2_m=1.2 * factor)))
-    found = sway_numbers(drive(crane, "near_far", commands), 3.5 + 3.0)
+    sway = sway_numbers(drive(crane, "near_far", commands), 3.5 + 3.0)
     expected = reference["sway_real_valve"][shaper]
     residual = expected["res" if factor == 1.0 else f"res_f{factor}"]
     # A residual taken on a slope of the swing feels the 0.4 ms of the reference's rate limiter.
-    assert found["res6"] == pytest.approx(residual, abs=5e-3)
+    assert sway["res6"] == pytest.approx(residual, abs=5e-3)
     if factor == 1.0:
-        assert found["peak6"] == pytest.approx(expected["peak"], abs=1e-3)
+        assert sway["peak6"] == pytest.approx(expected["peak"], abs=1e-3)
 
 
 @pytest.mark.parametrize(
@@ -124,6 +124,6 @@ def test_built_in_pulses_show_the_same_sway(
     script = SCRIPTS[f"pulse-{axis}"]
     ticks = round(script.duration_s / TICK_S)
     commands = [script.command(axis, k * TICK_S) for k in range(ticks)]
-    found = sway_numbers(drive(Crane(), axis, commands), 3.5 + 2.5)
-    assert (found["peak5"], found["peak6"]) == pytest.approx(peaks, abs=0.2)
-    assert (found["res5"], found["res6"]) == pytest.approx(residuals, abs=0.2)
+    sway = sway_numbers(drive(Crane(), axis, commands), 3.5 + 2.5)
+    assert (sway["peak5"], sway["peak6"]) == pytest.approx(peaks, abs=0.2)
+    assert (sway["res5"], sway["res6"]) == pytest.approx(residuals, abs=0.2)

@@ -28,9 +28,11 @@ def residual_reduction_pct(file: str, script: str, axis: str, machine: str | Non
 
 def test_near_far_pulse_through_the_tip_controller() -> None:
     """98.7 % where valves move the tip itself; four valves in the place of one cost a percent."""
-    found = residual_reduction_pct("forwarder.yaml", "pulse-near_far", "near_far", "tip-controller")
-    assert found >= 97.0
-    assert found <= residual_reduction_pct("forwarder.yaml", "pulse-near_far", "near_far")
+    reduction_pct = residual_reduction_pct(
+        "forwarder.yaml", "pulse-near_far", "near_far", "tip-controller"
+    )
+    assert reduction_pct >= 97.0
+    assert reduction_pct <= residual_reduction_pct("forwarder.yaml", "pulse-near_far", "near_far")
 
 
 def test_slew_pulse_is_the_same_with_and_without_joints() -> None:
@@ -63,9 +65,9 @@ def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
     def left_deg(path: Path, script: str) -> float:
         recording = drive(load_deployment(path), script_named(script, JOINT_AXES))
         assert recording.crane is not None
-        found = crane_metrics(recording, recording.crane).residual_deg
-        assert found is not None
-        return found
+        residual_deg = crane_metrics(recording, recording.crane).residual_deg
+        assert residual_deg is not None
+        return residual_deg
 
     slew, loading = ((left_deg(shipped, s), left_deg(file, s)) for s in ("pulse-slew", "loading"))
     print(f"slew {slew[0]:.1f} and {slew[1]:.1f}, loading {loading[0]:.1f} and {loading[1]:.1f}")
@@ -75,12 +77,12 @@ def test_a_telescope_is_no_near_far_axis(tmp_path: Path) -> None:
 
 def test_drive_joint_by_joint_is_recorded() -> None:
     deployment = load_deployment(CONFIG / "forwarder-joints.yaml")
-    found = drive(deployment, SCRIPTS["loading-joints"])
-    assert tuple(found.axes) == JOINT_AXES
-    boom = [found.axes[axis].sway_deg for axis in JOINT_AXES[1:]]
+    recording = drive(deployment, SCRIPTS["loading-joints"])
+    assert tuple(recording.axes) == JOINT_AXES
+    boom = [recording.axes[axis].sway_deg for axis in JOINT_AXES[1:]]
     assert boom[0] == boom[1] == boom[2]
-    assert found.axes["slew"].sway_deg != boom[0]
-    for trace in found.axes.values():
+    assert recording.axes["slew"].sway_deg != boom[0]
+    for trace in recording.axes.values():
         assert max(map(abs, trace.joystick)) > 0.3
         assert max(map(abs, trace.sent)) > 0.2
         # The speed follows what was sent: shaped, it is never faster than the joystick asked.
@@ -91,8 +93,8 @@ def test_drive_joint_by_joint_is_recorded() -> None:
 def test_a_drive_may_start_with_a_swing(machine: str) -> None:
     deployment = load_deployment(CONFIG / "forwarder.yaml")
     swing = Sway(theta6_rad=0.1)
-    found = drive(deployment, SCRIPTS["pulse-slew"], machine=machine, sway=swing)
-    sway_deg = found.axes["near_far"].sway_deg
+    recording = drive(deployment, SCRIPTS["pulse-slew"], machine=machine, sway=swing)
+    sway_deg = recording.axes["near_far"].sway_deg
     assert sway_deg is not None
     assert sway_deg[0] == pytest.approx(5.7, abs=0.1)
 

@@ -61,11 +61,11 @@ def machine(tmp_path: Path) -> Make:
 
 def frames(node: JoystickNode, milliseconds: int) -> dict[int, list[tuple[int, bytes]]]:
     """(time in ms, data) of every frame by id, as the node is called in real time."""
-    found: dict[int, list[tuple[int, bytes]]] = {}
+    by_id: dict[int, list[tuple[int, bytes]]] = {}
     for time_ms in range(0, milliseconds, node.cycle_ms):
         for frame in node.frames(time_ms):
-            found.setdefault(frame.can_id, []).append((time_ms, frame.data))
-    return found
+            by_id.setdefault(frame.can_id, []).append((time_ms, frame.data))
+    return by_id
 
 
 @pytest.mark.parametrize("kind", CHECKSUMS)

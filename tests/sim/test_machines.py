@@ -37,14 +37,14 @@ def renamed(tmp_path: Path, file: Path, *changes: tuple[str, str]) -> Deployment
 
 
 def decoded(deployment: Deployment, frames: list[Frame]) -> dict[str, dict[str, Any]]:
-    found: dict[str, Any] = {}
+    values: dict[str, Any] = {}
     for frame in frames:
         for name in (*FEEDBACK, *JOINT_FEEDBACK):
             entry = deployment.messages.find(name)
             assert not isinstance(entry, str)
             if entry[1].frame_id == frame.can_id:
-                found[name] = entry[1].decode(frame.data)
-    return found
+                values[name] = entry[1].decode(frame.data)
+    return values
 
 
 def test_axes_choose_the_machine() -> None:
@@ -100,18 +100,18 @@ def test_joint_feedback(file: Path, machine: str | None) -> None:
     deployment = load_deployment(file)
     plant = PlantNode(deployment, machine=machine)
     plant.advance(0.02)
-    found = decoded(deployment, plant.feedback())
-    assert [*found] == [*JOINT_FEEDBACK, *FEEDBACK]  # closes with the sway
+    values = decoded(deployment, plant.feedback())
+    assert [*values] == [*JOINT_FEEDBACK, *FEEDBACK]  # closes with the sway
     boom = plant.crane.boom
     assert isinstance(boom, JointBoom)
     slew, lift, knuckle, extension = boom.joints
-    position = found["JointPosition"]
+    position = values["JointPosition"]
     assert position["SlewAngle"] == pytest.approx(math.degrees(slew), abs=0.01)
     assert position["LiftAngle"] == pytest.approx(math.degrees(lift), abs=0.01)
     assert position["KnuckleAngle"] == pytest.approx(math.degrees(knuckle), abs=0.01)
     assert position["Extension"] == pytest.approx(extension, abs=0.001)
-    assert found["TipPosition"]["Radius"] == pytest.approx(3.0, abs=0.001)
-    assert found["TipPosition"]["Height"] == pytest.approx(4.0, abs=0.001)
+    assert values["TipPosition"]["Radius"] == pytest.approx(3.0, abs=0.001)
+    assert values["TipPosition"]["Height"] == pytest.approx(4.0, abs=0.001)
 
 
 def test_the_tip_machine_sends_what_it_did() -> None:

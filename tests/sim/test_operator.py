@@ -41,8 +41,8 @@ def test_a_stroke_is_a_trapezoid() -> None:
 
 def test_a_stroke_without_ramp_is_a_step() -> None:
     script = Script("step", (Stroke("lift", 0.5, 1.0, 1.0, 0.0),), 2.0)
-    found = [script.command("lift", t) for t in (0.4999, 0.5, 1.4999, 1.5)]
-    assert found == [0.0, 1.0, 1.0, 0.0]
+    commands = [script.command("lift", t) for t in (0.4999, 0.5, 1.4999, 1.5)]
+    assert commands == [0.0, 1.0, 1.0, 0.0]
 
 
 def test_area_is_level_times_duration() -> None:

@@ -117,7 +117,7 @@ def test_the_controller_is_followed(machine: Deployment) -> None:
     assert fastest > 0.1
 
 
-def test_the_joysticks_of_a_machine_with_headers_are_taken(tmp_path: Path) -> None:
+def test_the_joysticks_of_a_machine_with_headers_are_received(tmp_path: Path) -> None:
     deployment = protected_machine.load(tmp_path)
     controller = Controller(deployment)
     joysticks = JoystickNode(deployment, random_script(1))

@@ -40,15 +40,15 @@ def test_least_squares_gives_the_velocity_with_the_smallest_rates(
     assert tip_velocity(jacobian, solver.free) == pytest.approx((0.0, 0.0), abs=1e-9)
 
 
-@given(pose=poses, velocity=velocities, limits=bounds, wish=st.floats(-0.5, 0.5))
+@given(pose=poses, velocity=velocities, limits=bounds, target=st.floats(-0.5, 0.5))
 def test_bounds_are_kept_with_the_fastest_motion_in_the_asked_direction(
-    pose: Vector, velocity: tuple[float, float], limits: Bounds, wish: float
+    pose: Vector, velocity: tuple[float, float], limits: Bounds, target: float
 ) -> None:
     assume(max(map(abs, velocity)) > 1e-3)
     jacobian = BOOM.jacobian(*pose)
     solver = ResolvedRates(jacobian, FULL, 0.2)
     p = solver.least_squares(*velocity)
-    scale, rates = solver.within(p, limits, wish)
+    scale, rates = solver.within(p, limits, target)
     for low, rate, high in zip(limits.low, rates, limits.high, strict=True):
         assert low <= rate <= high
     assert tip_velocity(jacobian, rates) == pytest.approx(

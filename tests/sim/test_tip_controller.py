@@ -58,10 +58,10 @@ def controller(**changes: Any) -> TipController:
     ],
 )
 def test_tip_moves_as_commanded_away_from_limits(speeds: tuple[float, ...], ticks: int) -> None:
-    wanted = [v * full for v, full in zip(speeds, TIP_FULL, strict=True)]
+    expected = [v * full for v, full in zip(speeds, TIP_FULL, strict=True)]
     states = run(TipControlledCrane(), speeds, ticks)
     for state in states[40:]:
-        assert state[4:7] == pytest.approx(wanted, abs=0.01)  # rad/s, m/s
+        assert state[4:7] == pytest.approx(expected, abs=0.01)  # rad/s, m/s
     # What the start-up of four unequal valves leaves behind.
     if not speeds[2]:
         assert states[-1].height_m == pytest.approx(4.0, abs=0.015)

@@ -20,13 +20,13 @@ def speeds(
 ) -> list[float]:
     """Speed at the end of every held command, advanced in `steps` equal steps each."""
     valve = Valve(parameters)
-    found = []
+    measured = []
     for command in commands:
         valve.set_command(command)
         for _ in range(steps):
             valve.advance(hold_s / steps)
-        found.append(valve.speed)
-    return found
+        measured.append(valve.speed)
+    return measured
 
 
 @pytest.mark.parametrize(
@@ -43,8 +43,8 @@ def test_deadband_comes_before_the_flow_limit() -> None:
 
 
 def test_lag_alone_is_the_exponential() -> None:
-    found = speeds(IDEAL, [0.7] * 50, 0.01)
-    for i, speed in enumerate(found):
+    measured = speeds(IDEAL, [0.7] * 50, 0.01)
+    for i, speed in enumerate(measured):
         assert speed == pytest.approx(0.7 * (1.0 - math.exp(-0.01 * (i + 1) / 0.1)), abs=1e-14)
 
 
@@ -169,9 +169,9 @@ def test_speed_stays_within_the_flow_limit(
 
 
 def test_neutral_brings_the_speed_to_zero() -> None:
-    found = speeds(ValveParameters(), [1.0] * 50 + [0.04] * 200, 0.02)
-    assert found[49] == pytest.approx(1.0, abs=1e-3)
-    assert abs(found[-1]) < 1e-15
+    measured = speeds(ValveParameters(), [1.0] * 50 + [0.04] * 200, 0.02)
+    assert measured[49] == pytest.approx(1.0, abs=1e-3)
+    assert abs(measured[-1]) < 1e-15
 
 
 @pytest.mark.parametrize(
@@ -201,6 +201,6 @@ def test_a_command_that_is_no_number_is_refused(command: float) -> None:
 def test_hysteresis_is_a_play_between_command_and_spool() -> None:
     parameters = ValveParameters(deadband=0.0, hysteresis=0.04, rate_limit_1_s=math.inf)
     commands = [0.5, 0.49, 0.47, 0.45, 0.46, 0.48, 0.5, 0.0]
-    found = speeds(parameters, commands, 3.0)
-    assert found == pytest.approx([0.48, 0.48, 0.48, 0.47, 0.47, 0.47, 0.48, 0.02], abs=1e-9)
+    measured = speeds(parameters, commands, 3.0)
+    assert measured == pytest.approx([0.48, 0.48, 0.48, 0.47, 0.47, 0.47, 0.48, 0.02], abs=1e-9)
     assert speeds(replace(parameters, hysteresis=0.0), commands, 3.0) == pytest.approx(commands)

@@ -20,7 +20,7 @@ class Gff:
     """Gains of the limit-aware G_FF for one sway mode, tick and pair of real poles.
 
     Args:
-        sway: the sway model of the axis; whoever owns it steps it with what was really sent.
+        sway: the sway model of the axis; its owner steps it with what was really sent.
         poles_rad_s: the two poles of the filter, real and negative.
         third_pole_rad_s: a third real pole, as a first-order lag on the command: without it a step
             on the joystick comes out at once as 1/(a2 w^2) times the command.

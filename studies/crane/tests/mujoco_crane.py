@@ -4,7 +4,7 @@ The model is built from drawings, not from the DH table: boxes hinged to boxes, 
 and y. MuJoCo does all mechanics, the joints of the boom included.
 
 How the boom follows its motion exactly: each driven joint carries a rotor of 1e14 kg m^2 (MuJoCo's
-"armature": inertia about that joint alone) and is pushed by 1e14 times the wanted acceleration.
+"armature": inertia about that joint alone) and is pushed by 1e14 times the commanded acceleration.
 Weight of the boom and pull of the grapple, some 1e5 N m, change its acceleration by 1e-9, and in
 20 s its angle by 2e-7; the test looks at what is left. The push is set in MuJoCo's control
 callback, which its Runge-Kutta integrator calls at every stage, so the whole is of fourth order.

@@ -93,18 +93,18 @@ def test_faults_are_reported_with_file_and_line(
     old, new, place, message = fault
     text = shipped_path.read_text(encoding="utf-8")
     assert text.count(old) == 1
-    (found,) = problems(tmp_path / "crane.yaml", text.replace(old, new))
+    (problem,) = problems(tmp_path / "crane.yaml", text.replace(old, new))
     line = 1 + text[: re.search(rf"(^|, )\s*{place}", text, re.MULTILINE).end()].count("\n")
-    assert found.startswith(f"crane.yaml:{line}: ")
-    assert message in found
+    assert problem.startswith(f"crane.yaml:{line}: ")
+    assert message in problem
 
 
 def test_all_faults_are_reported_at_once(tmp_path: Path) -> None:
-    found = problems(tmp_path / "crane.yaml", "name: 7\nwheels: 8\n")
-    assert sorted(f.split(": ")[1] for f in found) == ["grapple", "joints", "name", "wheels"]
+    reported = problems(tmp_path / "crane.yaml", "name: 7\nwheels: 8\n")
+    assert sorted(f.split(": ")[1] for f in reported) == ["grapple", "joints", "name", "wheels"]
     assert (
         "crane.yaml:2: wheels: expected one of the keys name, joints, grapple, got an unknown one"
-        in found
+        in reported
     )
 
 

@@ -1,4 +1,4 @@
-"""The judge nobody here wrote: the same crane in MuJoCo, joint by joint."""
+"""The judge no one here wrote: the same crane in MuJoCo, joint by joint."""
 
 import mujoco
 import numpy as np
@@ -58,7 +58,7 @@ def test_sway_of_twenty_seconds_of_random_driving(
     motion = random_motion(kinematics, seed, TIMES)
     start = np.array([0.1, -0.2])
     expected, boom = simulate(judge, STEP_S, motion, start)
-    assert boom == pytest.approx(motion[0][::2], abs=1e-6)  # MuJoCo's boom did as it was told
+    assert boom == pytest.approx(motion[0][::2], abs=1e-6)  # MuJoCo's boom did as commanded
     got = swing(dynamics.driven_by(kinematics), STEP_S, motion, start)[:, :2]
     peak = np.abs(expected).max(axis=0)
     assert (peak > np.radians(10.0)).all()

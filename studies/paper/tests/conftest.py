@@ -10,13 +10,13 @@ FILE = Path(__file__).resolve().parents[3] / "config" / "forwarder.yaml"
 
 
 @pytest.fixture(scope="session")
-def told() -> list[int]:
+def steps_done() -> list[int]:
     return []
 
 
 @pytest.fixture(scope="session")
-def study(told: list[int]) -> Study:
-    return Study(load_deployment(FILE), lambda: told.append(1))
+def study(steps_done: list[int]) -> Study:
+    return Study(load_deployment(FILE), lambda: steps_done.append(1))
 
 
 @pytest.fixture(scope="session")

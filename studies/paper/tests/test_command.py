@@ -24,8 +24,8 @@ def done(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Result]:
 def test_everything_is_written(done: tuple[Path, Result]) -> None:
     out, result = done
     assert result.exit_code == 0, result.output
-    wanted = {f"figure-{n}.{kind}" for n in (3, 4, 6, 7, 8) for kind in ("png", "json")}
-    assert {path.name for path in out.iterdir()} == wanted | {"paper.json"}
+    expected = {f"figure-{n}.{kind}" for n in (3, 4, 6, 7, 8) for kind in ("png", "json")}
+    assert {path.name for path in out.iterdir()} == expected | {"paper.json"}
     for path in out.glob("*.png"):
         assert path.read_bytes().startswith(b"\x89PNG")
 

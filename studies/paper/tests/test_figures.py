@@ -40,8 +40,8 @@ def test_png_of_the_right_size(figures: dict[int, Figure], number: int, tmp_path
 
 
 def headline(fig: Figure) -> str:
-    found: str = fig.get_suptitle()
-    return found
+    title: str = fig.get_suptitle()
+    return title
 
 
 @pytest.mark.parametrize(("number", "plane"), [(3, "perpendicular"), (4, "parallel")])

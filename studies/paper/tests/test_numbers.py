@@ -54,21 +54,21 @@ def test_slew_poles_agree_with_an_independent_program() -> None:
 
 def test_the_document_has_these_numbers(table: dict[str, Any]) -> None:
     text = (ROOT / "studies" / "README.md").read_text(encoding="utf-8")
-    for found in table["reductions"]:
+    for claim in table["reductions"]:
         cells = [
-            f"**{value:.0f}**" if metric in found["holds_for"][plant] else f"{value:.0f}"
-            for plant, values in found["ours_pct"].items()
+            f"**{value:.0f}**" if metric in claim["holds_for"][plant] else f"{value:.0f}"
+            for plant, values in claim["ours_pct"].items()
             for metric, value in values.items()
         ]
-        assert f"| > {found['more_than_pct']:g} | {' | '.join(cells)} |" in text
+        assert f"| > {claim['more_than_pct']:g} | {' | '.join(cells)} |" in text
     for fact in table["others"]:
         assert f"| {fact['paper']} | {fact['ours']} |" in text
 
 
 def row(table: dict[str, Any], index: int, plant: str) -> dict[str, float]:
     assert table["reductions"][index]["plane"] == CLAIMS[index].plane
-    found: dict[str, float] = table["reductions"][index]["ours_pct"][plant]
-    return found
+    reductions: dict[str, float] = table["reductions"][index]["ours_pct"][plant]
+    return reductions
 
 
 @pytest.mark.parametrize("plant", ["linear", "real"])
@@ -102,11 +102,11 @@ def test_limit_aware_controller_on_a_real_valve_is_close_to_the_ideal(
 
 
 def test_verdicts_follow_from_the_numbers(table: dict[str, Any]) -> None:
-    for found in table["reductions"]:
-        for plant, values in found["ours_pct"].items():
+    for claim in table["reductions"]:
+        for plant, values in claim["ours_pct"].items():
             for metric, value in values.items():
-                if abs(value - found["more_than_pct"]) > 0.1:  # printed to 0.1 %
-                    assert (value > found["more_than_pct"]) == (metric in found["holds_for"][plant])
+                if abs(value - claim["more_than_pct"]) > 0.1:  # printed to 0.1 %
+                    assert (value > claim["more_than_pct"]) == (metric in claim["holds_for"][plant])
 
 
 def test_words_name_metric_and_assumption(table: dict[str, Any]) -> None:
@@ -157,11 +157,11 @@ def test_bode_is_that_of_the_closed_form(study: Study) -> None:
 
 
 def test_bode_numbers(numbers: dict[int, dict[str, Any]]) -> None:
-    found = numbers[6]
-    assert found["curves"]["G11"]["natural_frequency_rad_s"] == pytest.approx(2.6686, abs=1e-4)
-    assert found["curves"]["G22"]["natural_frequency_rad_s"] == pytest.approx(2.8592, abs=1e-4)
-    assert found["apart_pct"] == pytest.approx(7.1)
-    assert found["slewing"] == {
+    bode = numbers[6]
+    assert bode["curves"]["G11"]["natural_frequency_rad_s"] == pytest.approx(2.6686, abs=1e-4)
+    assert bode["curves"]["G22"]["natural_frequency_rad_s"] == pytest.approx(2.8592, abs=1e-4)
+    assert bode["apart_pct"] == pytest.approx(7.1)
+    assert bode["slewing"] == {
         "slew_rate_rad_s": 0.5,
         "natural_frequencies_rad_s": pytest.approx([2.26, 3.275], abs=0.01),
         "peak_g11": pytest.approx(18.2, abs=0.1),
@@ -170,23 +170,23 @@ def test_bode_numbers(numbers: dict[int, dict[str, Any]]) -> None:
 
 
 def test_printed_poles_and_optima(table: dict[str, Any]) -> None:
-    found = {fact["what"]: fact for fact in table["others"]}
-    assert found["Slew: poles of a1, a2"]["ours"] == "-5.6550, -4.1124"
-    assert found["Slew: poles of a1, a2"]["agrees"]
-    assert found["Near-far: poles of a1, a2"]["ours"] == "-3.5576, -2.3424"
+    facts = {fact["what"]: fact for fact in table["others"]}
+    assert facts["Slew: poles of a1, a2"]["ours"] == "-5.6550, -4.1124"
+    assert facts["Slew: poles of a1, a2"]["agrees"]
+    assert facts["Near-far: poles of a1, a2"]["ours"] == "-3.5576, -2.3424"
     for axis, ours, fitted in (
         ("Slew", "0.619, 0.0957", "0.420, 0.0431"),
         ("Near-far", "0.667, 0.1113", "0.708, 0.1200"),
     ):
-        fact = found[f"{axis}: optimal a1, a2"]
+        fact = facts[f"{axis}: optimal a1, a2"]
         assert fact["ours"] == ours
         assert fact["agrees"] is False
         assert fitted in fact["remark"]
         assert "fitted" in fact["remark"]
-    assert found["Fig. 3: -3, -3 leaves least sway"]["ours"] == "least peak and RMS"
-    assert found["Fig. 3: poles far out"]["agrees"] is False
-    assert found["Fig. 4: poles far out"]["agrees"] is True
-    assert found["Factor 3 (the radius in m)"]["ours"] == "in G11"
+    assert facts["Fig. 3: -3, -3 leaves least sway"]["ours"] == "least peak and RMS"
+    assert facts["Fig. 3: poles far out"]["agrees"] is False
+    assert facts["Fig. 4: poles far out"]["agrees"] is True
+    assert facts["Factor 3 (the radius in m)"]["ours"] == "in G11"
 
 
 def test_json_has_no_nan(table: dict[str, Any], numbers: dict[int, dict[str, Any]]) -> None:
@@ -195,8 +195,8 @@ def test_json_has_no_nan(table: dict[str, Any], numbers: dict[int, dict[str, Any
 
 
 def test_the_progress_ends_where_it_is_said_to(
-    table: dict[str, Any], numbers: dict[int, dict[str, Any]], told: list[int], all_steps: int
+    table: dict[str, Any], numbers: dict[int, dict[str, Any]], steps_done: list[int], all_steps: int
 ) -> None:
     assert table
     assert numbers
-    assert len(told) == all_steps
+    assert len(steps_done) == all_steps

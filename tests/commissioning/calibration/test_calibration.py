@@ -54,7 +54,7 @@ def measured(deployment: Deployment, *changes: str, ramp: Ramp = RAMP) -> Calibr
 def test_a_known_valve_is_found(
     deployment: Deployment, deadband: float, more: float, gain: float, dead_time: float
 ) -> None:
-    found = measured(
+    valve = measured(
         deployment,
         f"slew.deadband={deadband}",
         f"slew.negative_more_deadband={more}",
@@ -62,12 +62,12 @@ def test_a_known_valve_is_found(
         f"slew.dead_time_s={dead_time}",
     )
     # A step of the frame is 0.8 % of the command.
-    assert found.positive.opens == pytest.approx(deadband, abs=0.008)
-    assert found.negative.opens == pytest.approx(deadband + more, abs=0.008)
-    assert found.positive.full == pytest.approx(0.5, rel=0.04)
-    assert found.negative.full / found.positive.full == pytest.approx(gain, rel=0.04)
+    assert valve.positive.opens == pytest.approx(deadband, abs=0.008)
+    assert valve.negative.opens == pytest.approx(deadband + more, abs=0.008)
+    assert valve.positive.full == pytest.approx(0.5, rel=0.04)
+    assert valve.negative.full / valve.positive.full == pytest.approx(gain, rel=0.04)
     # A longer dead time is a later opening on the way up, and no other curve.
-    assert found.positive.delay == pytest.approx(2 * RAMP.rate_per_s * (0.1 + dead_time), abs=0.01)
+    assert valve.positive.delay == pytest.approx(2 * RAMP.rate_per_s * (0.1 + dead_time), abs=0.01)
 
 
 @pytest.mark.parametrize(("rate_per_s", "top"), [(0.1, 0.15), (0.1, 0.4), (0.05, 0.15)])
@@ -75,8 +75,8 @@ def test_a_quick_or_low_ramp_finds_the_same_valve(
     deployment: Deployment, rate_per_s: float, top: float
 ) -> None:
     ramp = Ramp(rate_per_s=rate_per_s, top=top, rest_s=1.0)
-    found = measured(deployment, "slew.deadband=0.08", ramp=ramp)
-    for direction in (found.positive, found.negative):
+    valve = measured(deployment, "slew.deadband=0.08", ramp=ramp)
+    for direction in (valve.positive, valve.negative):
         assert direction.opens == pytest.approx(0.08, abs=0.008)
         assert direction.full == pytest.approx(0.5, rel=0.1)
         assert direction.delay == pytest.approx(2 * rate_per_s * 0.1, abs=0.01)

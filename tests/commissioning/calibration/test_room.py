@@ -28,10 +28,10 @@ def of_joint(axis: str, ramp: Ramp) -> CalibrationDrive:
 @pytest.mark.parametrize("axis", ["lift_cylinder", "knuckle", "extension"])
 def test_a_joint_has_room_for_the_ramp_that_is_proposed(axis: str) -> None:
     """The lift cylinder begins at its upper end, and is brought back first."""
-    found = of_joint(axis, Ramp(RATE_PER_S, TOP)).result()
-    for direction in (found.positive, found.negative):
+    valve = of_joint(axis, Ramp(RATE_PER_S, TOP)).result()
+    for direction in (valve.positive, valve.negative):
         assert direction.opens == pytest.approx(0.08, abs=0.004)
-        assert direction.full == pytest.approx(found.positive.full, rel=0.02)
+        assert direction.full == pytest.approx(valve.positive.full, rel=0.02)
 
 
 @pytest.mark.parametrize("axis", ["knuckle", "extension"])

@@ -50,16 +50,20 @@ def with_messages(folder: Path, long: int = 20, fd: str = "") -> Deployment:
 
 
 def drive_on(
-    deployment: Deployment, axis: str, speed: tuple[str, str], heard: list[Frame], ticks: int = 400
+    deployment: Deployment,
+    axis: str,
+    speed: tuple[str, str],
+    feedback: list[Frame],
+    ticks: int = 400,
 ) -> CalibrationDrive:
-    """Joysticks held in neutral with their enable; the speed is ``heard``, the last for ever."""
+    """Joysticks held in neutral with their enable; the speed is ``feedback``, the last for ever."""
     drive, hand = CalibrationDrive(deployment, axis, speed, RAMP), Hand(deployment)
     for tick in range(ticks):
         now_ns = tick * TICK_NS
         for frame in hand.frames(tick * 20, Held({}, enable=True)):
             drive.receive(frame, now_ns)
         list(drive.tick(now_ns))
-        drive.receive(heard[min(tick, len(heard) - 1)], now_ns)
+        drive.receive(feedback[min(tick, len(feedback) - 1)], now_ns)
     return drive
 
 
@@ -78,8 +82,8 @@ def test_another_valve_that_speaks_does_not_stand_for_one_that_fell_silent() -> 
         Frame("crane", 0x0CFE1000 | source, True, b"\x7d\x7d" + b"\xff" * 6)
         for source in (0x80, 0x55)
     )
-    heard = [own] * 200 + [other]
-    drive = drive_on(deployment, "slew", ("AVEF0", "ExtendFlow"), heard)
+    feedback = [own] * 200 + [other]
+    drive = drive_on(deployment, "slew", ("AVEF0", "ExtendFlow"), feedback)
     assert drive.ended == "stopped: the feedback fell silent, or reports an error"
     assert 0.0 < drive.progress < 1.0
 
@@ -152,8 +156,8 @@ def test_in_a_gateway_the_frames_of_the_joystick_move_the_crane() -> None:
 
 def test_the_end_in_a_gateway_can_be_reported_more_than_once() -> None:
     deployment = load_deployment(ROOT / "config" / "gateway-forwarder.yaml")
-    heard = [Frame("machine", 0x402, False, bytes(6))]
-    drive = drive_on(deployment, "slew", ("TipVelocity", "SlewRate"), heard, 150)
+    feedback = [Frame("machine", 0x402, False, bytes(6))]
+    drive = drive_on(deployment, "slew", ("TipVelocity", "SlewRate"), feedback, 150)
     assert drive.waiting_for == ""
     reported = [drive.neutral_frames() for _ in range(3)]
     assert [[frame.data[:2] for frame in frames] for frames in reported] == [[bytes(2)]] * 3

@@ -95,15 +95,15 @@ def test_a_wrong_deployment_is_reported_before_anything_runs(tmp_path: Path) -> 
 
 def children_of(pid: int) -> set[int]:
     """Processes of a measurement that this process started, even if it is gone itself."""
-    found = set()
+    pids = set()
     for entry in Path("/proc").glob("[0-9]*"):
         try:
             words = (entry / "cmdline").read_bytes().decode(errors="replace").split("\0")
         except OSError:
             continue
         if len(words) > 2 and f'"parent": {pid},' in words[-2]:
-            found.add(int(entry.name))
-    return found
+            pids.add(int(entry.name))
+    return pids
 
 
 def wait_until_there_are(pid: int, number: int) -> None:

@@ -28,25 +28,25 @@ def here(tmp_path: Path) -> FakeDevices:
 
 
 def finding(here: FakeDevices, channel: str, **match: Any) -> Finding:
-    asked = Match(**match) if match else None
-    bus = Bus(interface="socketcan", channel=channel, match=asked)
-    (found,) = device_findings("crane", bus, here.root, here.query)
-    return found
+    expected = Match(**match) if match else None
+    bus = Bus(interface="socketcan", channel=channel, match=expected)
+    (result,) = device_findings("crane", bus, here.root, here.query)
+    return result
 
 
 def test_a_match_that_holds(here: FakeDevices) -> None:
-    found = finding(here, "can2", serial="no 5*")
-    assert found == Finding("can2 device", Level.OK, "match of bus crane holds")
+    result = finding(here, "can2", serial="no 5*")
+    assert result == Finding("can2 device", Level.OK, "match of bus crane holds")
 
 
 def test_a_match_that_does_not_hold(here: FakeDevices) -> None:
-    found = finding(here, "can2", serial="0A17", port=1)
-    assert found.level is Level.BAD
-    assert found.found == (
+    result = finding(here, "can2", serial="0A17", port=1)
+    assert result.level is Level.BAD
+    assert result.found == (
         "expected serial number 0A17, port 1, but can2 has serial number no 5*, port 0;"
         " the device of the file is can1"
     )
-    assert found.remedy
+    assert result.remedy
 
 
 def test_an_interface_that_is_not_there_is_said_once(here: FakeDevices) -> None:
@@ -64,9 +64,9 @@ def test_a_kernel_that_does_not_answer(
         raise OSError(errno.EPERM, "Operation not permitted")
 
     bus = Bus(interface="socketcan", channel="can0", match=match)
-    found = device_findings("crane", bus, here.root, refuse)
+    findings = device_findings("crane", bus, here.root, refuse)
     text = "cannot be looked at: Operation not permitted"
-    assert found == [Finding("can0 device", level, text)]
+    assert findings == [Finding("can0 device", level, text)]
 
 
 @pytest.mark.parametrize(
@@ -82,10 +82,10 @@ def test_a_kernel_that_does_not_answer(
 def test_the_match_to_paste_is_one_that_holds(
     here: FakeDevices, channel: str, level: Level, match: Match
 ) -> None:
-    found = finding(here, channel)
-    assert found.level is level
-    assert found.found == f"bus crane has no match: whatever is called {channel} is driven"
-    line = found.remedy.splitlines()[0]
+    result = finding(here, channel)
+    assert result.level is level
+    assert result.found == f"bus crane has no match: whatever is called {channel} is driven"
+    line = result.remedy.splitlines()[0]
     key, _, text = line.partition("match: ")
     assert key == "in the deployment file, bus crane: "
     assert Match.model_validate(yaml.safe_load(text)) == match
@@ -141,8 +141,8 @@ def test_a_virtual_bus_gets_no_name(here: FakeDevices) -> None:
     ],
 )
 def test_a_name_that_linux_takes(here: FakeDevices, bus: str, name: str) -> None:
-    found = device_findings(bus, Bus(interface="socketcan", channel="can3"), here.root, here.query)
-    assert f"  Name={name}\n" in found[0].remedy
+    findings = device_findings(bus, Bus(interface="socketcan", channel="can3"), here.root, here.query)
+    assert f"  Name={name}\n" in findings[0].remedy
     assert len(name) <= 15
 
 

@@ -13,15 +13,16 @@ TIMES = st.lists(st.integers(0, ENDS_US[-1] * 1000), min_size=1, max_size=200)
 def test_a_quantile_is_the_smallest_value_with_that_share_at_or_below(
     times: list[int], share: float
 ) -> None:
-    found = quantile(sorted(times), share)
-    assert sum(t <= found for t in times) >= share * len(times)
-    assert sum(t < found for t in times) < share * len(times)
+    value = quantile(sorted(times), share)
+    assert sum(t <= value for t in times) >= share * len(times)
+    assert sum(t < value for t in times) < share * len(times)
 
 
 def test_one_in_a_thousand_is_above_the_last_quantile() -> None:
-    found = summary([1_000_000, *[20_000] * 500, *[10_000] * 499])
-    assert found is not None
-    assert (found.count, found.p50, found.p99, found.p99_9, found.max) == (1000, 20, 20, 20, 1000)
+    figures = summary([1_000_000, *[20_000] * 500, *[10_000] * 499])
+    assert figures is not None
+    assert (figures.count, figures.max) == (1000, 1000)
+    assert (figures.p50, figures.p99, figures.p99_9) == (20, 20, 20)
 
 
 def test_no_times_have_no_figures() -> None:

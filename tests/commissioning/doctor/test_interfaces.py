@@ -100,9 +100,11 @@ def findings(file: str, channel: str, bitrate: int | None = None) -> dict[str, F
     ],
 )
 def test_levels(file: str, channel: str, levels: dict[str, Level]) -> None:
-    found = findings(file, channel)
-    assert {s: f.level for s, f in found.items()} == {channel + s: v for s, v in levels.items()}
-    assert all(f.remedy for f in found.values() if f.level in (WARNING, BAD))
+    by_subject = findings(file, channel)
+    assert {s: f.level for s, f in by_subject.items()} == {
+        channel + s: v for s, v in levels.items()
+    }
+    assert all(f.remedy for f in by_subject.values() if f.level in (WARNING, BAD))
 
 
 def test_what_is_said() -> None:
@@ -140,22 +142,22 @@ def test_error_counters_of_the_controller_are_reported() -> None:
     text = text.replace('"berr_counter":{"tx":0,"rx":0}', '"berr_counter":{"tx":8,"rx":0}')
     link = parse_ip(text)
     assert link is not None
-    found = interfaces.errors(link)
-    assert found is not None
-    assert (found.level, found.found) == (WARNING, "counted: tx 8")
+    finding = interfaces.errors(link)
+    assert finding is not None
+    assert (finding.level, finding.found) == (WARNING, "counted: tx 8")
 
 
 def test_a_virtual_bus_that_is_down() -> None:
     text = (IP / "vcan0.json").read_text().replace('["NOARP","UP","LOWER_UP"]', '["NOARP"]')
-    (found,) = link_findings(parse_ip(text), bus("vcan0"))
-    assert (found.level, found.found) == (BAD, "is down")
+    (finding,) = link_findings(parse_ip(text), bus("vcan0"))
+    assert (finding.level, finding.found) == (BAD, "is down")
 
 
 def test_no_such_interface() -> None:
     assert read_link("nocan7") is None  # by ip where there is one, and by /sys
-    (found,) = link_findings(None, bus("nocan7"))
-    assert found.level is BAD
-    assert "ip link add nocan7 type vcan" in found.remedy
+    (finding,) = link_findings(None, bus("nocan7"))
+    assert finding.level is BAD
+    assert "ip link add nocan7 type vcan" in finding.remedy
 
 
 def test_output_that_is_not_json() -> None:
@@ -173,13 +175,13 @@ def test_without_ip_the_kernel_reports_less(tmp_path: Path, flags: str, level: L
         (directory / name).write_text(text + "\n")  # as they stand for can0 in the lane
     link = read_sys("can0", tmp_path)
     assert link is not None
-    found = link_findings(link, bus("can0"))
-    assert [(f.subject, f.level) for f in found] == [
+    results = link_findings(link, bus("can0"))
+    assert [(f.subject, f.level) for f in results] == [
         ("can0", level),
         ("can0 queue", OK),
         ("can0", WARNING),
     ]
-    assert "not checked" in found[2].found
+    assert "not checked" in results[2].found
     assert read_sys("can1", tmp_path) is None
 
 
@@ -215,18 +217,20 @@ def test_a_kernel_without_can(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "modprobe can_raw" in finding.remedy
 
 
-def fd_findings(file: str, channel: str, **asked: Any) -> dict[str, Finding]:
+def fd_findings(file: str, channel: str, **options: Any) -> dict[str, Finding]:
     link = parse_ip((IP / f"{file}.json").read_text())
     assert link is not None
-    config = Bus(interface="socketcan", channel=channel, fd=True, **asked)
+    config = Bus(interface="socketcan", channel=channel, fd=True, **options)
     return {f.subject: f for f in link_findings(link, config)}
 
 
 def test_a_controller_without_can_fd() -> None:
-    found = fd_findings("can1-good", "can1", bitrate=250_000, data_bitrate=1_000_000)["can1 CAN FD"]
-    assert (found.level, found.found) == (BAD, "off, the MTU is 16")
+    finding = fd_findings("can1-good", "can1", bitrate=250_000, data_bitrate=1_000_000)[
+        "can1 CAN FD"
+    ]
+    assert (finding.level, finding.found) == (BAD, "off, the MTU is 16")
     options = "type can dbitrate 1000000 fd on"
-    assert found.remedy == f"with can1 down: sudo ip link set can1 {options}"
+    assert finding.remedy == f"with can1 down: sudo ip link set can1 {options}"
 
 
 @pytest.mark.parametrize(
@@ -238,8 +242,8 @@ def test_a_virtual_bus_with_and_without_can_fd(mtu: int, level: Level, remedy: s
     link = parse_ip(text + ' {"info_kind": "vcan"}}]')
     assert link is not None
     assert [f.subject for f in link_findings(link, bus("vcan0"))] == ["vcan0"]
-    _, found = link_findings(link, Bus(interface="socketcan", channel="vcan0", fd=True))
-    assert (found.subject, found.level, found.remedy) == ("vcan0 CAN FD", level, remedy)
+    _, finding = link_findings(link, Bus(interface="socketcan", channel="vcan0", fd=True))
+    assert (finding.subject, finding.level, finding.remedy) == ("vcan0 CAN FD", level, remedy)
 
 
 @pytest.mark.parametrize(
@@ -261,14 +265,14 @@ def test_the_bit_rate_of_the_data_is_that_of_the_file(
     link = parse_ip(json.dumps(entry))
     assert link is not None
     config = Bus(interface="socketcan", channel="can1", fd=True, data_bitrate=data_bitrate)
-    found = {f.subject: f for f in link_findings(link, config)}["can1 CAN FD"]
-    assert (found.level, found.found) == (level, text)
+    finding = {f.subject: f for f in link_findings(link, config)}["can1 CAN FD"]
+    assert (finding.level, finding.found) == (level, text)
 
 
 def test_a_controller_of_can_fd_that_is_down_is_set_up_with_its_rates() -> None:
     link = parse_ip((IP / "can1-down.json").read_text())
     assert link is not None
-    asked = {"bitrate": 500_000, "data_bitrate": 2_000_000}
-    config = Bus(interface="socketcan", channel=link.name, fd=True, **asked)
-    found = link_findings(link, config)[0]
-    assert "dbitrate 2000000 fd on restart-ms 100" in found.remedy
+    options = {"bitrate": 500_000, "data_bitrate": 2_000_000}
+    config = Bus(interface="socketcan", channel=link.name, fd=True, **options)
+    finding = link_findings(link, config)[0]
+    assert "dbitrate 2000000 fd on restart-ms 100" in finding.remedy

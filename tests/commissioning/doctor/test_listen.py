@@ -1,4 +1,4 @@
-"""What was heard of the joysticks, against their cycle and their timeout."""
+"""What was received of the joysticks, against their cycle and their timeout."""
 
 import errno
 import os
@@ -32,8 +32,8 @@ def at(gaps_ms: Iterable[float]) -> list[int]:
 
 
 def judged(gaps_ms: Iterable[float]) -> Finding:
-    heard = {"joystick left": at(gaps_ms), "joystick right": at([20.0] * 50)}
-    left, right = arrival_findings(DEPLOYMENT, heard)
+    arrivals = {"joystick left": at(gaps_ms), "joystick right": at([20.0] * 50)}
+    left, right = arrival_findings(DEPLOYMENT, arrivals)
     assert (right.subject, right.level) == ("joystick right", Level.OK)
     return left
 
@@ -53,9 +53,9 @@ def judged(gaps_ms: Iterable[float]) -> Finding:
     ],
 )
 def test_levels(gaps_ms: list[float], level: Level) -> None:
-    found = judged(gaps_ms)
-    assert found.level is level
-    assert bool(found.remedy) == (level is not Level.OK)
+    finding = judged(gaps_ms)
+    assert finding.level is level
+    assert bool(finding.remedy) == (level is not Level.OK)
 
 
 def test_what_is_said() -> None:
@@ -65,9 +65,9 @@ def test_what_is_said() -> None:
 
 
 def test_other_buses_are_not_listened_to(two_buses: Path) -> None:
-    heard = {"joystick left": at([20.0] * 50)}
-    found = arrival_findings(load_deployment(two_buses), heard)
-    assert [(f.subject, f.level) for f in found] == [
+    arrivals = {"joystick left": at([20.0] * 50)}
+    findings = arrival_findings(load_deployment(two_buses), arrivals)
+    assert [(f.subject, f.level) for f in findings] == [
         ("joystick left", Level.OK),
         ("joystick right", Level.NOTE),
         ("emergency stop", Level.NOTE),
@@ -114,12 +114,12 @@ def test_joysticks_of_j1939_are_received_from_whatever_address(
 
     monkeypatch.setattr(listening, "open_sockets", sockets)
     deployment = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
-    heard = listening.listen(deployment, 0.1, lambda _passed: None)
-    assert {name: len(times) for name, times in heard.items()} == {
+    arrivals = listening.listen(deployment, 0.1, lambda _passed: None)
+    assert {name: len(times) for name, times in arrivals.items()} == {
         "joystick left": 20,
         "joystick right": 20,
     }
-    assert {f.level for f in arrival_findings(deployment, heard)} == {Level.OK}
+    assert {f.level for f in arrival_findings(deployment, arrivals)} == {Level.OK}
 
 
 @pytest.mark.parametrize(

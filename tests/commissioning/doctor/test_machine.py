@@ -57,10 +57,10 @@ def test_preemption(
     tmp_path: Path, version: str, files: dict[str, str], level: Level, says: str
 ) -> None:
     write(tmp_path, **files)
-    found = machine.preemption(tmp_path, version)
-    assert found.level is level
-    assert says in found.found
-    assert bool(found.remedy) == (level is not Level.OK)
+    finding = machine.preemption(tmp_path, version)
+    assert finding.level is level
+    assert says in finding.found
+    assert bool(finding.remedy) == (level is not Level.OK)
 
 
 @pytest.mark.parametrize(
@@ -79,7 +79,7 @@ def test_throttling(tmp_path: Path, runtime: str, level: Level) -> None:
 
 
 def test_a_system_that_reports_nothing_is_no_error(tmp_path: Path) -> None:
-    for found in (
+    for finding in (
         machine.throttling(tmp_path),
         machine.swap(tmp_path),
         machine.huge_pages(tmp_path),
@@ -89,7 +89,7 @@ def test_a_system_that_reports_nothing_is_no_error(tmp_path: Path) -> None:
         machine.virtual(None, tmp_path),
         machine.processors(tmp_path, 2),
     ):
-        assert found.level in (Level.OK, Level.NOTE)
+        assert finding.level in (Level.OK, Level.NOTE)
 
 
 @pytest.mark.parametrize(
@@ -103,9 +103,9 @@ def test_a_system_that_reports_nothing_is_no_error(tmp_path: Path) -> None:
 )
 def test_swap(tmp_path: Path, lines: str, level: Level, says: str) -> None:
     write(tmp_path, **{"proc/swaps": SWAPS + lines})
-    found = machine.swap(tmp_path)
-    assert found.level is level
-    assert says in found.found
+    finding = machine.swap(tmp_path)
+    assert finding.level is level
+    assert says in finding.found
 
 
 @pytest.mark.parametrize(
@@ -120,20 +120,20 @@ def test_huge_pages_of_any_program_are_noted(
     tmp_path: Path, modes: str, level: Level, says: str
 ) -> None:
     write(tmp_path, **{"sys/kernel/mm/transparent_hugepage/enabled": f"{modes}\n"})
-    found = machine.huge_pages(tmp_path)
-    assert found.level is level
-    assert found.found.startswith(says)
-    assert bool(found.remedy) == (level is Level.NOTE)
+    finding = machine.huge_pages(tmp_path)
+    assert finding.level is level
+    assert finding.found.startswith(says)
+    assert bool(finding.remedy) == (level is Level.NOTE)
 
 
 def test_one_slow_processor_is_enough(tmp_path: Path) -> None:
     write(tmp_path, **{f"{CPU}cpu{i}/cpufreq/scaling_governor": "performance\n" for i in (0, 1)})
     assert machine.governor(tmp_path) == Finding("governor", Level.OK, "performance")
     write(tmp_path, **{f"{CPU}cpu1/cpufreq/scaling_governor": "powersave\n"})
-    found = machine.governor(tmp_path)
-    assert found.level is Level.WARNING
-    assert found.found.startswith("performance, powersave:")
-    assert "cpupower" in found.remedy
+    finding = machine.governor(tmp_path)
+    assert finding.level is Level.WARNING
+    assert finding.found.startswith("performance, powersave:")
+    assert "cpupower" in finding.remedy
 
 
 def idle_state(root: Path, number: int, name: str, latency_us: int, disable: int = 0) -> None:
@@ -151,8 +151,8 @@ def idle_state(root: Path, number: int, name: str, latency_us: int, disable: int
 def test_the_deepest_idle_state_that_is_on_counts(tmp_path: Path) -> None:
     for number, (name, latency_us) in enumerate((("POLL", 0), ("C1", 2), ("C6", 133))):
         idle_state(tmp_path, number, name, latency_us)
-    found = machine.idle_states(tmp_path, 20)
-    assert found == Finding("idle states", Level.OK, "the deepest is C6, 133 us to wake up")
+    finding = machine.idle_states(tmp_path, 20)
+    assert finding == Finding("idle states", Level.OK, "the deepest is C6, 133 us to wake up")
     assert machine.idle_states(tmp_path, 1).level is Level.WARNING
     idle_state(tmp_path, 2, "C6", 133, disable=1)
     assert "C1, 2 us" in machine.idle_states(tmp_path, 1).found
@@ -177,10 +177,10 @@ def test_clock_source(
             f"{CLOCK}available_clocksource": f"{available} \n",
         },
     )
-    found = machine.clock_source(tmp_path)
-    assert found.level is level
-    assert current in found.found
-    assert says in found.remedy
+    finding = machine.clock_source(tmp_path)
+    assert finding.level is level
+    assert current in finding.found
+    assert says in finding.remedy
 
 
 def test_suspend(tmp_path: Path) -> None:
@@ -188,9 +188,9 @@ def test_suspend(tmp_path: Path) -> None:
     write(tmp_path, **{"sys/power/state": "\n"})
     assert machine.suspend(tmp_path) == Finding("suspend", Level.OK, "the kernel offers none")
     write(tmp_path, **{"sys/power/state": "freeze mem\n"})
-    found = machine.suspend(tmp_path)
-    assert (found.level, found.remedy) == (Level.WARNING, "sudo systemctl mask sleep.target")
-    assert found.found == "possible (freeze mem); logind as it comes: the lid suspends"
+    finding = machine.suspend(tmp_path)
+    assert (finding.level, finding.remedy) == (Level.WARNING, "sudo systemctl mask sleep.target")
+    assert finding.found == "possible (freeze mem); logind as it comes: the lid suspends"
     write(
         tmp_path,
         **{
@@ -198,8 +198,8 @@ def test_suspend(tmp_path: Path) -> None:
             "etc/systemd/logind.conf.d/idle.conf": "[Login]\nIdleAction=suspend\n",
         },
     )
-    found = machine.suspend(tmp_path)
-    assert found.found == "possible (freeze mem); HandleLidSwitch=ignore, IdleAction=suspend"
+    finding = machine.suspend(tmp_path)
+    assert finding.found == "possible (freeze mem); HandleLidSwitch=ignore, IdleAction=suspend"
     masked = tmp_path / "etc/systemd/system/sleep.target"
     masked.parent.mkdir(parents=True)
     masked.write_text("[Unit]\n")
@@ -210,12 +210,12 @@ def test_suspend(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("told", "level"), [("qemu", Level.WARNING), ("kvm", Level.WARNING), ("none", Level.OK)]
+    ("hypervisor", "level"), [("qemu", Level.WARNING), ("kvm", Level.WARNING), ("none", Level.OK)]
 )
-def test_virtual_machine(tmp_path: Path, told: str, level: Level) -> None:
-    found = machine.virtual(told, tmp_path)
-    assert found.level is level
-    assert found.found.startswith(told)
+def test_virtual_machine(tmp_path: Path, hypervisor: str, level: Level) -> None:
+    finding = machine.virtual(hypervisor, tmp_path)
+    assert finding.level is level
+    assert finding.found.startswith(hypervisor)
 
 
 def test_virtual_machine_without_the_tool(tmp_path: Path) -> None:
@@ -236,14 +236,14 @@ def test_isolated_processors_are_reported(tmp_path: Path) -> None:
     ("load", "level"), [(0.1, Level.NOTE), (2.0, Level.NOTE), (2.1, Level.WARNING)]
 )
 def test_other_programs(load: float, level: Level) -> None:
-    found = machine.others(load, 2)
-    assert found.level is level
-    assert found.found.startswith(f"{load} processes")
+    finding = machine.others(load, 2)
+    assert finding.level is level
+    assert finding.found.startswith(f"{load} processes")
 
 
 def test_all_checks_work_on_this_machine() -> None:
-    found = machine.machine_findings(20)
-    assert [f.subject for f in found] == [
+    findings = machine.machine_findings(20)
+    assert [f.subject for f in findings] == [
         "kernel",
         "real-time share",
         "swap",
@@ -257,5 +257,5 @@ def test_all_checks_work_on_this_machine() -> None:
         "other programs",
         "Python",
     ]
-    assert all(f.found for f in found)
-    assert all(f.remedy for f in found if f.level in (Level.WARNING, Level.BAD))
+    assert all(f.found for f in findings)
+    assert all(f.remedy for f in findings if f.level in (Level.WARNING, Level.BAD))

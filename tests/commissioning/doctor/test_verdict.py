@@ -66,9 +66,9 @@ def test_parts_of_the_tick(run: Make, name: str, field: str, subject: str, good:
 )
 def test_missed_deadlines(run: Make, name: str, missed: int, level: Level) -> None:
     late = [50_000] * (1000 - 2 * missed) + [21_000_000] * missed
-    found = judged({name: run(missed=missed, late_ns=late)})[f"deadlines {name}"]
-    assert found.level is level
-    assert f"{missed} of 1000 missed" in found.found
+    finding = judged({name: run(missed=missed, late_ns=late)})[f"deadlines {name}"]
+    assert finding.level is level
+    assert f"{missed} of 1000 missed" in finding.found
 
 
 def test_remedies_begin_with_the_priority_that_was_not_there(run: Make) -> None:
@@ -83,25 +83,25 @@ def test_remedies_begin_with_the_priority_that_was_not_there(run: Make) -> None:
 
 
 def test_what_was_not_permitted(run: Make) -> None:
-    found = judged({IDLE: run(policy="Operation not permitted", memory="no memory")})
-    assert found["scheduling"].level is Level.WARNING
-    assert "Operation not permitted" in found["scheduling"].found
-    assert "canshaper@.service" in found["scheduling"].remedy
-    assert found["memory"].level is Level.WARNING
-    assert "no memory" in found["memory"].found
+    findings = judged({IDLE: run(policy="Operation not permitted", memory="no memory")})
+    assert findings["scheduling"].level is Level.WARNING
+    assert "Operation not permitted" in findings["scheduling"].found
+    assert "canshaper@.service" in findings["scheduling"].remedy
+    assert findings["memory"].level is Level.WARNING
+    assert "no memory" in findings["memory"].found
 
 
 @pytest.mark.parametrize(
     ("late_ms", "level"), [(20.0, Level.OK), (29.9, Level.OK), (30.1, Level.WARNING)]
 )
 def test_joystick_to_valve(run: Make, late_ms: float, level: Level) -> None:
-    found = judged({IDLE: run(joystick_ns=[round(late_ms * 1e6)] * 1000)})
-    assert found["joystick to valve idle"].level is level
+    findings = judged({IDLE: run(joystick_ns=[round(late_ms * 1e6)] * 1000)})
+    assert findings["joystick to valve idle"].level is level
 
 
 def test_no_answer_is_not_fit(run: Make) -> None:
-    found = judged({IDLE: run(joystick_ns=[])})
-    assert found["joystick to valve idle"].level is Level.BAD
+    findings = judged({IDLE: run(joystick_ns=[])})
+    assert findings["joystick to valve idle"].level is Level.BAD
 
 
 @pytest.mark.parametrize(
@@ -119,9 +119,9 @@ def test_no_answer_is_not_fit(run: Make) -> None:
     ],
 )
 def test_axes_that_stop(run: Make, changes: dict[str, Any], level: Level, says: str) -> None:
-    found = judged({LOADED: run(**changes)})[f"axes {LOADED}"]
-    assert found.level is level
-    assert says in found.found
+    finding = judged({LOADED: run(**changes)})[f"axes {LOADED}"]
+    assert finding.level is level
+    assert says in finding.found
 
 
 def test_the_verdict_is_that_of_the_worst() -> None:

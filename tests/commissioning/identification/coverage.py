@@ -83,9 +83,9 @@ def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
     parser.add_argument("--cranes", type=int, default=150)
     parser.add_argument("--seed", type=int, default=0)
-    asked = parser.parse_args()
+    options = parser.parse_args()
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    every = [case for i in range(asked.cranes) for case in drawn(asked.seed + i)]
+    every = [case for i in range(options.cranes) for case in drawn(options.seed + i)]
     groups: dict[str, list[Case]] = defaultdict(list)
     for case in every:
         if case.finding.usable:

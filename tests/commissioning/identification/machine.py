@@ -45,7 +45,7 @@ def driven(
 ) -> list[tuple[CraneState, dict[str, float]]]:
     """States of the crane and the commands that led to each."""
     parameters = CraneParameters(grapple=grapple or Grapple())
-    crane, told = Crane(parameters, sway), []
+    crane, drive = Crane(parameters, sway), []
     for tick in range(round(seconds / tick_s)):
         now = tick * tick_s
         commands = {"slew": 0.0, "near_far": 0.0, "lift": 0.0}
@@ -53,8 +53,8 @@ def driven(
             if push.start_s <= now < push.start_s + push.duration_s:
                 commands[push.axis] = push.level
         crane.step(tick_s, commands)
-        told.append((crane.state, commands))
-    return told
+        drive.append((crane.state, commands))
+    return drive
 
 
 class Coloured:
@@ -73,7 +73,7 @@ class Coloured:
 
 def candump(
     path: Path,
-    told: Sequence[tuple[CraneState, dict[str, float]]],
+    drive: Sequence[tuple[CraneState, dict[str, float]]],
     *,
     seed: int = 0,
     noise_deg: float = 0.1,
@@ -87,7 +87,7 @@ def candump(
     axes = (deployment or load_deployment(FILE)).axes
     noise = Coloured(seed, noise_deg, memory), Coloured(seed + 10_000, noise_deg, memory)
     lines = []
-    for state, commands in told:
+    for state, commands in drive:
         stamp = epoch_s + state.time_s
         if valves:
             for name, command in commands.items():
@@ -105,7 +105,7 @@ def candump(
 
 def phone(
     path: Path,
-    told: Sequence[tuple[CraneState, dict[str, float]]],
+    drive: Sequence[tuple[CraneState, dict[str, float]]],
     *,
     seed: int = 0,
     noise_rad_s: float = 0.005,
@@ -117,7 +117,7 @@ def phone(
     noise = Coloured(seed, noise_rad_s, 0.2)
     turn = math.radians(turned_deg)
     lines = [header]
-    for state, _ in told:
+    for state, _ in drive:
         slew, near = state.theta5_rate_rad_s, state.theta6_rate_rad_s
         x = math.cos(turn) * slew - math.sin(turn) * near + 0.01 + noise()
         y = math.sin(turn) * slew + math.cos(turn) * near - 0.004 + noise()

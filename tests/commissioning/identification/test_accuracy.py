@@ -52,12 +52,12 @@ def truth(grapple: Grapple, direction: int) -> tuple[float, float]:
 @pytest.mark.parametrize("grapple", [EMPTY, LOADED], ids=["empty", "loaded"])
 def test_two_degrees_in_noise(grapple: Grapple, direction: int, seed: int) -> None:
     time, angle = swung(grapple, 2.0, direction)
-    found = identify("slew", "", [noisy(time, angle, seed, 0.15)])
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio
+    finding = identify("slew", "", [noisy(time, angle, seed, 0.15)])
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
     period, ratio = truth(grapple, direction)
-    assert found.period_s.value == pytest.approx(period, rel=0.01)
-    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+    assert finding.period_s.value == pytest.approx(period, rel=0.01)
+    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.2)
 
 
 @pytest.mark.long
@@ -68,25 +68,25 @@ def test_the_interval_holds_the_truth() -> None:
     held = np.zeros(2)
     halves = []
     for seed in range(60):
-        found = identify("near_far", "", [noisy(time, angle, seed, 0.25, memory=0.9)])
-        assert found.period_s and found.damping_ratio
+        finding = identify("near_far", "", [noisy(time, angle, seed, 0.25, memory=0.9)])
+        assert finding.period_s and finding.damping_ratio
         held += [
-            abs(found.period_s.value - period) < found.period_s.half,
-            abs(found.damping_ratio.value - ratio) < found.damping_ratio.half,
+            abs(finding.period_s.value - period) < finding.period_s.half,
+            abs(finding.damping_ratio.value - ratio) < finding.damping_ratio.half,
         ]
-        halves.append(found.period_s.relative)
+        halves.append(finding.period_s.relative)
     assert (held >= 54).all(), held
     assert float(np.median(halves)) < 0.01  # an interval as wide as the world would hold it too
 
 
 def test_a_large_swing_is_slower_and_reported_as_a_small_one() -> None:
     time, angle = swung(EMPTY, 40.0, SLEW)
-    found = identify("slew", "", [noisy(time, angle, 1, 0.2)])
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio
+    finding = identify("slew", "", [noisy(time, angle, 1, 0.2)])
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
     period, ratio = truth(EMPTY, SLEW)
-    assert found.period_s.value == pytest.approx(period, rel=0.003)
-    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.05)
+    assert finding.period_s.value == pytest.approx(period, rel=0.003)
+    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.05)
     # In a unit that tells no angle there is nothing to correct by, and it comes out too long.
     bars = noisy(time, angle, 1, 0.2)
     plain = identify("slew", "", [Series("p", "", Unit(Kind.OTHER, 1.0, "bar"), time, bars.value)])
@@ -97,11 +97,11 @@ def test_a_large_swing_is_slower_and_reported_as_a_small_one() -> None:
 def test_the_interval_holds_what_the_model_leaves_out() -> None:
     """Large swings, hardly any noise: the tool on two joints is not quite a pendulum."""
     time, angle = swung(EMPTY, 30.0, SLEW)
-    found = identify("slew", "", [noisy(time, angle, 1, 0.02)])
-    assert found.period_s and found.damping_ratio
+    finding = identify("slew", "", [noisy(time, angle, 1, 0.02)])
+    assert finding.period_s and finding.damping_ratio
     period, ratio = truth(EMPTY, SLEW)
-    assert abs(found.period_s.value - period) < found.period_s.half < 0.003 * period
-    assert abs(found.damping_ratio.value - ratio) < found.damping_ratio.half < 0.05 * ratio
+    assert abs(finding.period_s.value - period) < finding.period_s.half < 0.003 * period
+    assert abs(finding.damping_ratio.value - ratio) < finding.damping_ratio.half < 0.05 * ratio
 
 
 @pytest.mark.parametrize("direction", [SLEW, NEAR_FAR])
@@ -116,14 +116,14 @@ def test_a_crane_in_mujoco(direction: int) -> None:
     model: mujoco.MjModel = model_of(crane)
     swings, _ = simulate(model, step_s, still, start)
     time = np.arange(len(swings)) * step_s
-    found = identify("slew", "", [noisy(time, swings[:, direction], 3, 0.2)])
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio
+    finding = identify("slew", "", [noisy(time, swings[:, direction], 3, 0.2)])
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
     g = crane.grapple
     grapple = Grapple(g.l1_m, g.l2_m, g.m1_kg, g.m2_kg, g.c5_n_m_s_rad, g.c6_n_m_s_rad)
     period, ratio = truth(grapple, direction)
-    assert found.period_s.value == pytest.approx(period, rel=0.005)
-    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.1)
+    assert finding.period_s.value == pytest.approx(period, rel=0.005)
+    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.1)
 
 
 def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
@@ -153,28 +153,28 @@ BUSY = [Push("near_far", 2.0 * k, 1.0, 0.3 * (-1) ** k) for k in range(20)]
 
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_full_speed_by_single_strokes(kind: Kind) -> None:
-    found = identify("near_far", "", [drive(STROKES, 45.0, kind, 1)])
-    check(found)
-    assert found.free and found.free.swings > 10
-    assert found.free.segments[0].segment.start_s > 2.7 + 0.5  # not while it was driven
+    finding = identify("near_far", "", [drive(STROKES, 45.0, kind, 1)])
+    check(finding)
+    assert finding.free and finding.free.swings > 10
+    assert finding.free.segments[0].segment.start_s > 2.7 + 0.5  # not while it was driven
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("kind", [Kind.ANGLE, Kind.RATE])
 def test_never_free_but_driven(kind: Kind) -> None:
-    found = identify("near_far", "", [drive(BUSY, 41.0, kind, 2)])
-    check(found)
-    assert found.free is None
-    assert any("from driven motion" in note for note in found.notes)
+    finding = identify("near_far", "", [drive(BUSY, 41.0, kind, 2)])
+    check(finding)
+    assert finding.free is None
+    assert any("from driven motion" in note for note in finding.notes)
 
 
-def check(found: Finding) -> None:
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio and found.full_speed_m_s
+def check(finding: Finding) -> None:
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio and finding.full_speed_m_s
     period, ratio = truth(EMPTY, NEAR_FAR)
-    assert found.period_s.value == pytest.approx(period, rel=0.01)
-    assert found.damping_ratio.value == pytest.approx(ratio, rel=0.2)
-    assert found.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)
+    assert finding.period_s.value == pytest.approx(period, rel=0.01)
+    assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.2)
+    assert finding.full_speed_m_s.value == pytest.approx(1.0, rel=0.12)
 
 
 def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
@@ -182,15 +182,15 @@ def test_driving_in_the_log_is_not_taken_for_a_free_swing() -> None:
     reported = driven(40.0, STROKES)
     time = np.array([s.time_s for s, _ in reported])
     angle = np.array([s.theta6_rad for s, _ in reported])
-    found = identify("near_far", "", [noisy(time, angle, 4, 0.05)])
-    assert found.usable, found.poor
-    assert found.free
-    assert len(found.free.segments) == 2
-    for part, stroke in zip(found.free.segments, STROKES, strict=True):
+    finding = identify("near_far", "", [noisy(time, angle, 4, 0.05)])
+    assert finding.usable, finding.poor
+    assert finding.free
+    assert len(finding.free.segments) == 2
+    for part, stroke in zip(finding.free.segments, STROKES, strict=True):
         ended = stroke.start_s + stroke.duration_s
         assert ended < part.segment.start_s < ended + 2.0
-    assert found.period_s
-    assert found.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.005)
+    assert finding.period_s
+    assert finding.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.005)
 
 
 def test_a_slow_sensor_with_jitter_and_lost_values() -> None:
@@ -199,20 +199,20 @@ def test_a_slow_sensor_with_jitter_and_lost_values() -> None:
     keep = (np.arange(len(time)) % 7 == 0) & (random.random(len(time)) > 0.1)
     shaken = time[keep] + random.uniform(0.0, 0.01, int(keep.sum()))
     value = np.interp(shaken, time, angle)
-    found = identify("slew", "", [noisy(shaken, value, 6, 0.1)])
-    assert found.usable, found.poor
-    assert found.period_s
-    assert found.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.003)
+    finding = identify("slew", "", [noisy(shaken, value, 6, 0.1)])
+    assert finding.usable, finding.poor
+    assert finding.period_s
+    assert finding.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.003)
 
 
 def test_a_hole_in_the_log_parts_a_swing() -> None:
     time, angle = swung(EMPTY, 10.0, SLEW)
     keep = (time < 8.0) | (time > 14.0)
-    found = identify("slew", "", [noisy(time[keep], angle[keep], 7, 0.05)])
-    assert found.usable, found.poor
-    assert found.free and len(found.free.segments) == 2
-    assert found.period_s
-    assert found.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.005)
+    finding = identify("slew", "", [noisy(time[keep], angle[keep], 7, 0.05)])
+    assert finding.usable, finding.poor
+    assert finding.free and len(finding.free.segments) == 2
+    assert finding.period_s
+    assert finding.period_s.value == pytest.approx(truth(EMPTY, SLEW)[0], rel=0.005)
 
 
 def test_several_logs_count_together() -> None:
@@ -229,8 +229,8 @@ def test_swings_that_differ_widen_the_interval() -> None:
     grapples = [Grapple(l2_m=length) for length in (1.14, 1.2, 1.26)]
     swings = [swung(g, 8.0, NEAR_FAR) for g in grapples]
     logs = [noisy(time, angle, seed, 0.05) for seed, (time, angle) in enumerate(swings)]
-    found = identify("near_far", "", logs)
-    assert found.period_s
-    assert found.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.01)
+    finding = identify("near_far", "", logs)
+    assert finding.period_s
+    assert finding.period_s.value == pytest.approx(truth(EMPTY, NEAR_FAR)[0], rel=0.01)
     periods = [truth(g, NEAR_FAR)[0] for g in grapples]
-    assert 0.5 * (periods[2] - periods[0]) < found.period_s.half < 4.0 * (periods[2] - periods[0])
+    assert 0.5 * (periods[2] - periods[0]) < finding.period_s.half < 4.0 * (periods[2] - periods[0])

@@ -18,7 +18,7 @@ from canshaper.machine.deployment import Deployment
 from tests.commissioning.identification.machine import FILE, ROOT, Push, candump, driven
 
 PUSHES = [Push("slew", 2.0, 1.0, 0.5), Push("near_far", 6.0, 1.0, -0.4)]
-TOLD = driven(12.0, PUSHES)
+DRIVE = driven(12.0, PUSHES)
 SWAY = {"slew": "GrappleSway.SwayPerpendicular", "near_far": "GrappleSway.SwayParallel"}
 
 
@@ -29,7 +29,7 @@ def deployment() -> Deployment:
 
 @pytest.fixture
 def log(tmp_path: Path) -> Path:
-    return candump(tmp_path / "a.log", TOLD, noise_deg=0.0)
+    return candump(tmp_path / "a.log", DRIVE, noise_deg=0.0)
 
 
 def write(log: Path, lines: list[str]) -> None:
@@ -37,12 +37,12 @@ def write(log: Path, lines: list[str]) -> None:
 
 
 def test_signals_and_commands(log: Path, deployment: Deployment) -> None:
-    found = read_can(log, "empty", SWAY, deployment.messages, deployment=deployment)
-    slew, near = found["slew"], found["near_far"]
+    recorded = read_can(log, "empty", SWAY, deployment.messages, deployment=deployment)
+    slew, near = recorded["slew"], recorded["near_far"]
     assert slew.source == "a.log: GrappleSway.SwayPerpendicular"
     assert (slew.label, slew.unit.kind) == ("empty", Kind.ANGLE)
-    wanted = np.array([state.theta5_rad for state, _ in TOLD])
-    assert slew.value == pytest.approx(wanted, abs=math.radians(0.006))
+    expected = np.array([state.theta5_rad for state, _ in DRIVE])
+    assert slew.value == pytest.approx(expected, abs=math.radians(0.006))
     assert np.diff(slew.time_s) == pytest.approx(0.02, abs=1e-5)
     assert slew.command and near.command
     # 5 % dead band of the deployment, on the grid of the frame.
@@ -58,7 +58,7 @@ def test_signals_and_commands(log: Path, deployment: Deployment) -> None:
 
 
 def test_without_commands_nothing_is_known_of_them(tmp_path: Path, deployment: Deployment) -> None:
-    log = candump(tmp_path / "a.log", TOLD, valves=False)
+    log = candump(tmp_path / "a.log", DRIVE, valves=False)
     slew = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
     assert slew.command is None
     assert slew.idle is None
@@ -67,7 +67,7 @@ def test_without_commands_nothing_is_known_of_them(tmp_path: Path, deployment: D
 def test_commands_that_fall_silent_are_not_taken_for_standing(
     tmp_path: Path, deployment: Deployment
 ) -> None:
-    log = candump(tmp_path / "a.log", TOLD)
+    log = candump(tmp_path / "a.log", DRIVE)
     kept = [
         line
         for line in log.read_text().splitlines()
@@ -83,7 +83,7 @@ def test_joysticks_report_the_commands_where_no_valve_does(
     tmp_path: Path, deployment: Deployment
 ) -> None:
     """A machine on which canshaper does not run yet: the joystick goes to the valve as it is."""
-    log = candump(tmp_path / "a.log", TOLD, valves=False)
+    log = candump(tmp_path / "a.log", DRIVE, valves=False)
     lines = log.read_text().splitlines()
     for tick in range(600):
         joystick = 500 if 100 <= tick < 150 else 15  # 1.5 %, still neutral
@@ -98,18 +98,18 @@ def test_joysticks_report_the_commands_where_no_valve_does(
 
 
 def test_other_formats(tmp_path: Path, log: Path, deployment: Deployment) -> None:
-    wanted = read_can(log, "", SWAY, deployment.messages)["slew"]
+    expected = read_can(log, "", SWAY, deployment.messages)["slew"]
     for suffix in (".asc", ".blf"):
         other = tmp_path / f"b{suffix}"
         with can.Logger(other) as logger:
             for message in can.LogReader(log):
                 logger.on_message_received(message)
-        found = read_can(other, "", SWAY, deployment.messages)["slew"]
-        assert np.array_equal(found.value, wanted.value)
-        assert found.time_s == pytest.approx(wanted.time_s, abs=1e-3)
+        signal = read_can(other, "", SWAY, deployment.messages)["slew"]
+        assert np.array_equal(signal.value, expected.value)
+        assert signal.time_s == pytest.approx(expected.time_s, abs=1e-3)
     packed = tmp_path / "a.log.gz"
     packed.write_bytes(gzip.compress(log.read_bytes()))
-    assert len(read_can(packed, "", SWAY, deployment.messages)["slew"].value) == len(wanted.value)
+    assert len(read_can(packed, "", SWAY, deployment.messages)["slew"].value) == len(expected.value)
 
 
 def test_a_log_without_the_signal(log: Path, deployment: Deployment) -> None:
@@ -124,9 +124,9 @@ def test_a_log_without_the_signal(log: Path, deployment: Deployment) -> None:
 def test_a_log_that_is_cut_off_is_used_up_to_there(log: Path, deployment: Deployment) -> None:
     text = log.read_text()
     log.write_text(text[: len(text) // 2 - 7])
-    found = read_can(log, "", SWAY, deployment.messages)["slew"]
-    assert 295 <= len(found.value) <= 300
-    assert any("cut off" in note and str(log) in note for note in found.notes), found.notes
+    signal = read_can(log, "", SWAY, deployment.messages)["slew"]
+    assert 295 <= len(signal.value) <= 300
+    assert any("cut off" in note and str(log) in note for note in signal.notes), signal.notes
 
 
 def test_mixed_clocks(log: Path, deployment: Deployment) -> None:
@@ -142,15 +142,15 @@ def test_no_values_are_left_out_and_reported(tmp_path: Path) -> None:
     dbc = tmp_path / "a.dbc"
     dbc.write_text(text + 'VAL_ 1024 SwayPerpendicular 9000 "Error" ;\n')
     messages = messages_of(dbc)
-    log = candump(tmp_path / "a.log", TOLD)
+    log = candump(tmp_path / "a.log", DRIVE)
     lines = log.read_text().splitlines()
     for k, data in ((7, "FF7F0000"), (11, "FE7F0000"), (15, "00"), (19, "28230000")):
         lines[k] = lines[k].partition("#")[0] + "#" + data
     write(log, lines)
-    found = read_can(log, "", {"slew": SWAY["slew"]}, messages)["slew"]
-    assert len(found.value) == 600 - 4
-    assert np.abs(found.value).max() < 1.0
-    short, none = found.notes
+    signal = read_can(log, "", {"slew": SWAY["slew"]}, messages)["slew"]
+    assert len(signal.value) == 600 - 4
+    assert np.abs(signal.value).max() < 1.0
+    short, none = signal.notes
     assert "1 frames were too short" in short
     assert "3 values were not available, errors or out of range" in none
 
@@ -163,8 +163,8 @@ def messages_of(path: Path) -> Messages:
 
 
 def test_two_senders_need_a_choice(tmp_path: Path, deployment: Deployment) -> None:
-    one = candump(tmp_path / "a.log", TOLD).read_text().splitlines()
-    two = candump(tmp_path / "b.log", TOLD, channel="can1", seed=5).read_text().splitlines()
+    one = candump(tmp_path / "a.log", DRIVE).read_text().splitlines()
+    two = candump(tmp_path / "b.log", DRIVE, channel="can1", seed=5).read_text().splitlines()
     log = tmp_path / "c.log"
     write(log, [line for pair in zip(one, two, strict=True) for line in pair])
     with pytest.raises(IdentificationError, match=r"0x400 on can0, 0x400 on can1; .*--channel"):
@@ -209,8 +209,8 @@ def test_j1939_takes_any_priority_and_reports_two_addresses(tmp_path: Path) -> N
     rows = [f"({1.7e9 + 0.01 * k:.6f}) can0 0CFF1D21#{k:02X}00FFFFFFFFFFFF" for k in range(90)]
     log = tmp_path / "a.log"
     write(log, rows)
-    found = read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))["slew"]
-    assert found.value[:3] == pytest.approx([0.0, math.radians(0.01), math.radians(0.02)])
+    signal = read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))["slew"]
+    assert signal.value[:3] == pytest.approx([0.0, math.radians(0.01), math.radians(0.02)])
     write(log, [*rows, rows[-1].replace("0CFF1D21", "0CFF1D22")])
     with pytest.raises(IdentificationError, match=r"0xcff1d21 on can0, 0xcff1d22 on can0"):
         read_can(log, "", {"slew": "Incline.Pitch"}, messages_of(dbc))
@@ -223,16 +223,16 @@ def test_the_signal_of_the_grapple_is_read_next_to(tmp_path: Path) -> None:
     grapple = "load_state: { bus: crane, message: TipPosition, signal: Radius, timeout_ms: 500 }\n"
     file.write_text(text + grapple)
     deployment = load_deployment(file)
-    log = candump(tmp_path / "a.log", TOLD)
+    log = candump(tmp_path / "a.log", DRIVE)
     lines = log.read_text().splitlines()
     lines += [f"({1.7e9 + 13 + 0.1 * k:.6f}) can0 401#0000F40B0000" for k in range(10)]
     write(log, lines)
-    found = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
-    assert found.at == pytest.approx(3.06)
+    signal = read_can(log, "", SWAY, deployment.messages, deployment=deployment)["slew"]
+    assert signal.at == pytest.approx(3.06)
 
 
 def test_a_long_log_reports_how_far_it_is(tmp_path: Path, deployment: Deployment) -> None:
-    lines = candump(tmp_path / "a.log", TOLD).read_text().splitlines()
+    lines = candump(tmp_path / "a.log", DRIVE).read_text().splitlines()
     log = tmp_path / "b.log"
     rows = [f"({1.7e9 + 20 + 0.001 * k:.6f}) can0 123#00" for k in range(50_000)]
     write(log, [*lines, *rows])
@@ -246,9 +246,9 @@ def test_a_long_log_reports_how_far_it_is(tmp_path: Path, deployment: Deployment
 def test_a_measurement_of_poor_merit_is_left_out(tmp_path: Path) -> None:
     """Of a sway sensor with a figure of merit, as the daemon leaves it out."""
     deployment = load_deployment(ROOT / "config" / "j1939-sensor.yaml")
-    found = deployment.messages.find("SSI2")
-    assert not isinstance(found, str)
-    message = found[1]
+    entry = deployment.messages.find("SSI2")
+    assert not isinstance(entry, str)
+    message = entry[1]
     rows = []
     for number in range(40):
         raw = {s.name: 0 for s in message.signals} | {"PitchAngle": 4_000_000 + number}

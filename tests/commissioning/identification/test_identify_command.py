@@ -99,19 +99,19 @@ def test_empty_and_loaded(tmp_path: Path, file: Path, logs: Path) -> None:
     labelled = f"empty={logs / 'empty.log'}", f"loaded={logs / 'loaded.log'}"
     result = run(tmp_path, *labelled, "--file", file, "--json", "--write")
     assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
-    assert [(f["axis"], f["label"]) for f in found["findings"]] == [
+    report = json.loads(result.stdout)
+    assert [(f["axis"], f["label"]) for f in report["findings"]] == [
         ("slew", "empty"),
         ("near_far", "empty"),
         ("slew", "loaded"),
         ("near_far", "loaded"),
     ]
-    for finding in found["findings"]:
+    for finding in report["findings"]:
         grapple = EMPTY if finding["label"] == "empty" else LOADED
         mode = grapple.mode5 if finding["axis"] == "slew" else grapple.mode6
         assert finding["usable"]
         assert finding["period_s"]["low"] < period_of(mode) < finding["period_s"]["high"]
-    near = found["axes"]["near_far"]
+    near = report["axes"]["near_far"]
     lengths = [period_of(g.mode6) ** 2 for g in (EMPTY, LOADED)]
     assert near["sway"]["period_s"] == pytest.approx(math.sqrt(sum(lengths) / 2), rel=0.003)
     spread = 100.0 * (lengths[1] - lengths[0]) / sum(lengths)
@@ -119,7 +119,7 @@ def test_empty_and_loaded(tmp_path: Path, file: Path, logs: Path) -> None:
     assert (
         f"robust shaper for ±{math.ceil(near['spread_pct'] + 3)} % length" in near["recommendation"]
     )
-    assert found["written"] == ["slew", "near_far"]
+    assert report["written"] == ["slew", "near_far"]
     sway = load_deployment(file).axes["near_far"].config.sway
     assert sway and sway.period_s == near["sway"]["period_s"]
 

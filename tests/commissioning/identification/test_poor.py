@@ -1,4 +1,4 @@
-"""Data that is too poor is told so, with what to do; nothing is made of it."""
+"""Data that is too poor is reported, with what to do; nothing is made of it."""
 
 import math
 
@@ -46,18 +46,18 @@ def times(seconds: float, step_s: float = 0.02) -> Array:
 
 
 def refused(one: Series, text: str) -> Finding:
-    found = identify("slew", "", [one])
-    assert not found.usable
-    assert any(text in fault for fault in found.poor), found.poor
-    return found
+    finding = identify("slew", "", [one])
+    assert not finding.usable
+    assert any(text in fault for fault in finding.poor), finding.poor
+    return finding
 
 
 def test_the_same_data_is_good_enough() -> None:
     """What the refusals below are held against."""
     time = times(25.0)
-    found = identify("slew", "", [series(time, decay(time) + noise(len(time), 0.1))])
-    assert found.usable, found.poor
-    assert not found.notes
+    finding = identify("slew", "", [series(time, decay(time) + noise(len(time), 0.1))])
+    assert finding.usable, finding.poor
+    assert not finding.notes
 
 
 def test_too_few_swings() -> None:
@@ -81,15 +81,15 @@ def test_a_signal_that_stands() -> None:
 def test_only_noise() -> None:
     time = times(60.0)
     for seed in range(10):
-        found = identify("slew", "", [series(time, noise(len(time), 1.0, seed))])
-        assert not found.usable
-        assert any("touch nothing for ten swings" in fault for fault in found.poor)
+        finding = identify("slew", "", [series(time, noise(len(time), 1.0, seed))])
+        assert not finding.usable
+        assert any("touch nothing for ten swings" in fault for fault in finding.poor)
 
 
 def test_a_swing_below_the_noise() -> None:
     time = times(25.0)
-    found = refused(series(time, decay(time, 0.5) + noise(len(time), 0.6)), "touch nothing")
-    assert found.poor
+    finding = refused(series(time, decay(time, 0.5) + noise(len(time), 0.6)), "touch nothing")
+    assert finding.poor
 
 
 def test_too_slow_a_log() -> None:
@@ -100,8 +100,8 @@ def test_too_slow_a_log() -> None:
 def test_a_clipped_sensor() -> None:
     time = times(25.0)
     clipped = np.clip(decay(time, 20.0, ratio=0.02), -math.radians(8.0), math.radians(8.0))
-    found = refused(series(time, clipped), "the sensor is at the end of its range")
-    assert "stands at 8 deg" in found.poor[0]
+    finding = refused(series(time, clipped), "the sensor is at the end of its range")
+    assert "stands at 8 deg" in finding.poor[0]
 
 
 def test_too_coarse_a_signal() -> None:
@@ -113,8 +113,8 @@ def test_too_coarse_a_signal() -> None:
 def test_one_step_of_a_coarse_signal_is_no_clipping() -> None:
     time = times(25.0)
     fine = np.round(decay(time) / math.radians(0.2)) * math.radians(0.2)
-    found = identify("slew", "", [series(time, fine)])
-    assert found.usable, found.poor
+    finding = identify("slew", "", [series(time, fine)])
+    assert finding.usable, finding.poor
 
 
 def test_degrees_that_are_called_radians() -> None:
@@ -138,8 +138,8 @@ def test_two_directions_in_one_signal() -> None:
 def test_the_joysticks_were_never_left_alone() -> None:
     time = times(30.0)
     idle = [(3.0 * k, 3.0 * k + 1.5) for k in range(10)]
-    found = refused(series(time, decay(time), idle=idle), "never left to swing freely")
-    assert found.free is None
+    finding = refused(series(time, decay(time), idle=idle), "never left to swing freely")
+    assert finding.free is None
 
 
 def test_dry_friction_is_reported() -> None:
@@ -148,36 +148,36 @@ def test_dry_friction_is_reported() -> None:
     omega = 2.0 * math.pi / PERIOD
     envelope = np.maximum(math.radians(10.0) - math.radians(0.45) * time, 0.0)
     value = envelope * np.cos(omega * time) + noise(len(time), 0.05)
-    found = identify("slew", "", [series(time, value)])
-    assert found.usable, found.poor
-    assert any("dry friction" in note for note in found.notes), found.notes
+    finding = identify("slew", "", [series(time, value)])
+    assert finding.usable, finding.poor
+    assert any("dry friction" in note for note in finding.notes), finding.notes
 
 
 def test_viscous_damping_is_not_taken_for_friction() -> None:
     time = times(25.0)
     for seed in range(20):
-        found = identify("slew", "", [series(time, decay(time) + noise(len(time), 1.0, seed))])
-        assert not any("damping ratio changes" in note for note in found.notes), found.notes
+        finding = identify("slew", "", [series(time, decay(time) + noise(len(time), 1.0, seed))])
+        assert not any("damping ratio changes" in note for note in finding.notes), finding.notes
 
 
 def test_a_pressure_serves_too() -> None:
     time = times(25.0)
     bars = 120.0 + 0.05 * time + 300.0 * decay(time) + 100.0 * noise(len(time), 0.3)
-    found = identify("slew", "", [series(time, bars, BAR)])
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio
-    assert found.period_s.value == pytest.approx(PERIOD, rel=0.005)
-    assert found.damping_ratio.value == pytest.approx(RATIO, rel=0.1)
+    finding = identify("slew", "", [series(time, bars, BAR)])
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
+    assert finding.period_s.value == pytest.approx(PERIOD, rel=0.005)
+    assert finding.damping_ratio.value == pytest.approx(RATIO, rel=0.1)
 
 
 def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
     """A stronger oscillation, of the pump or the boom, is passed over."""
     time = times(25.0)
     value = decay(time, 2.0) + decay(time, 6.0, period=0.7, ratio=0.02) + noise(len(time), 0.05)
-    found = identify("slew", "", [series(time, value)], about_s=2.2)
-    assert found.usable, found.poor
-    assert found.period_s
-    assert found.period_s.value == pytest.approx(PERIOD, rel=0.01)
+    finding = identify("slew", "", [series(time, value)], about_s=2.2)
+    assert finding.usable, finding.poor
+    assert finding.period_s
+    assert finding.period_s.value == pytest.approx(PERIOD, rel=0.01)
     alone = identify("slew", "", [series(time, value)])
     assert alone.period_s
     assert alone.period_s.value == pytest.approx(0.7, rel=0.01)
@@ -186,9 +186,9 @@ def test_a_period_that_is_known_about_leads_to_the_swing() -> None:
 def test_a_useless_log_does_not_spoil_a_good_one() -> None:
     time = times(25.0)
     good = series(time, decay(time) + noise(len(time), 0.1))
-    found = identify("slew", "", [series(time, np.zeros(len(time))), good])
-    assert found.usable, found.poor
-    assert any("it stands at 0" in note for note in found.notes)
+    finding = identify("slew", "", [series(time, np.zeros(len(time))), good])
+    assert finding.usable, finding.poor
+    assert any("it stands at 0" in note for note in finding.notes)
 
 
 def test_a_clock_that_goes_back() -> None:

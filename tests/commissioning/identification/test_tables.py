@@ -57,14 +57,14 @@ def test_what_apps_write(tmp_path: Path, name: str) -> None:
     # All of the swing is in the direction that was found: rate amplitude by angle and frequency.
     highest = 0.15 * Grapple().mode5.omega_rad_s
     assert np.abs(series.value).max() == pytest.approx(highest, rel=0.08)
-    found = identify("slew", "", [series])
-    assert found.usable, found.poor
-    assert found.period_s and found.damping_ratio
-    assert found.period_s.value == pytest.approx(PERIOD, rel=0.002)
-    assert found.damping_ratio.value == pytest.approx(Grapple().mode5.zeta, rel=0.05)
+    finding = identify("slew", "", [series])
+    assert finding.usable, finding.poor
+    assert finding.period_s and finding.damping_ratio
+    assert finding.period_s.value == pytest.approx(PERIOD, rel=0.002)
+    assert finding.damping_ratio.value == pytest.approx(Grapple().mode5.zeta, rel=0.05)
 
 
-def test_a_named_column_is_taken_as_it_is(tmp_path: Path) -> None:
+def test_a_named_column_is_used_as_it_is(tmp_path: Path) -> None:
     table = read_table(phone(tmp_path / "a.csv", SWUNG))
     for name in ("Gyroscope y (rad/s)", "gyroscope Y"):
         series = series_of(table, "", name)

@@ -1,4 +1,4 @@
-"""The monitor on a pseudo terminal and in a pipe, beside a real daemon on a multicast bus."""
+"""The monitor on a pseudo terminal and in a pipe, next to a real daemon on a multicast bus."""
 
 import fcntl
 import os
@@ -146,7 +146,7 @@ def test_lines_for_pipes_and_nothing_is_sent(tmp_path: Path) -> None:
 def test_a_second_signal_ends_what_waits_for_an_adapter(
     tmp_path: Path, verb: str, number: int, codes: tuple[int, ...]
 ) -> None:
-    """A server of socketcand that never answers holds whoever opens it."""
+    """A server of socketcand that never answers holds the process that opens it."""
     with socket.create_server(("127.0.0.1", 0)) as server:
         options = {"host": "127.0.0.1", "port": server.getsockname()[1]}
         content = yaml.safe_load((ROOT / "config" / "forwarder.yaml").read_text(encoding="utf-8"))

@@ -37,12 +37,12 @@ def deployment() -> Deployment:
     return loader("forwarder.yaml")()
 
 
-def heard(frame: Frame | None, time_ns: int) -> ReceivedFrame:
+def received(frame: Frame | None, time_ns: int) -> ReceivedFrame:
     assert frame is not None
     return ReceivedFrame(time_ns, frame.bus, "vcan0", frame.can_id, frame.extended, frame.data, "")
 
 
-def told(
+def status_frames(
     deployment: Deployment,
     time_ns: int = NOW,
     state: State = State.ACTIVE,
@@ -50,12 +50,12 @@ def told(
 ) -> list[ReceivedFrame]:
     """Status of all axes and of the service."""
     frames = [
-        heard(axis.status.frame(report(state, reason, 0.5, -0.25, 3.4)), time_ns)
+        received(axis.status.frame(report(state, reason, 0.5, -0.25, 3.4)), time_ns)
         for axis in deployment.axes.values()
         if axis.status
     ]
     assert deployment.status
-    return [*frames, heard(deployment.status.frame(COUNTERS), time_ns)]
+    return [*frames, received(deployment.status.frame(COUNTERS), time_ns)]
 
 
 def j1939(source: str, folder: Path) -> Deployment:
@@ -73,8 +73,8 @@ def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: 
     deployment = j1939(source, tmp_path)
     monitor = Monitor(deployment)
     for n, priority in enumerate((3, 6, 0)):
-        monitor.take(heard(bjm("BJM1", 0x33, priority), NOW + n * MS))
-    monitor.take(heard(bjm("BJM1", 0x35), NOW + 9 * MS))
+        monitor.take(received(bjm("BJM1", 0x33, priority), NOW + n * MS))
+    monitor.take(received(bjm("BJM1", 0x35), NOW + 9 * MS))
     rate = monitor.messages[deployment.joysticks["left"].key]
     assert (len(rate.times), rate.last_ns) == (3, NOW + 2 * MS)
 
@@ -94,7 +94,7 @@ def open_null() -> "object":
 
 def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment):
+    for frame in status_frames(deployment):
         monitor.take(frame)
     lines = text(monitor, NOW + 100 * MS)
     assert lines[1].startswith(
@@ -112,7 +112,7 @@ def test_it_fits_the_terminal(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for i in range(300):
         reason = Reason.EMERGENCY_STOP_LOST if i % 2 else Reason.JOYSTICK_CONTRADICTORY
-        for frame in told(deployment, NOW + i * 100 * MS, State(i % 6), reason):
+        for frame in status_frames(deployment, NOW + i * 100 * MS, State(i % 6), reason):
             monitor.take(frame)
     for width, height in ((80, 24), (60, 12), (200, 60), (40, 8)):
         lines = text(monitor, NOW + 30_000 * MS, width, height)
@@ -131,7 +131,7 @@ def test_before_anything_is_received_it_says_so(deployment: Deployment) -> None:
 
 def test_what_is_stale_says_stale(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment):
+    for frame in status_frames(deployment):
         monitor.take(frame)
     fresh = "\n".join(text(monitor, NOW + 290 * MS))
     assert "STALE" not in fresh
@@ -159,9 +159,9 @@ def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
 
 def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL):
+    for frame in status_frames(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL):
         monitor.take(frame)
-    for frame in told(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
+    for frame in status_frames(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
         monitor.take(frame)
     lines = "\n".join(text(monitor, NOW + 200 * MS))
     assert "axis=slew state=TRIPPED from=READY reason=ENABLE_LOST" in lines
@@ -176,7 +176,7 @@ def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
     monitor.take(
         ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, "")
     )  # unknown numbers
-    for frame in told(deployment)[1:]:
+    for frame in status_frames(deployment)[1:]:
         monitor.take(frame)
     lines = "\n".join(text(monitor, NOW))
     assert "1 error frames" in lines
@@ -202,7 +202,7 @@ def test_a_bar_shows_side_and_size() -> None:
 
 def test_a_line_for_pipes(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment):
+    for frame in status_frames(deployment):
         monitor.take(frame)
     line = status_line(monitor, NOW)
     assert "slew=ACTIVE(JOYSTICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
@@ -218,7 +218,7 @@ def drive(deployment: Deployment, monitor: Monitor) -> None:
         for axis in deployment.axes.values():
             assert axis.status
             said = report(State.ACTIVE, Reason.JOYSTICK_MOVED, command, command, 4.0 * command)
-            monitor.take(heard(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
+            monitor.take(received(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
 
 
 def test_a_wide_terminal_has_lines_over_time(deployment: Deployment) -> None:
@@ -245,7 +245,7 @@ def test_a_line_over_time_keeps_short_peaks_and_leaves_out_what_did_not_come() -
 
 def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    for frame in told(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST):
+    for frame in status_frames(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST):
         monitor.take(frame)
     monitor.note(NOW, "axis=slew state=TRIPPED from=ACTIVE reason=ENABLE_LOST")
     rows = text(monitor, NOW, width=40, height=60)
@@ -259,7 +259,7 @@ def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
 
 def test_keys_pause_choose_an_axis_and_end(deployment: Deployment) -> None:
     monitor, keys = Monitor(deployment), Keys([*deployment.axes])
-    for frame in told(deployment):
+    for frame in status_frames(deployment):
         monitor.take(frame)
     monitor.note(NOW, "axis=lift state=READY from=ACTIVE reason=AT_REST")
 

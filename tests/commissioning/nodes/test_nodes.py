@@ -83,15 +83,15 @@ def test_pdos_are_those_that_canopen_decodes(objects: dict, tmp_path: Path) -> N
 
 
 def test_ids_timers_and_lengths_are_those_of_the_file(tmp_path: Path) -> None:
-    found = messages.messages(node_of(tmp_path, ALL_TYPES), "n", ())
-    assert [(m.name, m.frame_id, m.is_extended_frame, m.cycle_time, m.length) for m in found] == [
+    parsed = messages.messages(node_of(tmp_path, ALL_TYPES), "n", ())
+    assert [(m.name, m.frame_id, m.is_extended_frame, m.cycle_time, m.length) for m in parsed] == [
         ("n_TPDO1", 0x185, False, 20, 7),
         ("n_TPDO2", 0x285, False, 20, 8),
         ("n_TPDO3", 0x385, True, None, 8),
         ("n_TPDO4", 0x485, False, 20, 5),
     ]
-    assert [s.name for s in found[0].signals] == ["X", "ZAxisRaw", "S2nd", "Y"]
-    assert [s.name for s in found[3].signals] == ["Record20002nd_1", "Record20002nd_2", "X"]
+    assert [s.name for s in parsed[0].signals] == ["X", "ZAxisRaw", "S2nd", "Y"]
+    assert [s.name for s in parsed[3].signals] == ["Record20002nd_1", "Record20002nd_2", "X"]
 
 
 def test_each_bit_of_switches_is_a_signal_and_profiles_give_units(tmp_path: Path) -> None:
@@ -271,6 +271,6 @@ def test_garbled_files_are_read_or_refused(seed: int, tmp_path: Path) -> None:
     except ConfigError as error:
         assert str(error).startswith(f"{file}")  # either is good
         return
-    found = messages.messages(node, "n", messages.bytes_of(node))
-    assert messages.dbc(found)
+    parsed = messages.messages(node, "n", messages.bytes_of(node))
+    assert messages.dbc(parsed)
     parameters("n", node, [(one, Use(20, 100)) for one in node.pdos])

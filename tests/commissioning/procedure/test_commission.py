@@ -166,7 +166,7 @@ def test_the_machine_has_changed_since_the_copy_was_made(machine: Path) -> None:
     )
 
 
-def test_the_second_commissioning_of_a_file_is_told(machine: Path) -> None:
+def test_the_second_commissioning_of_a_file_is_reported(machine: Path) -> None:
     commission("--step", "buses", "--yes")
     before = STATE.read_bytes()
     with Files(COPY).locked():

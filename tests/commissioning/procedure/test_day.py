@@ -1,4 +1,4 @@
-"""A whole day at the desk, on a crane whose pendulum nobody has told."""
+"""A whole day at the desk, on a crane whose pendulum is not known."""
 
 import json
 import re

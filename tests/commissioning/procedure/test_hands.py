@@ -1,4 +1,4 @@
-"""Hands that do something else than they were told: what is missing, and what to do."""
+"""Hands that do something else than they should: what is missing, and what to do."""
 
 import shutil
 from dataclasses import replace
@@ -68,37 +68,37 @@ def both(one: Stroke) -> list[Stroke]:
 )
 def test_joysticks_moved_otherwise(machine: Path, change: Any, text: str) -> None:
     before = machine.read_bytes()
-    found = run(machine, "joysticks", strokes(change))
-    assert found.poor[0].startswith(text)
-    assert not found.diff
+    outcome = run(machine, "joysticks", strokes(change))
+    assert outcome.poor[0].startswith(text)
+    assert not outcome.diff
     assert machine.read_bytes() == before
 
 
 def test_joysticks_without_enable(machine: Path) -> None:
-    found = run(machine, "joysticks", lambda task: replace(task, released=(0.0, 9.0)))
-    assert found.poor[0].startswith("slew: the enable switch was not seen held")
+    outcome = run(machine, "joysticks", lambda task: replace(task, released=(0.0, 9.0)))
+    assert outcome.poor[0].startswith("slew: the enable switch was not seen held")
 
 
 def test_a_dry_drive_without_one_axis(machine: Path) -> None:
-    found = run(machine, "dry", strokes(lambda one: [one] if one.axis == "slew" else []))
-    assert [fault.partition(":")[0] for fault in found.poor] == ["near_far", "lift"]
+    outcome = run(machine, "dry", strokes(lambda one: [one] if one.axis == "slew" else []))
+    assert [fault.partition(":")[0] for fault in outcome.poor] == ["near_far", "lift"]
 
 
 def test_a_dry_drive_without_enable(machine: Path) -> None:
-    found = run(machine, "dry", lambda task: replace(task, released=(0.0, 100.0)))
-    assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in found.poor[0]
+    outcome = run(machine, "dry", lambda task: replace(task, released=(0.0, 100.0)))
+    assert "slew: it was never ACTIVE, but NEUTRAL_WAIT (ENABLE_OFF)" in outcome.poor[0]
 
 
 def test_a_first_motion_to_one_side(machine: Path) -> None:
     change = strokes(lambda one: [replace(one, level=abs(one.level))])
-    found = run(machine, "motion", change)
-    assert {fault.partition(":")[0] for fault in found.poor} == {"slew", "near_far", "lift"}
-    assert "its valve did not follow its joystick in both directions" in found.poor[0]
+    outcome = run(machine, "motion", change)
+    assert {fault.partition(":")[0] for fault in outcome.poor} == {"slew", "near_far", "lift"}
+    assert "its valve did not follow its joystick in both directions" in outcome.poor[0]
 
 
 def test_a_first_motion_with_the_enable_held_all_the_time(machine: Path) -> None:
-    found = run(machine, "motion", lambda task: replace(task, released=None))
-    assert found.poor == [
+    outcome = run(machine, "motion", lambda task: replace(task, released=None))
+    assert outcome.poor == [
         "the enable was not let go while an axis moved, or is in no message of a joystick: let it"
         " go in motion; neutral has to follow at once"
     ]
@@ -111,8 +111,8 @@ def test_a_bus_on_which_nothing_comes(machine: Path) -> None:
 
     bench = Silent(None)
     one = Procedure(Files(machine), bench, load_deployment, STEPS, origin=machine)
-    found = one.run(one.step("buses"))
-    assert any("bus crane: no frame was received: is the machine on" in f for f in found.poor)
+    outcome = one.run(one.step("buses"))
+    assert any("bus crane: no frame was received: is the machine on" in f for f in outcome.poor)
 
 
 class Renamed(Simulated):

@@ -117,11 +117,11 @@ def test_a_daemon_that_dies_is_reported(deployment: Deployment) -> None:
 
 def children(verb: str) -> list[int]:
     """Own child processes of that verb."""
-    found = []
+    pids = []
     for line in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split():
         if verb.encode() in Path(f"/proc/{line}/cmdline").read_bytes().split(b"\0"):
-            found.append(int(line))
-    return found
+            pids.append(int(line))
+    return pids
 
 
 @pytest.mark.long
@@ -165,7 +165,7 @@ def test_ctrl_c_ends_a_measurement_and_is_ctrl_c_again(deployment: Deployment) -
 def test_a_measurement_that_cannot_begin_ends_by_itself(
     deployment: Deployment, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """No one holds the enable: there is nobody at all."""
+    """No one holds the enable: there is no one at all."""
     monkeypatch.setattr(run, "WAIT_LIMIT_S", 0.2)
     speed = speed_signal(deployment, "slew", None)
     drive = CalibrationDrive(deployment, "slew", speed, Ramp(0.03, 0.4))

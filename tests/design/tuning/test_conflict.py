@@ -22,7 +22,7 @@ def test_run_on_against_output_within_the_command() -> None:
     text = str(caught.value)
     assert "run-on at most 1.2 s" in text
     assert "within the command" in text
-    found = {
+    limits = {
         k: float(v) for k, v in re.findall(r"kept: (first jump|run-on) at most ([\d.]+)", text)
     }
     # The shortest run-on of all filters whose output stays within the command, by trying them.
@@ -32,9 +32,9 @@ def test_run_on_against_output_within_the_command() -> None:
         for q in slow
         for y in [step_response(MODE, 0.02, gff((-q, -(MODE.omega_rad_s**2) / q)))]
     )
-    assert found["run-on"] == pytest.approx(shortest, abs=0.021)
-    tune(Task(MODE, require=Requirements(max_run_on_s=found["run-on"] + 0.02)))
-    jump = found["first jump"] * 1.02
+    assert limits["run-on"] == pytest.approx(shortest, abs=0.021)
+    tune(Task(MODE, require=Requirements(max_run_on_s=limits["run-on"] + 0.02)))
+    jump = limits["first jump"] * 1.02
     tune(Task(MODE, require=Requirements(within_command=False, max_jump=jump, max_run_on_s=1.2)))
 
 

@@ -116,7 +116,7 @@ CASES: dict[str, tuple[str, Mapping[str, Value], str]] = {
         NEW,
         "\n  kind: gff\n  a1: 0.7\n  a2: 0.12233\n",
     ),
-    "block, take out beside a comment": (
+    "block, take out next to a comment": (
         "\n  kind: gff\n  third_pole_rad_s: -4 # why\n  a1: 1\n  a2: 0.1\n",
         NEW,
         "\n  kind: gff\n  # why\n  a1: 0.7\n  a2: 0.12233\n",

@@ -32,12 +32,12 @@ KNOWN = {
 @pytest.mark.parametrize("poles", KNOWN)
 def test_known_measures(poles: tuple[float, float]) -> None:
     peak, rise, run_on, delay, residuals = KNOWN[poles]
-    found = evaluate(MODE, 0.02, gff(poles))
-    assert found.peak == pytest.approx(peak, rel=2e-3)
-    assert found.rise_s == pytest.approx(rise, abs=0.021)
-    assert found.run_on_s == pytest.approx(run_on, abs=0.021)
-    assert found.mean_delay_s == pytest.approx(delay, abs=2e-3)
-    assert [100.0 * r.linear for r in found.residuals] == pytest.approx(residuals, abs=0.03)
+    measures = evaluate(MODE, 0.02, gff(poles))
+    assert measures.peak == pytest.approx(peak, rel=2e-3)
+    assert measures.rise_s == pytest.approx(rise, abs=0.021)
+    assert measures.run_on_s == pytest.approx(run_on, abs=0.021)
+    assert measures.mean_delay_s == pytest.approx(delay, abs=2e-3)
+    assert [100.0 * r.linear for r in measures.residuals] == pytest.approx(residuals, abs=0.03)
 
 
 @pytest.mark.parametrize("poles", KNOWN)
@@ -51,9 +51,9 @@ def test_a_machine_without_limits_leaves_what_the_filter_leaves(
 
 
 def test_no_filter_leaves_everything() -> None:
-    found = evaluate(MODE, 0.02, lambda _sway: Off())
-    assert (found.first_jump, found.rise_s, found.run_on_s) == (1.0, 0.0, 0.0)
-    for residual in found.residuals:
+    measures = evaluate(MODE, 0.02, lambda _sway: Off())
+    assert (measures.first_jump, measures.rise_s, measures.run_on_s) == (1.0, 0.0, 0.0)
+    for residual in measures.residuals:
         assert residual.linear == pytest.approx(1.0)
         assert residual.machine == pytest.approx(1.0)
 
@@ -62,22 +62,24 @@ def test_no_filter_leaves_everything() -> None:
 def test_every_filter_of_the_registry_can_be_measured(kind: str) -> None:
     """And leaves no more of the swing than none does."""
     for given in KINDS[kind].settings(MODE, 0.02).values():
-        found = evaluate(MODE, 0.02, partial(build_shaper, kind, 0.02, **given), lengths_pct=(0,))
-        assert found.residuals[0].linear <= 1.0
-        assert (found.run_on_s > 0.0) is (kind != "off")
+        measures = evaluate(
+            MODE, 0.02, partial(build_shaper, kind, 0.02, **given), lengths_pct=(0,)
+        )
+        assert measures.residuals[0].linear <= 1.0
+        assert (measures.run_on_s > 0.0) is (kind != "off")
 
 
 def test_a_known_filter_leaves_what_it_should() -> None:
-    found = evaluate(MODE, 0.02, lambda sway: build_shaper("zv", 0.02, sway))
-    assert found.run_on_s == pytest.approx(1.10, abs=0.021)
-    assert 100.0 * found.residuals[0].linear == pytest.approx(35.9, abs=0.2)
+    measures = evaluate(MODE, 0.02, lambda sway: build_shaper("zv", 0.02, sway))
+    assert measures.run_on_s == pytest.approx(1.10, abs=0.021)
+    assert 100.0 * measures.residuals[0].linear == pytest.approx(35.9, abs=0.2)
 
 
 def test_third_pole_removes_the_jump_and_keeps_the_zeros() -> None:
-    found = evaluate(MODE, 0.02, gff((-4.0, -4.0), -4.0))
-    assert found.first_jump < 0.15
-    assert found.residuals[3].linear < 1e-9
-    assert found.run_on_s == pytest.approx(1.82, abs=0.021)
+    measures = evaluate(MODE, 0.02, gff((-4.0, -4.0), -4.0))
+    assert measures.first_jump < 0.15
+    assert measures.residuals[3].linear < 1e-9
+    assert measures.run_on_s == pytest.approx(1.82, abs=0.021)
 
 
 def test_a_short_tail_costs_residual_sway() -> None:

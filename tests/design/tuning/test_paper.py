@@ -54,8 +54,8 @@ def test_the_best_single_pendulum_is_a_quarter_off() -> None:
     printed = ((PAPER_SLEW, (0.42, 0.043)), (PAPER_NEAR_FAR, (0.708, 0.12)))
 
     def error(pendulum: tuple[float, float]) -> float:
-        found = [as_printed(pendulum, weights) for weights, _ in printed]
-        pairs = zip(found, (pair for _, pair in printed), strict=True)
+        poles = [as_printed(pendulum, weights) for weights, _ in printed]
+        pairs = zip(poles, (pair for _, pair in printed), strict=True)
         return max(max(abs(t.a1 / a1 - 1.0), abs(t.a2 / a2 - 1.0)) for t, (a1, a2) in pairs)
 
     lengths = (0.35, 0.45, 0.52, 0.6, 0.8, 1.15)

@@ -24,13 +24,17 @@ VALVE = {"tick_s": 0.02, "rate_per_s": 5.0}
 def test_designs_of_the_literature_values(
     duration_s: float, range_pct: float, residual_pct: float
 ) -> None:
-    found = least_residual(MODE, duration_s=duration_s, range_pct=range_pct, least_tap=0.0, **VALVE)
-    assert 100.0 * found.residual == pytest.approx(residual_pct, abs=0.4)
-    assert min(found.taps) >= 0.0
-    assert math.fsum(found.taps) == pytest.approx(1.0)
-    assert max(found.taps) <= 5.0 * 0.02 * (1.0 + 1e-9)
-    judged = max(residual_left(found.taps, m, 0.02) for m in modes_over_range(MODE, range_pct, 301))
-    assert judged == pytest.approx(found.residual, rel=0.01)
+    design = least_residual(
+        MODE, duration_s=duration_s, range_pct=range_pct, least_tap=0.0, **VALVE
+    )
+    assert 100.0 * design.residual == pytest.approx(residual_pct, abs=0.4)
+    assert min(design.taps) >= 0.0
+    assert math.fsum(design.taps) == pytest.approx(1.0)
+    assert max(design.taps) <= 5.0 * 0.02 * (1.0 + 1e-9)
+    judged = max(
+        residual_left(design.taps, m, 0.02) for m in modes_over_range(MODE, range_pct, 301)
+    )
+    assert judged == pytest.approx(design.residual, rel=0.01)
 
 
 def test_a_least_tap_makes_one_movement_of_a_tap_for_a_little_more_residual() -> None:
@@ -58,9 +62,9 @@ def test_no_other_taps_of_that_kind_do_better() -> None:
 
 
 def test_shortest_is_as_short_as_can_be() -> None:
-    found = shortest(MODE, residual_pct=5.0, range_pct=30.0, **VALVE)
-    assert found.residual <= 0.05
-    shorter = least_residual(MODE, duration_s=found.duration_s - 0.04, range_pct=30.0, **VALVE)
+    design = shortest(MODE, residual_pct=5.0, range_pct=30.0, **VALVE)
+    assert design.residual <= 0.05
+    shorter = least_residual(MODE, duration_s=design.duration_s - 0.04, range_pct=30.0, **VALVE)
     assert shorter.residual > 0.05
 
 

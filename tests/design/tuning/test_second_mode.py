@@ -191,12 +191,12 @@ def test_the_second_mode_is_left_in_peace_within_its_range_at_no_run_on(
 def test_no_allowed_second_mode_spoils_the_first() -> None:
     """Compared with a swing that has died away, a damped one took the first from 0.1 to 6.8."""
     first = SwayMode.from_period(2.4, 0.02)
-    asked = {"duration_s": 1.84, "range_pct": 15.0, **VALVE}
-    alone = least_residual(first, **asked)
+    options = {"duration_s": 1.84, "range_pct": 15.0, **VALVE}
+    alone = least_residual(first, **options)
     for period_s in (0.3, 0.6, 0.96):
         for damping_ratio in (0.0, 0.1, 0.4):
             second = second_mode(first, period_s, damping_ratio, 20.0, **VALVE)
-            covering = least_residual(first, second=second, **asked)
+            covering = least_residual(first, second=second, **options)
             assert covering.residual < alone.residual + 0.02
             assert covering.second_residual <= 0.51 * covering.residual
             assert covering.mean_delay_s < alone.mean_delay_s + 0.01

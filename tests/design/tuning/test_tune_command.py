@@ -66,15 +66,15 @@ def test_result_and_picture(file: Path) -> None:
 def test_json(file: Path) -> None:
     result = run(file, "--axis", "slew", "--json", "--third-pole", "--max-run-on", "2.2")
     assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
-    assert found["axis"] == "slew"
-    assert found["converged"] == 3
-    assert found["third_pole_rad_s"] < 0.0
-    assert found["run_on_s"] <= 2.2
-    assert found["first_jump"] <= 0.1 + 1e-6
-    assert [r["length_pct"] for r in found["residuals"]] == [-30, -20, -10, 0, 10, 20, 30]
-    assert found["in_file"]["first_jump"] == pytest.approx(1.11, abs=0.01)
-    assert found["written"] is None
+    report = json.loads(result.stdout)
+    assert report["axis"] == "slew"
+    assert report["converged"] == 3
+    assert report["third_pole_rad_s"] < 0.0
+    assert report["run_on_s"] <= 2.2
+    assert report["first_jump"] <= 0.1 + 1e-6
+    assert [r["length_pct"] for r in report["residuals"]] == [-30, -20, -10, 0, 10, 20, 30]
+    assert report["in_file"]["first_jump"] == pytest.approx(1.11, abs=0.01)
+    assert report["written"] is None
 
 
 def test_write_and_write_back(file: Path) -> None:
@@ -128,9 +128,9 @@ def test_the_longer_tail_leaves_less_swing_at_the_same_stop(file: Path) -> None:
         if room:
             file.write_text(file.read_text().replace(*ROOM))
         assert run(file, "--axis", "near_far", "--write").exit_code == 0
-        found = json.loads(run(file, "--axis", "near_far", "--json").stdout)["in_file"]
-        left = next(r["machine"] for r in found["residuals"] if r["length_pct"] == 0)
-        measured[room] = (left, found["run_on_s"])
+        in_file = json.loads(run(file, "--axis", "near_far", "--json").stdout)["in_file"]
+        left = next(r["machine"] for r in in_file["residuals"] if r["length_pct"] == 0)
+        measured[room] = (left, in_file["run_on_s"])
     assert measured[False] == pytest.approx((0.044, 1.86), abs=0.001)
     assert measured[True] == pytest.approx((0.012, 1.86), abs=0.001)
 
@@ -177,9 +177,9 @@ def test_another_filter_is_replaced_on_write(file: Path) -> None:
 def test_length_range_takes_the_tail_as_run_on(file: Path) -> None:
     result = run(file, "--axis", "near_far", "--length-range", "15", "--json")
     assert result.exit_code == 0, result.output
-    found = json.loads(result.stdout)
-    assert "run-on" in found["active"]
-    assert 1.9 < found["run_on_s"] <= 2.0
+    report = json.loads(result.stdout)
+    assert "run-on" in report["active"]
+    assert 1.9 < report["run_on_s"] <= 2.0
 
 
 BAD = {
@@ -264,18 +264,18 @@ def test_the_daemon_never_imports_the_tuner() -> None:
 @pytest.mark.parametrize("pole", [-0.71234567, -2.8591956, -3.3333333333, -17.77777777])
 def test_digits_of_a_file_keep_poles_real_and_the_jump_small(pole: float) -> None:
     a1, a2 = -2.0 / pole, 1.0 / pole**2
-    found = deployed(Tuning((pole, pole), pole, a1, a2, "optimal"), MODE, 0.02, Machine())
-    assert found.a2 >= a2
-    assert found.a1**2 >= 4.0 * found.a2
-    assert found.poles_rad_s == pytest.approx((pole, pole), rel=5e-3)
-    assert found.third_pole_rad_s == pytest.approx(pole, rel=1e-5)
-    assert len(f"{found.a1}".replace(".", "").lstrip("0")) <= 6
+    tuned = deployed(Tuning((pole, pole), pole, a1, a2, "optimal"), MODE, 0.02, Machine())
+    assert tuned.a2 >= a2
+    assert tuned.a1**2 >= 4.0 * tuned.a2
+    assert tuned.poles_rad_s == pytest.approx((pole, pole), rel=5e-3)
+    assert tuned.third_pole_rad_s == pytest.approx(pole, rel=1e-5)
+    assert len(f"{tuned.a1}".replace(".", "").lstrip("0")) <= 6
 
 
 def test_manual_setting_is_measured() -> None:
-    found = deployed(manual(MODE), MODE, 0.02, Machine())
-    assert found.measures.run_on_s > 5.0
+    tuned = deployed(manual(MODE), MODE, 0.02, Machine())
+    assert tuned.measures.run_on_s > 5.0
     same = setting(
-        a1=found.a1, a2=found.a2, third_pole_rad_s=None, mode=MODE, tick_s=0.02, machine=Machine()
+        a1=tuned.a1, a2=tuned.a2, third_pole_rad_s=None, mode=MODE, tick_s=0.02, machine=Machine()
     )
-    assert same == found
+    assert same == tuned

@@ -56,7 +56,7 @@ def run(context: Context) -> Outcome:
     deployment, bench = context.deployment, context.bench
     axes = swinging(deployment)
     outcome = Outcome()
-    sources = _asked(bench, deployment, axes)
+    sources = _swing_sources(bench, deployment, axes)
     missing = [name for name in axes if not _has(sources, name)]
     if missing:
         text = f"{', '.join(missing)}: nothing shows the swing: name a signal of the bus, a phone's"
@@ -92,7 +92,7 @@ def run(context: Context) -> Outcome:
 _TIMED = ("swings", "seconds", "first", "last")
 
 
-def _asked(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
+def _swing_sources(bench: Bench, deployment: Deployment, axes: Sequence[str]) -> _Sources:
     """What shows the swing, by the person; of the simulated crane its own message."""
     sources = _Sources()
     for name in axes:
