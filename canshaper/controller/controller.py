@@ -9,7 +9,7 @@ from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.counters import Counters
 from canshaper.controller.events import FeedbackEvent, StateEvent
 from canshaper.controller.inputs import MachineInputs, received_by
-from canshaper.controller.motion import MotionRunner
+from canshaper.controller.motion import motion_runners
 from canshaper.controller.outputs import ValveOutputs
 from canshaper.controller.overrun import OverrunDetector
 from canshaper.controller.parts import parts
@@ -49,7 +49,6 @@ class Controller:
             name: AxisRunner(bound, tick_s, inputs.joysticks[bound.config.command.joystick])
             for name, bound in deployment.axes.items()
         }
-        self.motions: list[MotionRunner] = []
         self._sensors: dict[str, SensorReport] = {}
         self._connect(inputs, tick_s)
         bound = inputs.bound + [
@@ -236,12 +235,7 @@ class Controller:
         for name, message in inputs.sway_sensors.items():
             self.axes[name].add_sway_sensor(message)
             self._sensors[name] = SensorReport(name, self.axes[name])
-        for name, bound in self.deployment.motions.items():
-            motion = bound.config
-            near_far = self.axes[motion.near_far] if motion.near_far else None
-            slew, radius = self.axes[motion.slew], inputs.radii.get(name)
-            one = MotionRunner(name, motion, slew, near_far, radius, tick_s=tick_s)
-            self.motions.append(one)
+        self.motions = motion_runners(self.deployment, self.axes, inputs.radii, tick_s)
 
     def _report(self, name: str, runner: AxisRunner, now_ns: int) -> None:
         """Report when valve or sway sensor say something else than before."""

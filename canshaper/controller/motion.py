@@ -1,9 +1,12 @@
 """The two-axis motion of a crane at work: it adds to both axes before either of them moves."""
 
+from collections.abc import Mapping
+
 from canshaper.config.motion import Motion
 from canshaper.controller.events import MotionEvent
 from canshaper.controller.runner import AxisRunner
 from canshaper.inputs.value import ValueInput
+from canshaper.machine.deployment import Deployment
 from canshaper.shaping.motion import TwoAxisMotion, farthest_m
 from canshaper.shaping.moving_axis import MovingAxis
 from canshaper.shaping.states import State
@@ -147,3 +150,26 @@ def _full_speed_m_s(near_far: AxisRunner) -> float:
     sway = near_far.bound.config.sway
     assert sway is not None  # checked with the deployment
     return sway.full_speed_m_s
+
+
+def motion_runners(
+    deployment: Deployment,
+    axes: Mapping[str, AxisRunner],
+    radii: Mapping[str, ValueInput],
+    tick_s: float,
+) -> list[MotionRunner]:
+    """Motions of a deployment.
+
+    Args:
+        deployment: the deployment.
+        axes: all of its axes by name.
+        radii: measured radii of the tip by name of the motion, where there are any.
+        tick_s: time between two ticks of the controller.
+    """
+    motions = []
+    for name, bound in deployment.motions.items():
+        config = bound.config
+        near_far = axes[config.near_far] if config.near_far else None
+        slew, radius = axes[config.slew], radii.get(name)
+        motions.append(MotionRunner(name, config, slew, near_far, radius, tick_s=tick_s))
+    return motions
