@@ -11,7 +11,7 @@ import typer
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from tests.cli.test_cli import ROOT, VERBS
+from tests.cli.invocation import ROOT, VERBS
 
 WIDTH = 80
 # Of desk work that is done in a second or two; others need a bus, a log, or minutes.

@@ -1,0 +1,17 @@
+"""The command line called in this process, and the files of it that are shipped."""
+
+from pathlib import Path
+from typing import Any
+
+import typer
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+
+ROOT = Path(__file__).parents[2]
+SHIPPED = ROOT / "config" / "forwarder.yaml"
+VERBS = sorted(typer.main.get_command(app).commands)  # type: ignore[attr-defined]
+
+
+def invoke(*arguments: str) -> Any:
+    return CliRunner().invoke(app, list(arguments), prog_name="canshaper")

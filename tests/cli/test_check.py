@@ -1,0 +1,207 @@
+"""``canshaper check``: what it shows of a deployment, and every problem with its line."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from canshaper.machine.binding import load_deployment
+from tests.cli.invocation import ROOT, SHIPPED, invoke
+
+ROBUST = Path(__file__).parents[2] / "config" / "forwarder-robust.yaml"
+
+
+def test_check_of_a_good_file_shows_what_it_does() -> None:
+    result = invoke("check", str(SHIPPED))
+    identity = load_deployment(SHIPPED).identity
+    assert result.exit_code == 0
+    assert result.stderr == ""
+    before, _, _ = result.stdout.partition("\n  ".ljust(60))  # the table of stopping distances
+    assert before.splitlines() == [
+        f"{SHIPPED}: good",
+        "  bus crane: socketcan vcan0, its 10 messages load 12% of 250 kbit/s",
+        "  axis slew: JoystickLeft.Slew -> gff -> SlewCommand.Velocity every 20 ms",
+        "  axis near_far: JoystickLeft.NearFar -> gff -> NearFarCommand.Velocity every 20 ms",
+        "  axis lift: JoystickRight.Lift -> off -> LiftCommand.Velocity every 20 ms",
+        "  slew is in no motion: together with another axis it leaves more swing;",
+        "    a motion takes one axis that moves the tip in and out, which joints are not",
+        f"  digest {identity.digest:#06x} of deployment, DBC files and program:",
+        *(f"    {line}" for line in identity.lines()[1:]),
+    ]
+
+
+def test_check_shows_how_far_every_axis_travels_on() -> None:
+    lines = invoke("check", str(SHIPPED)).stdout.splitlines()
+    lines = lines[next(i for i, line in enumerate(lines) if "stops from" in line) :]
+    assert max(map(len, lines)) <= 80
+    rows = {line[:26].strip(): line[26:].split() for line in lines if line.startswith(" ")}
+    # 0.5 rad/s at 9.6 m; lift has no speed
+    assert rows["joystick released"] == ["3.63", "m", "22", "deg", "0.74", "m", "0.11", "s"]
+    assert rows["joystick lost"] == ["4.11", "m", "25", "deg", "0.84", "m", "0.21", "s"]
+    assert rows["limits allow"] == ["10.22", "m", "61", "deg", "2.13", "m", "0.63", "s"]
+    assert rows["stop_distance_m"] == ["10.5", "m", "2.2", "m", "-"]
+    assert "WARNING" not in "".join(lines)
+    assert "lift: in seconds of full speed" in "".join(lines)
+    assert "slewing: of one that slews" not in "".join(lines)
+
+
+def test_check_says_which_axis_moves_without_its_joystick() -> None:
+    note = (
+        "  NOTE: while slew moves, near_far moves too without its joystick: by up to 0.25 m/s,"
+        " 0.3 m in or out, 6 s"
+    )
+    assert note in invoke("check", "forwarder-robust.yaml").stdout.splitlines()
+    assert "without its joystick" not in invoke("check", str(SHIPPED)).stdout
+
+
+@pytest.mark.parametrize("name", ["forwarder-sensor", "j1939-sensor", "canopen-sensor"])
+def test_check_counts_what_a_sway_sensor_moves_it_besides(tmp_path: Path, name: str) -> None:
+    way = " m/s, 0.6 m in or out (0.3 for slewing, as much to damp by its sway sensor), 6 s"
+    note = "near_far moves too without its joystick"
+    shipped = ROOT / "config" / f"{name}.yaml"
+    text = shipped.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    [row] = [row for row in invoke("check", str(shipped)).stdout.splitlines() if note in row]
+    assert row.endswith(way)
+    watched = tmp_path / "watched.yaml"
+    watched.write_text(text.replace("use: damp", "use: watch"))
+    [row] = [row for row in invoke("check", str(watched)).stdout.splitlines() if note in row]
+    assert row.endswith(" m/s, 0.3 m in or out, 6 s")
+
+
+def test_check_says_where_a_filter_no_longer_fits(
+    tmp_path: Path,
+) -> None:
+    file = tmp_path / "machine.yaml"
+    text = ROBUST.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    assert "designed" not in invoke("check", str(ROBUST)).stdout
+    text = text.replace("sway: { period_s: 2.356", "sway: { period_s: 2.6")
+    file.write_text(
+        text.replace("mass_kg: 300", "mass_kg: 120").replace("fall_per_s: 5", "fall_per_s: 4")
+    )
+    result = invoke("check", str(file))
+    assert result.exit_code == 0
+    slew, near_far = (
+        number for number, row in enumerate(text.splitlines(), 1) if "designed_for" in row
+    )
+    again = "; design it again: canshaper robust"
+    slew_for, near_for = "axes.slew.filter.designed_for", "axes.near_far.filter.designed_for"
+    valve = "valve_rate_per_s: expected a valve of 5 full speeds per s or more, got 4"
+    assert [row for row in result.stdout.splitlines() if "designed_for" in row] == [
+        f"WARNING: {file}:{slew}: {slew_for}.period_s:"
+        f" expected a swing of 2.17 to 2.53 s, got 2.60 s{again}",
+        f"WARNING: {file}:{slew}: {slew_for}.{valve}{again}",
+        f"WARNING: {file}:{near_far}: {near_for}.damping_ratio:"
+        f" expected a damping ratio of 0.019 to 0.079, got 0.121{again}",
+        f"WARNING: {file}:{near_far}: {near_for}.{valve}{again}",
+    ]
+
+
+def unstated(tmp_path: Path) -> Path:
+    """The shipped machine, whose slew does not state how far it may travel on."""
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    file = tmp_path / "unstated.yaml"
+    file.write_text(text.replace(", stop_distance_m: 10.5", "").replace("    slewing:", "    #"))
+    return file
+
+
+LONG_WAY = (
+    "axes.slew.limits.stop_distance_m: missing: to stop, the limits allow 3.2 m, which is more"
+    " than 2 m; where that is meant, state stop_distance_m: 3.2"
+)
+
+
+def test_check_warns_of_a_long_way_that_is_not_stated(tmp_path: Path) -> None:
+    file = unstated(tmp_path)
+    result = invoke("check", str(file))
+    assert result.exit_code == 0
+    line = file.read_text().splitlines().index("  near_far:") - 1
+    assert result.stdout.splitlines()[-1] == f"WARNING: {file}:{line}: {LONG_WAY}"
+    assert "slewing: of one that slews" in " ".join(result.stdout.split())
+
+
+def test_run_moves_nothing_over_a_long_way_that_is_not_stated(
+    tmp_path: Path, opened: list[dict[str, Any]]
+) -> None:
+    file = unstated(tmp_path)
+    result = invoke("run", str(file))
+    assert result.exit_code == 2
+    assert LONG_WAY in result.stderr
+    assert opened == []
+    assert invoke("run", str(file), "--listen-only").exit_code == 3  # as it moves nothing
+
+
+def test_check_of_a_broken_file_reports_every_problem(broken: Path) -> None:
+    result = invoke("check", str(broken))
+    assert result.exit_code == 2
+    assert result.stdout == ""
+    line = (
+        SHIPPED.read_text(encoding="utf-8")
+        .splitlines()
+        .index("tick_ms: 20 # period of the control loop")
+    )
+    first, second, count = result.stderr.splitlines()
+    assert first == f"{broken}:{line + 1}: tick_ms: expected a whole number, 1 to 50 ms, got 0"
+    assert (
+        "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
+        " 'zvd', 'ei', 'two_mode', 'robust', got 'x'" in second
+    )
+    assert count == "2 problems"
+
+
+def test_check_of_no_file() -> None:
+    result = invoke("check", "nowhere/none.yaml")
+    assert result.exit_code == 2
+    assert result.stderr.splitlines() == [
+        "nowhere/none.yaml: No such file or directory",
+        "1 problem",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "where", "got"),
+    [
+        ("dbc: [", 'dbc: ["a\\0b.dbc", ', "dbc.0", r"'a\x00b.dbc'"),
+        (
+            "tick_ms: 20",
+            'tick_ms: 20\ncontrol: { socket: "/run/a\\0b",'
+            " adjustable: { axes.slew.limits.max_pct: [20, 100] } }",
+            "control.socket",
+            r"'/run/a\x00b'",
+        ),
+    ],
+)
+def test_check_refuses_a_path_that_the_system_would_not_take(
+    tmp_path: Path, old: str, new: str, where: str, got: str
+) -> None:
+    text = SHIPPED.read_text(encoding="utf-8").replace("../dbc", str(ROOT / "dbc"))
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace(old, new, 1), encoding="utf-8")
+    result = invoke("check", str(file))
+    line = 1 + next(i for i, row in enumerate(file.read_text().splitlines()) if "\\0" in row)
+    problem = f"{file}:{line}: {where}: expected text without control characters, got {got}"
+    assert (result.exit_code, result.stderr.splitlines()) == (2, [problem, "1 problem"])
+
+
+def test_a_shipped_file_goes_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name in ("forwarder.yaml", "config/forwarder.yaml"):
+        assert invoke("check", name).exit_code == 0
+    assert invoke("check", "other/forwarder.yaml").exit_code == 2
+    Path("forwarder.yaml").write_text("tick_ms: 0\n", encoding="utf-8")  # one that is there wins
+    assert invoke("check", "forwarder.yaml").exit_code == 2
+
+
+@pytest.mark.parametrize(
+    ("file", "slews"),
+    [
+        ("forwarder.yaml", ["slew"]),
+        ("forwarder-joints.yaml", ["slew"]),
+        ("two-cranes.yaml", ["front_slew", "rear_slew"]),
+        ("forwarder-robust.yaml", []),
+    ],
+)
+def test_check_names_an_axis_that_slews_in_no_motion(file: str, slews: list[str]) -> None:
+    lines = invoke("check", file).stdout.splitlines()
+    named = [line.split()[0] for line in lines if "is in no motion" in line]
+    assert named == slews
+    assert sum("which joints are not" in line for line in lines) == len(slews)

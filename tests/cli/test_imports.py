@@ -1,0 +1,91 @@
+"""What the command line imports, and what it does without the desk tools."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from tests.cli.invocation import ROOT, SHIPPED
+
+# Nothing of these belongs on a small machine PC.
+HEAVY = ("casadi", "scipy", "numpy", "matplotlib", "pandas")
+
+
+def python(code: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
+    return done.stdout.strip()
+
+
+def test_the_daemon_imports_nothing_heavy() -> None:
+    code = f"""
+import sys
+from pathlib import Path
+import canshaper.cli.app, canshaper.bus.port, canshaper.daemon.daemon
+from canshaper.cli.common import loader
+from canshaper.controller.controller import Controller
+controller = Controller(loader({str(SHIPPED)!r})())
+for i in range(100):
+    list(controller.tick(i * 20_000_000))
+print(len(controller.axes), sorted({{m.split(".")[0] for m in sys.modules}} & set({HEAVY!r})))
+"""
+    assert python(code) == "3 []"
+
+
+def test_the_watch_of_heavy_imports_would_see_one() -> None:
+    assert python("import sys, numpy; print('numpy' in sys.modules)") == "True"
+
+
+# The imports stand for a machine without the extra.
+WITHOUT_TOOLS = """
+import sys
+sys.modules.update(dict.fromkeys({gone!r}))
+sys.argv = ["canshaper", *{arguments!r}]
+from canshaper.cli.app import main
+main()
+"""
+
+
+def without(gone: tuple[str, ...], folder: Path, *arguments: str) -> "subprocess.CompletedProcess":
+    code = WITHOUT_TOOLS.format(gone=gone, arguments=arguments)
+    return subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=False, cwd=folder
+    )
+
+
+# Into the environment that runs, from wherever a reader stands.
+TOOLS = f"{sys.executable} -m pip install canopen casadi matplotlib numpy scipy"
+
+
+@pytest.mark.parametrize(
+    ("missing", "arguments"),
+    [
+        ("numpy", ("tune", str(SHIPPED), "--axis", "slew")),
+        ("casadi", ("tune", str(SHIPPED), "--axis", "slew")),
+        ("numpy", ("robust", str(SHIPPED), "--axis", "slew")),
+        ("scipy", ("robust", str(SHIPPED), "--axis", "slew")),
+        ("numpy", ("compare",)),
+    ],
+)
+def test_without_the_tools_a_verb_says_what_to_install(
+    missing: str, arguments: tuple[str, ...], tmp_path: Path
+) -> None:
+    done = without((missing,), tmp_path, *arguments)
+    text = f"this command needs {missing}, which is missing: {TOOLS}\n"
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", text)
+
+
+def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> None:
+    arguments = ("demo", "--lockstep", "--script", "pulse-near_far")
+    done = without(("casadi", "matplotlib", "numpy", "scipy"), tmp_path, *arguments)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"Picture: none, matplotlib is missing: {TOOLS}" in done.stdout
+    assert [path.name for path in tmp_path.rglob("*.*")] == ["report.json"]
+
+
+def test_a_module_that_is_no_tool_is_a_fault_of_ours(tmp_path: Path) -> None:
+    done = without(("yaml",), tmp_path, "check", str(SHIPPED))
+    assert done.returncode == 1
+    assert "ModuleNotFoundError: import of yaml halted" in done.stderr

@@ -1,0 +1,192 @@
+"""Every kind of bad deployment file: one clear problem each, with its line."""
+
+import re
+
+import pytest
+
+from tests.config.sections import TOP, Problems, changed
+
+SWAY = (
+    "expected length_m, damping_nms and mass_kg, or period_s and damping_ratio, or period_s"
+    " and decay_per_swing"
+)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        # unknown keys, wherever they stand, with those allowed there
+        ("tick_ms", "ticks", f"ticks: expected one of the keys {TOP}"),
+        (
+            "channel: vcan0",
+            "channel: a, speed: 1",
+            "buses.crane.speed: expected one of the keys interface, channel, bitrate",
+        ),
+        (
+            "enable: Enable",
+            "enable: Enable\n    on: X",
+            "joysticks.left.on: expected one of the keys bus, message, alive_counter, checksum,"
+            " e2e, cycle_ms, multiplexor, source, timeout_ms, alive_max_step, qualify, enable,"
+            " enable_of, reset, anti_sway_off, next_profile, node, stuck_s",
+        ),
+        (
+            "{ joystick: left,",
+            "{ joystick: left, deadzone: 1,",
+            "axes.slew.command.deadzone: expected one of the keys full, zero, invert, joystick,"
+            " signal, flags, negative, neutral_pct",
+        ),
+        (
+            "kind: gff,",
+            "kind: gff, a3: 1,",
+            "axes.slew.filter.a3: expected one of the keys kind, a1, a2, poles_rad_s",
+        ),
+        ("kind: off", "kind: off, a1: 1", "axes.lift.filter.a1: expected one of the keys kind"),
+        # missing keys, with what they mean
+        ("interface: socketcan, ", "", "buses.crane.interface: missing: python-can interface"),
+        ("joystick: left, ", "", "axes.slew.command.joystick: missing: name of a joystick"),
+        (", full_speed_m_s: 1.5", "", "axes.slew.sway.full_speed_m_s: missing: speed of the tip"),
+        # numbers
+        ("tick_ms: 20", "tick_ms: 0", "expected a whole number, 1 to 50 ms, got 0"),
+        ("tick_ms: 20", "tick_ms: 51", "expected a whole number, 1 to 50 ms, got 51"),
+        ("tick_ms: 20", "tick_ms: 20.0", "expected a whole number, 1 to 50 ms, got 20.0"),
+        ("tick_ms: 20", "tick_ms: '20'", "expected a whole number, 1 to 50 ms, got '20'"),
+        ("tick_ms: 20", "tick_ms: true", "expected a whole number, 1 to 50 ms, got True"),
+        ("tick_ms: 20", "tick_ms: 024", "expected a whole number, 1 to 50 ms, got 24.0"),
+        ("tick_ms: 20", "tick_ms:", "expected a whole number, 1 to 50 ms, got nothing"),
+        (
+            "timeout_ms: 100",
+            "timeout_ms: 1:40",
+            "expected a whole number, 10 to 1000 ms, got '1:40'",
+        ),
+        ("rise_per_s: 5", "rise_per_s: .nan", "expected 0.2 to 100 full speeds per s, got nan"),
+        ("rise_per_s: 5", "rise_per_s: .inf", "expected 0.2 to 100 full speeds per s, got inf"),
+        ("rise_per_s: 5", "rise_per_s: -1e999", "expected 0.2 to 100 full speeds per s, got -inf"),
+        ("rise_per_s: 5", "rise_per_s: [5]", "expected 0.2 to 100 full speeds per s, got [5]"),
+        (
+            "rise_per_s: 5",
+            "rise_per_s: {a: 5}",
+            "expected 0.2 to 100 full speeds per s, got {'a': 5}",
+        ),
+        (
+            "neutral_pct: 2",
+            "neutral_pct: 20.1",
+            "expected 0.1 to 20 % of full deflection, got 20.1",
+        ),
+        (
+            "period_s: 2.356",
+            "period_s: 0.1",
+            "axes.slew.sway.period_s: expected 0.15 to 12 s, got 0.1",
+        ),
+        ("damping_nms: 120", "damping_nms: -1", "expected 0 to 1e+06 N m s/rad, got -1"),
+        # other types
+        (
+            "channel: vcan0",
+            "channel: 0",
+            "expected text (in quotes where it looks like a number), got 0",
+        ),
+        ("tail_s: 2.0", "allow_reverse: 1", "expected true or false, got 1"),
+        ("tail_s: 2.0", "allow_faster: yes", "expected true or false, got 'yes'"),
+        ("[../dbc/forwarder.dbc]", "a.dbc", "dbc: expected a list, got 'a.dbc'"),
+        ("[../dbc/forwarder.dbc]", "[]", "dbc: expected 1 or more entries, got []"),
+        (
+            "[../dbc/forwarder.dbc]",
+            "[3]",
+            "dbc.0: expected text (in quotes where it looks like a number), got 3",
+        ),
+        (
+            "{ interface: socketcan, channel: vcan0, bitrate: 250000 }",
+            "vcan0",
+            "buses.crane: expected a section with the keys interface, channel, bitrate, fd,"
+            " data_bitrate, options, match, network, j1939, canopen, got 'vcan0'",
+        ),
+        (
+            "{ kind: off }",
+            "off",
+            "expected a section of the kind 'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd',"
+            " 'ei', 'two_mode', 'robust', got 'off'",
+        ),
+        # filters
+        (
+            "kind: off",
+            "kind: on",
+            "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
+            " 'zvd', 'ei', 'two_mode', 'robust', got 'on'",
+        ),
+        (
+            "kind: off",
+            "",
+            "axes.lift.filter.kind: expected one of 'off', 'gff', 'first_order', 's_curve', 'zv',"
+            " 'zvd', 'ei', 'two_mode', 'robust', got nothing",
+        ),
+        (
+            "kind: off",
+            "kind: true",
+            "expected one of 'off', 'gff', 'first_order', 's_curve', 'zv', 'zvd', 'ei',"
+            " 'two_mode', 'robust', got True",
+        ),
+        ("a1: 0.708, a2: 0.12", "", "filter: expected a1 and a2, or poles_rad_s, got neither"),
+        (", a2: 0.12", "", "axes.slew.filter: expected a1 and a2, or poles_rad_s, got a1"),
+        ("a1: 0.708", "a1: null", "axes.slew.filter: expected a1 and a2, or poles_rad_s, got a2"),
+        (
+            "a2: 0.12",
+            "a2: 0.12, poles_rad_s: [-3, -4]",
+            "axes.slew.filter: expected a1 and a2, or poles_rad_s, got a1, a2, poles_rad_s",
+        ),
+        (
+            "a1: 0.708",
+            "a1: 0.6",
+            "a1: expected 0.69282 or more for a2 = 0.12 (real poles, a1^2 >= 4 a2), got 0.6",
+        ),
+        ("a1: 0.708, a2: 0.12", "poles_rad_s: [-3]", "expected 2 or more entries, got [-3]"),
+        (
+            "a1: 0.708, a2: 0.12",
+            "poles_rad_s: [-3, -4, -5]",
+            "expected 2 entries at most, got [-3, -4, -5]",
+        ),
+        (
+            "a1: 0.708, a2: 0.12",
+            "poles_rad_s: [-3, 4]",
+            "axes.slew.filter.poles_rad_s.1: expected -100 to -0.1 rad/s, got 4",
+        ),
+        # sway data
+        ("period_s: 2.356, damping_ratio: 0.038, ", "", f"sway: {SWAY}, got no sway data"),
+        ("damping_ratio: 0.038, ", "", f"axes.slew.sway: {SWAY}, got period_s"),
+        ("mass_kg: 300, ", "", f"axes.near_far.sway: {SWAY}, got damping_nms, length_m"),
+        ("mass_kg: 300", "period_s: 2", f"{SWAY}, got damping_nms, length_m, period_s"),
+        ("mass_kg: 300", "mass_kg: ~", f"axes.near_far.sway: {SWAY}, got damping_nms, length_m"),
+        (
+            "damping_ratio: 0.038",
+            "damping_ratio: 0.038, decay_per_swing: 0.2",
+            f"{SWAY}, got damping_ratio, decay_per_swing, period_s",
+        ),
+        (
+            "damping_nms: 120",
+            "damping_nms: 100000",
+            "axes.near_far.sway: damping ratio: expected 0 to 0.95, got ",
+        ),
+        # what does not go together
+        (
+            "rise_per_s: 5",
+            "min_pct: 30, max_pct: 30",
+            "min_pct: expected less than max_pct, got 30",
+        ),
+        (
+            "    sway: { period",
+            "    # { period",
+            "axes.slew: expected sway data for filter gff, got none",
+        ),
+    ],
+)
+def test_one_fault_is_one_problem_with_its_line(
+    shipped: str, problems: Problems, old: str, new: str, says: str
+) -> None:
+    text, line = changed(shipped, old, new)
+    (problem,) = problems(text)
+    assert says in problem
+    reported = re.match(r"machine\.yaml:(\d+): ", problem)
+    assert reported, problem
+    # a problem of a whole axis stands at its name, that of an added line one below
+    name = shipped.splitlines().index("  slew:") + 1
+    assert int(reported[1]) in (
+        (name,) if "sway data for" in says else (line, line + new.count("\n"))
+    )
