@@ -1,0 +1,166 @@
+"""DBC files as they are: faults of messages that are not used, and how one is read later."""
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+from typer.testing import CliRunner
+
+from canshaper.cli.app import app
+from tests.machine.plain_dbc import OTHER, parts, whole
+from tests.rigs.files import Machine
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    return tmp_path / "one.dbc"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("8|8@1+", "9|8@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "8|8@0+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "15|9@0+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "8|0@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "-1|8@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "8|1.5@1+", 1, "Other: has 2 bytes, and the signal Two is not within them"),
+        ("8|8@1+", "7|8@1+", 1, "Other: has overlapping signals, One and Two"),
+        ("Two : 8|8", "One : 8|8", 1, "Other: has two signals of the name One"),
+        ("8|8@1+", "7|8@0+", 1, "Other: has overlapping signals, One and Two"),
+        ("8|8@1+", "8|999999999@1+", 1, "the signal Two is not within them"),
+        ("BO_ 5", "BO_ 2048", 1, "Other: has the id 0x800 of more than 11 bits; an id of 29"),
+        ("BO_ 5", "BO_ 2684354560", 1, "Other: has the id 0x20000000 of more than 29 bits"),
+        ("BO_ 5", "BO_ 1024", 1, "Other: has the id 0x400 of GrappleSway"),
+        ("Two : 8|8", 'Two : 8|8@1+ (1,0) [0|0] "" A\n SG_ A m1 : 0|1', 1, "One and A"),
+        ("Two : 8|8", 'Two m1 : 8|8@1+ (1,0) [0|0] "" A\n SG_ A : 15|1', 1, "Two and A"),
+        ("Two : 8|8", 'Two m1 : 8|8@1+ (1,0) [0|0] "" A\n SG_ A m1 : 15|1', 1, "Two and A"),
+        (
+            ' "" A\n SG_ T',
+            ' "" A\n\nVAL_ 5 None 1 "on" ;\nBO_ 6 X: 8 A\n SG_ T',
+            4,
+            "VAL_ 5 None is",
+        ),
+        ("BO_ 5", 'VAL_ 77 None 1 "on" ;\nBO_ 5', 1, "VAL_ 77 None is of a signal that"),
+        ("BO_ 5", "SIG_VALTYPE_ 5 None : 1;\nBO_ 5", 1, "SIG_VALTYPE_ 5 None is of a signal"),
+    ],
+)
+def test_a_fault_of_a_message_that_is_not_used_is_a_warning(
+    machine: Machine, old: str, new: str, line: int, says: str
+) -> None:
+    machine.in_yaml("dbc: [", "dbc: [")
+    first = machine.in_dbc("CM_ ", OTHER.replace(old, new, 1) + "\nCM_ ")
+    count, (warning,) = machine.load().messages.warnings()
+    assert count == 1
+    assert str(warning).startswith(f"{machine.directory}/machine.dbc:{first + line - 1}: ")
+    assert says in str(warning)
+
+
+def with_signals(*signals: str) -> Iterator[str]:
+    yield "BO_ 5 Other: 2 A"
+    for name in signals:
+        yield f' SG_ {name}@1+ (1,0) [0|0] "" A'
+
+
+@pytest.mark.parametrize(
+    "signals",
+    [
+        ("M M : 0|8", "A m0 : 8|8", "B m1 : 8|8"),
+        ("A : 8|8", "B m0 : 0|8", "C m1 : 0|8"),
+        ("M M : 0|4", "N m0M : 4|4", "B m1 : 4|8", "C m1 : 8|8"),  # which is of which is not known
+        ("M M : 0|4", "N m0M : 4|4", "O m1M : 4|4", "B m1 : 8|8", "C m1 : 8|8"),
+        (),
+    ],
+)
+def test_signals_that_exclude_each_other_may_overlap(
+    machine: Machine, signals: tuple[str, ...]
+) -> None:
+    machine.in_dbc("CM_ ", "\n".join(with_signals(*signals)) + "\n\nCM_ ")
+    assert machine.load().messages.warnings() == (0, [])
+
+
+def test_a_message_too_long_for_any_protocol_is_not_compared(machine: Machine) -> None:
+    """So that a file takes no more time than others of its size."""
+    same = 'SG_ S : 0|8@1+ (1,0) [0|0] "" A\n'
+    for length, count in ((4095, 1), (4096, 0)):
+        machine.in_dbc("CM_ ", f"BO_ {length - 4000} L{length}: {length} A\n {same} {same}\nCM_ ")
+        assert machine.load().messages.warnings()[0] == 1, count
+
+
+def test_an_id_that_a_used_message_has_is_a_problem(machine: Machine) -> None:
+    line = machine.in_dbc("CM_ ", OTHER.replace("BO_ 5", "BO_ 272") + "\nCM_ ")
+    assert machine.problems() == [f"machine.dbc:{line}: Other: has the id 0x110 of JoystickLeft"]
+
+
+def test_all_warnings_are_counted_and_the_first_kept(machine: Machine) -> None:
+    rows = "".join(f'VAL_ {n} None 1 "on" ;\n' for n in range(2000, 2150))
+    machine.in_dbc("CM_ ", f"{rows}{OTHER.replace('8|8', '9|8')}\nCM_ ")
+    count, warnings = machine.load().messages.warnings()
+    assert (count, len(warnings)) == (151, 100)
+    assert "Other" in str(warnings[0])
+
+
+def test_their_ids_and_names_are_known(machine: Machine) -> None:
+    machine.in_dbc("CM_ ", OTHER + OTHER.replace("BO_ 5 O", "BO_ 2147483653 Wide") + "\nCM_ ")
+    messages = machine.load().messages
+    assert {(5, False), (5, True), (272, False)} <= messages.ids()
+    assert messages.named({(5, False), (5, True), (6, False)}) == ["Other", "Widether"]
+    assert "Other" not in {m.name for m in messages.all()}
+    names = ", ".join(messages.named(messages.ids()))
+    assert (
+        messages.find("None")
+        == f"expected a message of the DBC files, got 'None'; there are {names}"
+    )
+
+
+def test_check_shows_the_first_of_them(machine: Machine) -> None:
+    machine.load()
+    command = ["check", str(machine.directory / "machine.yaml")]
+    assert "not used" not in CliRunner().invoke(app, command).output
+    line = machine.in_dbc("CM_ ", 'VAL_ 2000 None 1 "on" ;\nCM_ ')
+    machine.load()
+    shown = CliRunner().invoke(app, command)
+    assert shown.exit_code == 0
+    path = machine.directory / "machine.dbc"
+    assert "  1 WARNING in messages and tables that are not used:" in shown.output
+    assert f"    {path}:{line}: VAL_ 2000 None is of a signal that there is not\n" in shown.output
+    assert "more" not in shown.output.split("not used:")[1].split("  bus")[0]
+    machine.in_dbc("CM_ ", 'VAL_ 2000 None 1 "on" ;\n' * 10 + "CM_ ")
+    machine.load()
+    shown = CliRunner().invoke(app, command)
+    assert "  11 WARNINGS in messages and tables that are not used:" in shown.output
+    assert shown.output.count("that there is not") == 10
+    assert "    and 1 more\n" in shown.output
+
+
+# -- read when they are asked for -----------------------------------------------------------------
+
+
+def test_another_message_is_read_when_it_is_asked_for(machine: Machine) -> None:
+    messages = machine.load().messages
+    entry = messages.find("TipPosition")
+    assert not isinstance(entry, str)
+    file, message = entry
+    path = machine.directory / "machine.dbc"
+    assert parts(message) == parts(whole(path).get_message_by_name("TipPosition"))
+    assert str(file.problem(message, "x")).endswith(
+        f"machine.dbc:{machine.in_dbc('BO_ 1025', 'BO_ 1025')}: TipPosition: x"
+    )
+    path.unlink()
+    assert messages.find("TipPosition") == entry
+    assert messages.find("GrappleSway") == f"{path}: No such file or directory"
+
+
+def test_another_message_that_cannot_be_used(machine: Machine) -> None:
+    machine.in_dbc("CM_ ", OTHER.replace("8|8", "9|8") + "\nCM_ ")
+    result = machine.load().messages.find("Other")
+    assert isinstance(result, str)
+    assert "The signal Two does not fit in message Other" in result
+
+
+def test_a_file_that_has_changed_is_not_mixed_with_what_was_read(machine: Machine) -> None:
+    messages = machine.load().messages
+    machine.in_dbc("BO_ 1025", "BO_ 1055")
+    path = machine.directory / "machine.dbc"
+    path.write_text(machine.dbc.split("CM_ ")[0], encoding="cp1252")
+    assert messages.find("TipPosition") == f"{path}: has changed since it was read"

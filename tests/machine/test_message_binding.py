@@ -1,0 +1,238 @@
+"""Messages of DBC files that cannot do what a deployment asks of them."""
+
+import pytest
+
+from canshaper.codec.frame import FrameFault
+from canshaper.shaping.states import Reason
+from tests.rigs.files import Machine
+
+SLEW_JOYSTICK = "Slew : 0|16@1- (0.1,0) [-100|100]"
+SLEW_VALVE = "Velocity : 0|8@1- (0.8,0) [-100|100]"
+
+
+@pytest.mark.parametrize(
+    ("changes", "says"),
+    [
+        (
+            [("JoystickLeft: 8", "JoystickLeft: 9")],
+            "joysticks.left.message: JoystickLeft: expected a message of classical CAN, 8 bytes at"
+            " most, got 9 bytes: bus crane has no fd: true",
+        ),
+        (
+            [("SlewCommand: 2", "SlewCommand: 12")],
+            "axes.slew.valve.message: SlewCommand: expected a message of classical CAN, 8 bytes at"
+            " most, got 12 bytes: bus crane has no fd: true",
+        ),
+        (
+            [("Slew : 0|16", "Slew m0 : 0|16"), ("Enable : 32", "Enable M : 32")],
+            "joysticks.left.message: JoystickLeft is multiplexed; without multiplexor"
+            " nothing can be taken from it",
+        ),
+        (
+            [("Velocity : 0|8", "Velocity m0 : 0|8"), ("Counter : 8|8", "Counter M : 8|8")],
+            "axes.slew.valve.message: SlewCommand is multiplexed; without multiplexor"
+            " nothing can be sent in it",
+        ),
+    ],
+)
+def test_messages_of_another_kind(
+    machine: Machine, changes: list[tuple[str, str]], says: str
+) -> None:
+    for old, new in changes:
+        machine.in_dbc(old, new)
+    (problem,) = machine.problems()
+    assert problem.startswith("machine.yaml:")
+    assert problem.endswith(says)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "of", "says"),
+    [
+        # full scale
+        (
+            SLEW_JOYSTICK,
+            "Slew : 0|16@1- (0.1,0) [0|0]",
+            "JoystickLeft",
+            "Slew has no range in the DBC",
+        ),
+        (
+            SLEW_JOYSTICK,
+            "Slew : 0|16@1- (0.1,0) [-100|102]",
+            "JoystickLeft",
+            "Slew: expected a symmetrical range, got [-100|102]",
+        ),
+        (
+            SLEW_JOYSTICK,
+            "Slew : 0|16@1+ (0.1,0) [-100|100]",
+            "JoystickLeft",
+            "Slew cannot reach its",
+        ),
+        (
+            SLEW_JOYSTICK,
+            "Slew : 0|16@1- (0,0) [-100|100]",
+            "JoystickLeft",
+            "Slew: expected a scale other than 0, got 0",
+        ),
+        (SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [0|0]", "SlewCommand", "Velocity has no range"),
+        (
+            SLEW_VALVE,
+            "Velocity : 0|8@1- (0.8,0) [0|100]",
+            "SlewCommand",
+            "a symmetrical range, got [0|100]",
+        ),
+        (
+            SLEW_VALVE,
+            "Velocity : 0|8@1- (0.4,0) [-100|100]",
+            "SlewCommand",
+            "Velocity cannot reach its range [-100|100] with 8 bits at 0.4 per bit",
+        ),
+        (SLEW_VALVE, "Velocity : 0|8@1- (11,0) [-100|100]", "SlewCommand", "fewer than 10 steps"),
+        (
+            SLEW_VALVE,
+            "Velocity : 0|8@1+ (0.8,-102.3) [-100|100]",
+            "SlewCommand",
+            "Velocity has no raw value for zero",
+        ),
+        # cycle times
+        ("BO_ 272 20;", "BO_ 272 0;", "JoystickLeft", "has no GenMsgCycleTime"),
+        (
+            "BO_ 512 20;",
+            "BO_ 512 0;",
+            "SlewCommand",
+            "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got none",
+        ),
+        (
+            "BO_ 512 20;",
+            "BO_ 512 50;",
+            "SlewCommand",
+            "GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got 50 ms",
+        ),
+        (
+            "BO_ 512 20;",
+            "BO_ 512 220;",
+            "SlewCommand",
+            "GenMsgCycleTime: expected up to 200 ms for a valve, got 220 ms",
+        ),
+        ("BO_ 784 500;", "BO_ 784 0;", "ShaperStatus", "a multiple of tick_ms, 20 ms, got none"),
+        ("BO_ 768 100;", "BO_ 768 110;", "SlewStatus", "a multiple of tick_ms, 20 ms, got 110 ms"),
+        # status
+        ("State : 0|4@1+", "State : 0|2@1+", "SlewStatus", "State cannot carry 5 with 2 bits"),
+        (
+            "Reason : 8|8",
+            "Reason : 8|6",
+            "SlewStatus",
+            f"cannot carry {max(Reason)} with",
+        ),
+        (
+            "LastFault : 0|8",
+            "LastFault : 0|2",
+            "ShaperStatus",
+            f"cannot carry {max(FrameFault)}",
+        ),
+        (
+            "PredictedSway : 48|16@1- (0.01,0)",
+            "PredictedSway : 48|16@1- (0,0)",
+            "SlewStatus",
+            "PredictedSway: expected an integer signal with a scale, got a scale of 0",
+        ),
+        (" SG_ SendFailures :", " SG_ Sends :", "ShaperStatus", "lacks the signals SendFailures"),
+    ],
+)
+def test_what_a_message_of_the_dbc_cannot_do(
+    machine: Machine, old: str, new: str, of: str, says: str
+) -> None:
+    machine.in_dbc(old, new)
+    start = next(
+        i for i, row in enumerate(machine.dbc.splitlines(), 1) if row[:3] == "BO_" and of in row
+    )
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.dbc:{start}: {of}: ")
+    assert says in problem
+
+
+def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machine) -> None:
+    # 88.9 / 0.7 is a little more than 127 in floating point
+    machine.in_dbc(SLEW_VALVE, "Velocity : 0|8@1- (0.7,0) [-88.9|88.9]")
+    assert machine.load().axes["slew"].valve.steps == 127
+
+
+@pytest.mark.parametrize(
+    ("changes", "type_of", "says"),
+    [
+        (
+            [("SlewCommand: 2", "SlewCommand: 8"), ("0|8@1- (0.8", "32|32@1- (0.8")],
+            "512 Velocity",
+            "axes.slew.valve.signal: Velocity: expected an integer signal, got a float",
+        ),
+        (
+            [("SlewCommand: 2", "SlewCommand: 8"), ("Counter : 8|8@1+", "Counter : 8|32@1-")],
+            "512 AliveCounter",
+            "axes.slew.valve.alive_counter: AliveCounter: expected an unsigned integer signal, got"
+            " a float",
+        ),
+        (
+            [
+                ("Sway : 48|16@1-", "Sway : 32|32@1-"),
+                ("RawCommand : 16|16", "RawCommand : 16|8"),
+                ("ShapedCommand : 32|16", "Shaped : 24|8"),
+            ],
+            "768 PredictedSway",
+            "PredictedSway: expected an integer signal with a scale, got a float",
+        ),
+        (
+            [
+                ("NearFar : 16|16", "NearFar : 16|2"),
+                ("Slew : 0|16", "Slew : 18|14"),
+                ("Enable : 32|2", "Enable : 0|2"),
+                ("AntiSwayOff : 34", "AntiSwayOff : 2"),
+                ("Reset : 36", "Reset : 4"),
+                ("Counter : 56|8@1+", "Counter : 32|32@1-"),
+            ],
+            "272 AliveCounter",
+            "joysticks.left.alive_counter: AliveCounter: expected an unsigned integer signal, got"
+            " a float",
+        ),
+    ],
+)
+def test_floats_where_whole_numbers_are_needed(
+    machine: Machine, changes: list[tuple[str, str]], type_of: str, says: str
+) -> None:
+    for old, new in changes:
+        at = machine.dbc.index(f"BO_ {type_of.split(maxsplit=1)[0]} ")
+        machine.dbc = machine.dbc[:at] + machine.dbc[at:].replace(old, new, 1)
+    machine.dbc += f"SIG_VALTYPE_ {type_of} : 1;\n"
+    assert any(says in p for p in machine.problems())
+
+
+def test_a_counter_with_a_sign_cannot_count(machine: Machine) -> None:
+    at = machine.dbc.index("BO_ 512 ")
+    machine.dbc = machine.dbc[:at] + machine.dbc[at:].replace("er : 8|8@1+", "er : 8|8@1-", 1)
+    (problem,) = machine.problems()
+    assert problem.endswith(
+        "axes.slew.valve.alive_counter: AliveCounter: expected an unsigned integer signal, got a"
+        " signed one"
+    )
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message", "says"),
+    [
+        (
+            "Slew : 0|16",
+            "Slew : -1|16",
+            "JoystickLeft",
+            "Slew: expected a start bit of 0 or more, got -1",
+        ),
+        (
+            '"GenMsgCycleTime" INT',  # a type that there is not: everything is text
+            '"GenMsgCycleTime" nanINT',
+            "JoystickLeft",
+            "GenMsgCycleTime: expected a whole number of ms, got '20'",
+        ),
+    ],
+)
+def test_numbers_that_are_none_are_reported(
+    machine: Machine, old: str, new: str, message: str, says: str
+) -> None:
+    machine.in_dbc(old, new)
+    assert any(f"{message}: {says}" in problem for problem in machine.problems())
