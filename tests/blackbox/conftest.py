@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ from pathlib import Path
 
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 
 SECOND = 50  # ticks
 TRIP = 3 * SECOND

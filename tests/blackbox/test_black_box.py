@@ -23,7 +23,7 @@ from canshaper.daemon.daemon import Daemon
 from canshaper.errors import StateError
 from canshaper.machine.binding import load_deployment
 from tests.blackbox.driven import SECOND, TRIP, drive
-from tests.daemon.test_reload import Bench, FakePort
+from tests.daemon.bench import Bench, FakePort
 from tests.rigs.forwarder import ROOT
 
 

@@ -11,7 +11,7 @@ from canshaper.blackbox.ring import BLOCK, Ring
 from canshaper.controller.controller import Controller
 from canshaper.controller.guarded import Guarded
 from canshaper.machine.binding import load_deployment
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 
 
 def filled(ring_: Ring, count: int, first: int = 0) -> None:

@@ -1,12 +1,16 @@
 """A daemon on ports without a bus, and its log."""
 
 import logging
-from collections.abc import Callable
+import signal
+from collections.abc import Callable, Iterator
 from pathlib import Path
+from types import FrameType
 
 import pytest
 
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
+from tests.daemon.diary import Diary
+from tests.daemon.pipes import ANSWER_S, Pipe
 
 
 @pytest.fixture
@@ -18,3 +22,29 @@ def bench(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Bench:
 def log(caplog: pytest.LogCaptureFixture) -> Callable[[], list[str]]:
     caplog.set_level(logging.INFO, "canshaper")
     return lambda: [f"{r.levelname} {r.getMessage()}" for r in caplog.records]
+
+
+@pytest.fixture
+def diary(bench: Bench, monkeypatch: pytest.MonkeyPatch) -> Diary:
+    return Diary(bench, monkeypatch)
+
+
+@pytest.fixture
+def never_wait() -> Iterator[None]:
+    """A handler that blocks, or never comes to an end, is interrupted and fails the test."""
+
+    def hung(_number: int, _frame: FrameType | None) -> None:
+        pytest.fail("the handler did not return")  # no OSError: those it catches
+
+    before = signal.signal(signal.SIGALRM, hung)
+    signal.alarm(ANSWER_S)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+@pytest.fixture
+def pipe() -> Iterator[Pipe]:
+    opened = Pipe()
+    yield opened
+    opened.close()

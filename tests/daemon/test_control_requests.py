@@ -11,8 +11,8 @@ from canshaper.blackbox.keeper import BlackBox
 from canshaper.blackbox.recorder import Recorder
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
+from tests.daemon.bench import Bench
 from tests.daemon.test_daemon_control import answered, control
-from tests.daemon.test_reload import Bench
 
 
 @pytest.fixture

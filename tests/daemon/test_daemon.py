@@ -1,144 +1,16 @@
-"""The daemon around its loop: buses that fail, the last frames, reads of its file, its end."""
+"""The daemon around its loop: reads of its file, its digest, its end."""
 
 import signal
 from collections.abc import Callable
-from dataclasses import replace
-from typing import Any
 
 import pytest
 
-from canshaper.codec.frame import BusState, Frame, FrameFault
+from canshaper.codec.frame import Frame
 from canshaper.daemon import daemon as module
 from canshaper.daemon import reloads
-from canshaper.daemon.daemon import Daemon
-from canshaper.errors import BusError, WrongBusError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.daemon.test_reload import BUS, Bench, FakePort, Read
-
-
-def at(bench: Bench, acts: dict[int, Callable[[], Any]], last: int = 20) -> None:
-    """Run, and do something before these ticks."""
-
-    def script(number: int) -> None:
-        bench.joysticks()
-        if number in acts:
-            acts[number]()
-        if number == last:
-            bench.stop()
-
-    bench.run(script)
-
-
-def test_the_state_of_a_bus_is_logged_when_it_changes(
-    bench: Bench, log: Callable[[], list[str]]
-) -> None:
-    def becomes(state: BusState) -> Callable[[], None]:
-        return lambda: setattr(bench.ports[0], "state", state)
-
-    at(bench, {5: becomes(BusState.DOWN), 10: becomes(BusState.UP)})
-    assert [line for line in log() if "bus=" in line] == [
-        "WARNING bus=crane state=down",
-        "INFO bus=crane state=up",
-    ]
-
-
-# No one receives us there, or we no one; and where a bus only has trouble.
-OFF = [
-    BusState.BUS_OFF,
-    BusState.NOT_CONFIRMED,
-    BusState.DOWN,
-    BusState.GONE,
-    BusState.WRONG_DEVICE,
-]
-ON = [BusState.UP, BusState.PASSIVE, BusState.FAILED]
-
-
-def test_we_are_on_a_bus_or_not_whatever_its_state() -> None:
-    """A state that is new has to be put to one of them."""
-    assert {*OFF, *ON} == {*BusState}
-
-
-@pytest.mark.parametrize("state", OFF)
-def test_of_a_bus_that_we_are_not_on_the_controller_knows(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
-) -> None:
-    off: list[str] = []
-    monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
-    at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
-    assert set(off) == {"crane"}
-
-
-@pytest.mark.parametrize("state", ON)
-def test_a_bus_that_only_has_trouble_is_one_that_we_are_on(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, state: BusState
-) -> None:
-    off: list[str] = []
-    monkeypatch.setattr(module.Controller, "on_bus_off", lambda _, bus: off.append(bus))
-    at(bench, {5: lambda: setattr(bench.ports[0], "state", state)}, last=6)
-    assert off == []
-
-
-def test_a_fault_of_a_bus_is_counted(bench: Bench, log: Callable[[], list[str]]) -> None:
-    faults: list[Callable[[FrameFault], None]] = []
-    opened = bench._open
-
-    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
-        faults.append(fault)
-        return opened(name, bus, fault, ids)
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("canshaper.daemon.ports.open_port", opens)
-        at(bench, {5: lambda: faults[0](FrameFault.ERROR_FRAME)})
-    assert any("fault=ERROR_FRAME" in line and "'ErrorFrames': 1" in line for line in log())
-
-
-def test_who_only_listens_says_so(bench: Bench, log: Callable[[], list[str]]) -> None:
-    bench.script = lambda number: bench.stop() if number == 3 else None
-    Daemon(lambda: replace(load_deployment(bench.file), listen_only=True)).run()
-    lines = log()
-    assert "WARNING listen-only=yes valves=none: nothing is sent but status" in lines
-    assert lines[-1] == "INFO stopped valves=not-sent"
-    assert not any(frame.can_id in range(0x200, 0x203) for frame in bench.sent)
-
-
-# -- the last frames -------------------------------------------------------------------------------
-
-
-def test_neutral_that_is_not_sent_is_tried_again_and_then_reported(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
-) -> None:
-    tries: list[Frame] = []
-
-    def full(_port: FakePort, frame: Frame) -> bool:
-        tries.append(frame)
-        return frame.can_id != 0x201
-
-    at(bench, {20: lambda: monkeypatch.setattr(FakePort, "send", full)})
-    assert [line for line in log() if "not-sent" in line] == [
-        "ERROR neutral=not-sent bus=crane id=0x201"
-    ]
-    last = [frame.can_id for frame in tries[-10:]]
-    assert last == [0x201] * 10  # the others only once
-    assert log()[-1] == "INFO stopped valves=neutral"
-
-
-def test_neutral_is_sent_as_soon_as_the_queue_has_room(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[], list[str]]
-) -> None:
-    full_until_ns: list[int] = []
-    send = FakePort.send
-
-    def full(port: FakePort, frame: Frame) -> bool:
-        full_until_ns[:] = full_until_ns or [bench.now_ns + 50_000_000]
-        return bench.now_ns >= full_until_ns[0] and send(port, frame)
-
-    at(bench, {20: lambda: monkeypatch.setattr(FakePort, "send", full)})
-    assert not [line for line in log() if "not-sent" in line]
-    assert [f.can_id for f in bench.sent[-3:]] == [0x200, 0x201, 0x202]
-
-
-# -- reading the file again ------------------------------------------------------------------------
+from tests.daemon.bench import Bench, FakePort, Read, at
 
 
 class Slow(Read):
@@ -241,29 +113,6 @@ def test_the_digest_is_not_sent_from_an_address_that_is_not_ours(
     monkeypatch.setattr(module.Controller, "silent_buses", silent)
     at(bench, {}, last=60)
     assert not [frame for frame in bench.sent if frame[:3] == status.sender.key]
-
-
-# -- a bus that is another device ------------------------------------------------------------------
-
-
-def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
-    bench: Bench, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    bench.text = bench.text.replace(
-        BUS, "crane:\n    interface: socketcan\n    channel: vcan0\n    match: { serial: '1' }"
-    )
-    bench.file.write_text(bench.text, encoding="utf-8")
-
-    def wrong(*_: object) -> None:
-        raise WrongBusError("crane", "expected serial number 1, found 2")
-
-    monkeypatch.setattr("canshaper.daemon.ports.open_port", wrong)
-    with pytest.raises(BusError) as error:
-        Daemon(lambda: load_deployment(bench.file))
-    lines = bench.text.splitlines()
-    number = 1 + next(i for i, line in enumerate(lines) if "match:" in line)
-    assert str(error.value).startswith(f"{bench.file}:{number}: buses.crane.match:")
-    assert str(error.value).endswith("expected serial number 1, found 2")
 
 
 class Left(Exception):

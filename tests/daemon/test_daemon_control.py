@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from tests.daemon.test_daemon import at
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench, at
 
 RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
 

@@ -11,8 +11,7 @@ from canshaper.daemon.io_cycle import FramePort, FrameProcessor, receive_waiting
 from canshaper.daemon.standstill import Standstill
 from canshaper.errors import BusError
 from canshaper.machine.deployment import Deployment
-from tests.daemon.test_daemon import at
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench, at
 from tests.rigs.forwarder import ROOT
 
 

@@ -16,7 +16,7 @@ from canshaper.daemon.follow import AFTER_NS, CLUSTER_NS, TickFollower
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 from tests.rigs.forwarder import ROOT
 
 MS = 1_000_000

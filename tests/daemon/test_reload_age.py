@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.daemon import daemon as module
 from canshaper.daemon import ports as service_ports
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 
 READY = ("READY", "JOYSTICK_NEUTRAL")
 

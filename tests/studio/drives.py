@@ -10,7 +10,7 @@ from canshaper.codec.frame import Frame
 from canshaper.design.lockstep import Simulation
 from canshaper_sim.operator import script_named
 from tests.blackbox.driven import SECOND, TRIP, drive
-from tests.daemon.test_reload import Bench
+from tests.daemon.bench import Bench
 
 START_S = 1_700_000_000.0
 

@@ -1,0 +1,165 @@
+"""What a daemon says of a reload, and what becomes of its ports."""
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from canshaper.bus.port import ListeningPort
+from canshaper.codec.frame import FrameFault
+from canshaper.daemon.daemon import Daemon
+from canshaper.daemon.ports import open_ports
+from canshaper.errors import BusError
+from canshaper.machine.binding import load_deployment
+from tests.daemon.bench import BUS, SECOND, Bench, FakePort
+from tests.daemon.diary import SECOND_TICKS, VALVES, Diary
+from tests.rigs.forwarder import TICK_NS
+
+
+@pytest.fixture
+def log(caplog: pytest.LogCaptureFixture) -> Callable[[str], list[str]]:
+    caplog.set_level(logging.INFO, "canshaper")
+    return lambda what: [
+        f"{r.levelname} {r.getMessage()}" for r in caplog.records if what in r.getMessage()
+    ]
+
+
+def test_a_reload_is_put_to_work_behind_neutral_and_at_once(
+    bench: Bench, diary: Diary, log: Callable[[str], list[str]]
+) -> None:
+    """The manager knows while it lasts; the next tick does not wait for a bus that is not new."""
+    diary.run(80, {9: bench.reload})
+    (tick,) = {tick for tick, line in diary.lines if line == "reloading"}
+    during = [line for at, line in diary.lines if at == tick]
+    done = ["black box begins", "ready: reload applied", "freeze"]
+    assert during == [*VALVES, "reloading", *VALVES, *done]
+    assert diary.starts[tick + 1] == diary.starts[tick]
+    assert log("reload=") == [f"INFO reload=applied file={bench.file}"]
+    assert [at for at, _ in diary.statuses()] == [0, tick + 1 + SECOND_TICKS]
+
+
+def test_a_reload_that_is_refused_changes_nothing_and_people_can_read_why(
+    bench: Bench, diary: Diary
+) -> None:
+    """For a second, before the line says again how things are; deadlines stay as they were."""
+
+    def opening(channel: str) -> None:
+        if channel == "vcan1":
+            raise BusError("bus two: cannot open: no such adapter")
+
+    bench.opening = opening
+    diary.run(80, {9: lambda: bench.reload(BUS, SECOND)})
+    (tick,) = {tick for tick, line in diary.lines if line == "reloading"}
+    during = [line for at, line in diary.lines if at == tick]
+    why = "reload refused: bus two: cannot open: no such adapter"
+    assert during == [*VALVES, "reloading", "ready: as before", f"status: {why}"]
+    assert [at for at, _ in diary.statuses()] == [0, tick, tick + SECOND_TICKS]
+    assert diary.starts == [n * TICK_NS for n in range(81)]
+
+
+def test_a_reload_in_motion_is_logged_as_waiting_while_it_waits(
+    bench: Bench, log: Callable[[str], list[str]]
+) -> None:
+    seen: list[list[str]] = []
+
+    def script(number: int) -> None:
+        bench.joysticks(Slew=1000 if 5 <= number < 20 else 0)
+        if number == 10:
+            bench.reload()
+        if number == 15:
+            seen.append(log("reload="))
+        if number == 200:
+            bench.stop()
+
+    bench.run(script)
+    assert seen == [["INFO reload=waiting until every axis is neutral"]]
+
+
+# -- buses of a reload -----------------------------------------------------------------------------
+
+
+def test_a_port_that_stays_open_gets_what_it_is_for_now(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    watched: list[Any] = []
+    monkeypatch.setattr(FakePort, "watch", lambda _, name, ids: watched.append((name, ids)))
+
+    def script(number: int) -> None:
+        bench.joysticks()
+        if number == 9:
+            bench.reload("timeout_ms: 100 #", "timeout_ms: 120 #")
+        if number == 40:
+            bench.stop()
+
+    bench.run(script)
+    ((name, ids),) = watched
+    routes = load_deployment(bench.file).routing.buses["crane"]
+    assert (name, ids.sent, ids.claims) == ("crane", routes.sent, routes.claims)
+
+
+@pytest.mark.parametrize("at_start", [True, False])
+def test_of_buses_that_do_not_all_open_none_stays_open_that_was_not(
+    bench: Bench, at_start: bool
+) -> None:
+    three = f"{SECOND}\n  three: {{ interface: socketcan, channel: vcan2 }}"
+
+    def opening(channel: str) -> None:
+        if channel == "vcan2":
+            raise BusError("bus three: cannot open")
+
+    def script(number: int) -> None:
+        if number == 9:
+            bench.reload(BUS, three)
+        if number == 30:
+            closed.extend((port.channel, port.closed) for port in bench.ports)
+            bench.stop()
+
+    bench.opening = opening
+    closed: list[tuple[str, bool]] = []
+    if at_start:
+        bench.file.write_text(bench.text.replace(BUS, three, 1), encoding="utf-8")
+        with pytest.raises(BusError, match="bus three"):
+            Daemon(lambda: load_deployment(bench.file))
+        assert [port.closed for port in bench.ports] == [True, True]
+    else:
+        bench.run(script)
+        assert closed == [("vcan0", False), ("vcan1", True)]
+
+
+def test_a_fault_of_a_bus_that_a_reload_opened_is_counted(
+    bench: Bench, monkeypatch: pytest.MonkeyPatch, log: Callable[[str], list[str]]
+) -> None:
+    faults: list[Callable[[FrameFault], None]] = []
+    opened = bench._open
+
+    def opens(name: str, bus: Any, fault: Callable[[FrameFault], None], ids: Any) -> Any:
+        assert ids.sent == load_deployment(bench.file).routing.buses[name].sent
+        faults.append(fault)
+        return opened(name, bus, fault, ids)
+
+    monkeypatch.setattr("canshaper.daemon.ports.open_port", opens)
+
+    def script(number: int) -> None:
+        if number == 9:
+            bench.reload(BUS, SECOND)
+        if number == 30:
+            faults[1](FrameFault.ERROR_FRAME)
+        if number == 40:
+            bench.stop()
+
+    bench.run(script)
+    assert log("fault=ERROR_FRAME")
+
+
+def test_who_takes_part_has_the_port_itself_and_who_listens_one_around_it(bench: Bench) -> None:
+    """No step more on the way of a frame than there has to be."""
+    deployment = load_deployment(bench.file)
+    (port,) = open_ports(deployment, {}, lambda _fault: None).values()
+    assert port is bench.ports[0]
+    listening = replace(deployment, listen_only=True)
+    (port,) = open_ports(listening, {}, lambda _fault: None).values()
+    assert isinstance(port, ListeningPort)
+    opened = {listening.config.buses["crane"]: port}
+    assert open_ports(listening, opened, lambda _fault: None) == {"crane": port}
