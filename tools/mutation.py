@@ -33,10 +33,10 @@ TESTS = {
 }
 CORE = [f"canshaper.shaping.{name}" for name in ("axis", "limits", "state_machine", "transfer")]
 CORE_TESTS = [
-    "test_added.py",
+    "test_added*.py",
     "test_axis*.py",
     "test_limits.py",
-    "test_motion.py",
+    "test_motion*.py",
     "test_other_plane.py",
     "test_sensed.py",
     "test_sets.py",

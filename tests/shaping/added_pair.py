@@ -1,0 +1,26 @@
+"""An axis that may be added to, and one to compare."""
+
+from collections.abc import Callable
+
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.kind import Shaper
+from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.states import CommandInput
+
+TICK_S = 0.05
+# So fine that rounding does not hide what is added.
+STEPS = 1_000_000
+SLACK = 1e-4
+LARGEST, TIME_S = 0.25, 1.5
+
+
+def pair(limits: OutputLimits, shaper: Callable[[], Shaper] = Off) -> tuple[Axis, Axis]:
+    """An axis that may be added to, and one to which nothing is added."""
+    one, plain = (
+        Axis(TICK_S, limits, sway=None, shaper=shaper(), grid_steps=STEPS) for _ in range(2)
+    )
+    one.allow_added(LARGEST, TIME_S)
+    one.tick(CommandInput())
+    plain.tick(CommandInput())
+    return one, plain

@@ -1,0 +1,17 @@
+"""The sway and the sensor of the tests of the observer."""
+
+from canshaper.shaping.sway import SwayMode
+from canshaper.shaping.sway_sensor import Measured, SensorTiming
+
+TICK_S = 0.02
+MODE = SwayMode(2.86, 0.05)
+
+
+def timing(
+    measured: Measured, *, delay_s: float = 0.0, lag_s: float = 0.0, quickness: float = 1.0
+) -> SensorTiming:
+    return SensorTiming(measured, TICK_S, delay_s, lag_s, lost_s=0.1, quickness=quickness)
+
+
+def pulses(tick: int) -> float:
+    return (0.0, 1.0, -0.4, 0.7)[tick // 40 % 4]
