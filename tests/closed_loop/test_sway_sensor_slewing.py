@@ -1,0 +1,111 @@
+"""A sway sensor damps what slewing makes the grapple swing along the boom."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from canshaper.design.lockstep import drive as lock_step
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.recording import Recording
+from canshaper_sim.strokes import Script, Stroke
+
+FILE = Path(__file__).resolve().parents[2] / "config" / "forwarder-sensor.yaml"
+
+
+def watching(tmp_path: Path) -> Deployment:
+    """The shipped deployment whose sensors are only watched."""
+    text = FILE.read_text(encoding="utf-8").replace("../dbc", str(FILE.parents[1] / "dbc"))
+    path = tmp_path / "machine.yaml"
+    path.write_text(text.replace("use: damp", "use: watch"), encoding="utf-8")
+    return load_deployment(path)
+
+
+def drive_both(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> Recording:
+    """A drive of 13 s with a grapple that is so much longer."""
+    crane = CraneParameters()
+    crane = replace(crane, grapple=crane.grapple.longer(length_pct))
+    return lock_step(deployment, Script("both", strokes, 13.0), parameters=crane)
+
+
+def tilt_deg(deployment: Deployment, strokes: tuple[Stroke, ...], length_pct: float) -> float:
+    """Largest tilt of the grapple in the last three seconds."""
+    recording = drive_both(deployment, strokes, length_pct)
+    assert recording.crane is not None
+    return max(recording.crane.sway_deg[-150:])
+
+
+def test_a_slew_is_damped_in_its_plane(tmp_path: Path) -> None:
+    reversal = (Stroke("slew", 0.5, 1.5, 1.0, 0.1), Stroke("slew", 2.0, 1.5, -1.0, 0.1))
+    damped, watched = load_deployment(FILE), watching(tmp_path)
+    for length_pct in (-15.0, 15.0):
+        planes = [
+            drive_both(one, reversal, length_pct).axes["slew"].sway_deg or []
+            for one in (damped, watched)
+        ]
+        left = [max(map(abs, plane[300:])) for plane in planes]
+        print(f"{length_pct:+.0f} %: {left[0]:.2f} degrees, only watched {left[1]:.2f}")
+        assert left[0] < 0.8
+        assert left[1] > 4.0
+
+
+# Near-far proves its sensor; 3.7 s later slew, and for a reversal it turns at 8 s.
+PROVED = (Stroke("near_far", 0.3, 0.8, 0.5), Stroke("near_far", 1.3, 0.8, -0.5))
+SLEWS = {
+    "stroke": (Stroke("slew", 6.5, 2.5, 1.0),),
+    "reversal": (Stroke("slew", 6.5, 1.5, 1.0, 0.1), Stroke("slew", 8.0, 1.5, -1.0, 0.1)),
+}
+
+
+def along_boom_deg(
+    deployment: Deployment, slew: tuple[Stroke, ...], length_pct: float, seed: int = 1
+) -> float:
+    """What slewing leaves along the boom, where no one touches the joystick."""
+    crane = CraneParameters()
+    grapple = crane.grapple.longer(length_pct)
+    sensor = replace(crane.sway_sensor, seed=seed)
+    crane = replace(crane, grapple=grapple, sway_sensor=sensor)
+    recording = lock_step(deployment, Script("slew", (*PROVED, *slew), 15.0), parameters=crane)
+    return max(map(abs, (recording.axes["near_far"].sway_deg or [])[600:]))
+
+
+@pytest.mark.parametrize("slew", SLEWS)
+def test_what_slewing_swings_along_the_boom_is_damped(slew: str, tmp_path: Path) -> None:
+    damped, watched = load_deployment(FILE), watching(tmp_path)
+    left = [along_boom_deg(one, SLEWS[slew], 15.0) for one in (damped, watched)]
+    print(f"{left[0]:.2f} degrees, only watched {left[1]:.2f}")
+    assert left[0] < 0.6
+    assert left[1] > 1.5
+
+
+@pytest.mark.study
+@pytest.mark.long
+def test_twelve_seeds_of_slewing(tmp_path: Path) -> None:
+    damped, watched, worst = load_deployment(FILE), watching(tmp_path), {}
+    for length_pct in (0.0, -15.0, 15.0, -30.0, 30.0):
+        worst[length_pct] = max(
+            along_boom_deg(damped, slew, length_pct, seed)
+            for slew in SLEWS.values()
+            for seed in range(1, 13)
+        )
+        left = max(along_boom_deg(watched, slew, length_pct) for slew in SLEWS.values())
+        print(f"{length_pct:+.0f} %: {worst[length_pct]:.2f} degrees, only watched {left:.2f}")
+    assert worst[0.0] < 0.6
+    assert max(worst[-15.0], worst[15.0]) < 0.8
+    assert max(worst.values()) < 1.2
+
+
+@pytest.mark.parametrize("late_s", [-1.2, 0.0, 0.6])
+def test_both_joysticks_at_once_are_better_with_a_wrong_length_and_as_good_with_the_right_one(
+    tmp_path: Path, late_s: float
+) -> None:
+    """What the two-axis motion adds is no swing to damp."""
+    slew = Stroke("slew", 0.5 - min(0.0, late_s), 3.0, 1.0)
+    strokes = (slew, Stroke("near_far", 0.5 + max(0.0, late_s), 3.0, 1.0))
+    damped, watched = load_deployment(FILE), watching(tmp_path)
+    left = [tilt_deg(one, strokes, pct) for pct in (0.0, 15.0) for one in (damped, watched)]
+    print(", ".join(f"{one:.2f}" for one in left))
+    assert left[0] < left[1] + 0.15
+    assert left[2] < 0.6 * left[3]

@@ -1,0 +1,13 @@
+"""Manoeuvres and outcomes of a comparison."""
+
+from pathlib import Path
+
+from canshaper.design.comparison.manoeuvres import Manoeuvre, manoeuvres
+
+CONFIG = Path(__file__).parents[3] / "config"
+FILE = CONFIG / "forwarder-robust.yaml"
+ROBUST = "robust 1.8 s ±15 %"
+
+
+def task(name: str) -> Manoeuvre:
+    return next(t for t in manoeuvres() if t.name == name)
