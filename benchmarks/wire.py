@@ -130,7 +130,7 @@ class Wire:
 
 
 def stamped_port(channel: str, can_id: int) -> socket.socket:
-    """A socket that hears one message, with the kernel's stamps."""
+    """A socket that receives one message, with the kernel's stamps."""
     port = socket.socket(socket.AF_CAN, socket.SOCK_RAW, socket.CAN_RAW)
     filters = struct.pack("=II", can_id, 0xC00007FF)
     port.setsockopt(socket.SOL_CAN_RAW, socket.CAN_RAW_FILTER, filters)

@@ -55,7 +55,7 @@ def choose_transport(request: str, deployment: Deployment) -> Transport:
     """
     if len(deployment.config.buses) > 1 or cranes(deployment):
         raise DriveError("this deployment has several buses or cranes; drive it with --lockstep")
-    # A group of this process alone: two demos on one machine must not hear each other.
+    # A group of this process alone: two demos on one machine must not receive from each other.
     group = f"239.{1 + os.getpid() // 65536 % 250}.{os.getpid() // 256 % 256}.{os.getpid() % 256}"
     multicast = Transport("udp_multicast", group, "udp_multicast (python-can)")
     channel = "vcan0" if request == "auto" else request

@@ -100,7 +100,7 @@ class Crane:
             "sim": Child([*CANSHAPER, *sim], directory / f"{name}-sim.log"),
             "run": Child([*program, *run], directory / f"{name}-run.log"),
         }
-        # What the daemon tells its service manager once a second.
+        # What the daemon reports to its service manager once a second.
         self._status = socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM | socket.SOCK_NONBLOCK)
         self._status_path = directory / f"{name}-notify.sock"
         self._status.bind(str(self._status_path))

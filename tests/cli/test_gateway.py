@@ -1,4 +1,4 @@
-"""The verb of the gateway without SocketCAN, and what the check tells about a gateway."""
+"""The verb of the gateway without SocketCAN, and what the check reports about a gateway."""
 
 from pathlib import Path
 from typing import Any

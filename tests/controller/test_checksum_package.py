@@ -169,7 +169,7 @@ def broken(installed: Installed) -> None:
     installed.package()
 
 
-def name_taken(installed: Installed) -> None:
+def two_packages(installed: Installed) -> None:
     installed.package()
     installed.package("other-can")
 
@@ -183,7 +183,7 @@ def ours(installed: Installed) -> None:
     [
         (broken, "crc16_id", "'crc16_id' of the package acme-can 1.5 cannot be loaded:"
          " RuntimeError: no licence for this PC"),
-        (name_taken, "crc16_id", "expected one package with the checksum 'crc16_id', got acme-can"
+        (two_packages, "crc16_id", "expected one package with the checksum 'crc16_id', got acme-can"
          " 1.5 and other-can 1.5"),
         (ours, "crc8_sae_j1850", "expected one package with the checksum 'crc8_sae_j1850', got"
          " canshaper and acme-can 1.5"),
@@ -200,5 +200,5 @@ def test_a_package_that_is_wrong_is_one_line_of_the_file(
     line = next(i for i, row in enumerate(file.read_text().splitlines(), 1) if "kind:" in row)
     output = installed.canshaper("check", file, code=2)
     assert output == f"{file}:{line}: joysticks.left.checksum.kind: {says}\n1 problem\n"
-    if change in (broken, name_taken):
+    if change in (broken, two_packages):
         assert installed.canshaper("config-schema", "--checksums", code=2) == f"{says}\n"

@@ -27,7 +27,7 @@ FOREIGN = Frame("crane", 0x200, False, b"\0\0")
 
 
 class FakePort:
-    """A port that hears what comes to its channel, other ports of ours included, after a while."""
+    """A port that receives what comes to its channel, of other ports of ours too, after a while."""
 
     state = BusState.UP
 
@@ -156,7 +156,7 @@ class Bench:
         self.put(self.rig.joystick("JoystickLeft", **raw), self.rig.joystick("JoystickRight"))
 
     def reported(self) -> tuple[str, str]:
-        """What the last status of the slew axis tells: state and reason."""
+        """What the last status of the slew axis reports: state and reason."""
         message = self.rig.messages["SlewStatus"]
         frame = next(f for f in reversed(self.sent) if f.can_id == message.frame_id)
         values = message.decode(frame.data)

@@ -1,7 +1,7 @@
 """The recorded drive: an operator on the simulated crane, with what happens on a machine.
 
 The enable switch is released in motion, the joysticks fall silent for longer than their timeout,
-the anti-sway switch is used, a joystick tells an error, and a node sends what no one knows.
+the anti-sway switch is used, a joystick reports an error, and a node sends what no one knows.
 """
 
 from canshaper.codec.frame import Frame

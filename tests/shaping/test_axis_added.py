@@ -192,7 +192,7 @@ class AddedByAnother(RuleBasedStateMachine):
         self.check_rate(before)
 
     def check_model(self, carried: float) -> None:
-        """It hears of what was sent for the operator of this axis, and of nothing else."""
+        """It is driven by what was sent for the operator of this axis, and by nothing else."""
         axis = self.axis
         if axis.reason is Reason.OUTPUT_INVALID:
             self.shadow.angle, self.shadow.rate = 0.0, 0.0

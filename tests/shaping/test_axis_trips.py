@@ -96,7 +96,7 @@ def test_no_way_out_of_a_trip(drive: Drive, inputs: list[CommandInput]) -> None:
         [RESET],
         [CommandInput(reset=True, enabled=False)],
         [CommandInput(enabled=False), CENTRED],
-        # off in a frame that tells it, though its joystick is not available
+        # off in a frame that reports it, though its joystick is not available
         [CommandInput(fault=Reason.JOYSTICK_NOT_AVAILABLE, enabled=False), CENTRED],
         [CommandInput(0.8, reset=True), CENTRED, RESET],  # a second edge
         [CommandInput(fault=Reason.JOYSTICK_TIMEOUT), CENTRED, RESET],  # off before, seen off after

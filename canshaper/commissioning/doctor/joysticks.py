@@ -66,7 +66,7 @@ class Joysticks:
         run_at_deadlines(round(self._step_ms * 1_000_000 * SLOWER), self._body)
 
     def _body(self, _now_ns: int, missed: int, _late_ns: int) -> bool:
-        for one in self._sockets.values():  # what valves and displays hear
+        for one in self._sockets.values():  # what valves and displays receive
             with suppress(BlockingIOError, ConnectionError):
                 while one.recv(FD_SIZE):
                     pass
