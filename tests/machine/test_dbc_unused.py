@@ -1,7 +1,6 @@
 """DBC files as they are: faults of messages that are not used, and how one is read later."""
 
 from collections.abc import Iterator
-from pathlib import Path
 
 import pytest
 from typer.testing import CliRunner
@@ -9,11 +8,6 @@ from typer.testing import CliRunner
 from canshaper.cli.app import app
 from tests.machine.plain_dbc import OTHER, parts, whole
 from tests.rigs.files import Machine
-
-
-@pytest.fixture
-def file(tmp_path: Path) -> Path:
-    return tmp_path / "one.dbc"
 
 
 @pytest.mark.parametrize(
