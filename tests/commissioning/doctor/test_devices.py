@@ -141,7 +141,9 @@ def test_a_virtual_bus_gets_no_name(here: FakeDevices) -> None:
     ],
 )
 def test_a_name_that_linux_takes(here: FakeDevices, bus: str, name: str) -> None:
-    findings = device_findings(bus, Bus(interface="socketcan", channel="can3"), here.root, here.query)
+    findings = device_findings(
+        bus, Bus(interface="socketcan", channel="can3"), here.root, here.query
+    )
     assert f"  Name={name}\n" in findings[0].remedy
     assert len(name) <= 15
 
