@@ -67,7 +67,10 @@ def frame_of(bus: str, packet: bytes) -> Frame | None:
         return None
     if word & (ERR_FLAG | RTR_FLAG) or length > len(payload):
         return None
-    return Frame(bus, word & EFF_MASK, word & EFF_FLAG != 0, payload[:length])
+    extended = word & EFF_FLAG != 0
+    # Bits beyond those of the id come from another program here, and never reach a bus.
+    can_id = word & (EFF_MASK if extended else SFF_MASK)
+    return Frame(bus, can_id, extended, payload[:length])
 
 
 def kernel_ids(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:

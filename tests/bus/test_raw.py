@@ -56,6 +56,14 @@ def test_ids_of_both_widths_both_ways(
     assert len(data) == 16
 
 
+@pytest.mark.parametrize(
+    ("word", "can_id"), [(0x1000_0110, 0x110), (0x800, 0), (0x1FFF_FFFF, 0x7FF)]
+)
+def test_bits_beyond_a_standard_id_are_not_part_of_it(line: Line, word: int, can_id: int) -> None:
+    line.far[UNKNOWN].send(struct.pack("=IB3x8s", word, 2, b"\1\2" + bytes(6)))
+    assert line.received() == [Frame("crane", can_id, False, b"\1\2")]
+
+
 @pytest.mark.parametrize("number", [RECEIVED, SENT_BACK, UNKNOWN])
 def test_what_is_no_data_frame_is_counted_and_not_handed_on(line: Line, number: int) -> None:
     for can_id, extended in ((0x110, False), (0x110, True)):

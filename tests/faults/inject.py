@@ -31,7 +31,7 @@ def _foreign(fault: Fault) -> list[Frame]:
     rng, machine = fault.rng, fault.machine
     bus, can_id, extended = fault.joystick.key
     data = rng.randbytes(rng.choice([0, 2, 8]))
-    used = {*machine.inputs, *machine.valves, *machine.statuses, machine.service}
+    used = {*machine.inputs, *machine.valves, *machine.statuses, machine.service, machine.identity}
     if machine.radius:
         used.add(machine.radius[0])
     frames = [

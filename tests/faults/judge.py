@@ -49,7 +49,7 @@ class Judge:
         }
         self._by_valve = {a.axis.valve_key: a for a in self.axes.values()}
         self._by_status = {a.axis.status_key: a for a in self.axes.values() if a.axis.status_key}
-        ours = {*self._by_valve, *self._by_status, *({machine.service} - {None})}
+        ours = {*self._by_valve, *self._by_status, *({machine.service, machine.identity} - {None})}
         self._ours = ours
         radius = {machine.radius[0]} if machine.radius else set()
         used = {key[1:] for key in (*self._inputs, *radius, *ours) if key}

@@ -81,6 +81,9 @@ class Machine:
         if section := data.get("status"):
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
+        self.identity: Key | None = None
+        if section := data.get("identity"):
+            self.identity = self._sent(section["bus"], messages[section["message"]])
         inputs = [*self.joysticks.values(), *self.switches]
         self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
         # longest time between two ticks after which an axis in motion may go on

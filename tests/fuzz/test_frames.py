@@ -49,5 +49,6 @@ def test_nothing_on_the_buses_makes_a_wrong_move(
 
 @settings(max_examples=200)
 @given(data=st.binary(max_size=400))
+@example(data=b"\0\xe1\x01\x11\x03" + bytes(12))  # our identity, on a bus it is not sent on
 def test_any_bytes_are_a_script_without_a_wrong_move(data: bytes) -> None:
     frames.run(data)
