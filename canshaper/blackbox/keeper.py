@@ -105,8 +105,8 @@ class BlackBox:
         elif self._frozen and neutral:
             self._start_writer()
 
-    def ask(self) -> None:
-        """Somebody wants a file now; it is written as soon as every axis is neutral.
+    def request(self) -> None:
+        """A file is to be written now; it is written as soon as every axis is neutral.
 
         Raises:
             ValueError: there is nowhere to write one.

@@ -159,7 +159,7 @@ class Daemon:
             raise ValueError(f"expected {expected}, got another object")
         if "black_box" in request:
             if request["black_box"] == "write":
-                self._black_box.ask()
+                self._black_box.request()
                 log.info("black-box=requested %s", peer)
             return {"black_box": self._black_box.report()}
         if "set" in request:
@@ -279,7 +279,7 @@ class Daemon:
 
     def _on_signal(self, number: int, _frame: FrameType | None) -> None:
         if number == signal.SIGHUP:
-            self._reloads.ask()
+            self._reloads.request()
         elif self._stop:
             self._leave_at_once(number)
         else:

@@ -28,7 +28,7 @@ class Reloads:
         self.ready: Deployment | None = None
         self._waiting_logged = False
 
-    def ask(self) -> None:
+    def request(self) -> None:
         """Begin one at the next step; a signal handler may call it."""
         self._requested = True
 

@@ -67,8 +67,8 @@ class History:
         if deployment.status:
             self._codecs[deployment.status.sender.key] = deployment.status
 
-    def take(self, frame: ReceivedFrame) -> None:
-        """Take a data frame; one that is no status is passed over."""
+    def receive(self, frame: ReceivedFrame) -> None:
+        """A data frame was received; one that is no status is passed over."""
         key = (frame.bus, frame.can_id, frame.extended)
         codec = self._codecs.get(key)
         if codec is None or (values := codec.decode(frame.data)) is None:

@@ -56,7 +56,7 @@ class Recording:
                         log.write(frame.line())
                         self.frames[frame.kind] += 1
                         if not frame.kind:
-                            self.history.take(frame)
+                            self.history.receive(frame)
                     now = time.monotonic()
                     self.seconds, self.lost = now - begin, listener.lost
                     if now - flushed >= FLUSH_S:

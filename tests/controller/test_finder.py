@@ -71,7 +71,7 @@ def test_commands_of_a_log_are_those_of_the_joysticks(any_source: Deployment) ->
     commands = Commands(any_source)
     for n in range(100):
         frame = bjm("BJM1", JOYSTICK, 6, X=50.0 if n >= 50 else 0.0)
-        commands.take(n * 0.02, (frame.can_id, frame.extended), frame.data)
+        commands.receive(n * 0.02, (frame.can_id, frame.extended), frame.data)
     command = commands.of("slew")
     assert command is not None
     assert [*command.speed[[0, 49, 50, 99]]] == [0.0, 0.0, 0.5, 0.5]

@@ -93,10 +93,10 @@ def requested(monkeypatch: pytest.MonkeyPatch) -> list[BlackBox]:
     """Black boxes that were requested."""
     boxes: list[BlackBox] = []
 
-    def ask(box: BlackBox) -> None:
+    def request(box: BlackBox) -> None:
         boxes.append(box)
 
-    monkeypatch.setattr(BlackBox, "ask", ask)
+    monkeypatch.setattr(BlackBox, "request", request)
     return boxes
 
 

@@ -72,7 +72,7 @@ class CanopenNode:
         elif self.axis and self.valve and self.operational and frame[:3] == self.axis.valve_key:
             assert self.axis.words
             before = self.valve.state
-            self.valve.told(self.axis.words.control.get(int.from_bytes(frame.data, "little")))
+            self.valve.command(self.axis.words.control.get(int.from_bytes(frame.data, "little")))
             if self.valve.state != before:
                 self._world.at(self._world.now_ns + ANSWER_NS, self.status)
 

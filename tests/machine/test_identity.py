@@ -101,7 +101,7 @@ def said(deployment: Deployment, *digests: int) -> list[str]:
     monitor = Monitor(deployment)
     for i, value in enumerate(digests):
         frame: Frame = status.frame(value)
-        monitor.take(ReceivedFrame(i, frame.bus, "can0", *frame[1:], ""))
+        monitor.receive(ReceivedFrame(i, frame.bus, "can0", *frame[1:], ""))
     return [event.text for event in monitor.events]
 
 

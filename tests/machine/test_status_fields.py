@@ -35,7 +35,7 @@ def shown(deployment: Deployment) -> tuple[dict[str, object], str]:
     """Status of the first axis as a monitor decodes and shows it."""
     monitor = Monitor(deployment)
     for frame in Controller(deployment).tick(0):
-        monitor.take(ReceivedFrame(0, frame.bus, "can0", *frame[1:], ""))
+        monitor.receive(ReceivedFrame(0, frame.bus, "can0", *frame[1:], ""))
     return monitor.history.axes["slew"].values, screen(monitor, 0, 120, 40, plain=True).plain
 
 

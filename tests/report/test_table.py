@@ -108,9 +108,9 @@ def test_a_terminal_without_unicode(report: dict[str, Any]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("reduction", "told"),
+    ("reduction", "expected"),
     [(99.4, "-99 %"), (99.6, "-99.6 %"), (99.97, "-99.9 %"), (100.0, "-100 %")],
 )
-def test_nearly_all_is_not_all(report: dict[str, Any], reduction: float, told: str) -> None:
+def test_nearly_all_is_not_all(report: dict[str, Any], reduction: float, expected: str) -> None:
     report["axes"]["slew"]["residual_reduction_pct"] = reduction
-    assert told in printed(report)
+    assert expected in printed(report)

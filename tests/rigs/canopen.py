@@ -34,7 +34,7 @@ def write_variant(tmp_path: Path, *changes: tuple[str, str]) -> Path:
 
 
 class ValveNode:
-    """State machine of a valve: one step up when told the next state, down at once.
+    """State machine of a valve: one step up when commanded the next state, down at once.
 
     ``faulty`` clears the ready bit until an edge from 0x3 to 0xB; ``stuck`` keeps it cleared.
     """
@@ -48,7 +48,7 @@ class ValveNode:
     def fault(self, *, stuck: bool = False) -> None:
         self.state, self.stuck = RESET, stuck
 
-    def told(self, word: int) -> None:
+    def command(self, word: int) -> None:
         if self.state == RESET:
             if not self.stuck and (self.word, word) == (RESET, HOLD):
                 self.state = HOLD
@@ -102,7 +102,7 @@ class CanopenRig:
 
     def run(self, ticks: int = 1, **raw: int) -> dict[str, dict[str, int]]:
         """Ticks in which every node sends what it has to; joysticks and switches raw."""
-        told: dict[str, dict[str, int]] = {}
+        received: dict[str, dict[str, int]] = {}
         for _ in range(ticks):
             for name in ("Left", "Right"):
                 message = self.dbc.get_message_by_name(f"Joystick{name}")
@@ -117,10 +117,10 @@ class CanopenRig:
             for axis, valve in self.valves.items():
                 if not valve.silent:
                     self.status(axis, valve.state)
-            told = self.tick()
-            for axis, command in told.items():
-                self.valves[axis].told(command["ControlWord"])
-        return told
+            received = self.tick()
+            for axis, command in received.items():
+                self.valves[axis].command(command["ControlWord"])
+        return received
 
     def until(self, accept: Callable[[], bool], ticks: int = 400, **raw: int) -> int:
         """Run until that is so; how many ticks it took."""
@@ -137,9 +137,9 @@ class CanopenRig:
     def moving(self) -> "CanopenRig":
         """Slew and lift at work."""
         self.ready()
-        told = self.run(25, Slew=30000, Lift=20000)
-        assert told["slew"]["SetPoint"] > 3000
-        assert told["lift"]["SetPoint"] > 3000
+        received = self.run(25, Slew=30000, Lift=20000)
+        assert received["slew"]["SetPoint"] > 3000
+        assert received["lift"]["SetPoint"] > 3000
         return self
 
     def axis(self, name: str = "slew") -> tuple[str, str]:

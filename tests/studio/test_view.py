@@ -35,7 +35,7 @@ class Watched:
             self.deployment, lambda text, level: self.reported.append((text, level))
         )
 
-    def take(self, frames: list[Frame], now_s: float = 0.0) -> dict[str, Any]:
+    def receive(self, frames: list[Frame], now_s: float = 0.0) -> dict[str, Any]:
         for frame in frames:
             self.view.receive(frame, now_s)
         return self.view.values(now_s)
@@ -72,7 +72,7 @@ def test_nothing_is_known_at_the_start(watched: Watched) -> None:
 def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
     watched = Watched(name)
     joysticks = dict(zip(watched.deployment.axes, (0.5, -0.25, 1.0, -0.75), strict=False))
-    shown = watched.take(Hand(watched.deployment).frames(0, Held(joysticks)))
+    shown = watched.receive(Hand(watched.deployment).frames(0, Held(joysticks)))
     given = {axis: values["joystick"] for axis, values in shown["axes"].items()}
     assert given == pytest.approx({axis: joysticks.get(axis, 0.0) for axis in given}, abs=0.005)
 
@@ -81,7 +81,7 @@ def test_joysticks_of_every_kind_of_joystick(name: str) -> None:
 def test_pose_and_joints_are_those_of_the_crane(name: str) -> None:
     watched = Watched(name)
     crane = CraneParameters()
-    shown = watched.take(PlantNode(watched.deployment).feedback())
+    shown = watched.receive(PlantNode(watched.deployment).feedback())
     assert shown["crane"]
     assert shown["pose"] == pytest.approx((0.0, crane.start_radius_m, crane.start_height_m))
     if name != "forwarder-joints":
@@ -96,19 +96,19 @@ def test_pose_and_joints_are_those_of_the_crane(name: str) -> None:
 def test_the_valve_is_shown_as_the_speed_that_results(watched: Watched) -> None:
     """5 % of dead band: 5 % command gives nothing, full command full speed."""
     for steps, speed in ((0, 0.0), (6, 0.0), (-125, -1.0), (125, 1.0), (66, (0.528 - 0.05) / 0.95)):
-        shown = watched.take([watched.valve("near_far", steps)])
+        shown = watched.receive([watched.valve("near_far", steps)])
         assert shown["axes"]["near_far"]["valve"] == pytest.approx(speed, abs=1e-4)
         assert shown["axes"]["slew"]["valve"] is None
 
 
 def test_states_are_words_and_changes_are_events(watched: Watched) -> None:
-    shown = watched.take([watched.status(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)])
+    shown = watched.receive([watched.status(State.NEUTRAL_WAIT, Reason.ENABLE_OFF)])
     assert shown["axes"]["slew"]["state"] == "waiting for neutral"
     assert shown["axes"]["slew"]["reason"] == "enable is off"
     assert watched.reported == []
-    watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)] * 3)
-    watched.take([watched.status(State.STOPPING, Reason.JOYSTICK_TIMEOUT)])
-    watched.take([watched.status(State.TRIPPED, Reason.ENABLE_LOST)])
+    watched.receive([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)] * 3)
+    watched.receive([watched.status(State.STOPPING, Reason.JOYSTICK_TIMEOUT)])
+    watched.receive([watched.status(State.TRIPPED, Reason.ENABLE_LOST)])
     assert watched.reported == [
         ("slew: ready — joystick in neutral", "info"),
         ("slew: stopping — no joystick message", "warn"),
@@ -117,16 +117,16 @@ def test_states_are_words_and_changes_are_events(watched: Watched) -> None:
 
 
 def test_swing_is_the_largest_sway_of_the_last_period(watched: Watched) -> None:
-    watched.take(watched.sway(6.0, 8.0), 0.0)
-    assert watched.take(watched.sway(-3.0), 1.0)["swing"] == pytest.approx(10.0, abs=0.02)
-    shown = watched.take(watched.sway(1.0), 2.4)  # a period, of 2.36 s, later
+    watched.receive(watched.sway(6.0, 8.0), 0.0)
+    assert watched.receive(watched.sway(-3.0), 1.0)["swing"] == pytest.approx(10.0, abs=0.02)
+    shown = watched.receive(watched.sway(1.0), 2.4)  # a period, of 2.36 s, later
     assert shown["swing"] == pytest.approx(3.0, abs=0.02)
     assert shown["sway"] == pytest.approx((1.0, 0.0), abs=0.01)
 
 
 def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -> None:
     """Its lag is counted positive; across the boom the grapple then hangs to the other side."""
-    shown = watched.take(
+    shown = watched.receive(
         [
             watched.status(State.ACTIVE, Reason.JOYSTICK_MOVED, 4.0),
             watched.status(State.ACTIVE, Reason.JOYSTICK_MOVED, 3.0, "near_far"),
@@ -135,13 +135,13 @@ def test_without_a_measured_sway_that_of_the_models_is_shown(watched: Watched) -
     assert not shown["measured"]
     assert shown["sway"] == pytest.approx((-4.0, 3.0))
     assert shown["swing"] == pytest.approx(5.0)
-    assert watched.take(watched.sway(1.0))["measured"]
+    assert watched.receive(watched.sway(1.0))["measured"]
 
 
 def test_a_daemon_that_falls_silent_is_reported_and_its_states_are_cleared(
     watched: Watched,
 ) -> None:
-    watched.take([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)], 0.0)
+    watched.receive([watched.status(State.READY, Reason.JOYSTICK_NEUTRAL)], 0.0)
     watched.view.report_lateness(120)
     watched.view.check(0.0)
     watched.view.check(SILENT_S - 0.01)
@@ -151,7 +151,7 @@ def test_a_daemon_that_falls_silent_is_reported_and_its_states_are_cleared(
     shown = watched.view.values(SILENT_S + 1.0)
     assert not shown["daemon"] and shown["late_us"] is None
     assert shown["axes"]["slew"]["state"] is None
-    watched.take([watched.status(State.NEUTRAL_WAIT, Reason.START)], 2.0)
+    watched.receive([watched.status(State.NEUTRAL_WAIT, Reason.START)], 2.0)
     watched.view.check(2.0)
     assert [level for _, level in watched.reported] == ["info", "bad", "info"]
 
@@ -159,7 +159,7 @@ def test_a_daemon_that_falls_silent_is_reported_and_its_states_are_cleared(
 def test_a_crane_that_falls_silent_is_reported_and_its_sway_is_measured_no_more(
     watched: Watched,
 ) -> None:
-    watched.take(watched.sway(20.0), 0.0)
+    watched.receive(watched.sway(20.0), 0.0)
     watched.view.check(0.0)
     assert watched.view.values(0.0)["measured"]
     watched.view.check(SILENT_S)
@@ -176,7 +176,7 @@ def test_faults_are_reported_once(watched: Watched) -> None:
     counters = Counters()
     counters.add(FrameFault.COUNTER_JUMP)
     frame = codec.frame({"LastFault": int(counters.last_fault), **counters.values})
-    shown = watched.take([frame, frame])
+    shown = watched.receive([frame, frame])
     assert shown["fault"] == "counter jump"
     assert watched.reported == [("fault: counter jump", "warn")]
 
@@ -190,7 +190,7 @@ def test_frames_that_are_cut_short_are_passed_over(watched: Watched) -> None:
     ]
     for frame in frames:
         for length in range(len(frame.data)):
-            watched.take([frame._replace(data=frame.data[:length])])
+            watched.receive([frame._replace(data=frame.data[:length])])
     shown = watched.view.values(0.0)
     assert shown["sway"] is shown["pose"] is None
     assert {axis["joystick"] for axis in shown["axes"].values()} == {None}
@@ -207,7 +207,7 @@ def test_every_state_reason_and_fault_has_words() -> None:
 @pytest.mark.parametrize("priority", [3, 6])
 def test_a_joystick_of_j1939_is_seen_at_every_priority_and_one_at_a_time(priority: int) -> None:
     watched = Watched("j1939-forwarder")
-    watched.take([bjm("BJM1", s, priority, X=x) for s, x in ((0x33, 100.0), (0x34, -100.0))])
+    watched.receive([bjm("BJM1", s, priority, X=x) for s, x in ((0x33, 100.0), (0x34, -100.0))])
     assert watched.view.axes["slew"].joystick == pytest.approx(1.0)
 
 
@@ -217,7 +217,7 @@ def test_the_set_in_force_says_which_profile(number: int, name: str | None) -> N
     codec = watched.deployment.axes["slew"].status
     assert codec
     one = report(State.READY, Reason.JOYSTICK_NEUTRAL, active_set=number)
-    axes = watched.take([codec.frame(one)])["axes"]
+    axes = watched.receive([codec.frame(one)])["axes"]
     assert axes["slew"]["profile"] == name
     assert axes["near_far"]["profile"] is axes["lift"]["profile"] is None
 
@@ -226,9 +226,9 @@ def test_frames_a_second_and_age_of_each_source(watched: Watched) -> None:
     shown = watched.view.values(0.0)["sources"]
     assert shown["joystick left"] == {"per_s": 0, "age_s": None}
     for tick in range(100):  # two seconds, the joystick at 50 and the valve at 25 frames a second
-        watched.take(Hand(watched.deployment).frames(0, Held()), 0.02 * tick)
+        watched.receive(Hand(watched.deployment).frames(0, Held()), 0.02 * tick)
         if tick % 2:
-            watched.take([watched.valve("slew", 10)], 0.02 * tick)
+            watched.receive([watched.valve("slew", 10)], 0.02 * tick)
     shown = watched.view.values(1.99)["sources"]
     name = watched.deployment.axes["slew"].valve_message.name
     assert shown["joystick left"] == {"per_s": 50, "age_s": pytest.approx(0.01)}
@@ -240,13 +240,13 @@ def test_frames_a_second_and_age_of_each_source(watched: Watched) -> None:
 
 def test_a_frame_that_is_too_short_is_not_counted(watched: Watched) -> None:
     frame = watched.valve("slew", 10)
-    watched.take([frame._replace(data=frame.data[:1])])
+    watched.receive([frame._replace(data=frame.data[:1])])
     name = watched.deployment.axes["slew"].valve_message.name
     assert watched.view.values(0.0)["sources"][name]["age_s"] is None
 
 
 def test_a_joystick_position_that_is_old_is_shown_no_more(watched: Watched) -> None:
-    watched.take(Hand(watched.deployment).frames(0, Held({"slew": 0.5})), 1.0)
+    watched.receive(Hand(watched.deployment).frames(0, Held({"slew": 0.5})), 1.0)
     for age_s, position in ((SILENT_S - 0.01, 0.5), (SILENT_S, None)):
         watched.view.check(1.0 + age_s)
         axis = watched.view.values(1.0 + age_s)["axes"]["slew"]

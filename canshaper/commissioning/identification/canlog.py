@@ -54,8 +54,8 @@ class _Reader:
         sender = own & 0xFF if self.source is None else self.source
         return group_of(can_id) == group_of(own) and sender in (NULL, can_id & 0xFF)
 
-    def take(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
-        """Take a frame."""
+    def receive(self, time_s: float, sender: tuple[str, int], data: bytes) -> None:
+        """A frame was received."""
         self.senders.add(sender)
         if len(data) < self.message.length:
             self.wrong_length += 1
@@ -188,8 +188,8 @@ def _read(
             if key not in readers_of:
                 readers_of[key] = [r for r in readers if r.wants(*key)]
             for reader in readers_of[key]:
-                reader.take(time_s, (frame.channel, frame.can_id), frame.data)
-            commands.take(time_s, key, frame.data)
+                reader.receive(time_s, (frame.channel, frame.can_id), frame.data)
+            commands.receive(time_s, key, frame.data)
     except CutOffError as error:
         notes.append(f"{error}; what stands before it was used")
     if channel is not None and not frames:

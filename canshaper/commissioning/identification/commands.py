@@ -77,8 +77,8 @@ class Commands:
         self._joystick_buses = {joystick.key[0] for joystick in joysticks}
         self._finder = InputFinder(deployment.config.buses if deployment else {}, joysticks)
 
-    def take(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
-        """Take a frame."""
+    def receive(self, time_s: float, key: tuple[int, bool], data: bytes) -> None:
+        """A frame was received."""
         valves = self._by_valve.get(key)
         if valves:
             layout, length = self._layouts[key]

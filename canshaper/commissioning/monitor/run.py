@@ -38,7 +38,7 @@ class Ear:
             return
         try:
             for frame in self._listener.frames(timeout_s):
-                self._monitor.take(frame)
+                self._monitor.receive(frame)
         except BusError as error:
             self._monitor.note(time.time_ns(), f"{error}; trying again")
             self.close()

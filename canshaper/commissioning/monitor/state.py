@@ -43,7 +43,7 @@ class MessageRate:
     last_ns: int | None = None
     times: deque[int] = field(default_factory=deque)
 
-    def take(self, time_ns: int) -> None:
+    def received(self, time_ns: int) -> None:
         """It came."""
         self.last_ns = time_ns
         self.times.append(time_ns)
@@ -116,9 +116,9 @@ class Monitor:
         name, cycle = getattr(message, "name", ""), getattr(message, "cycle_time", None)
         self.messages.setdefault(key, MessageRate(name, cycle))
 
-    def take(self, frame: ReceivedFrame) -> None:
-        """Take a frame."""
-        self._buses[frame.bus].take(frame.time_ns)
+    def receive(self, frame: ReceivedFrame) -> None:
+        """A frame was received."""
+        self._buses[frame.bus].received(frame.time_ns)
         if frame.kind:
             self.others[frame.kind] += 1
             return
@@ -126,8 +126,8 @@ class Monitor:
         bound = self._finder.find(Frame(*key, frame.data), frame.time_ns)
         rate = self.messages.get(bound.key if bound else key)
         if rate is not None:
-            rate.take(frame.time_ns)
-        self.history.take(frame)
+            rate.received(frame.time_ns)
+        self.history.receive(frame)
         if (name := self._axis_of.get(key)) and (status := self.history.axes.get(name)):
             shaped, sway = (status.values[one] for one in ("ShapedCommand", "PredictedSway"))
             self.samples[name].append(Sample(frame.time_ns, shaped, sway))

@@ -83,8 +83,8 @@ class _Reader:
             for message in possible_joysticks(deployment)
         }
 
-    def take(self, frame: Frame, time_ns: int, time_s: float) -> None:
-        """Take a frame."""
+    def receive(self, frame: Frame, time_ns: int, time_s: float) -> None:
+        """A frame was received."""
         traffic, key = self.traffic, frame[:3]
         traffic.duration_s = time_s
         traffic.frames[key].append(time_s)
@@ -97,7 +97,7 @@ class _Reader:
                 raw: dict[str, Any] = Layout(axis.valve_message).decode(frame.data)
                 if (steps := axis.valve.read(raw)) is not None:
                     traffic.axes[axis.name].valve.add(time_s, steps / axis.valve.steps)
-        self._history.take(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
+        self._history.receive(ReceivedFrame(time_ns, frame.bus, "", *frame[1:], ""))
         traffic.missed_deadlines = self._history.counters.get("MissedDeadlines")
         for name, status in self._history.axes.items():
             states = traffic.axes[name].states
@@ -154,5 +154,5 @@ def read_traffic(log: Path, deployment: Deployment) -> Traffic:
         first_ns = one.time_ns if first_ns is None else first_ns
         if bus := buses.get(one.channel):
             frame = Frame(bus, one.can_id, one.extended, one.data)
-            reader.take(frame, one.time_ns, (one.time_ns - first_ns) / 1e9)
+            reader.receive(frame, one.time_ns, (one.time_ns - first_ns) / 1e9)
     return reader.traffic

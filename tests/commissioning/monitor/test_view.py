@@ -73,8 +73,8 @@ def test_a_joystick_of_j1939_is_known_at_every_priority(tmp_path: Path, source: 
     deployment = j1939(source, tmp_path)
     monitor = Monitor(deployment)
     for n, priority in enumerate((3, 6, 0)):
-        monitor.take(received(bjm("BJM1", 0x33, priority), NOW + n * MS))
-    monitor.take(received(bjm("BJM1", 0x35), NOW + 9 * MS))
+        monitor.receive(received(bjm("BJM1", 0x33, priority), NOW + n * MS))
+    monitor.receive(received(bjm("BJM1", 0x35), NOW + 9 * MS))
     rate = monitor.messages[deployment.joysticks["left"].key]
     assert (len(rate.times), rate.last_ns) == (3, NOW + 2 * MS)
 
@@ -95,7 +95,7 @@ def open_null() -> "object":
 def test_state_reason_bars_and_sway_of_an_axis(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for frame in status_frames(deployment):
-        monitor.take(frame)
+        monitor.receive(frame)
     lines = text(monitor, NOW + 100 * MS)
     assert lines[1].startswith(
         "slew        ACTIVE                 input ··········│█████·····  +50%"
@@ -113,7 +113,7 @@ def test_it_fits_the_terminal(deployment: Deployment) -> None:
     for i in range(300):
         reason = Reason.EMERGENCY_STOP_LOST if i % 2 else Reason.JOYSTICK_CONTRADICTORY
         for frame in status_frames(deployment, NOW + i * 100 * MS, State(i % 6), reason):
-            monitor.take(frame)
+            monitor.receive(frame)
     for width, height in ((80, 24), (60, 12), (200, 60), (40, 8)):
         lines = text(monitor, NOW + 30_000 * MS, width, height)
         assert len(lines) <= height
@@ -132,7 +132,7 @@ def test_before_anything_is_received_it_says_so(deployment: Deployment) -> None:
 def test_what_is_stale_says_stale(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for frame in status_frames(deployment):
-        monitor.take(frame)
+        monitor.receive(frame)
     fresh = "\n".join(text(monitor, NOW + 290 * MS))
     assert "STALE" not in fresh
     lines = text(monitor, NOW + 2_500 * MS)
@@ -145,9 +145,11 @@ def test_what_is_stale_says_stale(deployment: Deployment) -> None:
 def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for i in range(200):
-        monitor.take(ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), ""))
+        monitor.receive(
+            ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x110, False, bytes(8), "")
+        )
         if i % 2:
-            monitor.take(
+            monitor.receive(
                 ReceivedFrame(NOW + i * 20 * MS, "crane", "vcan0", 0x111, False, bytes(8), "")
             )
     lines = "\n".join(text(monitor, NOW + 199 * 20 * MS))
@@ -160,9 +162,9 @@ def test_rates_stand_next_to_those_of_the_dbc(deployment: Deployment) -> None:
 def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for frame in status_frames(deployment, state=State.READY, reason=Reason.JOYSTICK_NEUTRAL):
-        monitor.take(frame)
+        monitor.receive(frame)
     for frame in status_frames(deployment, NOW + 100 * MS, State.TRIPPED, Reason.ENABLE_LOST):
-        monitor.take(frame)
+        monitor.receive(frame)
     lines = "\n".join(text(monitor, NOW + 200 * MS))
     assert "axis=slew state=TRIPPED from=READY reason=ENABLE_LOST" in lines
     assert len(monitor.events) == 6
@@ -171,13 +173,13 @@ def test_events_are_kept_with_their_time(deployment: Deployment) -> None:
 
 def test_frames_that_are_none_of_its_messages(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
-    monitor.take(ReceivedFrame(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
-    monitor.take(ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
-    monitor.take(
+    monitor.receive(ReceivedFrame(NOW, "crane", "vcan0", 0x20000080, True, bytes(8), "error"))
+    monitor.receive(ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\x01", ""))  # too short
+    monitor.receive(
         ReceivedFrame(NOW, "crane", "vcan0", 0x300, False, b"\xff" * 8, "")
     )  # unknown numbers
     for frame in status_frames(deployment)[1:]:
-        monitor.take(frame)
+        monitor.receive(frame)
     lines = "\n".join(text(monitor, NOW))
     assert "1 error frames" in lines
     assert "unknown (15)" in lines
@@ -203,7 +205,7 @@ def test_a_bar_shows_side_and_size() -> None:
 def test_a_line_for_pipes(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for frame in status_frames(deployment):
-        monitor.take(frame)
+        monitor.receive(frame)
     line = status_line(monitor, NOW)
     assert "slew=ACTIVE(JOYSTICK_MOVED) raw=+50% sent=-25% sway=+3.4deg" in line
     assert "missed=3" in line
@@ -218,7 +220,7 @@ def drive(deployment: Deployment, monitor: Monitor) -> None:
         for axis in deployment.axes.values():
             assert axis.status
             said = report(State.ACTIVE, Reason.JOYSTICK_MOVED, command, command, 4.0 * command)
-            monitor.take(received(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
+            monitor.receive(received(axis.status.frame(said), NOW - (300 - n) * 100 * MS))
 
 
 def test_a_wide_terminal_has_lines_over_time(deployment: Deployment) -> None:
@@ -246,7 +248,7 @@ def test_a_line_over_time_keeps_short_peaks_and_leaves_out_what_did_not_come() -
 def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
     monitor = Monitor(deployment)
     for frame in status_frames(deployment, state=State.TRIPPED, reason=Reason.ENABLE_LOST):
-        monitor.take(frame)
+        monitor.receive(frame)
     monitor.note(NOW, "axis=slew state=TRIPPED from=ACTIVE reason=ENABLE_LOST")
     rows = text(monitor, NOW, width=40, height=60)
     assert max(map(len, rows)) <= 40
@@ -260,7 +262,7 @@ def test_forty_columns_lose_no_word(deployment: Deployment) -> None:
 def test_keys_pause_choose_an_axis_and_end(deployment: Deployment) -> None:
     monitor, keys = Monitor(deployment), Keys([*deployment.axes])
     for frame in status_frames(deployment):
-        monitor.take(frame)
+        monitor.receive(frame)
     monitor.note(NOW, "axis=lift state=READY from=ACTIVE reason=AT_REST")
 
     def shown() -> list[str]:

@@ -76,7 +76,7 @@ def test_a_valve_that_boots_for_ten_seconds_is_waited_for(rig: CanopenRig) -> No
     """In its self test it is not ready; that is no fault of the first two seconds."""
     valve = rig.valves["slew"]
     valve.state, valve.stuck = 0, True
-    valve.told = lambda _word: None  # type: ignore[method-assign]
+    valve.command = lambda _word: None  # type: ignore[method-assign]
     assert [word for word, _ in words(rig, 100)] == [INIT]
     rig.run(400)
     assert rig.axis() == NOT_READY
