@@ -33,8 +33,8 @@ class _Member:
         moving.largest = config.max_pct / 100.0
         moving.fall_per_s = axis.limits.fall_per_s
 
-    def take(self, tick_s: float, last: int, now: int) -> None:
-        """Take the state of the axis; see ``MotionRunner.step``."""
+    def update(self, tick_s: float, last: int, now: int) -> None:
+        """The state of the axis now; see ``MotionRunner.step``."""
         moving, runner = self.moving, self.runner
         axis, period = runner.axis, runner.period_ticks
         if period == 1 == now - last:
@@ -116,7 +116,7 @@ class MotionRunner:
             if member.runner.alone:
                 self._end()
                 return None
-            member.take(tick_s, last, now)
+            member.update(tick_s, last, now)
             if not (apart or member.moving.able):
                 apart = member.runner.bound.name
         tip_m = self._radius.fresh(now_ns) if self._radius else None

@@ -219,7 +219,7 @@ class AxisRunner:
         if self.chooser is not None:
             self.chooser.update(now_ns)
         if self._sway_signal is not None and axis.sensed is not None:
-            value, scale = self._sway_signal.take(), self._scale(now_ns)
+            value, scale = self._sway_signal.new_value(), self._scale(now_ns)
             axis.sensed.measure(value, scale, commanded=axis.commanded, damps=self._damps)
         transition = axis.act(command, self._added, damps=self._damps)
         self._put(axis.raw)

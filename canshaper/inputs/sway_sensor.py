@@ -82,7 +82,7 @@ class SwaySignal:
         self._name, self._factor = bound.signal.name, bound.factor
         self._number = message.number
 
-    def take(self) -> float | None:
+    def new_value(self) -> float | None:
         """A measurement that is new, rad or rad/s with the sign of the model; None without one."""
         message = self._message
         if message.number == self._number:

@@ -231,10 +231,10 @@ def test_a_frame_that_does_not_count_is_no_measurement() -> None:
     message = SwaySensorInput(sensor.message)
     signal = SwaySignal(message, sensor)
     message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=False)
-    assert signal.take() is None
+    assert signal.new_value() is None
     message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)
-    assert signal.take() == pytest.approx(math.radians(1.0))
-    assert signal.take() is None
+    assert signal.new_value() == pytest.approx(math.radians(1.0))
+    assert signal.new_value() is None
 
 
 @pytest.mark.parametrize(("merit", "counts"), [(0, True), (1, False), (2, False), (3, False)])
@@ -249,8 +249,8 @@ def test_only_a_good_figure_of_merit_measures(merit: int, counts: bool) -> None:
     raw = {"RollAngle": middle, "PitchAngle": middle, "RollMerit": merit, "PitchMerit": 0}
     fault = message.on_frame(raw, {}, 0, accepted=True)
     assert fault is (FrameFault.NONE if counts else FrameFault.INVALID_SIGNAL)
-    assert (across.take() is not None) == counts
-    assert along.take() == pytest.approx(0.0)
+    assert (across.new_value() is not None) == counts
+    assert along.new_value() == pytest.approx(0.0)
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_more_than_a_turn_is_no_measurement(turns: float, counts: bool) -> None:
     message = SwaySensorInput(sensor.message)
     signal = SwaySignal(message, replace(sensor, factor=math.tau * turns))
     message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)  # 1 in its unit
-    assert (signal.take() is not None) == counts
+    assert (signal.new_value() is not None) == counts
 
 
 HEARTBEAT, EMERGENCY = (
