@@ -76,7 +76,6 @@ class SwaySignal:
     """
 
     def __init__(self, message: SwaySensorInput, bound: BoundSwaySensor) -> None:
-        self.bound = bound
         self.node: SensorNode | None = None
         self._message = message
         self._name, self._factor = bound.signal.name, bound.factor

@@ -235,6 +235,19 @@ def test_a_frame_that_does_not_count_is_no_measurement() -> None:
     message.on_frame({"Across": 0, "Along": 100}, {}, 0, accepted=True)
     assert signal.new_value() == pytest.approx(math.radians(1.0))
     assert signal.new_value() is None
+    assert SwaySignal(message, sensor).new_value() is None  # it came before
+
+
+def test_after_a_standstill_nothing_is_known_of_it() -> None:
+    sensor = load_deployment(FILE).axes["near_far"].sway_sensor
+    assert sensor is not None
+    message = SwaySensorInput(sensor.message)
+    message.invalidate()  # before the first frame too
+    assert message.receive(bytes(sensor.message.message.length), 1) is FrameFault.NONE
+    assert message.received_ns == 1
+    message.invalidate()
+    assert message.received_ns is None
+    assert not message.values
 
 
 @pytest.mark.parametrize(("merit", "counts"), [(0, True), (1, False), (2, False), (3, False)])
