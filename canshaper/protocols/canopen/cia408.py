@@ -34,6 +34,12 @@ class ValveControl(Input):
         message: message of the valve, which the control word is put into.
     """
 
+    # Set by _go and _put.
+    _step: int
+    _reached: bool
+    _word: int
+    _since_ns: int | None  # when this word was first put; None: at the next tick
+
     def __init__(self, bound: BoundStatusWord, control: str, message: ValveMessage) -> None:
         super().__init__(bound)
         self._signal = bound.config.signal
@@ -43,11 +49,7 @@ class ValveControl(Input):
         self._state: int | None = None
         self._state_ns = 0
         self._left = False  # it was in another state than ACTIVE since it was looked at
-        self._step = 0
-        self._since_ns: int | None = None  # when this word was first put; None: at the next tick
         self._reset_ns = 0
-        self._reached = False
-        self._word = 0
         self._go(0, None)
 
     def on_frame(

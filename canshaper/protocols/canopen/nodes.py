@@ -169,8 +169,7 @@ class CanopenBus:
         self._bus = bus
         self.own = config.node
         self._cycle_ns = config.heartbeat_ms * 1_000_000
-        self._due_ns = 0
-        self._booted = False
+        self._due_ns: int | None = None  # of the next heartbeat; None before our boot-up message
         self._master = config.master
         self.nodes = {name: RemoteNode(node) for name, node in config.nodes.items()}
         self._reported: dict[str, str] = {}
@@ -181,12 +180,12 @@ class CanopenBus:
 
     def copy_state(self, before: Self) -> None:
         """Continue our heartbeat: a reload is no start of our node."""
-        self._booted, self._due_ns = before._booted, before._due_ns
+        self._due_ns = before._due_ns
 
     def frames(self, now_ns: int) -> Iterator[Frame]:
         """What is due now: our boot-up message or heartbeat, and commands to start."""
-        if not self._booted:
-            self._booted, self._due_ns = True, now_ns + self._cycle_ns
+        if self._due_ns is None:
+            self._due_ns = now_ns + self._cycle_ns
             yield Frame(self._bus, HEARTBEAT + self.own, False, BOOT_UP)
         elif now_ns >= self._due_ns:
             # From the time it was due, so that lateness does not add up; but never in a burst.

@@ -39,6 +39,15 @@ def test_we_boot_and_then_beat_every_200_ms(rig: CanopenRig) -> None:
     assert len(times) == 7
 
 
+def test_what_we_send_has_standard_ids_on_the_bus_of_the_nodes(rig: CanopenRig) -> None:
+    rig.heartbeat("left", PRE_OPERATIONAL)
+    rig.tick()
+    assert Frame("crane", 0x700 + OURS, False, b"\0") in rig.sent
+    assert Frame("crane", 0x000, False, bytes((START, NODES["left"]))) in rig.sent
+    rig.run(10)
+    assert Frame("crane", 0x700 + OURS, False, bytes((OPERATIONAL,))) in rig.sent
+
+
 def test_a_node_that_boots_is_started_at_once_and_again_until_it_works(rig: CanopenRig) -> None:
     rig.states = dict.fromkeys(NODES, -1)
     rig.states["slew"] = PRE_OPERATIONAL
@@ -60,6 +69,14 @@ def test_a_stopped_node_is_started_too(rig: CanopenRig) -> None:
     rig.states["left"] = STOPPED
     rig.run()
     assert rig.commands == [bytes((START, NODES["left"]))]
+
+
+def test_a_node_of_which_nothing_is_known_after_a_stall_is_not_started(rig: CanopenRig) -> None:
+    rig.ready()
+    rig.controller.stalled()
+    rig.tick()
+    assert not rig.commands
+    assert "bus=crane node=slew state=lost emergency=0x0000" in rig.texts
 
 
 def test_who_is_no_master_starts_no_one(guest: CanopenRig) -> None:
