@@ -9,7 +9,7 @@ from . import cli
 from .outcome import NO_LANE, say
 
 ROOT = Path(__file__).resolve().parents[2]
-TIMEOUT_S = 1800  # for all tests together, on an emulated processor
+TIMEOUT_S = 3600  # for all tests together, on an emulated processor that shares its core
 KVASER = 4  # two buses: joystick and valves apart
 
 
