@@ -1,5 +1,6 @@
 """The YAML reader: what is no YAML, what YAML allows and a deployment does not, line numbers."""
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -94,7 +95,7 @@ def test_missing_file_and_directory_and_unusable_name(tmp_path: Path) -> None:
     assert unreadable(tmp_path / "none.yaml") == ": No such file or directory"
     assert unreadable(tmp_path) == ": Is a directory"
     assert "File name too long" in unreadable(tmp_path / ("n" * 300))
-    assert "embedded null byte" in unreadable(tmp_path / "a\0b")
+    assert re.search("embedded null (byte|character)", unreadable(tmp_path / "a\0b"))
 
 
 def test_file_without_permission(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
