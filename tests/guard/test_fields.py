@@ -7,17 +7,18 @@ from typing import Any
 import cantools
 import pytest
 
+from canshaper.codec.signals import VelocitySignal
 from canshaper.config.schema import Command, Valve
-from canshaper.guard.bits import CommandBits, Field, JoystickBits, span_of
+from canshaper.guard.bits import CommandBits, Field, JoystickBits, Part, span_of
 
 HEAD = 'VERSION ""\nNS_ :\nBS_:\nBU_: JOYSTICK SHAPER\nBO_ 2 Message: 8 JOYSTICK\n'
 
 
-def message(*signals: str, floats: str = "") -> Any:
+def message(*signals: str, floats: str = "", tables: str = "") -> Any:
     """A message of 8 bytes with these signals; ``floats`` names the one that is a float."""
     lines = "".join(f' SG_ {signal} "" SHAPER\n' for signal in signals)
     kind = f"SIG_VALTYPE_ 2 {floats} : 1;\n" if floats else ""
-    loaded: Any = cantools.database.load_string(HEAD + lines + kind, "dbc")
+    loaded: Any = cantools.database.load_string(HEAD + lines + kind + tables, "dbc")
     return loaded.get_message_by_name("Message")
 
 
@@ -89,6 +90,52 @@ def test_the_same_in_another_resolution_with_an_offset(also: int, good: bool) ->
     signals = ["Speed : 0|8@1+ (1,0) [0|100]", "Also : 8|8@1+ (2,-100) [-100|100]"]
     bits = bits_of(signals, also=["Also"])
     assert bits.steps(bytes([50, also, *bytes(6)])) == (50 if good else None)
+
+
+@pytest.mark.parametrize(
+    ("ends", "raw", "value"),
+    [
+        # Two's complement has one step more on one side: full as well, and the last that is read.
+        ("-101|100", 50, 0.5),
+        ("-101|100", -50, -0.5),
+        ("-101|100", 100, 1.0),
+        ("-101|100", 101, 0.0),
+        ("-101|100", -101, -1.0),
+        ("-101|100", -102, 0.0),
+        ("-100|101", 50, 0.5),
+        ("-100|101", -100, -1.0),
+        ("-100|101", -101, 0.0),
+        ("-100|101", 101, 1.0),
+        ("-100|101", 102, 0.0),
+        ("-100|100", -101, 0.0),
+        ("-100|100", -150, 0.0),
+        # Of a range from 0 what is below it keeps its sign, up to full scale.
+        ("0|100", 50, 0.5),
+        ("0|100", 101, 0.0),
+        ("0|100", -50, -0.5),
+        ("0|100", -101, 0.0),
+        ("-100|100", 90, 0.0),  # what has a name of an error is no value
+    ],
+)
+def test_a_value_is_a_part_of_full_scale_as_the_codec_has_it(
+    ends: str, raw: int, value: float
+) -> None:
+    one = message(f"Signal : 0|16@1- (1,0) [{ends}]", tables='VAL_ 2 Signal 90 "Error" ;\n')
+    assert Part(one.signals[0], 8).value(struct.pack("<hHI", raw, 0, 0)) == value
+    read = VelocitySignal.of(one.signals[0]).read({"Signal": raw})
+    assert value == (read if isinstance(read, float) else 0.0)
+
+
+@pytest.mark.parametrize("scale", [0.001, 0.01, 1.0])
+@pytest.mark.parametrize(
+    ("ends", "full"), [((-50, 51), 50), ((-51, 50), 50), ((-50, 50), 50), ((0, 50), 50)]
+)
+def test_full_command_is_the_nearer_end_of_a_range(
+    scale: float, ends: tuple[int, int], full: int
+) -> None:
+    low, high = (end * scale for end in ends)
+    bits = bits_of([f"Speed : 0|8@1- ({scale},0) [{low:g}|{high:g}]"])
+    assert bits.full == full
 
 
 @pytest.mark.parametrize(("raw", "command"), [(199, 0.0), (200, 0.2), (-199, 0.0), (-200, -0.2)])
