@@ -81,9 +81,7 @@ class Machine:
         if section := data.get("status"):
             self.service_message = message = messages[section["message"]]
             self.service = self._sent(section["bus"], message)
-        self.identity: Key | None = None
-        if section := data.get("identity"):
-            self.identity = self._sent(section["bus"], messages[section["message"]])
+        self.identity = self._identity(data, messages)
         inputs = [*self.joysticks.values(), *self.switches]
         self.shortest_timeout_ns = min(v.timeout_ns for v in inputs)
         # longest time between two ticks after which an axis in motion may go on
@@ -97,6 +95,12 @@ class Machine:
         # longest time, in ticks, in which everything that runs on has come to rest
         longest = max((a.stop + a.tail + 4) * a.period_ticks for a in self.axes.values())
         self.rest_ticks = longest + self.shortest_timeout_ns // self.tick_ns
+
+    def _identity(self, data: dict[str, Any], messages: dict[str, Message]) -> Key | None:
+        """Key of the message that says what runs, where there is one."""
+        if section := data.get("identity"):
+            return self._sent(section["bus"], messages[section["message"]])
+        return None
 
     def _nodes(self, sections: dict[str, Any]) -> dict[str, Node]:
         """Nodes of those sections that name one."""
