@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterable
 from typing import NamedTuple, Self
 
-from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
+from canshaper.codec.can_id import EFF_FLAG, ERR_FLAG, RTR_FLAG, SFF_MASK, id_of
 from canshaper.codec.frame import Frame, new_frame
 
 CAN_FRAME = struct.Struct("=IB3x8s")
@@ -67,10 +67,7 @@ def frame_of(bus: str, packet: bytes) -> Frame | None:
         return None
     if word & (ERR_FLAG | RTR_FLAG) or length > len(payload):
         return None
-    extended = word & EFF_FLAG != 0
-    # Bits beyond those of the id come from another program here, and never reach a bus.
-    can_id = word & (EFF_MASK if extended else SFF_MASK)
-    return Frame(bus, can_id, extended, payload[:length])
+    return Frame(bus, *id_of(word), payload[:length])
 
 
 def kernel_ids(messages: Iterable[tuple[int, bool]]) -> frozenset[int]:

@@ -14,7 +14,7 @@ from canshaper.bus.packet import BRS, FD_SIZE, FDF, Packet
 from canshaper.bus.port import not_opened
 from canshaper.bus.python_can import open_python_can
 from canshaper.bus.socketcan import dropped_frames, open_sockets
-from canshaper.codec.can_id import EFF_FLAG, EFF_MASK, ERR_FLAG, RTR_FLAG, SFF_MASK
+from canshaper.codec.can_id import EFF_MASK, ERR_FLAG, RTR_FLAG, id_of
 from canshaper.config.bus import Bus
 from canshaper.errors import BusError
 
@@ -145,8 +145,7 @@ def _raw(one: socket.socket, bus: str, channel: str) -> ReceivedFrame | None:
     if word & ERR_FLAG:
         can_id = ERR_FLAG | word & EFF_MASK
         return ReceivedFrame(time_ns, bus, channel, can_id, True, payload, "error")
-    extended = bool(word & EFF_FLAG)
-    can_id = word & (EFF_MASK if extended else SFF_MASK)
+    can_id, extended = id_of(word)
     remote = "remote" if word & RTR_FLAG else ""
     return ReceivedFrame(time_ns, bus, channel, can_id, extended, payload, remote, flags)
 
