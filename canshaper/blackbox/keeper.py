@@ -106,7 +106,7 @@ class BlackBox:
             self._start_writer()
 
     def request(self) -> None:
-        """A file is to be written now; it is written as soon as every axis is neutral.
+        """Have a file written as soon as every axis is neutral.
 
         Raises:
             ValueError: there is nowhere to write one.

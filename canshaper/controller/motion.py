@@ -34,7 +34,7 @@ class _Member:
         moving.fall_per_s = axis.limits.fall_per_s
 
     def update(self, tick_s: float, last: int, now: int) -> None:
-        """The state of the axis now; see ``MotionRunner.step``."""
+        """Read the state of the axis; see ``MotionRunner.step``."""
         moving, runner = self.moving, self.runner
         axis, period = runner.axis, runner.period_ticks
         if period == 1 == now - last:

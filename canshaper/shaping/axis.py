@@ -299,14 +299,16 @@ class Axis:
         largest = self._largest_added if self._added else 0.0
         low, high = range_with_added(command, recent.low, recent.high, target, largest)
         low, high = max(low, -maximum), min(high, maximum)
-        rounded = unrounded = target
+        reference = unrounded = target
         if self._added:
             step = 1.0 / self._grid_steps
             unrounded = within(target + self._added, low, high, 0.0)
-            rounded = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
-            if rounded:
-                rounded = within(rounded + within(self._carry, -step, step, 0.0), low, high, 0.0)
-        self._limited = rate_limited(rounded, self._limited, self._rise, self._fall)
+            reference = within(unrounded, low, high, max(limits.minimum, 0.5 * step))
+            if reference:
+                reference = within(
+                    reference + within(self._carry, -step, step, 0.0), low, high, 0.0
+                )
+        self._limited = rate_limited(reference, self._limited, self._rise, self._fall)
         if self._dropped * self._limited < 0.0:  # the way to the other side begins at rest
             self._limited = 0.0
         self._dropped = 0.0

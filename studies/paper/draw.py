@@ -37,7 +37,7 @@ _PLANE_WORDS: Final[dict[Plane, str]] = {
 }
 _ALONG: Final[dict[Plane, str]] = {"perpendicular": "across", "parallel": "along"}
 _METRIC_WORDS: Final = {"peak": "peak", "rms": "RMS", "residual": "residual"}
-# Part of full command that the command panels show: fast poles have their spikes as words.
+# Part of full command that the command panels show: the spikes of fast poles are given as text.
 _COMMAND_TOP, _COMMAND_BOTTOM = 310.0, -210.0
 _BEYOND_PCT = 110.0
 _CONDITIONS = (

@@ -46,7 +46,7 @@ def port(adapter: Adapter) -> Port:
 def test_a_frame_of_python_can_arrived_right_after_the_read_before(
     adapter: Adapter, port: Port, clocks: Clocks
 ) -> None:
-    """The first after the opening of the port, then each after the last one that found no more."""
+    """The first after the opening of the port, then each after the last read that returned none."""
     before = 0
     for passed_ns in (3 * TICK_NS, TICK_NS, 5 * TICK_NS):
         adapter.put(2)

@@ -65,13 +65,13 @@ def test_a_system_without_socketcan_says_so(monkeypatch: pytest.MonkeyPatch) -> 
 
 def test_a_port_of_another_device_says_which_bus_and_why(monkeypatch: pytest.MonkeyPatch) -> None:
     def wrong(*_: object) -> None:
-        raise WrongDeviceError("expected serial number 1, found 2")
+        raise WrongDeviceError("expected serial number 1, got 2")
 
     monkeypatch.setattr(bus_module, "open_sockets", wrong)
     with pytest.raises(WrongBusError) as error:
         open_port("crane", BUS, lambda _: None, IDS)
     assert error.value.bus == "crane"
-    assert error.value.why.startswith("expected serial number 1, found 2")
+    assert error.value.why.startswith("expected serial number 1, got 2")
     assert str(error.value) == f"bus crane: {error.value.why}"
 
 

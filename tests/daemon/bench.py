@@ -138,7 +138,7 @@ class Bench:
         Daemon(lambda: load_deployment(self.file)).run()
 
     def reload(self, old: str = "", new: str = "") -> None:
-        """Tell the daemon to read the file again, with a piece of it replaced."""
+        """Have the daemon read the file again, with a piece of it replaced."""
         assert old in self.text
         self.file.write_text(self.text.replace(old, new, 1) if old else self.text, encoding="utf-8")
         self._handlers[module.signal.SIGHUP](module.signal.SIGHUP, None)

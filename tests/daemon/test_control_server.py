@@ -203,7 +203,7 @@ def test_the_socket_of_a_daemon_that_runs_is_left_alone(rig: Rig) -> None:
         ControlServer(rig.path, 0o600)
     with rig.connected() as one:
         one.send(b"{}")
-        rig.serve(4)  # the one that looked whether somebody is there comes first
+        rig.serve(4)  # the one that looked whether anything listens comes first
         assert one.recv(MOST_BYTES)
 
 

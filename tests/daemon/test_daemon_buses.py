@@ -134,7 +134,7 @@ def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
     bench.file.write_text(bench.text, encoding="utf-8")
 
     def wrong(*_: object) -> None:
-        raise WrongBusError("crane", "expected serial number 1, found 2")
+        raise WrongBusError("crane", "expected serial number 1, got 2")
 
     monkeypatch.setattr("canshaper.daemon.ports.open_port", wrong)
     with pytest.raises(BusError) as error:
@@ -142,4 +142,4 @@ def test_a_bus_of_another_device_is_a_problem_of_its_line_in_the_file(
     lines = bench.text.splitlines()
     number = 1 + next(i for i, line in enumerate(lines) if "match:" in line)
     assert str(error.value).startswith(f"{bench.file}:{number}: buses.crane.match:")
-    assert str(error.value).endswith("expected serial number 1, found 2")
+    assert str(error.value).endswith("expected serial number 1, got 2")

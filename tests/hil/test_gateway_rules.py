@@ -29,7 +29,7 @@ pytestmark = pytest.mark.usefixtures("no_rules")
 
 @pytest.mark.parametrize("kind", [kind for kind, row in CHECKSUMS.items() if row.kernel])
 def test_the_fallback_makes_checksums_right(tmp_path: Path, kind: str) -> None:
-    """Reckoned by crccheck at both ends; the kernel does it between."""
+    """Computed by crccheck at both ends; the kernel does it between."""
     dbc = (FILE.parents[1] / "dbc" / "forwarder.dbc").read_text()
     # In the last byte, with the counter before it.
     counter = ' SG_ AliveCounter : 56|8@1+ (1,0) [0|255] "" SHAPER\n\nBO_ 273'

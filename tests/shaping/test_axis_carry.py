@@ -46,7 +46,7 @@ def test_no_velocity_trips_and_poisons_nothing(bad: float, command: float) -> No
 
 @pytest.mark.parametrize("steps", [10, 125, 1000])
 def test_a_slow_path_there_and_back_is_run_to_its_end(steps: int) -> None:
-    """Far below a coarse grid's step: what rounding leaves out is paid, and nothing is left."""
+    """Far below a coarse grid's step: the quantisation error is carried, and nothing is left."""
     axis = axis_with(OutputLimits(deadband=0.05), steps)
     travel = []
     position = 0.0

@@ -44,7 +44,7 @@ class MessageRate:
     times: deque[int] = field(default_factory=deque)
 
     def received(self, time_ns: int) -> None:
-        """It came."""
+        """A frame of it was received."""
         self.last_ns = time_ns
         self.times.append(time_ns)
         self.invalidate(time_ns)

@@ -65,7 +65,7 @@ class AddressClaim:
         self._answered = answered
         self._cyclic = cyclic
         self._guest = guest
-        self._requesting = False  # which node has it; nothing is claimed meanwhile
+        self._requesting = False  # which node has the address; nothing is claimed meanwhile
         self._request_first = guest
         self._delay_ns = config.name.identity_number % 256 * STEP_NS
         self._due_ns: int | None = 0  # when to send a claim, or that there is none
