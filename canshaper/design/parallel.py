@@ -1,6 +1,7 @@
 """Many pieces of work on the processes of this machine."""
 
 import multiprocessing
+import os
 import signal
 import sys
 from collections import deque
@@ -19,6 +20,8 @@ from canshaper.errors import CampaignError
 MOST_DEATHS = 3
 # How soon Ctrl-C is seen.
 WAIT_S = 0.2
+# A process of the pool is a child of the one that began it, on every Python.
+_CONTEXT = multiprocessing.get_context("fork" if sys.platform == "linux" else "spawn")
 
 J = TypeVar("J")
 R = TypeVar("R")
@@ -72,7 +75,9 @@ class Processes:
         queue, ends = _Queue(jobs), False
         with _interrupt_seen() as interrupted:
             while not ends:
-                with ProcessPoolExecutor(self.count, initializer=_begin) as pool:
+                with ProcessPoolExecutor(
+                    self.count, _CONTEXT, initializer=_begin, initargs=(os.getpid(),)
+                ) as pool:
                     try:
                         ends = yield from self._drain(pool, work, queue, interrupted)
                     except BaseException:
@@ -132,10 +137,14 @@ def _interrupt_seen() -> Iterator[Callable[[], bool]]:
         signal.signal(signal.SIGINT, before)
 
 
-def _begin() -> None:
-    """What a process of the pool does first."""
+def _begin(parent: int) -> None:
+    """What a process of the pool does first.
+
+    Args:
+        parent: number of the process that started it.
+    """
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C goes to all; the parent ends this one
     end_with_parent(signal.SIGKILL)  # which may have no time for it
-    parent = multiprocessing.parent_process()
-    if parent is None or not parent.is_alive():
+    # Not by the pipe of multiprocessing: a sibling that was forked later holds its other end too.
+    if os.getppid() != parent:
         sys.exit(1)

@@ -66,3 +66,11 @@ def test_they_end_with_their_parent(code: str, how: signal.Signals, tmp_path: Pa
     while any(state_of(pid) != "Z" for pid in children):
         assert time.monotonic() < limit, "they outlive their parent"
         time.sleep(0.01)
+
+
+@pytest.mark.parametrize(("parent", "status"), [("os.getppid()", 0), ("os.getpid()", 1)])
+def test_a_process_of_a_pool_whose_parent_has_ended_before_it_began(
+    parent: str, status: int
+) -> None:
+    code = f"import os; from canshaper.design.parallel import _begin; _begin({parent})"
+    assert subprocess.run([sys.executable, "-c", code], check=False).returncode == status
