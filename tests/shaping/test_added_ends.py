@@ -155,3 +155,16 @@ def test_with_anti_sway_off_nothing_that_is_added_begins_a_motion() -> None:
     axis, _ = pair(OutputLimits())
     axis.tick(CommandInput(bypass=True), 0.2)
     assert (axis.state, axis.raw) == (State.READY, 0)
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_shaped_stop_is_that_of_an_axis_to_which_nothing_is_added(sign: float) -> None:
+    axis, plain = pair(OutputLimits(), lambda: Fir([0.1] * 10))
+    for one in (axis, plain):
+        for _ in range(20):
+            one.tick(CommandInput(sign))
+    for _ in range(12):
+        for one in (axis, plain):
+            one.tick(CommandInput(fault=Reason.JOYSTICK_TIMEOUT))
+        assert (axis.state, axis.sent) == (plain.state, plain.sent)
+    assert plain.sent == 0.0
