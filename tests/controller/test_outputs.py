@@ -1,0 +1,63 @@
+"""What leaves in the place of a valve frame that the output guard has refused."""
+
+from collections.abc import Callable
+
+import pytest
+
+from canshaper.codec.e2e import E2e
+from canshaper.controller.controller import Controller
+from canshaper.machine.binding import load_deployment
+from canshaper.shaping.states import Reason
+from canshaper_sim.hand import Hand, Held
+from tests.faults import shipped
+from tests.rigs.forwarder import Rig
+
+
+def driven(name: str) -> Controller:
+    """All axes of a shipped deployment in motion."""
+    deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
+    controller, hand = Controller(deployment), Hand(deployment)
+    for number in range(80):
+        pushed = 1.0 if number > 20 else 0.0
+        held = Held(dict.fromkeys(deployment.axes, pushed), enable=True)
+        for frame in hand.frames(number * 20, held):
+            controller.receive(frame, number * 20_000_000)
+        list(controller.tick(number * 20_000_000))
+    assert all(runner.axis.raw for runner in controller.axes.values())
+    return controller
+
+
+@pytest.mark.parametrize("name", ["forwarder", "canfd-forwarder", "gateway-forwarder"])
+def test_all_axes_of_its_message_are_neutral(name: str) -> None:
+    """A plain frame, one with a checksum, one with two axes."""
+    controller = driven(name)
+    for runner in controller.axes.values():
+        message = runner.bound.valve.message
+        frame = message.frame()
+        neutral = controller.refused(frame)
+        assert neutral[:3] == frame[:3]
+        for of in controller.axes.values():
+            if of.bound.valve.message is message:
+                raw = message.sender.fields.layout.decode(neutral.data)
+                assert of.bound.valve.read(raw) == 0
+
+
+def test_it_has_the_count_of_the_refused_one() -> None:
+    """Its receiver sees no gap."""
+    controller = driven("canfd-forwarder")
+    message = controller.axes["slew"].bound.valve.message
+    check = message.sender.protection.check
+    assert isinstance(check, E2e)
+    frame = message.frame()
+    neutral = controller.refused(frame)
+    assert check.verify(neutral.data)
+    assert check.count(neutral.data) == check.count(frame.data)
+
+
+def test_its_axes_trip_with_the_next_tick(changed_rig: Callable[..., Rig]) -> None:
+    rig = changed_rig().moving()
+    rig.controller.refused(rig.run(1, Slew=1000)["SlewCommand"][""])
+    assert rig.controller.axes["slew"].tripping
+    assert not rig.controller.axes["near_far"].tripping
+    rig.run(1, Slew=1000)
+    assert rig.reason() == Reason.OUTPUT_REFUSED.name
