@@ -65,6 +65,7 @@ def add_axes(
                 of_valve,
                 None if sender.cycle_time else cycle,
                 cia408,
+                None if cia408 else nodes.supervised(sender.name),
             )
         )
 

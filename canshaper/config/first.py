@@ -168,6 +168,8 @@ class FirstAxis:
     valve_scaling: FirstScaling = field(default_factory=FirstScaling)
     cycle_ms: int | None = None
     cia408: FirstCia408 | None = None
+    node: str | None = None
+    """Of a valve on CANopen without CiA 408."""
 
 
 @dataclass(frozen=True)

@@ -141,6 +141,7 @@ def _axis(axis: FirstAxis, joystick_timeout_ms: int) -> Iterator[str]:
     command += _scaling(axis.scaling)
     valve += _scaling(axis.valve_scaling)
     valve += f", cycle_ms: {axis.cycle_ms}" if axis.cycle_ms else ""
+    valve += f", node: {axis.node}" if axis.node else ""
     yield f"    command: {{ {command}, neutral_pct: 2 }}"
     if axis.cia408:
         yield from _cia408(valve, axis.cia408)

@@ -7,47 +7,20 @@ from pathlib import Path
 
 import canopen
 import pytest
-from click.testing import Result
-from typer.testing import CliRunner
 
-from canshaper.cli.app import app
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
-from tests.commissioning.nodes.eds_files import INCLINOMETER, JOYSTICK, VALVE, mapping, pdo, write
+from tests.cli.eds_nodes import ANSWERS, LEFT, NEAR, SLEW, TILT, init
+from tests.commissioning.nodes.eds_files import (
+    INCLINOMETER,
+    JOYSTICK,
+    U32,
+    VALVE,
+    write,
+)
 
 TICK_NS = 20_000_000
-LEFT, SLEW, NEAR, TILT = 0x10, 0x20, 0x21, 0x30
-ANSWERS = """
-joystick.eds: name = left
-left: node id = 0x10
-slew.dcf: name = slew
-near.eds: name = near
-near: node id = 33
-Messages of the joysticks = left_TPDO1
-left_TPDO1: enable switch = Buttons_1
-left_TPDO1: switch that resets = Buttons_2
-Axis of left_TPDO1.Slew = slew
-Slew: its value at full = 32767
-slew: valve command = slew_RPDO1.SetPoint
-Axis of left_TPDO1.NearFar = near_far
-NearFar: its value at full = 32767
-near_far: valve command = near_RPDO1.SetPoint
-near_far: silence = 250
-Node id of canshaper = 1
-"""
-
-
-def init(folder: Path, answers: str, *options: str) -> Result:
-    """With a joystick that is sent by no timer and two valves, of which slew has a DCF."""
-    write(folder / "joystick.eds", JOYSTICK)
-    write(folder / "slew.dcf", VALVE, SLEW)
-    write(folder / "near.eds", VALVE)
-    (folder / "answers.txt").write_text(answers)
-    words = ["init", str(folder / "machine.yaml"), "--answers", str(folder / "answers.txt")]
-    for name in ("joystick.eds", "slew.dcf", "near.eds"):
-        words += ["--eds", str(folder / name)]
-    return CliRunner().invoke(app, [*words, *options], input="", prog_name="canshaper")
 
 
 @pytest.fixture
@@ -254,44 +227,13 @@ def test_an_inclinometer_is_offered_as_a_sway_sensor(tmp_path: Path) -> None:
     assert (sensor.message, sensor.node, sensor.timeout_ms) == ("tilt_TPDO1", "tilt", 80)
 
 
-@pytest.mark.parametrize(
-    ("answers", "fault"),
-    [
-        ("left: node id = 128", "left: node id: expected a node id, 1 to 127, got '128'"),
-        ("near: node id = 32", "near: node id: expected a node id, 1 to 127 other than 16, 32"),
-        ("Node id of canshaper = 0x10", "expected a node id, 1 to 127 other than 16, 32, 33"),
-        ("near.eds: name = left", "expected another one than left, slew, got 'left'"),
-        ("near.eds: name = größe", "expected a word of letters, digits and _, 20 at most"),
-        ("left: objects = Slew", "left: objects: expected some of Buttons, -, got 'Slew'"),
-    ],
-)
-def test_answers_that_cannot_be_write_nothing(answers: str, fault: str, tmp_path: Path) -> None:
-    key = answers.partition(" =")[0]
-    others = "\n".join(line for line in ANSWERS.splitlines() if not line.startswith(key))
-    result = init(tmp_path, f"{answers}\n{others}\n")
-    assert result.exit_code == 2
-    assert fault in result.output
-    assert not list(tmp_path.glob("machine*"))
-
-
-def test_a_file_that_is_no_eds_is_one_line_and_a_bad_pdo_a_warning(tmp_path: Path) -> None:
-    words = ["init", str(tmp_path / "machine.yaml"), "--eds", str(tmp_path / "stick.eds")]
-    (tmp_path / "stick.eds").write_text("VERSION\n")
-    result = CliRunner().invoke(app, words, input="", prog_name="canshaper")
-    assert (result.exit_code, result.output.count("\n")) == (2, 1)
-    assert f"{tmp_path / 'stick.eds'}:1: expected sections of KEY=VALUE" in result.output
-    long = {0x1801: pdo("T", "0x290", "20"), 0x1A01: mapping(*[(0x6401, 1, 16)] * 5)}
-    write(tmp_path / "stick.eds", JOYSTICK | long)
-    (tmp_path / "a.txt").write_text("")
-    words += ["--answers", str(tmp_path / "a.txt")]
-    result = CliRunner().invoke(app, words, input="", prog_name="canshaper")
-    assert "[1A01sub5]: expected a mapping of 8 bytes at most, got 80 bits" in result.output
-    assert "TPDO1 0x190, event timer 0 ms: Slew, NearFar, Buttons" in result.output
-
-
-def test_a_dbc_that_is_there_stays(tmp_path: Path) -> None:
-    (tmp_path / "machine-canopen.dbc").write_text("mine")
-    result = init(tmp_path, ANSWERS)
-    assert result.exit_code == 2
-    assert "machine-canopen.dbc: is there already; --force replaces it" in result.output
-    assert (tmp_path / "machine-canopen.dbc").read_text() == "mine"
+@pytest.mark.usefixtures("quick")
+def test_a_drive_without_cia_408_is_watched_by_its_heartbeats(tmp_path: Path) -> None:
+    drive = VALVE | {0x1000: ("Device type", U32, "0x00020192")}  # CiA 402
+    result = init(tmp_path, ANSWERS, near=drive)
+    assert result.exit_code == 0, result.output
+    config = load_deployment(tmp_path / "machine.yaml").config
+    slew, near_far = config.axes["slew"].valve, config.axes["near_far"].valve
+    assert slew.cia408 is not None
+    assert (slew.node, slew.cia408.node) == (None, "slew")
+    assert (near_far.node, near_far.cia408) == ("near", None)

@@ -6,6 +6,7 @@ from pathlib import Path
 U8, U16, U32, I16 = 0x05, 0x06, 0x07, 0x03
 OFF = 1 << 31
 Entry = tuple[str, int, str]  # ParameterName, DataType, DefaultValue
+Objects = Mapping[int, Entry | Sequence[Entry]]
 
 
 def pdo(name: str, cob_id: str, timer: str | None, kind: int = 255) -> list[Entry]:
@@ -63,7 +64,7 @@ INCLINOMETER = {
 }
 
 
-def eds(objects: Mapping[int, Entry | Sequence[Entry]], node: int | None = None) -> str:
+def eds(objects: Objects, node: int | None = None) -> str:
     """Text of an EDS; of a DCF, where there is a node id."""
     lines = ["[FileInfo]", "FileName=test.eds", "EDSVersion=4.0", ""]
     lines += ["[DeviceInfo]", "VendorName=", "VendorNumber=", "BaudRate_250=1", "NrOfTXPDO=2", ""]
@@ -88,9 +89,7 @@ def _variable(entry: Entry) -> list[str]:
     return [*lines, "AccessType=rw", f"DefaultValue={value}", "PDOMapping=1"]
 
 
-def write(
-    path: Path, objects: Mapping[int, Entry | Sequence[Entry]], node: int | None = None
-) -> Path:
+def write(path: Path, objects: Objects, node: int | None = None) -> Path:
     """Write it."""
     path.write_text(eds(objects, node), encoding="latin-1", newline="")
     return path
