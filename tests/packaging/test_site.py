@@ -1,9 +1,12 @@
 """The pages as a site: built strictly, complete, and read in a real browser without a network."""
 
+import re
 import shutil
 from collections.abc import Iterator
+from html.parser import HTMLParser
 from pathlib import Path
 from typing import TYPE_CHECKING
+from urllib.parse import unquote
 
 import pytest
 
@@ -16,6 +19,8 @@ if TYPE_CHECKING:
     from playwright.sync_api import BrowserContext, Page
 
 pytestmark = pytest.mark.processes
+
+LOADED_BY_HREF = ("link", "image", "use")  # a link of <a> is only followed
 
 
 @pytest.fixture(scope="module")
@@ -62,13 +67,50 @@ def test_the_reference_has_every_public_name_and_every_verb(site: Path) -> None:
         assert f'id="canshaper-{verb}"' in commands
 
 
+class Parts(HTMLParser):
+    """What a page loads when it is opened: addresses, and the scripts that may load more."""
+
+    def __init__(self, page: Path) -> None:
+        super().__init__()
+        self.addresses: list[str] = []
+        self.scripts: set[str] = set()
+        self._inline = False
+        self.feed(page.read_text(encoding="utf-8"))
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        of = {key: value or "" for key, value in attrs}
+        loads = {"src", "srcset", "poster", "data"} | ({"href"} if tag in LOADED_BY_HREF else set())
+        self.addresses += [of[key] for key in loads & of.keys()]
+        self.addresses += re.findall(r"url\(([^)]*)", of.get("style", ""))
+        if tag == "script" and "src" in of:
+            self.scripts.add(Path(of["src"]).name)
+        self._inline = tag == "script" and of.get("type") != "application/json"
+
+    def handle_data(self, data: str) -> None:
+        if self._inline and data.strip():
+            self.scripts.add(re.sub(r"\.\./", "", data))
+
+
 def test_no_page_requests_anything_outside_of_it(offline: "BrowserContext") -> None:
-    faults: list[str] = []
+    """All pages by what they name; of those with the same scripts, one in the browser."""
     pages = sorted(SITE.rglob("*.html"))
     assert len(pages) > 40
+    kinds: dict[frozenset[str], Path] = {}
     for page in pages:
-        if page.name != "404.html":  # is for servers: its links begin at their root
-            opened(offline, page, faults).close()
+        if page.name == "404.html":  # is for servers: its links begin at their root
+            continue
+        parts = Parts(page)
+        assert any(address.endswith(".css") for address in parts.addresses)
+        for address in parts.addresses:
+            inside = (page.parent / unquote(address).partition("?")[0]).resolve()
+            assert address.startswith("data:") or SITE in inside.parents, (page, address)
+            assert address.startswith("data:") or inside.exists(), (page, address)
+        kinds.setdefault(frozenset(parts.scripts), page)
+    for sheet in SITE.rglob("*.css"):
+        assert not re.search(r"(url\(|@import)\s*[\"']?(\w+:)?//", sheet.read_text()), sheet
+    faults: list[str] = []
+    for page in kinds.values():
+        opened(offline, page, faults).close()
     assert faults == []
 
 
@@ -88,8 +130,7 @@ def test_search_and_diagram_work_in_files(offline: "BrowserContext") -> None:
     assert faults == []
 
 
-@pytest.mark.parametrize("link", ["docs/no-such-page.md", "docs/guide.md#no-such-heading"])
-def test_a_broken_link_fails(link: str, tmp_path: Path) -> None:
+def test_broken_links_fail(tmp_path: Path) -> None:
     """In a tree of its own, of the repository's files but one page."""
     for name in ("CHANGELOG.md", "CONTRIBUTING.md", "LICENSE", "README.md", "canshaper", "config"):
         (tmp_path / name).symlink_to(ROOT / name)
@@ -98,8 +139,11 @@ def test_a_broken_link_fails(link: str, tmp_path: Path) -> None:
     shutil.copytree(ROOT / "tools" / "site", tmp_path / "tools" / "site")
     shutil.copy(ROOT / "mkdocs.yml", tmp_path)
     text = (ROOT / "SECURITY.md").read_text(encoding="utf-8")
-    (tmp_path / "SECURITY.md").write_text(f"{text}\n[a link]({link})\n", encoding="utf-8")
+    links = ("docs/no-such-page.md", "docs/guide.md#no-such-heading")
+    text += "".join(f"\n[a link]({link})\n" for link in links)
+    (tmp_path / "SECURITY.md").write_text(text, encoding="utf-8")
     done = built(tmp_path)
     assert done.returncode == 1
-    assert "SECURITY.md' contains a link" in done.stderr
-    assert "Aborted with 1 warnings in strict mode" in done.stderr
+    for link in links:
+        assert f"SECURITY.md' contains a link '{link}'" in done.stderr
+    assert "Aborted with 2 warnings in strict mode" in done.stderr
