@@ -1,6 +1,8 @@
 """Mutants by mutmut and more operators, and what their tests say; for tools/mutation.py.
 
-    mutants.py run PROCESSES [PATTERN ...]         all; run-typed: without what mypy refuses
+    mutants.py run PROCESSES [PATTERN ...]         all
+    mutants.py run-new SURVIVORS PROCESSES [PATTERN ...]
+                                                   without what mypy refuses, and the explained ones
     mutants.py judge SURVIVORS [PATTERN ...]
 
 In the working directory, where mutmut finds its settings as soon as it is imported.
@@ -11,7 +13,7 @@ import re
 import signal
 import sys
 from collections import Counter, defaultdict
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from difflib import unified_diff
 from pathlib import Path
 from typing import NamedTuple
@@ -29,8 +31,9 @@ from mutmut.runners.harness import PytestRunner
 from mutmut.utils.file_utils import change_cwd, walk_mutatable_files
 from mutmut.workers.isolation import ForkRunner
 
-# Exit codes: no test failed; the time was up (a loop that never ends); left to the type checker.
-SURVIVED, TIMED_OUT, TYPES = 0, (-signal.SIGPROF, -signal.SIGXCPU), 37
+# Exit codes: no test failed; the time was up (a loop that never ends); left to the type checker; an
+# explained one, left to a run of all.
+SURVIVED, TIMED_OUT, TYPES, EXPLAINED = 0, (-signal.SIGPROF, -signal.SIGXCPU), 37, 38
 
 
 class Mutant(NamedTuple):
@@ -86,13 +89,14 @@ MORE = (
 # -- the run, in the working directory -------------------------------------------------------------
 
 
-def run(processes: int, patterns: list[str], *, typed: bool) -> int:
+def run(processes: int, patterns: list[str], known: Collection[str] | None = None) -> int:
     """Make the mutants and run the tests of each.
 
     Args:
         processes: how many at a time.
         patterns: names of mutants; none for all.
-        typed: whether what puts None into the code is left to the type checker, which refuses it.
+        known: survivors that are not run again, as each needs every test; then what puts None into
+            the code is not run either: the type checker refuses it.
 
     Returns:
         Exit code of pytest.
@@ -106,7 +110,9 @@ def run(processes: int, patterns: list[str], *, typed: bool) -> int:
     mutmut.create_mutants(processes)
     chosen = []
     for mutant in mutants():
-        if typed and re.search(r"-> None #\d+$", mutant.name):
+        if known is not None and mutant.name in known:
+            mutant.save(EXPLAINED)
+        elif known is not None and re.search(r"-> None #\d+$", mutant.name):
             mutant.save(TYPES)
         elif any(fnmatch.fnmatch(mutant.key, pattern) for pattern in patterns or ["*"]):
             chosen.append(mutant)
@@ -167,6 +173,8 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
                 print(f"\n# killed, though explained\n{mutant.name}\n{mutant.difference()}")
         elif code == TYPES:
             counts["left to the type checker"] += 1
+        elif code == EXPLAINED:
+            counts["explained, not run again"] += 1
         elif code == SURVIVED and mutant.name in known:
             counts["survived for a reason"] += 1
         else:
@@ -187,7 +195,9 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
 
 if __name__ == "__main__":
     match sys.argv[1:]:
-        case ["run" | "run-typed" as how, processes, *patterns]:
-            sys.exit(run(int(processes), patterns, typed=how == "run-typed"))
+        case ["run", processes, *patterns]:
+            sys.exit(run(int(processes), patterns))
+        case ["run-new", survivors, processes, *patterns]:
+            sys.exit(run(int(processes), patterns, explained(Path(survivors))))
         case ["judge", survivors, *patterns]:
             sys.exit(judge(explained(Path(survivors)), patterns))

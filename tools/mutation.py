@@ -1,7 +1,8 @@
 """Mutation run: change the code in small ways, one at a time, and see whether a test notices.
 
     tools/mutation.py                     every module of the coverage gate, group by group
-    tools/mutation.py core                what runs in `make test`: state machine and output limits
+    tools/mutation.py core                what runs in `make test`: state machine and output limits,
+                                          without the survivors that are explained
     tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
     tools/mutation.py -j1 daemon          so many at a time, here one; two without it
 
@@ -92,8 +93,8 @@ def run(group: str, patterns: list[str], processes: str) -> int:
     mutants = [sys.executable, str(ROOT / "tools/mutants.py")]
     log = work / "mutmut.log"
     with log.open("w") as out:
-        how = "run-typed" if group == "core" else "run"
-        command = [*mutants, how, processes, *patterns]
+        how = ["run-new", str(SURVIVORS)] if group == "core" else ["run"]
+        command = [*mutants, *how, processes, *patterns]
         ran = subprocess.run(command, cwd=work, stdout=out, stderr=subprocess.STDOUT, check=False)
     if ran.returncode:
         print(log.read_text()[-5000:])
