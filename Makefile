@@ -13,7 +13,7 @@
 # make generate   value tables of the DBC files and the tables of docs/states.md, from the program
 # make fuzz FUZZ_S=60   inputs of every kind that reach new code, for so many seconds each kind
 
-.PHONY: demo test quick versions test-others test-long test-studies test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime docs deb release image lock clean
+.PHONY: demo test quick versions test-others test-drives test-long test-studies test-socketcan drawing test-machines test-faults test-service test-studio lint coverage mutation mutation-core paper fuzz soak j1939 bench bench-realtime docs deb release image lock clean
 
 .venv/demo-ready: pyproject.toml tools/venv.sh
 	tools/venv.sh tools
@@ -34,9 +34,10 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo $(ARGS)
 
-# The parts of `make test`, the longest first: so many side by side, each printed when it ends.
-JOBS ?= 2
-PARTS = test-others coverage test-socketcan mutation-core test-long test-studio
+# The parts of `make test`, the longest first, each printed when it ends. Three at a time on two
+# cores: servers, browsers and buses wait for a part of theirs.
+JOBS ?= 3
+PARTS = test-others test-drives test-socketcan test-studio coverage mutation-core test-long
 test: lint
 	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
 
@@ -54,8 +55,13 @@ coverage: .venv/test-ready
 test-long: .venv/test-ready
 	$(NICE) .venv/bin/python -m pytest -q -m long $(GATE)
 
+# What drives simulated cranes.
+DRIVES = tests/closed_loop tests/commissioning tests/design tests/faults
+test-drives: .venv/test-ready
+	$(NICE) .venv/bin/python -m pytest -q -m "not study" $(DRIVES)
+
 test-others: .venv/test-ready
-	$(NICE) .venv/bin/python -m pytest -q -m "not study" $(GATE:%=--ignore=%)
+	$(NICE) .venv/bin/python -m pytest -q -m "not study" $(GATE:%=--ignore=%) $(DRIVES:%=--ignore=%)
 
 # Every seed of noise, instant of a fault and combination of a sway sensor, prints the worst; the
 # other 7500 drives with faults.

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from canshaper.commissioning.stopping import print_stopping, stopping
 from canshaper.machine.binding import load_deployment
-from tests.controller.test_sets import DBC, YAML
+from tests.controller.set_files import DBC, YAML
 from tests.rigs.forwarder import ROOT, Rig
 
 Make = Callable[..., Rig]

@@ -13,12 +13,12 @@ from canshaper.config.bus import CanopenNode
 from canshaper.controller.runner import FOREIGN_NS
 from canshaper.protocols.canopen.nodes import RemoteNode
 from canshaper.shaping.states import State
-from tests.inputs.test_press import tripped
 from tests.rigs.canopen import OPERATIONAL
 from tests.rigs.emergency import PRESSED, Machine
 from tests.rigs.forwarder import SLOW_VALVE, TICK_NS, Rig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
+from tests.rigs.tripped import tripped
 from tests.rigs.waiting import Waiting, both, tick
 
 MS = 1_000_000

@@ -12,7 +12,7 @@ from canshaper.blackbox.recorder import Recorder
 from canshaper.daemon.daemon import Daemon
 from canshaper.machine.binding import load_deployment
 from tests.daemon.bench import Bench
-from tests.daemon.test_daemon_control import answered, control
+from tests.daemon.control_client import answered, control
 
 
 @pytest.fixture

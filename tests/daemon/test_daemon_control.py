@@ -1,46 +1,12 @@
 """The control socket of a daemon: what is set, asked for and refused."""
 
-import json
-import socket
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from tests.daemon.bench import Bench, at
-
-RANGE = "axes.slew.filter.a1: [0.5, 1.0]"
-
-
-def control(bench: Bench, path: Path) -> None:
-    bench.text += f"control:\n  socket: {path}\n  adjustable:\n    {RANGE}\n"
-    bench.file.write_text(bench.text, encoding="utf-8")
-
-
-def ask(path: Path, request: object) -> Callable[[], socket.socket]:
-    def asks() -> socket.socket:
-        client = socket.socket(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-        client.settimeout(5)
-        client.connect(str(path))
-        client.send(json.dumps(request).encode())
-        clients.append(client)
-        return client
-
-    clients.clear()
-    return asks
-
-
-clients: list[socket.socket] = []
-
-
-def answered(bench: Bench, path: Path, request: object) -> dict[str, Any]:
-    replies: list[bytes] = []
-    asks = ask(path, request)
-    at(bench, {3: asks, 15: lambda: replies.append(clients[0].recv(65536))})
-    clients[0].close()
-    answer: dict[str, Any] = json.loads(replies[0])
-    return answer
+from tests.daemon.control_client import answered, control
 
 
 def test_a_number_is_set_and_the_log_has_it(

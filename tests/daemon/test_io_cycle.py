@@ -10,16 +10,13 @@ from canshaper.daemon.io_cycle import io_cycle
 from canshaper.daemon.standstill import Standstill
 from canshaper.shaping.states import State
 from tests.rigs.emergency import PRESSED, READY, Machine
-from tests.rigs.forwarder import ROOT, SLOW_VALVE, TICK_NS, Rig
+from tests.rigs.forwarder import PATIENT, ROOT, SLOW_VALVE, TICK_NS, Rig
 from tests.rigs.gateway import GatewayRig
 from tests.rigs.j1939 import Rig as J1939Rig
 from tests.rigs.j1939 import bjm
 from tests.rigs.waiting import Waiting, both, tick
 
 Make = Callable[..., Rig]
-
-# Joysticks that are believed for longer than a valve waits.
-PATIENT = {"timeout_ms: 100 #": "timeout_ms: 900 #", "timeout_ms: 100\n": "timeout_ms: 900\n"}
 
 
 def test_a_valve_that_has_closed_meanwhile_does_not_get_full_speed(changed_rig: Make) -> None:

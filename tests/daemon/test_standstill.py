@@ -8,9 +8,8 @@ from canshaper.daemon import loop
 from canshaper.daemon.loop import run_at_deadlines
 from canshaper.daemon.standstill import Standstill, longest_gap_ns
 from canshaper.shaping.states import State
-from tests.daemon.test_io_cycle import PATIENT
 from tests.rigs.emergency import DBC, LAST, STOP
-from tests.rigs.forwarder import ROOT
+from tests.rigs.forwarder import PATIENT, ROOT
 from tests.rigs.standing import MS, Machine, Make
 
 T_MS = 150

@@ -18,7 +18,7 @@ import typer
 from typer.testing import CliRunner
 
 from canshaper.cli.app import app
-from tests.docs.test_docs import PAGES, ROOT
+from tests.docs.pages import PAGES, ROOT
 
 COMMANDS: Any = typer.main.get_command(app)
 CONSOLE = re.compile(r"^```console\n(.*?)^```", re.MULTILINE | re.DOTALL)

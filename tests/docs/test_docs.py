@@ -12,11 +12,8 @@ import typer
 from canshaper.cli.app import app
 from canshaper.codec.frame import FrameFault
 from canshaper.shaping.states import Reason, State
+from tests.docs.pages import PAGES, ROOT
 
-ROOT = Path(__file__).parents[2]
-EVERY_PAGE = {*ROOT.glob("*.md"), *(ROOT / "docs").rglob("*.md"), ROOT / "studies" / "README.md"}
-# What was once may be named in it.
-PAGES = sorted(EVERY_PAGE - {ROOT / "CHANGELOG.md"})
 COMMANDS: Any = typer.main.get_command(app)
 CODE = re.compile(r"`([^`\n]+)`|^```\w*\n(.*?)^```", re.MULTILINE | re.DOTALL)
 COMMAND = re.compile(r"\b(?<!from )canshaper ([a-z][a-z-]*)((?:[^\S\n]+[^\s`|;&#]+|[^\S\n]*\\\n)*)")

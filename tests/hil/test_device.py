@@ -18,6 +18,7 @@ from tests.hil.machine import (
     ROOT,
     Service,
     candump,
+    drive,
     joysticks_on,
     logged,
     message_name,
@@ -25,7 +26,6 @@ from tests.hil.machine import (
     service,
     wait_for,
 )
-from tests.hil.test_daemon import drive
 
 OTHER_CRANE = "vcan1"
 JOYSTICKS = {"JoystickLeft", "JoystickRight"}

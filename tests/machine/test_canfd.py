@@ -7,7 +7,7 @@ import pytest
 from canshaper.codec.layout import FD_LENGTHS
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
-from tests.machine.test_gateway_binding import problems as gateway_problems
+from tests.machine.gateway_files import problems as gateway_problems
 from tests.rigs.files import Machine
 
 ROOT = Path(__file__).parents[2]

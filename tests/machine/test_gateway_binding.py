@@ -15,29 +15,10 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
 from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
+from tests.machine.gateway_files import ROOT, load, problems
 
-ROOT = Path(__file__).parents[2]
 SLEW = "bus: machine, message: JoystickLeft, signal: Slew, timeout_ms: 200,"
 COUNTER = "alive_counter: AliveCounter"
-
-
-def load(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> Deployment:
-    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text()
-    network = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
-    for old, new in changes:
-        assert old in text, old
-        text = text.replace(old, new, 1)
-    assert dbc[0] in network
-    (folder / "machine.dbc").write_text(network.replace(*dbc, 1), "cp1252")
-    file = folder / "machine.yaml"
-    file.write_text(text.replace("../dbc/forwarder.dbc", "machine.dbc"))
-    return load_deployment(file)
-
-
-def problems(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> list[str]:
-    with pytest.raises(ConfigError) as caught:
-        load(folder, *changes, dbc=dbc)
-    return [str(p).rpartition(f"{folder}/")[2] for p in caught.value.problems]
 
 
 def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:

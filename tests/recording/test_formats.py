@@ -4,22 +4,10 @@ from pathlib import Path
 
 import pytest
 
-from canshaper.errors import LogError
 from canshaper.recording.log import LogFile, TimedFrame, read_log
+from tests.recording.files import error_of, kept
 
 DAY_NS = 86_400 * 10**9
-
-
-def kept(folder: Path, name: str, content: str) -> Path:
-    path = folder / name
-    path.write_text(content, encoding="utf-8")
-    return path
-
-
-def error_of(path: Path) -> str:
-    with pytest.raises(LogError) as error:
-        list(read_log(path))
-    return str(error.value)
 
 
 # -- PEAK's TRC ------------------------------------------------------------------------------------

@@ -21,6 +21,8 @@ JOYSTICKS = {"JoystickLeft": ("Slew", "NearFar"), "JoystickRight": ("Lift", "Rot
 
 # For the DBC: the slew axis has its turn in every tenth tick.
 SLOW_VALVE = {"BO_ 512 20;": "BO_ 512 200;"}
+# For the YAML: joysticks that are believed for longer than a valve waits.
+PATIENT = {"timeout_ms: 100 #": "timeout_ms: 900 #", "timeout_ms: 100\n": "timeout_ms: 900\n"}
 NAMES = (*JOYSTICKS, "SlewCommand", "NearFarCommand", "LiftCommand", "ShaperStatus")
 NAMES += ("SlewStatus", "NearFarStatus", "LiftStatus")
 

@@ -10,8 +10,8 @@ from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.states import CommandInput
 from canshaper.shaping.sway import SwayMode
 from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
-from tests.shaping.test_sensed import Rig
-from tests.shaping.test_small_strokes import axis_with, tapped
+from tests.shaping.sensed_rig import Rig
+from tests.shaping.taps import axis_with, tapped
 
 TIMING = SensorTiming(Measured.ANGLE, 0.02, 0.0, 0.0, lost_s=0.07)
 LIMITS = SensorLimits(0.002, 0.05)

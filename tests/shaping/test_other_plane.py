@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.shaping.states import CommandInput, State
 from canshaper.shaping.trust import Trust
-from tests.shaping.test_sensed import SCALE, TICK_S, Rig
+from tests.shaping.sensed_rig import SCALE, TICK_S, Rig
 
 LARGEST, TIME_S = 0.25, 4.0
 

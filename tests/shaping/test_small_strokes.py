@@ -1,70 +1,20 @@
 """Taps and small strokes: one movement, as long as the joystick asked for."""
 
-import math
 import random
 from itertools import pairwise
 
 import pytest
 
-from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir, zv_taps
-from canshaper.shaping.shapers.gff import Gff
-from canshaper.shaping.shapers.kind import Shaper
 from canshaper.shaping.shapers.limit_aware import LimitAware
-from canshaper.shaping.shapers.off import Off
 from canshaper.shaping.small_strokes import SmallStrokes, least_velocity
-from canshaper.shaping.states import CommandInput, Reason, State
-from canshaper.shaping.sway import SwayMode, SwayModel
+from canshaper.shaping.states import CommandInput, Reason
 from canshaper.shaping.valve_curve import ValveCurve
-
-TICK_S = 0.02
-MODE = SwayMode.from_period(2.356, 0.038)
-LIMITS = OutputLimits(deadband=0.05, tail_s=2.2, brake_shaped=True)
-# Three heaps and a floor between them, as ``canshaper robust`` makes them: 1.8 s.
-TAPS = [0.1, 0.1, 0.1, *[0.0044] * 40, 0.1, 0.1, 0.048, *[0.0044] * 40, 0.1]
-
-
-class Ruleless:
-    """A shaper of which an axis does not know that it spreads."""
-
-    def __init__(self, shaper: Shaper) -> None:
-        self.step = shaper.step
-
+from tests.shaping.taps import LIMITS, MODE, TICK_S, axis_with, tapped
 
 LEVELS = (0.1, 0.13, 0.2, 0.34, 0.55, 0.79, 1.0)
 DURATIONS = (0.06, 0.1, 0.14, 0.2, 0.3, 0.36, 0.46, 1.0)
-
-
-def axis_with(
-    limits: OutputLimits = LIMITS, steps: int = 125, shaper: str = "robust", **changes: float
-) -> Axis:
-    """An axis in READY."""
-    sway = SwayModel(MODE, TICK_S)
-    total = math.fsum(TAPS)
-    fir = Fir([tap / total for tap in TAPS])
-    robust = LimitAware(sway, fir, 5.0)
-    shapers: dict[str, Shaper] = {
-        "robust": robust,
-        "ruleless": Ruleless(robust),
-        "gff": Gff(sway, (-5.655, -4.112)),
-        "off": Off(),
-    }
-    axis = Axis(TICK_S, limits, sway=sway, shaper=shapers[shaper], grid_steps=steps, **changes)
-    axis.tick(CommandInput())
-    axis.tick(CommandInput())
-    assert axis.state is State.READY
-    return axis
-
-
-def tapped(axis: Axis, level: float, duration_s: float, rest_s: float = 3.5) -> list[float]:
-    """What is sent at a tap."""
-    held = round(duration_s / TICK_S)
-    sent = []
-    for tick in range(held + round(rest_s / TICK_S)):
-        axis.tick(CommandInput(level if tick < held else 0.0))
-        sent.append(axis.sent)
-    return sent
 
 
 def movements(sent: list[float]) -> int:

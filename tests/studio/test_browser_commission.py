@@ -9,8 +9,8 @@ from playwright.sync_api import expect
 
 from tests.studio.browser import WAIT_MS
 from tests.studio.conftest import ROOT, Studio
-from tests.studio.test_browser_languages import LOCALES, is_good
-from tests.studio.test_languages import texts
+from tests.studio.languages import texts
+from tests.studio.reader import LOCALES, is_good
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser

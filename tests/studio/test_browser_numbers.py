@@ -8,9 +8,9 @@ from axe_playwright_python.sync_playwright import Axe
 from playwright.sync_api import Page, expect
 
 from tests.studio.conftest import Studio
+from tests.studio.languages import OTHERS, texts
 from tests.studio.machine import A1, PERIOD, Machine
-from tests.studio.test_browser_languages import english_said, in_language
-from tests.studio.test_languages import OTHERS, texts
+from tests.studio.reader import english_said, in_language
 
 
 @pytest.fixture

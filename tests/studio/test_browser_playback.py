@@ -10,8 +10,8 @@ from playwright.sync_api import Page, expect
 
 from tests.studio.conftest import Opened, Studio
 from tests.studio.drives import black_box, recorded
-from tests.studio.test_browser_languages import LOCALES, is_good
-from tests.studio.test_languages import OTHERS, texts
+from tests.studio.languages import OTHERS, texts
+from tests.studio.reader import LOCALES, is_good
 
 SIZES = [(390, 844), (1024, 700), (1920, 1080)]
 

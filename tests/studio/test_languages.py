@@ -1,6 +1,5 @@
 """The texts of the page: every language has every text, and the page has no text besides."""
 
-import json
 import re
 from html.parser import HTMLParser
 from pathlib import Path
@@ -11,9 +10,8 @@ from canshaper.commissioning.procedure.steps import STEPS
 from canshaper.shaping.reasons import REASON_TEXTS, STATE_TEXTS
 from canshaper.studio.server import STATIC
 from canshaper.studio.words import said
+from tests.studio.languages import ENGLISH, OTHERS, PLACE, texts
 
-ENGLISH, OTHERS = "en", ("de", "fi", "sv")
-PLACE = re.compile(r"\{\w+\}")
 KEY = re.compile(r"""data-t(?:-\w+)?="([\w.]+)"|["`]([a-z]\w*(?:\.\w+)+)["`]""")
 NOT_TEXTS = re.compile(r"\.(js|csv|png|json)$")
 # Keys that scripts put together, by what they begin with.
@@ -21,12 +19,6 @@ COMPOSED = ("term.", "axis.", "way.", "crane.", "slider.", "stick.", "gamepad.",
 COMPOSED += ("status.", "step.", "said.")
 NAMES = {"canshaper", "canshaper studio", "Commissioning, canshaper studio", "studio"}
 NAMES |= {"CSV", "PNG", "A/B"}
-
-
-def texts(language: str) -> dict[str, str]:
-    """The table of a language."""
-    table: dict[str, str] = json.loads((STATIC / "languages" / f"{language}.json").read_text())
-    return table
 
 
 def test_there_are_the_languages_that_the_page_offers() -> None:

@@ -6,11 +6,12 @@ import mujoco
 import numpy as np
 import pytest
 
-from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from canshaper.commissioning.identification.series import Array, Kind, Series, Unit
 from canshaper.commissioning.identification.verdict import Finding, identify
 from canshaper_sim.grapple import Grapple, Sway
 from studies.crane.config import load_crane
 from studies.crane.tests.mujoco_crane import model_of, simulate
+from tests.commissioning.identification.driven import drive
 from tests.commissioning.identification.machine import (
     EMPTY,
     LOADED,
@@ -124,27 +125,6 @@ def test_a_crane_in_mujoco(direction: int) -> None:
     period, ratio = truth(grapple, direction)
     assert finding.period_s.value == pytest.approx(period, rel=0.005)
     assert finding.damping_ratio.value == pytest.approx(ratio, rel=0.1)
-
-
-def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
-    """The near-far axis driven, with its commands, as an angle or its rate."""
-    reported = driven(seconds, pushes)
-    time = np.array([s.time_s for s, _ in reported])
-    rate = kind is Kind.RATE
-    swing = np.array([s.theta6_rate_rad_s if rate else s.theta6_rad for s, _ in reported])
-    noise = Coloured(seed, math.radians(0.2), 0.8)
-    commands = np.array([c["near_far"] for _, c in reported])
-    speed = np.sign(commands) * np.maximum(0.0, (np.abs(commands) - 0.05) / 0.95)
-    unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
-    value = swing + np.array([noise() for _ in time])
-    return Series("log", "", unit, time, value, Command(time - 0.02, speed), _idle(time, commands))
-
-
-def _idle(time: Array, commands: Array) -> list[tuple[float, float]]:
-    edges = np.flatnonzero(np.diff(np.concatenate([[1], (commands != 0.0).astype(int), [1]])))
-    return [
-        (float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)
-    ]
 
 
 STROKES = [Push("near_far", 2, 0.7, 0.4), Push("near_far", 22, 0.7, -0.3)]

@@ -12,8 +12,8 @@ from canshaper.commissioning.identification.series import BIN_S, Kind
 from canshaper.shaping.sway import GRAVITY_M_S2
 from canshaper_sim.grapple import Grapple
 from tests.commissioning.identification.coverage import BOTH, cases
+from tests.commissioning.identification.driven import drive
 from tests.commissioning.identification.machine import Push
-from tests.commissioning.identification.test_accuracy import drive
 
 
 @given(

@@ -1,0 +1,33 @@
+"""A crane that is driven, as a sensor shows it."""
+
+import math
+
+import numpy as np
+
+from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
+from tests.commissioning.identification.machine import (
+    Coloured,
+    Push,
+    driven,
+)
+
+
+def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
+    """The near-far axis driven, with its commands, as an angle or its rate."""
+    reported = driven(seconds, pushes)
+    time = np.array([s.time_s for s, _ in reported])
+    rate = kind is Kind.RATE
+    swing = np.array([s.theta6_rate_rad_s if rate else s.theta6_rad for s, _ in reported])
+    noise = Coloured(seed, math.radians(0.2), 0.8)
+    commands = np.array([c["near_far"] for _, c in reported])
+    speed = np.sign(commands) * np.maximum(0.0, (np.abs(commands) - 0.05) / 0.95)
+    unit = Unit(kind, 1.0, "rad/s" if rate else "rad")
+    value = swing + np.array([noise() for _ in time])
+    return Series("log", "", unit, time, value, Command(time - 0.02, speed), _idle(time, commands))
+
+
+def _idle(time: Array, commands: Array) -> list[tuple[float, float]]:
+    edges = np.flatnonzero(np.diff(np.concatenate([[1], (commands != 0.0).astype(int), [1]])))
+    return [
+        (float(time[a]), float(time[b - 1])) for a, b in zip(edges[::2], edges[1::2], strict=True)
+    ]

@@ -1,0 +1,30 @@
+"""The shipped gateway with pieces of its two files replaced."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+
+ROOT = Path(__file__).parents[2]
+
+
+def load(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> Deployment:
+    text = (ROOT / "config" / "gateway-forwarder.yaml").read_text()
+    network = (ROOT / "dbc" / "forwarder.dbc").read_text("cp1252")
+    for old, new in changes:
+        assert old in text, old
+        text = text.replace(old, new, 1)
+    assert dbc[0] in network
+    (folder / "machine.dbc").write_text(network.replace(*dbc, 1), "cp1252")
+    file = folder / "machine.yaml"
+    file.write_text(text.replace("../dbc/forwarder.dbc", "machine.dbc"))
+    return load_deployment(file)
+
+
+def problems(folder: Path, *changes: tuple[str, str], dbc: tuple[str, str] = ("", "")) -> list[str]:
+    with pytest.raises(ConfigError) as caught:
+        load(folder, *changes, dbc=dbc)
+    return [str(p).rpartition(f"{folder}/")[2] for p in caught.value.problems]
