@@ -61,3 +61,23 @@ def test_its_axes_trip_with_the_next_tick(changed_rig: Callable[..., Rig]) -> No
     assert not rig.controller.axes["near_far"].tripping
     rig.run(1, Slew=1000)
     assert rig.reason() == Reason.OUTPUT_REFUSED.name
+
+
+def test_a_frame_moves_while_any_axis_in_it_does() -> None:
+    """One that is too late must not leave then: slew moves, near-far behind it rests."""
+    deployment = load_deployment(shipped.CONFIG / "gateway-forwarder.yaml")
+    controller, hand = Controller(deployment), Hand(deployment)
+    controller.motions.clear()
+    slew, near_far = (controller.axes[name].axis for name in ("slew", "near_far"))
+    moves = []
+    for number in range(150):
+        time_ms = number * 20
+        held = Held({"slew": 1.0 if time_ms > 400 else 0.0}, enable=True)
+        for frame in hand.frames(time_ms, held) if time_ms < 2000 else ():  # then we stop the crane
+            controller.receive(frame, time_ms * 1_000_000)
+        for frame in controller.tick(time_ms * 1_000_000):
+            if frame.can_id == 272 and slew.raw:
+                assert not near_far.raw
+                moves.append(controller.moves)
+    assert moves
+    assert all(moves)

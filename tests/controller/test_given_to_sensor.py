@@ -1,0 +1,127 @@
+"""What an axis gives its sway sensor with a measurement: swing of full speed, and whose it is."""
+
+from typing import NamedTuple
+
+import pytest
+
+from canshaper.codec.frame import Frame
+from canshaper.controller.controller import Controller
+from canshaper.controller.runner import AxisRunner
+from canshaper.design.lockstep import LockStep
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from canshaper.shaping.axis import Axis
+from canshaper.shaping.limits import OutputLimits
+from canshaper.shaping.shapers.off import Off
+from canshaper_sim.crane import CraneParameters
+from canshaper_sim.joysticks import JoystickNode
+from canshaper_sim.plant import PlantNode
+from canshaper_sim.strokes import Script, Stroke
+from tests.faults import shipped
+
+STROKES = (Stroke("near_far", 0.5, 2.5, 1.0, 0.1), Stroke("slew", 6.0, 6.0, 1.0, 0.1))
+SLEWING = Script("slew", STROKES, 13.0)
+
+
+class Given(NamedTuple):
+    """With one measurement."""
+
+    scale: float
+    damps: object
+
+
+def given(runner: AxisRunner) -> list[Given]:
+    """What the sensor of an axis is given from now on."""
+    sensed = runner.axis.sensed
+    assert sensed is not None
+    measure, seen = sensed.measure, []
+
+    def spied(value: float | None, scale: float, *, commanded: bool, damps: bool = False) -> None:
+        seen.append(Given(scale, damps))
+        measure(value, scale, commanded=commanded, damps=damps)
+
+    sensed.measure = spied  # type: ignore[method-assign]
+    return seen
+
+
+def sensor_machine() -> Deployment:
+    return load_deployment(shipped.CONFIG / "forwarder-sensor.yaml")
+
+
+class Slewing:
+    """A crane that slews while its trusted sensor lets near-far damp."""
+
+    def __init__(self) -> None:
+        deployment = sensor_machine()
+        self.controller = Controller(deployment)
+        plant = PlantNode(deployment, CraneParameters())
+        hands = [JoystickNode(deployment, SLEWING)]
+        self._lock_step = LockStep(deployment, self.controller, plant, hands)
+        self.near_far = self.controller.axes["near_far"]
+        self.seen = given(self.near_far)
+
+    def until_it_damps(self) -> "Slewing":
+        while not (self.seen and self.seen[-1].damps):
+            assert self._lock_step.time_ms < 12000
+            self._lock_step.step()
+        return self
+
+    def step(self) -> Given:
+        self._lock_step.step()
+        return self.seen[-1]
+
+
+def test_by_the_radius_that_is_measured_and_by_the_last_when_that_is_lost() -> None:
+    deployment = sensor_machine()
+    controller = Controller(deployment)
+    tip = deployment.messages.find("TipPosition")
+    assert not isinstance(tip, str)
+    seen = given(controller.axes["slew"])
+    for number, radius_mm in enumerate((None, 3000, 6000, 100, *[None] * 20)):
+        if radius_mm is not None:
+            raw = {"SlewAngle": 0, "Radius": radius_mm, "Height": 0}
+            data = tip[1].encode(raw, scaling=False)
+            controller.receive(Frame("crane", tip[1].frame_id, False, data), number * 20_000_000)
+        list(controller.tick(number * 20_000_000))
+    unmeasured, at_3_m, at_6_m, at_pillar, *later = (one.scale for one in seen)
+    per_m = at_3_m / 3.0
+    assert unmeasured == pytest.approx(3.0 * per_m)  # 1.5 m/s in the file, 0.5 rad/s
+    assert at_6_m == pytest.approx(6.0 * per_m)
+    assert at_pillar == pytest.approx(0.5 * per_m)
+    assert set(later) == {at_pillar}
+
+
+def test_an_axis_that_nothing_moves_damps_no_swing_of_another() -> None:
+    controller = Controller(sensor_machine())
+    runner = controller.axes["near_far"]
+    assert runner.added == 0.0
+    controller.motions.clear()
+    seen = given(runner)
+    list(controller.tick(0))
+    assert [one.damps for one in seen] == [False]
+
+
+def test_while_the_crane_slews_it_does() -> None:
+    drive = Slewing().until_it_damps()
+    assert drive.step().damps is True
+
+
+def test_not_in_the_very_tick_in_which_slew_trips() -> None:
+    drive = Slewing().until_it_damps()
+    drive.controller.send_failed(Frame("crane", 512, False, bytes(2)))
+    assert drive.step().damps is False
+
+
+def test_not_when_it_is_measured_alone() -> None:
+    drive = Slewing().until_it_damps()
+    drive.near_far.isolate(drive.controller.joysticks["left"])
+    assert drive.step().damps is False
+
+
+def test_a_valve_that_is_measured_with_an_axis_of_its_own_needs_no_sensor() -> None:
+    drive = Slewing().until_it_damps()
+    own = Axis(0.02, OutputLimits(), sway=None, shaper=Off())
+    drive.near_far.isolate(drive.controller.joysticks["left"], own)
+    before = len(drive.seen)
+    drive.step()
+    assert len(drive.seen) == before
