@@ -114,6 +114,14 @@ def test_another_address_or_name_is_claimed(j1939: J1939Rig, change: tuple[str, 
     assert j1939.reason() == "ADDRESS_NOT_CLAIMED"
 
 
+def test_on_a_bus_that_was_opened_again_it_is_claimed_again(j1939: J1939Rig) -> None:
+    """Who has claimed it meanwhile was not seen."""
+    reload(j1939, ("bitrate: 250000", "bitrate: 500000"))
+    (claim,) = j1939.tick()
+    assert claim.can_id == CLAIM | OWN
+    assert j1939.reason() == "ADDRESS_NOT_CLAIMED"
+
+
 def test_a_claim_that_waits_goes_on_waiting(tmp_path: Path) -> None:
     rig = J1939Rig()
     rig.run(5)

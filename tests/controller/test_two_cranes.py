@@ -1,14 +1,17 @@
 """Two cranes in one deployment: a fault of one does not stop the other; and a rotator's rocker."""
 
+import shutil
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import cantools
 import pytest
 
-from canshaper.codec.frame import Frame
+from canshaper.codec.frame import Frame, FrameFault
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
+from tests.controller.reloaded import reload
 
 ROOT = Path(__file__).parents[2]
 TICK_NS = 20_000_000
@@ -24,7 +27,8 @@ class Rig:
     """Both cranes; ``silent`` and ``released`` name buses whose joysticks are so."""
 
     def __init__(self, file: Path = ROOT / "config" / "two-cranes.yaml") -> None:
-        self.controller = Controller(load_deployment(file))
+        self.deployment = load_deployment(file)
+        self.controller = Controller(self.deployment)
         self.dbc: Any = cantools.database.Database()
         for name in ("forwarder", "rotator"):
             self.dbc.add_dbc_file(ROOT / "dbc" / f"{name}.dbc")
@@ -90,6 +94,17 @@ def test_a_fault_of_one_crane_does_not_stop_the_other(rig: Rig, what: str) -> No
     assert rig.states("front") <= {"TRIPPED", "NEUTRAL_WAIT"}
     assert min(abs(v) for (bus, _), v in sent.items() if bus == "rear") > 100
     assert rig.states("rear") == {"ACTIVE"}
+
+
+def test_of_the_bus_that_is_opened_again_alone_counters_may_jump(rig: Rig, tmp_path: Path) -> None:
+    shutil.copy(rig.deployment.path, tmp_path)
+    rig.deployment = replace(rig.deployment, path=tmp_path / rig.deployment.path.name)
+    reload(rig, ("channel: vcan1, bitrate: 250000", "channel: vcan1, bitrate: 500000"))
+    rig.count += 5
+    rig.run(1)
+    assert rig.controller.counters.last_fault is FrameFault.COUNTER_JUMP
+    assert rig.states("front") == {"NEUTRAL_WAIT"}
+    assert rig.states("rear") == {"READY"}
 
 
 def test_a_second_sender_trips_its_own_valve_only(rig: Rig) -> None:
