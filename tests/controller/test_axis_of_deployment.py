@@ -84,6 +84,15 @@ def test_a_filter_that_feeds_back_knows_the_slower_rate_of_the_valve(
     assert max(got) > 0.5
 
 
+@pytest.mark.parametrize(("cycle_ms", "sent"), [(20, [True] * 6), (40, [True, False] * 3)])
+def test_its_status_is_as_frequent_as_its_message(
+    changed_rig: Make, cycle_ms: int, sent: list[bool]
+) -> None:
+    cycle = 'BA_ "GenMsgCycleTime" BO_ 770 '
+    rig = changed_rig(dbc={f"{cycle}100;": f"{cycle}{cycle_ms};"})
+    assert ["LiftStatus" in rig.tick() for _ in range(6)] == sent
+
+
 def test_an_axis_without_sway_reports_none(changed_rig: Make) -> None:
     rig = changed_rig()
     for tick in range(20):

@@ -9,6 +9,7 @@ from canshaper.codec.e2e import COUNTER, E2e
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.deployment import Deployment
+from canshaper.protocols.j1939.network import J1939Network
 from tests.controller.reloaded import reload
 from tests.machine.protected_machine import load
 from tests.rigs.canopen import BOOT_UP, OPERATIONAL, OURS, CanopenRig
@@ -120,6 +121,17 @@ def test_on_a_bus_that_was_opened_again_it_is_claimed_again(j1939: J1939Rig) -> 
     (claim,) = j1939.tick()
     assert claim.can_id == CLAIM | OWN
     assert j1939.reason() == "ADDRESS_NOT_CLAIMED"
+
+
+def test_of_that_bus_alone_inputs_from_any_address_are_forgotten(
+    j1939: J1939Rig, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    forgotten: list[str | None] = []
+    monkeypatch.setattr(J1939Network, "invalidate", lambda _, bus=None: forgotten.append(bus))
+    reload(j1939)
+    assert forgotten == []
+    reload(j1939, ("bitrate: 250000", "bitrate: 500000"))
+    assert forgotten == ["crane"]
 
 
 def test_a_claim_that_waits_goes_on_waiting(tmp_path: Path) -> None:

@@ -193,6 +193,15 @@ def test_a_rate_by_a_gyro(tmp_path: Path) -> None:
     assert run.trust("near_far") == ["UNPROVED", "TRUSTED"]
 
 
+def test_axes_whose_sensors_have_messages_of_their_own_read_their_own(tmp_path: Path) -> None:
+    """Slew an angle, near-far a gyro."""
+    along = "message: SwayAngle, signal: Along, kind: angle"
+    mixed = changed(tmp_path, (along, "message: SwayRate, signal: Along, kind: rate"))
+    run = Run(mixed, PULSE, crane(noise_deg=0.3))
+    assert run.trust("near_far") == ["UNPROVED", "TRUSTED"]
+    assert run.trust("slew") == ["UNPROVED"]
+
+
 def test_an_error_code_is_no_measurement(tmp_path: Path) -> None:
     deployment = load_deployment(FILE)
     controller = Controller(deployment)

@@ -21,6 +21,19 @@ class Stuck(Controller):
         return frame
 
 
+class FullSpeed(Controller):
+    """Whose frames through the gateway all command full slew."""
+
+    def receive(self, frame: Frame, arrived_ns: int) -> Frame | None:
+        passed = super().receive(frame, arrived_ns)
+        if passed is None or passed.can_id != 272:
+            return passed
+        raw = self.axes["slew"].bound.valve.message.raw
+        self.axes["slew"].bound.valve.put(self.axes["slew"].bound.valve.steps)
+        data = self.axes["slew"].bound.valve.message.sender.fields.layout.encode(raw)
+        return passed._replace(data=data)
+
+
 class Wrong:
     """The forwarder at rest, whose slew command is wrong in every tick."""
 
@@ -59,6 +72,33 @@ def test_one_that_goes_on_is_logged_once_a_second() -> None:
     assert sum("output=refused" in e.text for e in wrong.controller.events) == 2
 
 
+def test_in_the_place_of_a_wrong_one_neutral_leaves() -> None:
+    wrong = Wrong()
+    frames = [frame for _ in range(3) for frame in wrong.tick()]
+    assert len(frames) == 3
+    for frame in frames:
+        assert wrong.valve.read(wrong.valve.message.sender.fields.layout.decode(frame.data)) == 0
+    assert wrong.controller.counters.last_fault is FrameFault.OUTPUT_REFUSED
+
+
+def test_what_a_gateway_passes_on_is_looked_at_too() -> None:
+    deployment = load_deployment(shipped.CONFIG / "gateway-forwarder.yaml")
+    controller = FullSpeed(deployment)
+    guarded, hand = Guarded(controller), Hand(deployment)
+    valve = controller.axes["slew"].bound.valve
+    left = []
+    for number in range(10):
+        for frame in hand.frames(number * 20, Held(enable=True)):
+            left.append(guarded.receive(frame, number * TICK_NS))
+        left += guarded.tick(number * TICK_NS)
+    raws = [valve.message.sender.fields.layout.decode(f.data) for f in left if f and f[1] == 272]
+    assert raws
+    assert {valve.read(raw) for raw in raws} == {0}
+    (refusal,) = [e for e in controller.events if "output=refused" in e.text]
+    assert "0x110" in refusal.text
+    assert controller.axes["slew"].axis.reason is Reason.OUTPUT_REFUSED
+
+
 @pytest.mark.parametrize("name", shipped.NAMES)
 def test_the_last_frames_are_neutral(name: str) -> None:
     deployment = load_deployment(shipped.CONFIG / f"{name}.yaml")
@@ -95,5 +135,6 @@ def test_what_the_loop_says_reaches_the_controller() -> None:
     assert wrong.controller.counters.last_fault is FrameFault.SEND_FAILED
     wrong.tick()
     wrong.guarded.stalled()
+    assert wrong.guarded._guard._stood_still
     wrong.tick()
     assert wrong.controller.axes["slew"].axis.reason is Reason.JOYSTICK_TIMEOUT
