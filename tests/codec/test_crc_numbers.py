@@ -103,3 +103,10 @@ def test_one_that_a_reload_brings_is_known_where_it_is_handed_over(machine: Mach
     after = pickle.loads(handed_over).joysticks["left"].protection.check
     assert after == check
     assert after.verify(frame)
+
+
+def test_the_same_numbers_are_the_same_kind() -> None:
+    name = crc_kind(8, 0x07, 0, 0x55, reflected=False)
+    algorithm = CHECKSUMS[name].algorithm
+    assert crc_kind(8, 0x07, 0, 0x55, reflected=False) == name
+    assert CHECKSUMS[name].algorithm is algorithm

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from canshaper.checksums.algorithms import Xor
 from canshaper.checksums.kinds import CHECKSUMS, Checksum, ChecksumKind
-from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2
+from canshaper.codec.e2e import COUNTER, E2e, Profile1, Profile2, Profile4, Profile5, Profile6
 from canshaper.codec.kernel_check import kernel_check, neutral_fault
 from canshaper.codec.protection import Protection
 from canshaper.protocols.gateway.cangw import CS_CRC8, CS_XOR, changed_bytes
@@ -103,3 +103,9 @@ def test_a_data_id_that_alternates_is_refused() -> None:
 def test_bytes_behind_a_short_message_stay() -> None:
     (_, keep), (_, put) = changed_bytes(~0xFFFF, 0x1234, 4)
     assert (keep[8:16], put[8:16]) == (b"\0\0" + b"\xff" * 6, b"\x34\x12" + bytes(6))
+
+
+@pytest.mark.parametrize("profile", [Profile4(0x0A0B0C0D), Profile5(0x1234), Profile6(0x1234)])
+def test_a_wide_crc_is_refused(profile: Profile4 | Profile5) -> None:
+    text = "can-gw of the kernel knows no CRC of more than 8 bits"
+    assert neutral_fault(Protection(check=profile), LENGTH) == text

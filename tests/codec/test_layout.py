@@ -1,5 +1,8 @@
 """Bits of random messages, judged by cantools both ways."""
 
+import inspect
+import runpy
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -175,6 +178,26 @@ def test_what_has_no_layout() -> None:
     assert layout_fault(message) is None
     (message,) = cantools.database.load_string(DBC.replace("32|32@1-", "32|24@1-"), "dbc").messages
     assert layout_fault(message) == "Ratio: expected a float of 16, 32 or 64 bits, got 24"
+
+
+@pytest.mark.parametrize("value", ["1e999", "-1e999"])
+def test_a_start_value_that_is_no_number(value: str) -> None:
+    starts = f'{DBC}BA_DEF_ SG_ "GenSigStartValue" FLOAT -1 1;\nBA_DEF_DEF_ "GenSigStartValue" 0;\n'
+    (message,) = cantools.database.load_string(DBC, "dbc").messages
+    start = f'BA_ "GenSigStartValue" SG_ {message.frame_id} Ratio {value};\n'
+    (message,) = cantools.database.load_string(starts + start, "dbc").messages
+    number = value.replace("1e999", "inf")
+    assert layout_fault(message) == f"GenSigStartValue of Ratio: expected a number, got {number}"
+
+
+def test_without_the_compiled_part_it_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "bitstruct.c", None)
+    slow = runpy.run_path(str(inspect.getsourcefile(Layout)))["Layout"]
+    (message,) = cantools.database.load_string(DBC, "dbc").messages
+    data = bytes(range(7, 7 + message.length))
+    raw = Layout(message).decode(data)
+    assert slow(message).decode(data) == raw
+    assert slow(message).encode(raw) == Layout(message).encode(raw)
 
 
 def float_of_9_bits(machine: Machine, number: int, message: str, name: str) -> str:

@@ -9,7 +9,13 @@ import pytest
 
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.status import AXIS_STATUS, IDENTITY, SERVICE_STATUS, StatusCodec
+from canshaper.codec.status import (
+    AXIS_STATUS,
+    IDENTITY,
+    SERVICE_STATUS,
+    StatusCodec,
+    required_names,
+)
 from canshaper.shaping.states import Reason, State
 from tests.rigs.reports import report
 
@@ -93,3 +99,11 @@ def test_tables_of_the_dbc_are_the_numbers_of_the_program() -> None:
             assert table == {int(m): m.name for m in enum}
     faults = shipped.get_message_by_name("ShaperStatus").get_signal_by_name("LastFault").choices
     assert {n: str(text) for n, text in faults.items()} == {int(m): m.name for m in FrameFault}
+
+
+def test_a_message_needs_no_optional_signal() -> None:
+    needed = required_names(AXIS_STATUS)
+    assert needed < {one.name for one in AXIS_STATUS}
+    assert "SwaySensor" not in needed
+    message = shipped.get_message_by_name("SlewStatus")
+    assert needed <= {signal.name for signal in message.signals}

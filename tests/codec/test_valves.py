@@ -75,6 +75,14 @@ def test_both_resolutions_report_the_same(steps: int, data: str) -> None:
     assert codec.message.frame().data.hex() == data
 
 
+def test_both_resolutions_of_a_signal_with_a_sign() -> None:
+    message = network.get_message_by_name("Block")
+    first, second = (message.get_signal_by_name(name) for name in ("First", "Second"))
+    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[second])
+    codec.put(-25)
+    assert codec.message.frame().data[:2] == bytes((256 - 25, 256 - 25))
+
+
 @given(st.integers(-64_000, 64_000))
 def test_what_is_put_is_read_by_cantools(steps: int) -> None:
     codec = avc("ExtFlow", "PortFlow")
