@@ -44,7 +44,8 @@ test: lint
 # Where time counts runs before what only computes.
 NICE = nice -n 10
 # Rooms of what decides whether a valve moves.
-GATE = tests/shaping tests/inputs tests/guard tests/bus tests/protocols tests/controller tests/daemon
+GATE = tests/codec tests/machine tests/shaping tests/inputs tests/guard tests/bus tests/protocols \
+	tests/controller tests/daemon
 
 # Every line and branch; `long` tests add none.
 coverage: .venv/test-ready

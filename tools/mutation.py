@@ -24,6 +24,9 @@ SURVIVORS = ROOT / "tests/mutation/survivors.txt"
 DAEMON = [f"tests/{room}" for room in ("inputs", "guard", "protocols", "controller", "daemon")]
 # The groups: rooms, each with the tests that reach it.
 TESTS = {
+    "checksums": ["tests/codec"],
+    "codec": ["tests/codec", "tests/machine"],
+    "machine": ["tests/machine", "tests/codec"],
     "shaping": ["tests/shaping"],
     "inputs": DAEMON,
     "guard": DAEMON,
@@ -48,11 +51,12 @@ CORE_TESTS = [
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
 
 
+GATE = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["coverage"]["run"]
+
+
 def modules(group: str) -> list[str]:
     """Modules of the coverage gate in a room."""
-    config = tomllib.loads((ROOT / "pyproject.toml").read_text())
-    gate: list[str] = config["tool"]["coverage"]["run"]["source_pkgs"]
-    return [name for name in gate if name.split(".")[1] == group]
+    return [name for name in GATE["source_pkgs"] if name.split(".")[1] == group]
 
 
 def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
@@ -69,6 +73,7 @@ def prepare(work: Path, mutated: list[str], tests: list[str]) -> None:
 [tool.mutmut]
 source_paths = ["canshaper"]
 only_mutate = {only}
+do_not_mutate = {GATE["omit"]}
 also_copy = {COPIED[1:]}
 pytest_add_cli_args_test_selection = {tests}
 pytest_add_cli_args = [

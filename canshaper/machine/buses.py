@@ -1,5 +1,7 @@
 """What the buses and the gateway of a deployment file say against each other."""
 
+from itertools import takewhile
+
 from canshaper.codec.kernel_check import neutral_fault
 from canshaper.codec.rewrite import RewrittenMessage
 from canshaper.codec.valve import ValveMessage
@@ -53,9 +55,7 @@ def _check_match(diagnostics: Diagnostics, config: DeploymentConfig, name: str, 
     if rate and bus.bitrate and rate != bus.bitrate:
         text = f"expected the bitrate of the bus, {bus.bitrate}, got {rate}"
         diagnostics.add((*place, "bitrate"), text)
-    for other, before in config.buses.items():
-        if other == name:
-            break
+    for other, before in takewhile(lambda item: item[0] != name, config.buses.items()):
         if before.match and bus.match.may_be(before.match):
             text = f"expected another serial, path or port than bus {other}"
             diagnostics.add(place, f"{text}, got what may be its device")

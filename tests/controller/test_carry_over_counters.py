@@ -123,6 +123,13 @@ def test_on_a_bus_that_was_opened_again_it_is_claimed_again(j1939: J1939Rig) -> 
     assert j1939.reason() == "ADDRESS_NOT_CLAIMED"
 
 
+def test_of_a_lost_address_a_reload_is_the_way_back(j1939: J1939Rig) -> None:
+    j1939.tick(j1939.claim(-1))
+    assert j1939.events[-1].endswith("state=lost")
+    reload(j1939)
+    assert ids(j1939.tick()) == [CLAIM | OWN]
+
+
 def test_of_that_bus_alone_inputs_from_any_address_are_forgotten(
     j1939: J1939Rig, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -139,3 +139,16 @@ def test_the_filter_scaled_to_each_end_has_to_run(machine: Machine) -> None:
     )
     machine.in_yaml("[0.16, 3]", "[0.2, 3]")
     machine.load()
+
+
+def test_a_number_of_the_swing_that_goes_with_another_one_only_may_be_adjustable(
+    machine: Machine,
+) -> None:
+    """So light a grapple does not swing with this damping, but with less of it, set with it."""
+    adjustable(
+        machine,
+        "axes.near_far.sway.mass_kg: [10, 300]\n    axes.near_far.sway.damping_nms: [5, 120]",
+    )
+    control = machine.load().config.control
+    assert control is not None
+    assert len(control.adjustable) == 2

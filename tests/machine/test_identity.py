@@ -1,6 +1,8 @@
 """The digest of what runs: equal for equal content, another for any other byte."""
 
 import shutil
+from hashlib import sha256
+from importlib.metadata import EntryPoint
 from pathlib import Path
 
 import pytest
@@ -13,6 +15,8 @@ from canshaper.machine import identity as module
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.recording.listen import ReceivedFrame
+from canshaper.shaping.registry import ADDED
+from canshaper.shaping.shapers import off
 
 ROOT = Path(__file__).parents[2]
 SHIPPED = [
@@ -112,3 +116,13 @@ def test_a_monitor_compares_it_with_its_own_files() -> None:
     first, second = said(deployment, ours, ours, other, other)
     assert first == f"daemon runs digest {ours:#06x}"
     assert f"daemon runs digest {other:#06x}, not {ours:#06x}" in second
+
+
+def test_a_filter_of_another_package_is_named_with_its_module(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
+    monkeypatch.setitem(ADDED, "mine", point)
+    (line,) = module.filter_lines(["off", "mine"])
+    digest = sha256(Path(str(off.__file__)).read_bytes()).hexdigest()
+    assert line == f"filter=sha256:{digest} kind=mine package={point.value}"

@@ -3,6 +3,7 @@
 from typing import Any
 
 import pytest
+from can.interfaces import BACKENDS
 
 from canshaper.config.bus import Bus
 from canshaper.machine.interface_options import option_faults
@@ -107,3 +108,36 @@ def test_two_buses_that_differ_in_an_option_are_two() -> None:
     )
     assert first != second
     assert len({first, second, first.model_copy()}) == 2
+
+
+class Device:
+    """An adapter of nobody, for what only some of python-can's have."""
+
+
+class Opened:
+    """An interface that takes such a device, and one whose annotation only a type checker knows."""
+
+    def __init__(self, channel: str, device: Device, count: int = 1) -> None:
+        """Open nothing."""
+
+
+class Unknown:
+    """An interface with an annotation that is not there when it runs."""
+
+    def __init__(self, channel: str, device: "Nowhere") -> None:  # type: ignore[name-defined] # noqa: F821
+        """Open nothing."""
+
+
+@pytest.mark.parametrize("name", ["Opened", "Unknown"])
+def test_what_has_no_type_that_can_be_checked_may_be_right(
+    monkeypatch: pytest.MonkeyPatch, name: str
+) -> None:
+    monkeypatch.setitem(BACKENDS, "adapter", (__name__, name))
+    assert faults("adapter", device="usb0") == []
+
+
+def test_an_interface_that_needs_what_is_not_here_is_not_checked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(BACKENDS, "adapter", ("no_such_module", "Bus"))
+    assert faults("adapter", anything=1) == []

@@ -236,7 +236,19 @@ def test_a_lost_address_stays_lost_off_the_bus_and_after_a_stall(rig: Rig) -> No
     rig.run(20)
     rig.controller.on_bus_off("crane")
     rig.controller.stalled()
+    rig.controller.send_failed(Frame("crane", AVC | OWN, True, bytes(8)))
     assert [f for frames in rig.run(50) for f in frames] == []
+
+
+def test_what_happens_on_another_bus_is_nothing_to_our_address(rig: Rig) -> None:
+    rig.moving()
+    rig.controller.send_failed(Frame("other", AVC | OWN, True, bytes(8)))
+    rig.controller.on_bus_off("other")
+    rig.controller._invalidate("other")
+    sent = ids(rig.tick())
+    assert CLAIM not in sent
+    assert AVC | OWN in sent
+    assert rig.state() is State.ACTIVE
 
 
 @given(

@@ -1,0 +1,210 @@
+"""What is wrong in a file and was answered by no other test: each one line that names the place."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.controller.controller import Controller
+from canshaper.controller.sets import profile_by_number
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from tests.machine.gateway_files import problems as of_gateway
+from tests.rigs.files import Machine
+from tests.rigs.forwarder import ROOT
+
+BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
+STATUS = "status: { bus: crane, message: ShaperStatus }"
+LIFT_FILTER = "    filter: { kind: off } # lifting excites no sway\n"
+NO_MESSAGE = "expected a message of the DBC files, got Nothing"
+FEEDBACK = "    status: { bus: crane, message: LiftStatus }\n"
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "text"),
+    [
+        (
+            BUS,
+            BUS.replace(" }", ", options: { fd: true } }"),
+            "buses.crane.options",
+            "expected none with socketcan, which the system sets up, got some",
+        ),
+        (
+            STATUS,
+            f"{STATUS}\nload_state: {{ bus: crane, message: Nothing, signal: W, timeout_ms: 500 }}",
+            "load_state.message",
+            "Nothing",
+        ),
+        (
+            FEEDBACK,
+            f"{FEEDBACK}    feedback: {{ bus: crane, message: Nothing, signal: V,"
+            " tolerance_pct: 10, timeout_ms: 100 }\n",
+            "axes.lift.feedback.message",
+            "Nothing",
+        ),
+        (
+            "axes:\n",
+            "switches:\n  seat: { bus: crane, message: Nothing, signal: Seated, timeout_ms: 200 }\n"
+            "axes:\n",
+            "switches.seat.message",
+            "Nothing",
+        ),
+        (
+            LIFT_FILTER,
+            f"{LIFT_FILTER}    profiles:\n      calm: {{ filter: {{ kind: off }} }}\n",
+            "axes.lift",
+            "expected sway data of its own with profiles or a gain schedule, got none",
+        ),
+    ],
+)
+def test_it_is_answered(machine: Machine, old: str, new: str, place: str, text: str) -> None:
+    machine.in_yaml(old, new)
+    answers = machine.problems()
+    assert any(f" {place}: " in one and text in one for one in answers), answers
+
+
+def shipped(folder: Path, name: str, old: str, new: str) -> list[str]:
+    """Problems of a shipped deployment with a text replaced."""
+    text = (ROOT / "config" / f"{name}.yaml").read_text()
+    assert old in text
+    file = folder / "machine.yaml"
+    file.write_text(text.replace("../dbc", str(ROOT / "dbc")).replace(old, new, 1))
+    with pytest.raises(ConfigError) as caught:
+        load_deployment(file)
+    return [str(one) for one in caught.value.problems]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "place", "text"),
+    [
+        (
+            "signal: SetPoint",
+            "signal: Nothing",
+            "axes.slew.valve.signal",
+            "Nothing",
+        ),
+        (
+            "status: { bus: crane, message: SlewValve",
+            "status: { bus: crane, message: Nothing",
+            "axes.slew.valve.cia408.status.message",
+            "Nothing",
+        ),
+        (
+            "signal: StatusWord",
+            "signal: Nothing",
+            "axes.slew.valve.cia408.status.signal",
+            "Nothing",
+        ),
+    ],
+)
+def test_it_is_answered_of_a_valve_of_cia_408(
+    tmp_path: Path, old: str, new: str, place: str, text: str
+) -> None:
+    answers = shipped(tmp_path, "canopen-forwarder", old, new)
+    assert any(f" {place}: " in one and text in one for one in answers), answers
+
+
+def test_a_gateway_needs_the_switch_in_the_message_that_it_passes_on(tmp_path: Path) -> None:
+    switch = "switches:\n  seat: { bus: joysticks, message: JoystickRight, signal: Enable,"
+    (*_, answer) = of_gateway(
+        tmp_path,
+        ("    enable: Enable\n", "    enable: seat\n"),
+        ("axes:\n", f"{switch} timeout_ms: 100 }}\n\naxes:\n"),
+    )
+    assert "joysticks.left.enable: expected one switch of its own message" in answer
+
+
+def test_a_feedback_needs_a_full_scale(machine: Machine) -> None:
+    feedback = "feedback: { bus: crane, message: TipVelocity, signal: SlewRate, timeout_ms: 100 }"
+    machine.in_yaml(FEEDBACK, f"{FEEDBACK}    {feedback}\n")
+    machine.in_dbc("SlewRate : 0|16@1- (0.0001,0) [-3|3]", "SlewRate : 0|16@1- (0.0001,0) [0|0]")
+    (answer,) = machine.problems()
+    assert answer.endswith("SlewRate: expected a range in the DBC, or full, got neither")
+
+
+def test_a_gateway_needs_two_like_signals_of_a_rocker(tmp_path: Path) -> None:
+    near_far = "signal: NearFar, "
+    answers = of_gateway(
+        tmp_path,
+        (f"{near_far}neutral_pct: 2", f"{near_far}negative: Back, neutral_pct: 2"),
+        dbc=(
+            ' SG_ NearFar : 16|16@1- (0.1,0) [-100|100] "%" SHAPER\n',
+            ' SG_ NearFar : 16|16@1+ (0.1,0) [0|100] "%" SHAPER\n'
+            ' SG_ Back : 48|8@1+ (1,0) [0|100] "%" SHAPER\n',
+        ),
+    )
+    like = "Back: expected a signal like NearFar, got another kind"
+    assert any(like in answer for answer in answers), answers
+
+
+def test_a_gateway_needs_the_address_of_a_joystick_of_j1939(tmp_path: Path) -> None:
+    """It leaves under the joystick's."""
+    file = tmp_path / "machine.yaml"
+    file.write_text(f"""
+version: 1
+buses:
+  near: {{ interface: socketcan, channel: vcan0 }}
+  far: {{ interface: socketcan, channel: vcan1 }}
+dbc: [{ROOT / "dbc" / "j1939-bjm-avc.dbc"}]
+gateway: {{ between: [near, far], fallback: stop }}
+joysticks:
+  left: {{ bus: near, message: BJM1, timeout_ms: 100, enable: Button1 }}
+axes:
+  slew:
+    command: {{ joystick: left, signal: XPosition, flags: {{ neutral: XNeutral,
+      positive: XPositive, negative: XNegative }} }}
+    valve: {{ bus: far, message: BJM1, signal: XPosition, timeout_ms: 200 }}
+    filter: {{ kind: 'off' }}
+""")
+    with pytest.raises(ConfigError) as caught:
+        load_deployment(file)
+    needs = "BJM1 may come from any source address; where its frames leave, its joystick needs the"
+    assert any(needs in str(one) for one in caught.value.problems), caught.value.problems
+
+
+@pytest.mark.parametrize("signal", ["Slew", "NearFar"])
+def test_a_float_has_the_full_scale_of_the_file_alone(machine: Machine, signal: str) -> None:
+    """No step of it goes beyond that, as one of two's complement does."""
+    machine.in_yaml(f"signal: {signal}, neutral_pct", f"signal: {signal}, full: 80, neutral_pct")
+    start = {"Slew": 0, "NearFar": 16}[signal]
+    machine.in_dbc(f"{signal} : {start}|16@1- (0.1,0)", f"{signal} : {start}|16@1- (1,0)")
+    machine.dbc += f"SIG_VALTYPE_ 272 {signal} : 1;\n"
+    message = machine.load().joysticks["left"].message
+    of_file = next(one for one in message.signals if one.name == signal)
+    assert (of_file.minimum, of_file.maximum) == (-80.0, 80.0)
+
+
+def test_where_no_one_reads_the_status_none_is_sent(machine: Machine) -> None:
+    sent = {f.can_id for f in Controller(machine.load().unreported).tick(0)}
+    assert sent == {0x200, 0x201, 0x202}
+
+
+def test_dbc_files_of_a_bundle_are_inside_it(machine: Machine) -> None:
+    machine.load()
+    file = machine.directory / "machine.yaml"
+    assert load_deployment(file, inside=machine.directory)
+    other = machine.directory / "elsewhere"
+    other.mkdir()
+    for name in ("../machine.dbc", "loop.dbc"):
+        (other / "machine.yaml").write_text(machine.yaml.replace("machine.dbc", name))
+        if not (other / "loop.dbc").is_symlink():
+            (other / "loop.dbc").symlink_to(other / "loop.dbc")
+        with pytest.raises(ConfigError, match="expected a file of the bundle, got"):
+            load_deployment(other / "machine.yaml", inside=other)
+
+
+def test_dbc_files_are_of_a_size(machine: Machine, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("canshaper.machine.lookup.MOST_BYTES", 1000)
+    (answer,) = machine.problems()
+    assert "dbc: expected 1000 bytes at most in all, got" in answer
+
+
+def test_a_sway_sensor_is_named_by_message_and_signal() -> None:
+    axes = load_deployment(ROOT / "config" / "forwarder-sensor.yaml").axes
+    assert axes["slew"].sway_sensor is not None
+    assert axes["slew"].sway_sensor.name == "SwayAngle.Across"
+
+
+def test_which_profile_each_set_is_of(machine: Machine) -> None:
+    assert profile_by_number(machine.load().axes["slew"]) == []
+    profiles = load_deployment(ROOT / "config" / "j1939-profiles.yaml").axes["slew"]
+    assert profile_by_number(profiles) == ["", *profiles.config.profiles]
