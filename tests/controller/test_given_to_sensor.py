@@ -13,6 +13,7 @@ from canshaper.machine.deployment import Deployment
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.off import Off
+from canshaper.shaping.states import CommandInput
 from canshaper_sim.crane import CraneParameters
 from canshaper_sim.joysticks import JoystickNode
 from canshaper_sim.plant import PlantNode
@@ -104,6 +105,20 @@ def test_an_axis_that_nothing_moves_damps_no_swing_of_another() -> None:
 def test_while_the_crane_slews_it_does() -> None:
     drive = Slewing().until_it_damps()
     assert drive.step().damps is True
+
+
+def test_and_its_filter_is_carried_out_for_that(monkeypatch: pytest.MonkeyPatch) -> None:
+    drive = Slewing().until_it_damps()
+    act, carried = Axis.act, []
+
+    def spied(axis: Axis, command: CommandInput, added: float, *, damps: bool = False) -> object:
+        if axis is drive.near_far.axis:
+            carried.append(damps)
+        return act(axis, command, added, damps=damps)
+
+    monkeypatch.setattr(Axis, "act", spied)
+    drive.step()
+    assert carried == [True]
 
 
 def test_not_in_the_very_tick_in_which_slew_trips() -> None:

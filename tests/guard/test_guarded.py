@@ -96,6 +96,7 @@ def test_what_a_gateway_passes_on_is_looked_at_too() -> None:
     assert {valve.read(raw) for raw in raws} == {0}
     (refusal,) = [e for e in controller.events if "output=refused" in e.text]
     assert "0x110" in refusal.text
+    assert "axis=slew limit=asked" in refusal.text
     assert controller.axes["slew"].axis.reason is Reason.OUTPUT_REFUSED
 
 
@@ -114,6 +115,9 @@ def test_the_last_frames_are_neutral(name: str) -> None:
         for frame in hand.frames(number * tick_ms, held):
             guarded.receive(frame, now_ns)
         assert all(guarded.tick(now_ns))
+    assert not any("output=refused" in event.text for event in controller.events)
+    if name.startswith("j1939"):  # whose joysticks may have any address
+        assert all(controller.axes[axis].axis.raw for axis in ("slew", "near_far"))
     left = [frame[:3] for frame in guarded.neutral_frames()]
     assert keys == set(left)
     assert left == [frame[:3] for frame in controller.neutral_frames()]
