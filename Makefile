@@ -34,9 +34,8 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo $(ARGS)
 
-# The parts of `make test`, the longest first, each printed when it ends. Three at a time on two
-# cores: servers, browsers and buses wait for a part of theirs.
-JOBS ?= 3
+# The parts of `make test`, the longest first: so many side by side, each printed when it ends.
+JOBS ?= 2
 PARTS = test-others test-drives test-socketcan test-studio coverage mutation-core test-long
 test: lint
 	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
