@@ -49,8 +49,6 @@ CORE_TESTS = [
     "test_valve_curve.py",
 ]
 COPIED = ["canshaper", "sim", "dbc", "config", "docs", "tools"]
-
-
 GATE = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["coverage"]["run"]
 
 

@@ -86,7 +86,7 @@ class ForwardingRule(Protocol):
 
 
 class BusProtocol:
-    """One protocol on all buses of a machine; by default it does nothing but for ``usual``.
+    """One protocol on all buses of a machine; by default it does nothing; each defines ``usual``.
 
     Attributes:
         inputs: what receives its own messages, by their identifiers.
@@ -105,7 +105,7 @@ class BusProtocol:
         """What receives a frame that is none of ``inputs``."""
 
     def usual(self, frame: Frame) -> bool:
-        """Whether such a frame is no fault though no DBC file knows it; each protocol says it."""
+        """Whether such a frame is no fault though no DBC file knows it."""
         raise NotImplementedError
 
     def silence(self, now_ns: int) -> FrameFault:

@@ -12,13 +12,7 @@ from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
 from canshaper.machine.binding import load_deployment
 from tests.cli.eds_nodes import ANSWERS, LEFT, NEAR, SLEW, TILT, init
-from tests.commissioning.nodes.eds_files import (
-    INCLINOMETER,
-    JOYSTICK,
-    U32,
-    VALVE,
-    write,
-)
+from tests.commissioning.nodes.eds_files import INCLINOMETER, JOYSTICK, U32, VALVE, write
 
 TICK_NS = 20_000_000
 

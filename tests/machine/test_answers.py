@@ -8,6 +8,7 @@ from canshaper.controller.controller import Controller
 from canshaper.controller.sets import profile_by_number
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
+from tests.machine.gateway_files import j1939_gateway
 from tests.machine.gateway_files import problems as of_gateway
 from tests.rigs.files import Machine
 from tests.rigs.forwarder import ROOT
@@ -138,25 +139,8 @@ def test_a_gateway_needs_two_like_signals_of_a_rocker(tmp_path: Path) -> None:
 
 def test_a_gateway_needs_the_address_of_a_joystick_of_j1939(tmp_path: Path) -> None:
     """It leaves under the joystick's."""
-    file = tmp_path / "machine.yaml"
-    file.write_text(f"""
-version: 1
-buses:
-  near: {{ interface: socketcan, channel: vcan0 }}
-  far: {{ interface: socketcan, channel: vcan1 }}
-dbc: [{ROOT / "dbc" / "j1939-bjm-avc.dbc"}]
-gateway: {{ between: [near, far], fallback: stop }}
-joysticks:
-  left: {{ bus: near, message: BJM1, timeout_ms: 100, enable: Button1 }}
-axes:
-  slew:
-    command: {{ joystick: left, signal: XPosition, flags: {{ neutral: XNeutral,
-      positive: XPositive, negative: XNegative }} }}
-    valve: {{ bus: far, message: BJM1, signal: XPosition, timeout_ms: 200 }}
-    filter: {{ kind: 'off' }}
-""")
     with pytest.raises(ConfigError) as caught:
-        load_deployment(file)
+        load_deployment(j1939_gateway(tmp_path))
     needs = "BJM1 may come from any source address; where its frames leave, its joystick needs the"
     assert any(needs in str(one) for one in caught.value.problems), caught.value.problems
 

@@ -15,7 +15,7 @@ from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
 from canshaper.protocols.gateway.cangw import AND, CS_CRC8, CS_XOR, OR
 from canshaper.protocols.gateway.rules import excluded, fallback_rules, passing_rules
-from tests.machine.gateway_files import ROOT, load, problems
+from tests.machine.gateway_files import ROOT, j1939_gateway, load, problems
 
 SLEW = "bus: machine, message: JoystickLeft, signal: Slew, timeout_ms: 200,"
 COUNTER = "alive_counter: AliveCounter"
@@ -135,6 +135,20 @@ def test_rules_pass_what_is_not_ours_and_neutral_joysticks(tmp_path: Path) -> No
     assert right.changes[0][1][8:16] == b"\0\0\xff\xff\xff\xff\xff\xff"
 
 
+def test_what_is_blocked_passes_for_no_one(tmp_path: Path) -> None:
+    blocked = ("fallback: neutral", "fallback: neutral\n  blocked: [GrappleSway]")
+    before = {pattern.value for pattern in excluded(load(tmp_path))}
+    assert {p.value for p in excluded(load(tmp_path, blocked))} - before == {0x400}
+    file = j1939_gateway(tmp_path, source="source: 51,")
+    before = {pattern.value for pattern in excluded(load_deployment(file))}
+    text = file.read_text().replace("fallback: neutral", "fallback: neutral, blocked: [AVEF0]")
+    file.write_text(text)
+    (pattern,) = [p for p in excluded(load_deployment(file)) if p.value not in before]
+    for priority in range(8):  # from whatever address
+        assert pattern.fits(priority << 26 | 0x00FE1000 | 0x80 | EFF_FLAG)
+    assert not pattern.fits(0x0CFE1100 | 0x80 | EFF_FLAG)
+
+
 def test_without_a_fallback_there_is_no_rule_for_a_joystick(tmp_path: Path) -> None:
     assert fallback_rules(load(tmp_path, ("fallback: neutral", "fallback: stop"))) == []
 
@@ -159,33 +173,10 @@ def test_the_neutral_rule_makes_the_checksum(tmp_path: Path, kind: str, number: 
 
 def test_a_joystick_of_j1939_keeps_its_address_and_passes_in_no_priority(tmp_path: Path) -> None:
     """Magnitude and flags are ours, the address is the joystick's, who is not on that bus."""
-    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text()
-    loaded = load_deployment(ROOT / "config" / "j1939-forwarder.yaml")
-    joystick = next(iter(loaded.config.joysticks))
-    axis = next(a for a in loaded.config.axes.values() if a.command.joystick == joystick)
-    assert axis.command.flags
+    deployment = load_deployment(j1939_gateway(tmp_path, source="source: 51,"))
+    axis, message = deployment.config.axes["slew"], deployment.joysticks["left"].message
     flags = axis.command.flags
-    message = loaded.joysticks[joystick].message
-    file = tmp_path / "machine.yaml"
-    file.write_text(f"""
-version: 1
-buses:
-  near: {{ interface: socketcan, channel: vcan0 }}
-  far: {{ interface: socketcan, channel: vcan1 }}
-dbc: [{", ".join(str((ROOT / "config" / d).resolve()) for d in loaded.config.dbc)}]
-gateway: {{ between: [near, far], fallback: neutral }}
-joysticks:
-  left: {{ bus: near, message: {message.name}, timeout_ms: 100, source: 51,
-    enable: {loaded.config.joysticks[joystick].enable} }}
-axes:
-  slew:
-    command: {{ joystick: left, signal: {axis.command.signal}, flags: {{ neutral: {flags.neutral},
-      positive: {flags.positive}, negative: {flags.negative} }} }}
-    valve: {{ bus: far, message: {message.name}, signal: {axis.command.signal}, timeout_ms: 200 }}
-    filter: {{ kind: 'off' }}
-""")
-    assert text
-    deployment = load_deployment(file)
+    assert flags
     sent = deployment.axes["slew"].valve.message
     assert isinstance(sent, RewrittenMessage)
     assert sent.sender.key[1] & 0xFF == 51
@@ -195,7 +186,7 @@ axes:
     assert group.mask == 0x03FFFFFF | EFF_FLAG
     assert deployment.routing.buses["far"].sent_groups == set()
     neutral = sent.onto(bytes(8))
-    network = cantools.database.load_file((ROOT / "config" / loaded.config.dbc[0]).resolve())
+    network = cantools.database.load_file(ROOT / "dbc" / "j1939-bjm-avc.dbc")
     values = network.decode_message(message.frame_id, neutral.data, decode_choices=False)
     assert isinstance(values, dict)
     assert (values[flags.neutral], values[flags.positive], values[flags.negative]) == (1, 0, 0)

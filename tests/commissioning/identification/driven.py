@@ -5,11 +5,7 @@ import math
 import numpy as np
 
 from canshaper.commissioning.identification.series import Array, Command, Kind, Series, Unit
-from tests.commissioning.identification.machine import (
-    Coloured,
-    Push,
-    driven,
-)
+from tests.commissioning.identification.machine import Coloured, Push, driven
 
 
 def drive(pushes: list[Push], seconds: float, kind: Kind, seed: int) -> Series:
