@@ -34,9 +34,11 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo $(ARGS)
 
-# The parts of `make test`, the longest first: so many side by side, each printed when it ends.
+# The parts of `make test`, so many side by side, each printed when it ends. The emulated machine
+# first and never next to the browser, which takes both cores: its daemon would stand still. Then
+# the longest.
 JOBS ?= 2
-PARTS = test-others test-drives test-socketcan test-studio coverage mutation-core test-long
+PARTS = test-socketcan test-others test-drives test-studio coverage mutation-core test-long
 test: lint
 	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
 
