@@ -34,11 +34,10 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo $(ARGS)
 
-# The parts of `make test`, so many side by side, each printed when it ends. The emulated machine
-# first and never next to the browser, which takes both cores: its daemon would stand still. Then
-# the longest.
+# The parts of `make test`, so many side by side, each printed when it ends. The browser last: it
+# takes both cores, and next to it the loop of a daemon in the emulated machine stands still.
 JOBS ?= 2
-PARTS = test-socketcan test-others test-drives test-studio coverage mutation-core test-long
+PARTS = test-others coverage test-socketcan test-drives mutation-core test-long test-studio
 test: lint
 	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
 

@@ -4,6 +4,7 @@ They are noted when a machine is signed off; a changed file or program shows in 
 bundle.
 """
 
+import os
 import sys
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -64,7 +65,18 @@ def filter_lines(kinds: Iterable[str]) -> Iterator[str]:
 def program_sha256() -> str:
     """Of the modules of canshaper as they lie on the disk, by path: the same however installed."""
     total = sha256()
-    for path in sorted(PACKAGE.rglob("*.py")):
+    for path in sorted(_modules()):
         total.update(f"{path.relative_to(PACKAGE).as_posix()}\n".encode())
         total.update(sha256(path.read_bytes()).digest())
     return total.hexdigest()
+
+
+def _modules() -> Iterator[Path]:
+    for folder, inside, files in os.walk(PACKAGE, onerror=_unreadable):
+        # What Python makes comes and goes while another program starts.
+        inside[:] = (name for name in inside if name != "__pycache__")
+        yield from (Path(folder, name) for name in files if name.endswith(".py"))
+
+
+def _unreadable(error: OSError) -> None:
+    raise error

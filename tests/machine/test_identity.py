@@ -1,5 +1,6 @@
 """The digest of what runs: equal for equal content, another for any other byte."""
 
+import os
 import shutil
 from hashlib import sha256
 from importlib.metadata import EntryPoint
@@ -126,3 +127,28 @@ def test_a_filter_of_another_package_is_named_with_its_module(
     (line,) = module.filter_lines(["off", "mine"])
     digest = sha256(Path(str(off.__file__)).read_bytes()).hexdigest()
     assert line == f"filter=sha256:{digest} kind=mine package={point.value}"
+
+
+@pytest.mark.parametrize(("gone", "matters"), [("__pycache__", False), ("room", True)])
+def test_compiled_modules_that_come_and_go_are_no_part_of_the_program(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, gone: str, matters: bool
+) -> None:
+    """Another program that starts makes them; modules that cannot be read are a fault."""
+    for name in ("one.py", "room/two.py", "room/__pycache__/two.py"):
+        (tmp_path / name).parent.mkdir(exist_ok=True)
+        (tmp_path / name).write_text(name)
+    monkeypatch.setattr(module, "PACKAGE", tmp_path)
+    digest, scandir = module.program_sha256.__wrapped__, os.scandir
+
+    def racing(path: Path | str) -> object:
+        if Path(path).name == gone:
+            raise FileNotFoundError(2, "No such file or directory", str(path))
+        return scandir(path)
+
+    before = digest()
+    monkeypatch.setattr(os, "scandir", racing)
+    if matters:
+        with pytest.raises(FileNotFoundError):
+            digest()
+    else:
+        assert digest() == before
