@@ -34,11 +34,12 @@
 demo: .venv/demo-ready
 	.venv/bin/canshaper demo $(ARGS)
 
-# The parts of `make test`, so many side by side, each printed when it ends. The browser last: it
-# takes both cores, and next to it the loop of a daemon in the emulated machine stands still.
+# SocketCAN first and alone: next to other work the loop of a daemon in the emulated machine stands
+# still. Then the other parts, so many side by side, each printed when it ends.
 JOBS ?= 2
-PARTS = test-others coverage test-socketcan test-drives mutation-core test-long test-studio
+PARTS = test-others coverage test-drives mutation-core test-long test-studio
 test: lint
+	$(MAKE) --no-print-directory test-socketcan
 	$(MAKE) --no-print-directory --output-sync=target --jobs=$(JOBS) $(PARTS)
 
 # Where time counts runs before what only computes.

@@ -1,8 +1,9 @@
 """Every row of the table of checksums: published values, and each place that one may have."""
 
 import pickle
+import re
 from hashlib import sha256
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, entry_points, version
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.checksums import kinds as module
-from canshaper.checksums.algorithms import AUTOSAR, KernelSum
+from canshaper.checksums.algorithms import AUTOSAR, KernelSum, Xor
 from canshaper.checksums.kinds import (
     CHECKSUMS,
     Checksum,
@@ -39,6 +40,7 @@ VALUES = {
     "crc16_arc": 0xBB3D,
 }
 BODY = bytes(range(0x11, 0x19))
+ROOT = Path(__file__).parents[2]
 
 
 def places(kind: str) -> list[Checksum]:
@@ -154,6 +156,7 @@ def test_what_the_kernel_can_make() -> None:
     }  # fmt: skip
     with pytest.raises(NotImplementedError):
         KernelSum().of(b"")
+    assert Xor().of(b"\1\2") == 3
 
 
 # -- packages --------------------------------------------------------------------------------------
@@ -237,6 +240,15 @@ def test_what_is_wrong_with_a_package_is_one_line(
     assert known_checksum("sum") == "sum"  # the others are as good as ever
 
 
+def test_the_package_is_named_with_its_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    """By an entry point of a package that is really installed, though it is none of a checksum."""
+    (point,) = entry_points(group="console_scripts", name="pytest")
+    monkeypatch.setattr(module, "_packages", lambda: {"pytest": [point]})
+    text = f"'pytest' of the package pytest {version('pytest')}: expected a ChecksumKind"
+    with pytest.raises(ValueError, match=f"^{re.escape(text)}"):
+        known_checksum("pytest")
+
+
 @pytest.mark.parametrize("kind", [8, None, ["xor"], True])
 def test_what_is_no_name(kind: object) -> None:
     with pytest.raises(ValueError, match=r"^expected one of 'xor', .* or '.*', got "):
@@ -245,8 +257,8 @@ def test_what_is_no_name(kind: object) -> None:
 
 def test_the_table_has_every_kind(packages: Any) -> None:
     packages(always5=f"{__name__}:OWN")
-    head, _, *rows = checksum_table()
-    assert head.count("|") == 5
-    assert len(rows) == len(VALUES) + 1
-    assert rows[0] == "| `xor` | 8 | exclusive or of the bytes | yes |"
-    assert rows[-1] == "| `always5` | 8 | always 5 | no |"
+    *ours, its = checksum_table()
+    assert "\n".join(ours) in (ROOT / "docs" / "checksums.md").read_text(encoding="utf-8")
+    assert len(ours) == 2 + len(VALUES)
+    assert ours[2] == "| `xor` | 8 | exclusive or of the bytes | yes |"
+    assert its == "| `always5` | 8 | always 5 | no |"

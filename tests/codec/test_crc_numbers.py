@@ -57,8 +57,10 @@ def test_the_catalogue(name: str) -> None:
 
 def test_they_are_no_names_for_a_file() -> None:
     kind = crc_kind(8, 0x07, 0, 0, reflected=False)
-    assert kind == "crc8 0x7 start 0x0 end 0x0"
+    assert kind == CHECKSUMS[kind].text == "crc8 0x7 start 0x0 end 0x0"
     assert kind not in checksum_names()
+    other = crc_kind(16, 0x1021, 0xFFFF, 0x1, reflected=True)
+    assert other == CHECKSUMS[other].text == "crc16 0x1021 start 0xffff end 0x1 reflected"
 
 
 @pytest.mark.parametrize(

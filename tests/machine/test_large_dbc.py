@@ -20,6 +20,7 @@ def text() -> str:
     return large(COUNT)
 
 
+@pytest.mark.processes
 def test_a_deployment_starts_in_little_memory(text: str) -> None:
     """benchmarks/large_dbc.py shows what cantools takes for all of them."""
     ran = run(with_dbc("a.dbc", text))
