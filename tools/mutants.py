@@ -1,8 +1,8 @@
 """Mutants by mutmut and more operators, and what their tests say; for tools/mutation.py.
 
-    mutants.py run PROCESSES [PATTERN ...]         all
+    mutants.py run PROCESSES [PATTERN ...]         all that mypy does not refuse
     mutants.py run-new SURVIVORS PROCESSES [PATTERN ...]
-                                                   without what mypy refuses, and the explained ones
+                                                   the same, without the explained ones
     mutants.py judge SURVIVORS [PATTERN ...]
 
 In the working directory, where mutmut finds its settings as soon as it is imported.
@@ -21,6 +21,7 @@ from typing import NamedTuple
 import libcst as cst
 from mutant_names import explained, numbered
 from mutant_run import FAILED, UNREACHED, Forks
+from mutant_types import refused
 from mutmut import __main__ as mutmut
 from mutmut.configuration import config
 from mutmut.mutation.data import SourceFileMutationData
@@ -31,9 +32,15 @@ from mutmut.runners.harness import PytestRunner
 from mutmut.utils.file_utils import change_cwd, walk_mutatable_files
 from mutmut.workers.isolation import ForkRunner
 
-# Exit codes: no test failed; the time was up (a loop that never ends); left to the type checker; an
-# explained one, left to a run of all.
-SURVIVED, TIMED_OUT, TYPES, EXPLAINED = 0, (-signal.SIGPROF, -signal.SIGXCPU), 37, 38
+# Exit codes: no test failed; the type checker refuses it; an explained one, left to a run of all.
+SURVIVED, TYPES, EXPLAINED = 0, 37, 38
+KILLED = {
+    FAILED: "killed",
+    TYPES: "refused by the type checker",
+    # a loop that never ends
+    -signal.SIGPROF: "killed by the time limit",
+    -signal.SIGXCPU: "killed by the time limit",
+}
 
 
 class Mutant(NamedTuple):
@@ -95,8 +102,7 @@ def run(processes: int, patterns: list[str], known: Collection[str] | None = Non
     Args:
         processes: how many at a time.
         patterns: names of mutants; none for all.
-        known: survivors that are not run again, as each needs every test; then what puts None into
-            the code is not run either: the type checker refuses it.
+        known: survivors that are not run again, as each needs every test.
 
     Returns:
         Exit code of pytest.
@@ -108,12 +114,14 @@ def run(processes: int, patterns: list[str], known: Collection[str] | None = Non
     mutmut.copy_also_copy_files()
     mutmut.setup_source_paths()
     mutmut.create_mutants(processes)
+    with change_cwd("mutants"):
+        of_types = refused(list(walk_mutatable_files()))
     chosen = []
     for mutant in mutants():
-        if known is not None and mutant.name in known:
-            mutant.save(EXPLAINED)
-        elif known is not None and re.search(r"-> None #\d+$", mutant.name):
+        if mutant.key in of_types:
             mutant.save(TYPES)
+        elif known is not None and mutant.name in known:
+            mutant.save(EXPLAINED)
         elif any(fnmatch.fnmatch(mutant.key, pattern) for pattern in patterns or ["*"]):
             chosen.append(mutant)
     runner = PytestRunner()
@@ -166,13 +174,11 @@ def judge(known: dict[str, str], patterns: list[str]) -> int:
             continue
         code = mutant.data.exit_code_by_key[mutant.key]
         seen.add(mutant.name)
-        if code in (FAILED, *TIMED_OUT):
-            counts["killed" if code == FAILED else "killed by the time limit"] += 1
+        if code in KILLED:
+            counts[KILLED[code]] += 1
             if mutant.name in known:
                 failures += 1
                 print(f"\n# killed, though explained\n{mutant.name}\n{mutant.difference()}")
-        elif code == TYPES:
-            counts["left to the type checker"] += 1
         elif code == EXPLAINED:
             counts["explained, not run again"] += 1
         elif code == SURVIVED and mutant.name in known:

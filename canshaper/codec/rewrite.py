@@ -78,4 +78,5 @@ def _at_rest(signal: Signal, start: Any) -> Any:
     low, high = signal.minimum, signal.maximum
     if low is None or high is None or not low < 0 < high or start in special_codes(signal):
         return start
-    return 0.0 if signal.is_float else round(-signal.offset / signal.scale)
+    rest = 0.0 - signal.offset / signal.scale
+    return rest if signal.is_float else round(rest)

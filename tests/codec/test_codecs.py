@@ -9,7 +9,7 @@ from cantools.database.can import Message
 from hypothesis import given
 from hypothesis import strategies as st
 
-from canshaper.codec.codecs import JoystickCodec, Sender
+from canshaper.codec.codecs import Chosen, JoystickCodec, Sender
 from canshaper.codec.frame import Frame
 from canshaper.codec.protection import UNPROTECTED, Protection
 from canshaper.codec.signals import VelocitySignal
@@ -90,6 +90,17 @@ def raw_joystick(joystick: int) -> bytes:
 
 
 # -- joysticks ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("enable", "meant"), [(2, True), (1, False)])
+def test_of_a_multiplexed_message_only_frames_that_are_meant_move(enable: int, meant: bool) -> None:
+    message = custom.get_message_by_name("Joystick")
+    velocity = VelocitySignal.of(signal(message, "Joystick"))
+    codec = JoystickCodec(message, [velocity], Chosen("Enable", 2, alone=False))
+    raw = {"Joystick": 750, "Enable": enable, "Motorola": 0, "Plain": 0}
+    seen, commands = codec.decode(message.encode(raw, scaling=False, strict=False))
+    assert seen == raw
+    assert commands == ({"Joystick": 0.5} if meant else {})
 
 
 @pytest.mark.parametrize(

@@ -216,3 +216,12 @@ def test_qualification_counts_good_headers() -> None:
         checker.check(check.protect(bytes(8), count), 0)
         reported.append(checker.qualified)
     assert reported == [False, False, True, True, False, False, False, True]
+
+
+def test_bits_of_the_header() -> None:
+    assert [Profile1(1, mode).bits for mode in ("both", "low", "alternating", "nibble")] == [
+        *(12, 12, 12),
+        16,  # with four bits of the data ID
+    ]
+    with pytest.raises(NotImplementedError):
+        E2e().crc(b"", 0)

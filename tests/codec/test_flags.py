@@ -145,3 +145,11 @@ def test_a_zero_that_is_rounded_is_zero() -> None:
         assert read(flags, 300, "Offset") == 0.0
     assert read(NEGATIVE, 1300, "Offset") == -1.0
     assert read(POSITIVE, 299, "Offset") == Reason.JOYSTICK_OUT_OF_RANGE
+
+
+def test_a_rounding_is_zero() -> None:
+    codec = FlaggedVelocity(VelocitySignal("X", 1.0, 0.0, 1e6, {}), "0", "-", "+")
+    positive = {"0": 0, "-": 0, "+": 1}
+    assert codec.read({"X": 1, **positive}) == codec.read({"X": -1, **positive}) == 0.0
+    assert codec.read({"X": 2, **positive}) == pytest.approx(2e-6)
+    assert codec.read({"X": -2, **positive}) is Reason.JOYSTICK_OUT_OF_RANGE

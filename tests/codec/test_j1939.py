@@ -4,11 +4,13 @@ import re
 from pathlib import Path
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
+from canshaper.codec.can_id import id_of
 from canshaper.codec.identifier import (
+    at_every_priority,
     group_mask,
     group_of,
     has_destination,
@@ -16,7 +18,8 @@ from canshaper.codec.identifier import (
     pgn_of,
     with_source,
 )
-from canshaper.codec.j1939 import CLAIMED, DM1, claims_of
+from canshaper.codec.j1939 import CLAIMED, DM1, claims_of, name_bytes, sent_by
+from canshaper.config.bus import J1939Name
 from canshaper.errors import ConfigError
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
@@ -70,6 +73,9 @@ def machine(tmp_path: Path) -> Machine:
 
 
 @given(st.integers(0, 7), st.integers(0, 3), BYTE, BYTE, BYTE)
+@example(6, 0, 239, 0x33, 0)  # the last format with a destination
+@example(6, 0, 240, 0x33, 0)
+@example(6, 0, 241, 0x33, 0)
 def test_a_group_is_known_from_any_source_at_any_priority(
     priority: int, pages: int, pf: int, ps: int, source: int
 ) -> None:
@@ -88,6 +94,38 @@ def test_identifiers_of_the_standards() -> None:
     assert claims_of(OWN) == [0x18EEFF9C, 0x18EEFFFE]
     assert pgn_of(0x0CFDD633) == 64982  # BJM1 from 0x33
     assert pgn_of(0x18EAFFFE) == 59904  # a request to all
+    # the first format without a destination
+    assert identifier(0xEF00, 1, destination=0x55) == 0x18EF5501
+    assert identifier(0xF000, 1, destination=0x55) == 0x18F00001
+    # an acknowledgement, faults, and both messages of the transport protocol at lowest priority
+    assert sent_by(OWN) == [0x18E8FF9C, 0x18FECA9C, 0x1CECFF9C, 0x1CEBFF9C]
+    assert at_every_priority(0x18FECA9C) == [
+        *(0x00FECA9C, 0x04FECA9C, 0x08FECA9C, 0x0CFECA9C),
+        *(0x10FECA9C, 0x14FECA9C, 0x18FECA9C, 0x1CFECA9C),
+    ]
+
+
+def test_a_name_by_hand() -> None:
+    """Every field with its lowest and highest bit set, or the only one (SAE J1939-81)."""
+    name = J1939Name(
+        identity_number=0x100001,
+        manufacturer_code=0x401,
+        ecu_instance=0b101,
+        function_instance=0b10001,
+        function=0x81,
+        vehicle_system=0x41,
+        vehicle_system_instance=0b1001,
+        industry_group=0b101,
+    )
+    # 0 101 1001 | 1000001 0 | 10000001 | 10001 101 | 10000000001 1 0000 | 0000 0000 | 0000 0001
+    assert name_bytes(name)[::-1].hex() == "5982818d80300001"
+
+
+def test_the_id_in_a_word_of_the_kernel() -> None:
+    """What another program has set beyond an id of 11 bits does not reach a bus."""
+    assert id_of(0x123) == id_of(0x1FFF_F923) == (0x123, False)
+    assert id_of(0x9234_5678) == (0x1234_5678, True)
+    assert id_of(0x9FFF_FFFF) == (0x1FFF_FFFF, True)
 
 
 # -- binding ---------------------------------------------------------------------------------------

@@ -55,6 +55,31 @@ def test_a_row_is_possible_by_what_it_says() -> None:
     assert [c.byte for c in POSSIBLE if c.kind == "crc8_autosar"] == [0, LENGTH - 1]
 
 
+def test_what_is_impossible() -> None:
+    def fault(check: Checksum | E2e | None) -> str | None:
+        return neutral_fault(Protection(check=check), LENGTH)
+
+    known = "can-gw of the kernel knows no"
+    places = "can-gw of the kernel computes crc8_autosar in the first or last byte only"
+    assert fault(None) is fault(Checksum("xor", 3)) is None
+    assert [fault(Checksum("crc8_autosar", byte)) for byte in range(LENGTH)] == [
+        None,
+        *(places,) * (LENGTH - 2),
+        None,
+    ]
+    assert fault(Checksum("sum", 0)) == f"{known} checksum of the kind sum"
+    assert fault(Profile5(1)) == f"{known} CRC of more than 8 bits"
+    assert fault(Profile1(0x102, "alternating")) == f"{known} data ID that alternates"
+    assert fault(Profile1(0x102, "both")) is None
+
+
+def test_only_an_exclusive_or_is_0_before() -> None:
+    assert kernel_check(Protection(), LENGTH) == ((), 0)
+    checks = Checksum("crc8_autosar", 0), Profile1(1, "both"), Profile2(range(16))
+    assert [kernel_check(Protection(check=check), LENGTH)[1] for check in checks] == [0, 0, 0]
+    assert kernel_check(Protection(check=Checksum("xor", 2)), LENGTH)[1] == 0xFF0000
+
+
 @pytest.mark.parametrize("check", POSSIBLE, ids=str)
 @given(data=frames)
 def test_checksums(check: Checksum, data: bytes) -> None:

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from canshaper.codec import layout
 from canshaper.codec.codecs import Sender
-from canshaper.codec.layout import Layout, layout_fault
+from canshaper.codec.layout import Layout, frame_length, is_fd, layout_fault
 from canshaper.codec.signals import raw_limits
 from tests.rigs.files import Machine
 
@@ -131,6 +131,19 @@ def test_what_is_not_set_keeps_its_start_value(message: Message, data: st.DataOb
     assert Sender("b", message).frame(some).data == judge_encode(message, {**start, **some})
 
 
+@given(message=messages(), data=st.data())
+def test_in_j1939_the_bits_of_no_signal_are_1(message: Message, data: st.DataObject) -> None:
+    raw = raw_values(data, message)
+    every = {(byte, bit) for byte in range(message.length) for bit in range(8)}
+    free = set(every)
+    for s in message.signals:
+        free -= set(walk(s.byte_order, every, divmod(s.start, 8))[: s.length])
+    ones = sum(1 << 8 * byte + bit for byte, bit in free)
+    frame = int.from_bytes(judge_encode(message, raw), "little") | ones
+    message.protocol = "j1939"
+    assert Layout(message).encode(raw) == frame.to_bytes(message.length, "little")
+
+
 # -- by hand, not by cantools ----------------------------------------------------------------------
 
 
@@ -173,11 +186,34 @@ def test_the_same_in_python_alone(monkeypatch: pytest.MonkeyPatch) -> None:
         Layout(mixed).encode({"Intel": 2048, "Motorola": 0, "Ratio": 0.0})
 
 
+@pytest.mark.parametrize(
+    ("length", "fd", "protocol", "sent_in"),
+    [
+        (8, False, None, None),
+        (8, True, None, 8),
+        (9, False, None, 12),  # no classical frame is as long
+        (12, True, None, 12),
+        (33, True, None, 48),
+        (64, True, None, 64),
+        (65, False, None, 65),  # in no frame; refused elsewhere
+        (20, False, "j1939", None),
+        (20, True, "j1939", 20),
+    ],
+)
+def test_lengths_of_can_fd(length: int, fd: bool, protocol: str | None, sent_in: int) -> None:
+    message = Message(1, "M", length, [], is_fd=fd, protocol=protocol)
+    assert is_fd(message) is (sent_in is not None)
+    assert frame_length(message) == (sent_in or length)
+
+
 def test_what_has_no_layout() -> None:
     (message,) = cantools.database.load_string(DBC, "dbc").messages
     assert layout_fault(message) is None
     (message,) = cantools.database.load_string(DBC.replace("32|32@1-", "32|24@1-"), "dbc").messages
     assert layout_fault(message) == "Ratio: expected a float of 16, 32 or 64 bits, got 24"
+    wide = DBC.replace("32|32@1-", "0|64@1-").replace("4|12@1-", "0|12@1-")
+    (message,) = cantools.database.load_string(wide, "dbc", strict=False).messages
+    assert layout_fault(message) is None
 
 
 @pytest.mark.parametrize("value", ["1e999", "-1e999"])

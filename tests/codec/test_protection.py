@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from canshaper.checksums.kinds import CHECKSUMS, Checksum
 from canshaper.codec.e2e import Profile1, Profile2
 from canshaper.codec.frame import FrameFault
-from canshaper.codec.protection import Protection, Protector, SequenceChecker
+from canshaper.codec.protection import UNPROTECTED, Protection, Protector, SequenceChecker
 
 GOOD, WRONG = FrameFault.NONE, FrameFault.CHECKSUM
 REPEATED, JUMP = FrameFault.COUNTER_REPEATED, FrameFault.COUNTER_JUMP
@@ -268,6 +268,22 @@ def test_a_counter_that_we_send_goes_on_where_it_is_the_same(
     raw = {"C": 0, "D": 0}
     second.without_check(raw)
     assert max(raw.values()) == next_count
+
+
+def test_a_frame_that_did_not_leave_gives_its_count_back() -> None:
+    raw = {"C": 0}
+    protector = Protector(Protection("C", 4, Checksum("xor", 0)), Encoded())  # type: ignore[arg-type]
+    counts = []
+    for _ in range(5):
+        protector.without_check(raw)
+        protector.take_back()
+        protector.without_check(raw)
+        counts.append(raw["C"])
+    assert counts == [1, 2, 3, 0, 1]
+    plain = Protector(UNPROTECTED, Encoded())  # type: ignore[arg-type]
+    plain.without_check(raw)
+    plain.take_back()
+    assert plain.protect(raw) == b""
 
 
 class Encoded:

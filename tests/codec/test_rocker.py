@@ -5,6 +5,8 @@ from typing import Any
 
 import cantools
 import pytest
+from cantools.database.can import Message, Signal
+from cantools.database.conversion import BaseConversion
 from hypothesis import given
 from hypothesis import strategies as st
 
@@ -58,6 +60,15 @@ def test_a_signal_below_its_range_is_no_command() -> None:
     )
 
 
+def test_up_to_a_twentieth_of_both_is_noise_and_a_rounding_is_none() -> None:
+    both = RockerVelocity(*(VelocitySignal(n, 1.0, 0.0, 100.0, {}) for n in ("P", "M")))
+    assert both.read({"P": 5, "M": 5}) == 0.0
+    assert both.read({"P": 6, "M": 6}) is Reason.JOYSTICK_CONTRADICTORY
+    fine = RockerVelocity(*(VelocitySignal(n, 1.0, 0.0, 1e6, {}) for n in ("P", "M")))
+    assert fine.read({"P": -1, "M": 0}) == pytest.approx(-1e-6)
+    assert fine.read({"P": -2, "M": 0}) is Reason.JOYSTICK_OUT_OF_RANGE
+
+
 @given(st.integers(-250, 250))
 def test_what_is_put_is_read(steps: int) -> None:
     """As a valve, in a gateway: both signals hold what one command says."""
@@ -70,6 +81,23 @@ def test_what_is_put_is_read(steps: int) -> None:
     )
     assert codec.read(message.raw) == steps
     assert read(message.raw["RotateLeft"], message.raw["RotateRight"]) == pytest.approx(steps / 250)
+
+
+@given(st.integers(-100, 100))
+def test_the_same_with_an_offset(steps: int) -> None:
+    """Raw 25 is 0 in both signals, and a falling one counts down from there."""
+    for scale, offset in ((1.0, -25.0), (-1.0, 150.0)):
+        conversion = BaseConversion.factory(scale, offset)
+        positive, negative = (
+            Signal(name, 8 * at, 8, conversion=conversion, minimum=0.0, maximum=100.0)
+            for at, name in enumerate(("RotateLeft", "RotateRight"))
+        )
+        message = ValveMessage(Sender("b", Message(1, "M", 2, [positive, negative])))
+        codec = ValveCodec(message, positive, negative=negative)
+        codec.put(steps)
+        expected = {"RotateLeft": max(steps, 0), "RotateRight": max(-steps, 0)}
+        assert message.sender.fields.message.decode(message.frame().data) == expected
+        assert codec.read(message.raw) == steps
 
 
 def test_both_directions_at_once_are_no_command() -> None:
@@ -91,6 +119,7 @@ def test_flags_of_a_direction(flags: tuple[int, int, int], steps: int | None) ->
         codec.put(steps)
         assert tuple(codec.message.raw[n] for n in names) == flags
         assert codec.message.raw["RotateLeft"] == abs(steps)
+    assert codec.read({**raw, "RotateLeft": 40, "N": 1, "P": 0, "M": 0}) == 0
 
 
 def problems(folder: Path, *changes: tuple[str, str]) -> str:

@@ -15,8 +15,10 @@ from canshaper.codec.status import (
     SERVICE_STATUS,
     StatusCodec,
     required_names,
+    status_faults,
 )
 from canshaper.shaping.states import Reason, State
+from canshaper.shaping.trust import Trust
 from tests.rigs.reports import report
 
 SHIPPED = Path(__file__).parents[2] / "dbc" / "forwarder.dbc"
@@ -89,6 +91,46 @@ def test_a_code_of_another_version_is_shown_by_its_number() -> None:
     assert values["Reason"] == 254
     shown = {one.name: one.shown(values[one.name]) for one in codec.fields}
     assert (shown["State"], shown["Reason"]) == ("READY", "unknown (254)")
+
+
+def test_a_measurement_is_shown_as_a_number() -> None:
+    shown = {one.name: one.shown(12.5) for one in AXIS_STATUS}
+    assert (shown["SwingLength"], shown["State"]) == ("12.5", "unknown (12.5)")
+
+
+def test_a_code_is_sent_as_it_is_whatever_the_scale_of_its_signal() -> None:
+    """Old DBC files have their tables of raw values; a scale would move them."""
+    message = text_message("SG_ Digest : 0|16@1+ (0.5,-10) [0|0]")
+    codec = StatusCodec(Sender("b", message), IDENTITY)
+    assert codec.frame(0x1234).data == b"\x34\x12"
+    assert codec.decode(b"\x34\x12") == {"Digest": 0x1234}
+
+
+def test_what_a_status_message_lacks() -> None:
+    assert status_faults(text_message("SG_ Digest : 0|16@1+ (1,0) [0|0]"), IDENTITY) == []
+    signals = (
+        "SG_ State : 0|4@1+ (0,0) [0|0]",
+        "SG_ Reason : 8|6@1+ (1,0) [0|0]",
+        "SG_ ShapedCommand : 32|32@1- (1,0) [0|0]",
+        "SG_ SwaySensor : 16|1@1+ (1,0) [0|0]",
+        "SG_ ActiveSet : 17|1@1- (1,0) [0|0]",  # no codes: any number of bits will do
+    )
+    assert status_faults(text_message(*signals), AXIS_STATUS) == [
+        "lacks the signals RawCommand, PredictedSway",
+        "State: expected an integer signal with a scale, got a scale of 0",
+        f"Reason cannot carry {max(Reason)} with 6 bits",
+        "ShapedCommand: expected an integer signal with a scale, got a float",
+        f"SwaySensor cannot carry {max(Trust)} with 1 bits",
+    ]
+
+
+def text_message(*signals: str) -> Any:
+    lines = "\n ".join(f'{line} "" A' for line in signals)
+    floats = "SIG_VALTYPE_ 1 ShapedCommand : 1;\n" if len(signals) > 1 else ""
+    size = 8 if len(signals) > 1 else 2
+    text = f'VERSION ""\n\nBU_: A\n\nBO_ 1 M: {size} A\n {lines}\n\n{floats}'
+    (message,) = cantools.database.load_string(text, "dbc").messages
+    return message
 
 
 def test_tables_of_the_dbc_are_the_numbers_of_the_program() -> None:

@@ -7,8 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.checksums.kinds import Checksum
 from canshaper.codec.codecs import Sender
 from canshaper.codec.frame import Frame
+from canshaper.codec.protection import Protection
 from canshaper.codec.valve import DirectionCodec, ValveCodec, ValveMessage
 from canshaper.controller.controller import Controller
 from tests.rigs.files import Machine
@@ -30,6 +32,7 @@ BO_ 1280 Block: 8 SHAPER
  SG_ Second : 15|8@0- (0.8,0) [-100|100] "%" VALVE
  SG_ Third : 16|8@1+ (0.4,0) [0|100] "%" VALVE
  SG_ ThirdState : 24|2@1+ (1,0) [0|3] "" VALVE
+ SG_ Falling : 32|8@1- (-1,2) [-100|100] "%" VALVE
  SG_ Count : 60|4@1+ (1,0) [0|15] "" VALVE
 
 BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
@@ -83,6 +86,17 @@ def test_both_resolutions_of_a_signal_with_a_sign() -> None:
     assert codec.message.frame().data[:2] == bytes((256 - 25, 256 - 25))
 
 
+def test_the_same_in_a_signal_that_falls() -> None:
+    message = network.get_message_by_name("Block")
+    first, falling = (message.get_signal_by_name(name) for name in ("First", "Falling"))
+    codec = ValveCodec(ValveMessage(Sender("b", message)), first, also=[falling])
+    for steps in (-125, -1, 0, 25, 125):
+        codec.put(steps)
+        values: Any = message.decode(codec.message.frame().data)
+        assert values["First"] == pytest.approx(0.8 * steps)
+        assert values["Falling"] == pytest.approx(0.8 * steps, abs=0.5)
+
+
 @given(st.integers(-64_000, 64_000))
 def test_what_is_put_is_read_by_cantools(steps: int) -> None:
     codec = avc("ExtFlow", "PortFlow")
@@ -98,6 +112,31 @@ def test_what_is_put_is_read_by_cantools(steps: int) -> None:
 
 def test_neutral_is_what_it_holds_before_anything_is_put() -> None:
     assert avc("ExtFlow", "PortFlow").message.frame().data.hex() == "00ff300000ffffff"
+
+
+def test_the_smallest_commands_have_a_direction() -> None:
+    codec = avc("PortFlow")
+    for steps, state in ((1, 1), (-1, 2), (0, 0)):
+        codec.put(steps)
+        assert codec.message.raw["State"] == state
+
+
+def test_in_neutral_no_flow_is_a_command() -> None:
+    assert avc("PortFlow").read({"PortFlow": 10, "State": 0}) == 0
+
+
+def test_what_takes_the_place_of_a_frame_has_its_count() -> None:
+    block = network.get_message_by_name("Block")
+    for protection in (Protection("Count", 16), Protection("Count", 16, Checksum("xor", 6))):
+        message = ValveMessage(Sender("b", block, protection=protection))
+        first = message.frame()
+        message.raw["First"] = 5
+        second = message.instead(first)
+        assert first.data[7] >> 4 == second.data[7] >> 4 == 1
+        assert second.data[0] == 5
+        assert message.frame().data[7] >> 4 == 2
+        # two frames of one count differ in the command, and in a checksum where there is one
+        assert (first.data[6] == second.data[6]) is (protection.check is None)
 
 
 @pytest.mark.parametrize("state", [3, 4, 14, 15])
