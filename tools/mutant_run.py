@@ -74,6 +74,8 @@ class Forks:
         pid, status = os.wait()
         name, temporary = self._running.pop(pid)
         self.exit_codes[name] = os.waitstatus_to_exitcode(status)
+        if not self.exit_codes[name]:
+            print(f"survived: {name}", flush=True)
         killer = Path(temporary) / KILLER
         if killer.exists():
             self._killed[mangled_name_from_mutant_name(name)][killer.read_text()] += 1

@@ -27,7 +27,7 @@ DAEMON = [f"tests/{room}" for room in ("inputs", "guard", "protocols", "controll
 TESTS = {
     "checksums": ["tests/codec"],
     "codec": ["tests/codec"],
-    "machine": ["tests/machine"],
+    "machine": ["tests/machine", "tests/codec"],
     "shaping": ["tests/shaping"],
     "inputs": DAEMON,
     "guard": DAEMON,

@@ -83,7 +83,11 @@ def compare(path: Path, names: set[str]) -> None:
         assert str(entry.number) in rows[entry.line - 1]
 
 
-@pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
+@pytest.mark.parametrize(
+    "path",
+    [pytest.param(p, marks=pytest.mark.long) if p.name.startswith("j1939") else p for p in FILES],
+    ids=lambda path: path.name,
+)
 def test_each_message_is_that_of_the_whole_file(path: Path) -> None:
     names = sorted(message.name for message in whole(path).messages)
     for name in names:

@@ -128,6 +128,37 @@ class Unknown:
         """Open nothing."""
 
 
+class Ours:
+    """An interface that takes nothing but what stands elsewhere in the file."""
+
+    def __init__(self, channel: str) -> None:
+        """Open nothing."""
+
+
+class First:
+    """An interface whose own parameter comes first, and may be of two types."""
+
+    def __init__(self, number: int | str, channel: str) -> None:
+        """Open nothing."""
+
+
+def test_an_interface_without_options(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(BACKENDS, "adapter", (__name__, "Ours"))
+    text = "expected an option of adapter (it has none), got number"
+    assert faults("adapter", number=1) == [(("options", "number"), text)]
+
+
+def test_an_option_of_two_types(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(BACKENDS, "adapter", (__name__, "First"))
+    assert faults("adapter", number="A") == faults("adapter", number=1) == []
+    assert faults("adapter") == [
+        (("options",), "expected number, which adapter needs, got none"),
+    ]
+    assert faults("adapter", number=1.5) == [
+        (("options", "number"), "expected int | str, got 1.5"),
+    ]
+
+
 @pytest.mark.parametrize("name", ["Opened", "Unknown"])
 def test_what_has_no_type_that_can_be_checked_may_be_right(
     monkeypatch: pytest.MonkeyPatch, name: str

@@ -63,7 +63,8 @@ def test_run_refuses_a_simulated_valve_on_a_real_bus(tmp_path: Path) -> None:
     assert result.exit_code == 2
     assert result.stderr.startswith(
         f"{file}:{line_of(file, 'curve_origin')}: axes.slew.limits.curve_origin: expected a valve"
-        " measured on the machine, got one of a simulated crane, on socketcan none0;"
+        " measured on the machine, got one of a simulated crane, on socketcan none0; canshaper"
+        " calibrate --live measures it, canshaper run --simulated takes it as it is\n"
     )
     for option in ("--simulated", "--listen-only"):
         assert invoke("run", file, option).exit_code == 3  # there is no such bus

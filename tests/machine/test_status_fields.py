@@ -78,3 +78,17 @@ def test_every_field_is_itself_in_a_reload() -> None:
     """The deployment is read in a process of its own, and comes back as bytes."""
     for field in (*status.AXIS_STATUS, *status.SERVICE_STATUS, *status.IDENTITY):
         assert pickle.loads(pickle.dumps(field)) is field
+
+
+def test_a_status_that_is_multiplexed_or_missing(tmp_path: Path) -> None:
+    some = f'{ACTIVE_SET.replace(" :", " M :")} "" A\n SG_ More m1 : 60|4@1+ (1,0) [0|15]'
+    text = "SlewStatus is multiplexed; without multiplexor nothing can be sent in it"
+    with pytest.raises(ConfigError, match=text):
+        machine(tmp_path, ACTIVE_SET, some)
+    text = (ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc/", "")
+    status_line = next(line for line in text.splitlines() if "message: SlewStatus" in line)
+    (tmp_path / "forwarder.dbc").write_text((ROOT / "dbc" / "forwarder.dbc").read_text())
+    file = tmp_path / "without.yaml"
+    file.write_text(text.replace(status_line + "\n", ""))
+    axis = load_deployment(file).axes["slew"]
+    assert (axis.status, axis.status_ticks) == (None, 0)
