@@ -81,14 +81,18 @@ def test_every_field_is_itself_in_a_reload() -> None:
 
 
 def test_a_status_that_is_multiplexed_or_missing(tmp_path: Path) -> None:
-    some = f'{ACTIVE_SET.replace(" :", " M :")} "" A\n SG_ More m1 : 60|4@1+ (1,0) [0|15]'
-    text = "SlewStatus is multiplexed; without multiplexor nothing can be sent in it"
-    with pytest.raises(ConfigError, match=text):
-        machine(tmp_path, ACTIVE_SET, some)
+    dbc = (ROOT / "dbc" / "forwarder.dbc").read_text()
+    (tmp_path / "forwarder.dbc").write_text(dbc)
     text = (ROOT / "config" / "forwarder.yaml").read_text().replace("../dbc/", "")
-    status_line = next(line for line in text.splitlines() if "message: SlewStatus" in line)
-    (tmp_path / "forwarder.dbc").write_text((ROOT / "dbc" / "forwarder.dbc").read_text())
-    file = tmp_path / "without.yaml"
-    file.write_text(text.replace(status_line + "\n", ""))
+    line = next(line for line in text.splitlines() if "message: SlewStatus" in line)
+    file = tmp_path / "forwarder.yaml"
+    file.write_text(text.replace(line + "\n", ""))
     axis = load_deployment(file).axes["slew"]
     assert (axis.status, axis.status_ticks) == (None, 0)
+    file.write_text(text)
+    more = ' SG_ More m1 : 48|16@1- (1,0) [0|0] "" PLANT\n SG_ PredictedSway m0 :'
+    dbc = dbc.replace("SG_ ActiveSet :", "SG_ ActiveSet M :", 1)
+    (tmp_path / "forwarder.dbc").write_text(dbc.replace(" SG_ PredictedSway :", more, 1))
+    reason = "SlewStatus is multiplexed; without multiplexor nothing can be sent in it"
+    with pytest.raises(ConfigError, match=reason):
+        load_deployment(file)
