@@ -1,53 +1,18 @@
-"""Valve messages: direction by codes, the same in two resolutions, axes that share a message."""
+"""Valve messages: direction by codes, the same in two resolutions."""
 
 from typing import Any
 
-import cantools
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from canshaper.checksums.kinds import Checksum
 from canshaper.codec.codecs import Sender
-from canshaper.codec.frame import Frame
 from canshaper.codec.protection import Protection
 from canshaper.codec.valve import DirectionCodec, ValveCodec, ValveMessage
-from canshaper.controller.controller import Controller
+from tests.codec.valve_machine import CODES, DBC, network, with_valves
 from tests.rigs.files import Machine
 
-# ISO 11783-7 auxiliary valve command 0; the reserved bits and bytes 6 to 8 have no signals.
-DBC = """VERSION ""
-
-BU_: SHAPER VALVE
-
-BO_ 2365468926 AVC0: 8 SHAPER
- SG_ PortFlow : 0|8@1+ (0.4,0) [0|100] "%" VALVE
- SG_ ResolutionMode : 8|2@1+ (1,0) [0|3] "" VALVE
- SG_ State : 16|4@1+ (1,0) [0|15] "" VALVE
- SG_ FailSafe : 22|2@1+ (1,0) [0|3] "" VALVE
- SG_ ExtFlow : 24|16@1+ (0.0015625,0) [0|100] "%" VALVE
-
-BO_ 1280 Block: 8 SHAPER
- SG_ First : 0|8@1- (0.8,0) [-100|100] "%" VALVE
- SG_ Second : 15|8@0- (0.8,0) [-100|100] "%" VALVE
- SG_ Third : 16|8@1+ (0.4,0) [0|100] "%" VALVE
- SG_ ThirdState : 24|2@1+ (1,0) [0|3] "" VALVE
- SG_ Falling : 32|8@1- (-1,2) [-100|100] "%" VALVE
- SG_ Count : 60|4@1+ (1,0) [0|15] "" VALVE
-
-BA_DEF_ BO_ "GenMsgCycleTime" INT 0 65535;
-BA_DEF_DEF_ "GenMsgCycleTime" 0;
-BA_DEF_ SG_ "GenSigStartValue" FLOAT -100000 100000;
-BA_DEF_DEF_ "GenSigStartValue" 0;
-BA_DEF_ BO_ "VFrameFormat" ENUM "StandardCAN","ExtendedCAN","reserved","J1939PG";
-BA_DEF_DEF_ "VFrameFormat" "StandardCAN";
-BA_ "GenMsgCycleTime" BO_ 2365468926 20;
-BA_ "GenMsgCycleTime" BO_ 1280 20;
-BA_ "VFrameFormat" BO_ 2365468926 3;
-BA_ "GenSigStartValue" SG_ 2365468926 FailSafe 0;
-VAL_ 2365468926 State 0 "Block" 1 "Extend" 2 "Retract" 3 "Float" 15 "DontCare" ;
-"""
-network: Any = cantools.database.load_string(DBC, "dbc")
 STATE = DirectionCodec("State", (0, 1, 2))
 
 
@@ -153,23 +118,6 @@ def test_beyond_full_flow_is_no_command() -> None:
 
 # -- bound to a deployment -------------------------------------------------------------------------
 
-SLEW = "{ bus: crane, message: SlewCommand, signal: Velocity, timeout_ms: 200,"
-AVC = "{ bus: crane, message: AVC0, signal: PortFlow, timeout_ms: 200, "
-CODES = "direction: { signal: State, neutral: 0, positive: 1, negative: 2 }"
-ALIVE = " alive_counter: AliveCounter"
-NODE = "j1939: { address: 0x9C, name: { identity_number: 1, manufacturer_code: 1 } }"
-
-
-def with_valves(machine: Machine, *valves: tuple[str, str]) -> Machine:
-    """The shipped machine with a second DBC file and other valves of some axes."""
-    (machine.directory / "valves.dbc").write_text(DBC, encoding="cp1252")
-    machine.in_yaml("[machine.dbc]", "[machine.dbc, valves.dbc]")
-    for axis, valve in valves:
-        machine.in_yaml(f"message: {axis}Command, signal: Velocity, timeout_ms: 200,{ALIVE}", valve)
-    if "AVC0" in machine.yaml:
-        machine.in_yaml("bitrate: 250000", f"bitrate: 250000, {NODE}")
-    return machine
-
 
 def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
     valve = f"message: AVC0, signal: ExtFlow, also: [PortFlow], timeout_ms: 200, {CODES}"
@@ -231,86 +179,3 @@ def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Ma
     assert problem == (
         "valves.dbc:5: AVC0: PortFlow cannot reach its range [0|100] with 8 bits at 0.1 per bit"
     )
-
-
-# -- axes that share a message ---------------------------------------------------------------------
-
-BLOCK = "message: Block, timeout_ms: 200, alive_counter: Count"
-THREE = (
-    ("Slew", f"{BLOCK}, signal: First"),
-    ("NearFar", f"{BLOCK}, signal: Second"),
-    (
-        "Lift",
-        f"{BLOCK}, signal: Third,"
-        " direction: { signal: ThirdState, neutral: 0, positive: 1, negative: 2 }",
-    ),
-)
-
-
-def test_three_axes_in_one_message(machine: Machine) -> None:
-    """One frame a tick with the commands of all; its counter counts frames, not axes."""
-    deployment = with_valves(machine, *THREE).load()
-    controller = Controller(deployment)
-    joystick: Any = {m.name: m for m in deployment.messages.all()}
-    moved: list[Any] = []
-    for n in range(60):
-        for side, command in (
-            ("Left", {"Slew": 900, "NearFar": -400}),
-            ("Right", {"Lift": -600}),
-        ):
-            message = joystick[f"Joystick{side}"]
-            raw = dict.fromkeys((s.name for s in message.signals), 0)
-            raw |= {"Enable": 1, "AliveCounter": n % 256, **(command if n > 4 else {})}
-            data = message.encode(raw, scaling=False)
-            controller.receive(Frame("crane", message.frame_id, False, data), n * 20_000_000)
-        sent = [f for f in controller.tick(n * 20_000_000) if f.can_id == 0x500]
-        assert len(sent) == 1
-        moved.append(network.decode_message("Block", sent[0].data, scaling=False))
-    assert [m["Count"] for m in moved] == [(n + 1) % 16 for n in range(60)]
-    last = moved[-1]
-    assert last["First"] > 40
-    assert last["Second"] < -20
-    assert (last["Third"], last["ThirdState"]) == (155, 2)  # 60 %, and 5 % for the deadband
-    (neutral,) = controller.neutral_frames()
-    raw = network.decode_message("Block", neutral.data, scaling=False)
-    assert [raw[s] for s in ("First", "Second", "Third", "ThirdState")] == [0, 0, 0, 0]
-
-
-def test_a_frame_that_is_not_sent_trips_all_of_its_axes(machine: Machine) -> None:
-    deployment = with_valves(machine, *THREE).load()
-    controller = Controller(deployment)
-    (frame,) = (f for f in controller.tick(0) if f.can_id == 0x500)
-    controller.receive(frame, 0)
-    list(controller.tick(20_000_000))
-    assert {r.axis.reason.name for r in controller.axes.values()} == {"SECOND_SENDER"}
-
-
-@pytest.mark.parametrize(
-    ("old", "new", "says"),
-    [
-        (
-            "signal: Second",
-            "signal: First",
-            "expected a free signal, got 'First', which is axes.slew.valve.signal already",
-        ),
-        (
-            "signal: ThirdState",
-            "signal: Count",
-            "expected a free signal, got 'Count', which is alive_counter already",
-        ),
-        (
-            "signal: Second",
-            "signal: Second, alive_counter: null",
-            "",
-        ),
-    ],
-)
-def test_no_signal_serves_two(machine: Machine, old: str, new: str, says: str) -> None:
-    with_valves(machine, *THREE)
-    if not says:
-        machine.in_yaml(f"alive_counter: Count, {old}", old)
-        says = "alive_counter: expected the same as the other axes of Block, got another"
-    else:
-        machine.in_yaml(old, new)
-    problems = machine.problems()
-    assert any(says in problem for problem in problems), problems
