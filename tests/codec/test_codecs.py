@@ -229,7 +229,7 @@ def test_every_frame_decodes_to_a_command_or_a_fault(data: bytes) -> None:
     _, commands = codec.decode(data)
     judge = message.decode(data, decode_choices=False)
     named = message.decode(data, decode_choices=True)
-    assert isinstance(judge, dict) and isinstance(named, dict)  # noqa: PT018
+    assert isinstance(judge, dict) and isinstance(named, dict)
     for name in names:
         command, scaled = commands[name], judge[name]
         assert isinstance(scaled, int | float)
