@@ -12,10 +12,12 @@ for one that does not, and for an entry that fits no mutant any more. Works on c
 out/mutation.
 """
 
+import os
 import resource
 import shutil
 import subprocess
 import sys
+import tempfile
 import time
 import tomllib
 from pathlib import Path
@@ -31,9 +33,9 @@ TESTS = {
     "shaping": ["tests/shaping"],
     "inputs": DAEMON,
     "guard": DAEMON,
-    "protocols": DAEMON,
+    "protocols": [*DAEMON, "tests/machine/test_gateway_binding.py"],
     "controller": DAEMON,
-    "daemon": DAEMON,
+    "daemon": ["tests/daemon"],
     "bus": ["tests/bus"],
 }
 CORE = [f"canshaper.shaping.{name}" for name in ("axis", "limits", "state_machine", "transfer")]
@@ -96,10 +98,12 @@ def run(group: str, patterns: list[str], processes: str) -> int:
         prepare(work, modules(group), TESTS[group])
     mutants = [sys.executable, str(ROOT / "tools/mutants.py")]
     log = work / "mutmut.log"
-    with log.open("w") as out:
+    # Folders of its own: another run of pytest would remove them as garbage.
+    with log.open("w") as out, tempfile.TemporaryDirectory() as temporary:
         how = ["run-new", str(SURVIVORS)] if group == "core" else ["run"]
         command = [*mutants, *how, processes, *patterns]
-        ran = subprocess.run(command, cwd=work, stdout=out, stderr=subprocess.STDOUT, check=False)
+        env = {**os.environ, "PYTEST_DEBUG_TEMPROOT": temporary}
+        ran = subprocess.run(command, cwd=work, env=env, stdout=out, stderr=out, check=False)
     if ran.returncode:
         print(log.read_text()[-5000:])
         return ran.returncode

@@ -209,7 +209,7 @@ def _bind_command(used: UsedMessage, place: Place, name: str, magnitude: bool) -
         return None
     used.check_integer(place, signal)
     used.use(place, signal, key_path(place))
-    return signal
+    return None if signal.is_float else signal
 
 
 def _bind_direction(

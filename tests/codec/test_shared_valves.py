@@ -6,7 +6,7 @@ import pytest
 
 from canshaper.codec.frame import Frame
 from canshaper.controller.controller import Controller
-from tests.codec.valve_machine import network, with_valves
+from tests.codec.valve_machine import DBC, network, with_valves
 from tests.rigs.files import Machine
 
 BLOCK = "message: Block, timeout_ms: 200, alive_counter: Count"
@@ -88,3 +88,14 @@ def test_no_signal_serves_two(machine: Machine, old: str, new: str, says: str) -
         machine.in_yaml(old, new)
     problems = machine.problems()
     assert any(says in problem for problem in problems), problems
+
+
+def test_a_message_without_a_cycle_is_reported_once(machine: Machine) -> None:
+    """Not once for each of its axes, and none of them is bound."""
+    with_valves(machine, *THREE)
+    text = DBC.replace("BO_ 1280 20;", "BO_ 1280 0;")
+    (machine.directory / "valves.dbc").write_text(text, encoding="cp1252")
+    (problem,) = machine.problems()
+    assert problem == (
+        "valves.dbc:12: Block: GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got none"
+    )

@@ -145,6 +145,10 @@ def test_a_valve_with_a_direction_is_bound(machine: Machine) -> None:
             "axes.slew.valve.direction.negative: expected up to 15, of 4 bits of State, got 16",
         ),
         (
+            f"signal: PortFlow, {CODES.replace('neutral: 0', 'neutral: 16')}",
+            "axes.slew.valve.direction.neutral: expected up to 15, of 4 bits of State, got 16",
+        ),
+        (
             f"signal: PortFlow, {CODES.replace('State', 'Stat')}",
             "axes.slew.valve.direction.signal: expected a signal of AVC0, got 'Stat'; there are"
             " PortFlow",
@@ -178,4 +182,25 @@ def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Ma
     (problem,) = broken.problems()
     assert problem == (
         "valves.dbc:5: AVC0: PortFlow cannot reach its range [0|100] with 8 bits at 0.1 per bit"
+    )
+
+
+def test_the_largest_code_of_the_bits_is_a_direction(machine: Machine) -> None:
+    codes = CODES.replace("negative: 2", "negative: 15")
+    valve = f"message: AVC0, signal: PortFlow, timeout_ms: 200, {codes}"
+    codec = with_valves(machine, ("Slew", valve)).load().axes["slew"].valve
+    codec.put(-10)
+    assert codec.message.raw["State"] == 15
+
+
+def test_a_direction_with_a_sign_is_reported(machine: Machine) -> None:
+    broken = with_valves(
+        machine, ("Slew", f"message: AVC0, signal: PortFlow, timeout_ms: 200, {CODES}")
+    )
+    text = DBC.replace("State : 16|4@1+", "State : 16|4@1-")
+    (machine.directory / "valves.dbc").write_text(text, encoding="cp1252")
+    (problem,) = broken.problems()
+    assert problem.partition(": ")[2] == (
+        "axes.slew.valve.direction.signal: State: expected an unsigned integer signal, got a signed"
+        " one"
     )

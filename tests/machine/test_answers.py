@@ -141,8 +141,9 @@ def test_a_gateway_needs_the_address_of_a_joystick_of_j1939(tmp_path: Path) -> N
     """It leaves under the joystick's."""
     with pytest.raises(ConfigError) as caught:
         load_deployment(j1939_gateway(tmp_path))
-    needs = "BJM1 may come from any source address; where its frames leave, its joystick needs the"
-    assert any(needs in str(one) for one in caught.value.problems), caught.value.problems
+    needs = "in the DBC BJM1 may come from any source address; where its frames leave, its joystick"
+    answers = [str(one).partition(": ")[2] for one in caught.value.problems]
+    assert f"axes.slew.valve.message: {needs} needs the key source" in answers, answers
 
 
 @pytest.mark.parametrize("signal", ["Slew", "NearFar"])

@@ -80,6 +80,11 @@ def test_the_node_of_a_drive_is_one_of_its_bus(tmp_path: Path) -> None:
             "ControlWord: expected 4 bits or more, got 3",
         ),
         (
+            "SG_ ControlWord : 0|16@1+", "SG_ ControlWord : 0|16@1-",
+            " axes.slew.valve.cia408.control: ControlWord: expected an unsigned integer signal,"
+            " got a signed one",
+        ),
+        (
             "SG_ StatusWord : 0|16@1+", "SG_ StatusWord : 0|3@1+",
             "StatusWord: expected 4 bits or more, got 3",
         ),

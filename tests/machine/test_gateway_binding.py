@@ -19,6 +19,7 @@ from tests.machine.gateway_files import ROOT, j1939_gateway, load, problems
 
 SLEW = "bus: machine, message: JoystickLeft, signal: Slew, timeout_ms: 200,"
 COUNTER = "alive_counter: AliveCounter"
+ROCKER = ("signal: NearFar, neutral_pct", "signal: NearFar, negative: Back, neutral_pct")
 
 
 def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
@@ -32,45 +33,75 @@ def test_what_is_not_passed_on_is_read_with_the_others(tmp_path: Path) -> None:
     [
         (
             "[joysticks, machine]", "[joysticks, joysticks]",
-            "between: expected two different buses, got joysticks twice",
+            "gateway: between: expected two different buses, got joysticks twice",
         ),
         ("[joysticks, machine]", "[joysticks, crane]",
-         "expected a bus, got 'crane'; there are joysticks, machine"),
+         "gateway.between.1: expected a bus, got 'crane'; there are joysticks, machine"),
         (
             "forwarding: kernel", "forwarding: daemon",
-            "fallback: expected stop with forwarding: daemon, got neutral: without",
+            "gateway: fallback: expected stop with forwarding: daemon, got neutral: without the"
+            " daemon nothing passes",
         ),
         (
             "fallback: neutral", "fallback: neutral\n  blocked: [Nobody]",
-            "expected a message of the DBC files, got 'Nobody'",
+            "gateway.blocked.0: expected a message of the DBC files, got 'Nobody'; there are"
+            " GrappleSway, JointPosition, JointVelocity, JoystickLeft, JoystickRight, LiftCommand,"
+            " LiftStatus, NearFarCommand, NearFarStatus, ShaperIdentity, ShaperStatus, SlewCommand,"
+            " SlewStatus, TipPosition, TipVelocity",
         ),
         (
             SLEW, SLEW.replace("Slew", "NearFar"),
-            "expected the signal of its command, 'Slew', in the message of its joystick, got"
-            " 'NearFar'",
+            "axes.slew.valve.signal: expected the signal of its command, 'Slew', in the message of"
+            " its joystick, got 'NearFar'",
         ),
         (
             f"{SLEW} {COUNTER}", f"{SLEW}",
-            "alive_counter: expected the same as joystick left, got another",
+            "axes.slew.valve.alive_counter: expected the same as joystick left, got another",
         ),
         (SLEW, SLEW.replace("200", "120"),
-         "expected more than 120 ms, a tick more than joystick left, whose receiver"),
+         "axes.slew.valve.timeout_ms: expected more than 120 ms, a tick more than joystick left,"
+         " whose receiver must not give up before we do, got 120"),
         (SLEW, f"{SLEW} direction: {{ signal: Reset, neutral: 0, positive: 1, negative: 2 }},",
-         "direction: expected none in the message of joystick left, which"),
+         "axes.slew.valve.direction: expected none in the message of joystick left, which has that"
+         " of the command, got one"),
         (SLEW, f"{SLEW} multiplexor: 3,",  # frames with another value would not pass
-         "multiplexor: expected none in the message of joystick left, which"),
+         "axes.slew.valve.multiplexor: expected none in the message of joystick left, which has"
+         " that of the command, got one"),
         (SLEW, f"{SLEW} cycle_ms: 40,",
-         "cycle_ms: expected the same as joystick left, got another"),
+         "axes.slew.valve.cycle_ms: expected the same as joystick left, got another"),
         (f"{SLEW} {COUNTER}",
          "bus: machine, message: SlewCommand, signal: Velocity, timeout_ms: 200",
-         "leave with this command in them, got 'SlewCommand'"),
+         "axes.slew.valve.message: expected JoystickLeft on bus machine, as the frames of joystick"
+         " left leave with this command in them, got 'SlewCommand'"),
         ("joystick: left, signal: Slew", "joystick: right, signal: Rotate",
-         "expected the message of joystick right, or one of no joystick, got 'JoystickLeft'"),
+         "axes.slew.valve.message: expected the message of joystick right, or one of no joystick,"
+         " got 'JoystickLeft' of joystick left"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_reported(tmp_path: Path, old: str, new: str, message: str) -> None:
     reported = problems(tmp_path, (old, new))
-    assert any(message in problem for problem in reported), reported
+    assert message in [problem.partition(": ")[2] for problem in reported], reported
+
+
+def test_a_valve_needs_the_second_signal_of_its_rocker(tmp_path: Path) -> None:
+    reported = problems(tmp_path, ROCKER)
+    says = "axes.near_far.valve.signal: expected a signal of JoystickLeft, got 'Back'; there are"
+    assert [one for one in reported if says in one], reported
+
+
+def test_both_signals_of_a_rocker_are_rewritten(tmp_path: Path) -> None:
+    dbc = (
+        ' SG_ NearFar : 16|16@1- (0.1,0) [-100|100] "%" SHAPER\n',
+        ' SG_ NearFar : 16|16@1+ (0.1,0) [0|100] "%" SHAPER\n'
+        ' SG_ Back : 40|16@1+ (0.1,0) [0|100] "%" SHAPER\n',
+    )
+    valve = load(tmp_path, ROCKER, dbc=dbc).axes["near_far"].valve
+    sent = valve.message
+    assert isinstance(sent, RewrittenMessage)
+    assert sent.ours == {"Slew", "NearFar", "Back"}
+    valve.put(-250)
+    assert (sent.raw["NearFar"], sent.raw["Back"]) == (0, 250)
+    assert sent.onto(b"\xff" * 8).data.hex() == "00000000fffa0001"
 
 
 def test_an_ecu_that_waits_for_a_tick_longer_than_we_do_is_enough(tmp_path: Path) -> None:

@@ -150,6 +150,29 @@ def test_what_a_message_of_the_dbc_cannot_do(
     assert says in problem
 
 
+def test_a_valve_may_have_the_slowest_cycle(machine: Machine) -> None:
+    machine.in_dbc("BO_ 512 20;", "BO_ 512 200;")
+    machine.in_yaml("signal: Velocity, timeout_ms: 200", "signal: Velocity, timeout_ms: 600")
+    assert machine.load().axes["slew"].period_ticks == 10
+
+
+@pytest.mark.parametrize("numbers", ["(1e-300,0)", "(1e-300,1e300)"])
+def test_a_float_without_bounds_is_no_command(machine: Machine, numbers: str) -> None:
+    """Neither its number of steps nor its zero is one."""
+    machine.in_dbc(SLEW_VALVE, f"Velocity : 0|32@1- {numbers} [-1e300|1e300]")
+    machine.in_dbc("BO_ 512 SlewCommand: 2", "BO_ 512 SlewCommand: 5")
+    machine.in_dbc("AliveCounter : 8|8@1+", "AliveCounter : 32|8@1+")
+    machine.dbc += "\nSIG_VALTYPE_ 512 Velocity : 1;\n"
+    (problem,) = machine.problems()
+    assert problem.endswith("Velocity: expected an integer signal, got a float")
+
+
+def test_a_range_that_fits_no_direction_either_is_reported_alone(machine: Machine) -> None:
+    machine.in_dbc(SLEW_VALVE, "Velocity : 0|8@1- (0.8,0) [-100|98]")
+    (problem,) = machine.problems()
+    assert problem.endswith("Velocity: expected a symmetrical range, got [-100|98]")
+
+
 def test_a_range_at_the_last_bit_is_reached_in_spite_of_rounding(machine: Machine) -> None:
     # 88.9 / 0.7 is a little more than 127 in floating point
     machine.in_dbc(SLEW_VALVE, "Velocity : 0|8@1- (0.7,0) [-88.9|88.9]")

@@ -1,13 +1,14 @@
-"""The routing table of the shipped machines: what each id on a bus is."""
+"""The routing table: what each id on a bus is, on the shipped machines and on small ones."""
 
 import dataclasses
 from pathlib import Path
 
 import pytest
 
+from canshaper.config.bus import J1939, Bus, Canopen, CanopenNode, J1939Name
 from canshaper.machine.binding import load_deployment
 from canshaper.machine.deployment import Deployment
-from canshaper.machine.routing import GroupRoute, Role, Route
+from canshaper.machine.routing import GroupRoute, Key, Role, Route, Routing, build_routing
 
 CONFIG = Path(__file__).parents[2] / "config"
 
@@ -82,3 +83,132 @@ def test_the_table_is_built_once() -> None:
     assert deployment.routing is deployment.routing
     with pytest.raises(dataclasses.FrozenInstanceError):
         deployment.routing.routes = {}  # type: ignore[misc]
+
+
+def nodes_of(buses: dict[str, Bus], *, listen_only: bool = False) -> Routing:
+    """The table of these buses with the messages of no DBC file: what nodes say of themselves."""
+    config = machine("forwarder").config.model_copy(update={"buses": buses})
+    return build_routing(
+        config,
+        inputs=[],
+        axes=[],
+        statuses=[],
+        known=[],
+        j1939=["messages"],
+        fd=[],
+        listen_only=listen_only,
+    )
+
+
+def canopen_bus(*, master: bool) -> Bus:
+    nodes = {"left": CanopenNode(id=0x10, heartbeat_ms=500)}
+    canopen = Canopen(node=0x7E, master=master, nodes=nodes)
+    return Bus(interface="virtual", channel="canopen", canopen=canopen)
+
+
+def j1939_bus(address: int) -> Bus:
+    node = J1939(address=address, name=J1939Name(identity_number=1, manufacturer_code=2047))
+    return Bus(interface="virtual", channel="j1939", j1939=node)
+
+
+WATCHED = {("crane", 0x710, False), ("crane", 0x090, False)}
+
+
+@pytest.mark.parametrize(
+    ("master", "listen_only", "sent"),
+    [
+        (True, False, {("crane", 0x77E, False), ("crane", 0x000, False)}),
+        (False, False, {("crane", 0x77E, False)}),
+        (True, True, set()),
+        (False, True, set()),
+    ],
+)
+def test_a_node_of_canopen_sends_its_heartbeat_and_only_the_master_sends_nmt(
+    master: bool, listen_only: bool, sent: set[Key]
+) -> None:
+    routing = nodes_of({"crane": canopen_bus(master=master)}, listen_only=listen_only)
+    assert routing.routes == dict.fromkeys(WATCHED, Route(Role.NODE)) | dict.fromkeys(
+        sent, Route(Role.SENT)
+    )
+    assert routing.sent == sent
+    assert routing.buses["crane"].sent == {key[1:] for key in sent}
+    assert routing.buses["crane"].received == {key[1:] for key in WATCHED}
+
+
+def test_a_node_of_j1939_claims_its_address_and_sends_its_own_messages() -> None:
+    routing = nodes_of({"crane": j1939_bus(0x9C)})
+    claims = {("crane", can_id, True) for can_id in (0x18EEFF9C, 0x18EEFFFE)}
+    ids = (0x18E8FF9C, 0x18FECA9C, 0x1CECFF9C, 0x1CEBFF9C)  # acknowledge, DM1, transport
+    sent = {("crane", can_id, True) for can_id in ids}
+    assert routing.routes == dict.fromkeys(claims, Route(Role.CLAIM)) | dict.fromkeys(
+        sent, Route(Role.SENT)
+    )
+    assert routing.buses["crane"].claims == {key[1:] for key in claims}
+    assert routing.buses["crane"].sent == {key[1:] for key in sent}
+
+
+def test_a_listening_node_of_j1939_requests_from_the_null_address_and_sends_nothing_else() -> None:
+    routing = nodes_of({"crane": j1939_bus(0x9C)}, listen_only=True)
+    claims = {("crane", can_id, True) for can_id in (0x18EEFF9C, 0x18EEFFFE, 0x18EAFFFE)}
+    assert routing.routes == dict.fromkeys(claims, Route(Role.CLAIM))
+    assert routing.buses["crane"].claims == {key[1:] for key in claims}
+    assert not routing.buses["crane"].sent
+
+
+def test_a_bus_is_of_j1939_by_its_node_or_by_its_messages_and_of_canopen_by_its_node() -> None:
+    plain = Bus(interface="virtual", channel="plain")
+    buses = {
+        "node": j1939_bus(0x9C),
+        "messages": plain,
+        "valves": canopen_bus(master=True),
+        "plain": plain,
+    }
+    flags = {name: (bus.j1939, bus.canopen) for name, bus in nodes_of(buses).buses.items()}
+    assert flags == {
+        "node": (True, False),
+        "messages": (True, False),
+        "valves": (False, True),
+        "plain": (False, False),
+    }
+
+
+def test_only_the_two_buses_of_a_gateway_are_in_line() -> None:
+    deployment = machine("gateway-forwarder")
+    aside = Bus(interface="virtual", channel="aside")
+    buses = deployment.config.buses | {"aside": aside}
+    config = deployment.config.model_copy(update={"buses": buses})
+    routing = dataclasses.replace(deployment, config=config).routing
+    in_line = {name: bus.in_line for name, bus in routing.buses.items()}
+    assert in_line == {"joysticks": True, "machine": True, "aside": False}
+    assert not any(bus.in_line for bus in machine("two-cranes").routing.buses.values())
+
+
+def test_groups_of_two_buses_of_j1939_do_not_mix(tmp_path: Path) -> None:
+    text = (CONFIG / "j1939-forwarder.yaml").read_text()
+    name = "{ identity_number: 2, manufacturer_code: 2047 }"
+    rear = f"""buses:
+  rear:
+    interface: socketcan
+    channel: vcan1
+    bitrate: 250000
+    j1939: {{ address: 0x9D, name: {name} }}
+"""
+    changes = {
+        "buses:\n": rear,
+        "bus: crane\n    message: BJM2": "bus: rear\n    message: BJM2",
+        "bus: crane\n      message: AVC0": "bus: rear\n      message: AVC0",
+        "../dbc": str(CONFIG.parent / "dbc"),
+    }
+    for old, new in changes.items():
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    file = tmp_path / "machine.yaml"
+    file.write_text(text)
+    buses = load_deployment(file).routing.buses
+    claims = {0xEE0000, 0xEA0000}
+    bjm1, bjm2, feedback = 0xFDD600, 0xFDD800, {0xFE1000, 0xFE1100, 0xFE1200}
+    avc0, avc1, avc2 = 0xFE3000, 0xFE3100, 0xFE3200
+    assert buses["crane"].received_groups == claims | {bjm1} | feedback
+    assert buses["rear"].received_groups == claims | {bjm2}
+    assert buses["crane"].sent_groups == {avc1, avc2}
+    assert buses["rear"].sent_groups == {avc0}
