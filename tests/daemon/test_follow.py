@@ -260,3 +260,43 @@ def test_a_cycle_may_be_several_ticks(tmp_path: Path, tick_ms: int) -> None:
 
 def test_it_is_off_by_default() -> None:
     assert load_config(ROOT / "config" / "forwarder.yaml")[0].tick is None
+
+
+# -- one deadline ----------------------------------------------------------------------------------
+
+
+def step(cycle_ms: int, *others_ns: int, deadline_ns: int) -> int:
+    """How much later the deadline shall be, with a frame of the followed joystick at 40 ms."""
+    names = ["left", *(f"other {n}" for n, _ in enumerate(others_ns))]
+    joystick = SimpleNamespace(message=SimpleNamespace(cycle_time=cycle_ms))
+    tick = SimpleNamespace(follow="left")
+    deployment: Any = SimpleNamespace(
+        config=SimpleNamespace(tick=tick, tick_ms=20), joysticks=dict.fromkeys(names, joystick)
+    )
+    times = dict(zip(names, (40 * MS, *others_ns), strict=True))
+    inputs = {name: SimpleNamespace(received_ns=ns) for name, ns in times.items()}
+    controller: Any = SimpleNamespace(joysticks=inputs)
+    return TickFollower(deployment, controller)(deadline_ns)
+
+
+@pytest.mark.parametrize("ticks", [0, 1, 2, 3])
+def test_a_joystick_every_second_tick_is_followed_by_both(ticks: int) -> None:
+    at = 40 * MS + AFTER_NS + ticks * PERIOD_NS
+    assert step(40, deadline_ns=at + 50_000) == -50_000
+    assert step(40, deadline_ns=at - 50_000) == 50_000
+
+
+def test_the_nearest_of_two_frames_in_a_tick_is_followed() -> None:
+    assert step(10, deadline_ns=50 * MS + AFTER_NS + 50_000) == -50_000
+
+
+def test_frames_that_stand_together_are_waited_for() -> None:
+    """Half a millisecond before the next frame, and as far again: each is near the one before."""
+    half, far = CLUSTER_NS // 2, CLUSTER_NS * 6 // 5
+    for others, last in (
+        ([40 * MS + half - PERIOD_NS], half),
+        ([40 * MS + half, 40 * MS + far], far),
+        ([40 * MS + far], 0),
+    ):
+        at = 40 * MS + last + AFTER_NS
+        assert step(20, *others, deadline_ns=at + 50_000) == -50_000
