@@ -59,7 +59,8 @@ def test_ei_leaves_its_residual_at_the_nominal_period_and_less_next_to_it() -> N
     assert min(left) < 0.005
 
 
-@pytest.mark.parametrize("tick_s", [0.02, 0.03])  # 55 ticks to half a swing, and 36 2/3
+# 55 ticks to half a swing, 36 2/3, 1 2/9 (impulses share a tick), and 2/5
+@pytest.mark.parametrize("tick_s", [0.02, 0.03, 0.9, 2.75])
 @pytest.mark.parametrize("damping", [0.0, 0.1])
 def test_ei_has_three_impulses_that_lose_what_the_swing_loses(
     damping: float, tick_s: float
@@ -143,3 +144,17 @@ def test_taps_drawn_out_do_for_a_swing_that_is_so_much_slower(factor: float) -> 
     assert residual_left(drawn, slower, 0.02) == pytest.approx(left, abs=0.004)
     if factor == 1.0:
         assert drawn == pytest.approx(taps, abs=1e-15)
+
+
+def test_one_that_has_begun_just_now_is_continued_with_nothing_before() -> None:
+    taps = [0.4, 0.3, 0.2, 0.1]
+    old, new = Fir(taps), Fir(taps)
+    old.step(1.0)
+    new.copy_state(old)
+    assert [new.step(0.0) for _ in range(4)] == [old.step(0.0) for _ in range(4)]
+    assert new.taps[1:] == pytest.approx(taps[1:])
+
+
+def test_in_its_own_time_a_response_is_what_it_was() -> None:
+    for taps in ([1.0], [0.3, 0.7], [0.2, 0.3, 0.5]):
+        assert stretched(taps, 1.0) == pytest.approx(taps, abs=1e-15)

@@ -7,7 +7,7 @@ import pytest
 
 from canshaper.shaping.axis import Axis
 from canshaper.shaping.limits import OutputLimits
-from canshaper.shaping.registry import build_shaper
+from canshaper.shaping.registry import KINDS, build_shaper
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.shapers.gff import Gff
 from canshaper.shaping.shapers.kind import Shaper
@@ -39,6 +39,27 @@ def test_without_a_limit_it_is_the_shaper_itself(mode: SwayMode) -> None:
         out = aware.step(command)
         assert out == pytest.approx(bare.step(command), abs=1e-12)
         sway.step(out)
+
+
+@modes
+def test_a_swing_that_a_sensor_shows_is_damped_as_one_that_a_limit_made(mode: SwayMode) -> None:
+    made, shown = SwayModel(mode, TICK_S), SwayModel(mode, TICK_S)
+    one, other = (LimitAware(sway, Fir(zv_taps(mode, TICK_S))) for sway in (made, shown))
+    for sway, aware in ((made, one), (shown, other)):
+        sway.step(aware.step(0.5))
+    made.angle, made.rate = made.angle + 0.03, made.rate - 0.2
+    shown.free_angle, shown.free_rate = 0.03, -0.2
+    assert one.step(0.5) == pytest.approx(other.step(0.5), abs=1e-12)
+    assert abs(one.step(0.5) - Fir([1.0]).step(0.5)) > 0.01
+
+
+def test_it_is_stretched_with_all_its_taps_at_the_same_period() -> None:
+    kind = KINDS["robust"]
+    assert kind.stretched
+    assert kind.stretched({"tick_ms": 20, "taps": [0.2, 0.3, 0.5]}, 2.0) == {
+        "tick_ms": 20,
+        "taps": pytest.approx([0.1, 0.1, 0.15, 0.15, 0.25, 0.25]),
+    }
 
 
 # Half a second to full speed. A valve far slower than the swing leaves the feedback no room.
