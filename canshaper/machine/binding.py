@@ -59,6 +59,7 @@ def load_deployment(path: Path, inside: Path | None = None) -> Deployment:
     identity, _ = bind_status(lookup, ("identity",), config.identity, IDENTITY)
     if config.gateway:
         check_gateway(lookup, config.gateway, [axis.valve.message for axis in axes.values()])
+    lookup.check_groups()
     check_following(diagnostics, config, joysticks)
     check_profiles(diagnostics, config)
     check_control(diagnostics, config)

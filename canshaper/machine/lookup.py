@@ -9,6 +9,7 @@ from canshaper.codec.codecs import Sender
 from canshaper.codec.identifier import (
     NULL,
     WITHOUT_PRIORITY,
+    group_of,
     has_destination,
     service_of,
     with_source,
@@ -141,6 +142,23 @@ class Lookup:
             names = ", ".join(nodes) or "none"
             text = f"expected a node of bus {bus}, got {name!r}; there are {names}"
             self.diagnostics.add((*place, "node"), text)
+
+    def check_groups(self) -> None:
+        """In a group of J1939 that commands a valve others say nothing: it would be a command."""
+        commanded: dict[tuple[str, int], UsedMessage] = {}
+        read: list[tuple[tuple[str, int], UsedMessage]] = []
+        for (bus, _, _), used in self.used.items():
+            if not is_j1939(used.message) or has_destination(used.can_id):
+                continue
+            group = (bus, group_of(used.can_id))
+            if used.can_id & 0xFF != self.own_address(bus):
+                read.append((group, used))
+            elif used.place[-1] == "valve":
+                commanded[group] = used
+        for group, used in read:
+            if valve := commanded.get(group):
+                text = f"{used.message.name}: expected a group that commands no valve"
+                used.add("message", f"{text}, got that of {key_path(valve.place)}")
 
     def _check_length(self, used: UsedMessage, in_dbc: Message, config: Protected) -> None:
         """A message fits into one frame of its bus."""

@@ -229,6 +229,20 @@ def test_a_message_to_one_node_needs_its_sender(machine: Machine) -> None:
     assert (0x18EF9C33, True) in machine.load().routing.buses["crane"].received
 
 
+@pytest.mark.parametrize("source", ["", "source: 0x80, "])
+def test_what_commands_a_valve_is_no_input(machine: Machine, source: str) -> None:
+    """From another address it has to count as a second controller."""
+    given = "feedback: { bus: crane, message: AVEF0, signal: ExtendFlow,"
+    line = machine.in_yaml(
+        given, f"feedback: {{ bus: crane, message: AVC0, {source}signal: PortFlow,"
+    )
+    (problem, *_) = [p for p in machine.problems() if "commands no valve" in p]
+    assert problem == (
+        f"machine.yaml:{line}: axes.slew.feedback.message: AVC0: expected a group that commands no"
+        " valve, got that of axes.slew.valve"
+    )
+
+
 def test_an_emergency_stop_needs_its_sender(machine: Machine) -> None:
     stop = "emergency_stop: { bus: crane, message: BJM3, signal: Button1, timeout_ms: 200 }\n"
     machine.yaml += stop

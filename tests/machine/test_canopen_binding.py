@@ -86,7 +86,7 @@ def test_the_node_of_a_drive_is_one_of_its_bus(tmp_path: Path) -> None:
         ),
         (
             "SG_ StatusWord : 0|16@1+", "SG_ StatusWord : 0|3@1+",
-            "StatusWord: expected 4 bits or more, got 3",
+            " axes.slew.valve.cia408.status.signal: StatusWord: expected 4 bits or more, got 3",
         ),
         ("BO_ 1696 SlewStatus", "BO_ 1586 SlewStatus", "SlewStatus: expected the id of a PDO, "
          "got 0x632, which is one of SDO in CANopen"),
@@ -105,6 +105,17 @@ def test_problems_of_the_dbc(tmp_path: Path, old: str, new: str, says: str) -> N
     (tmp_path / "machine.dbc").write_text(dbc)
     file = write_variant(tmp_path, (str(ROOT / "dbc" / DBC_FILE), "machine.dbc"))
     assert any(says in one for one in problems(file)), problems(file)
+
+
+def test_a_word_of_as_many_bits_as_the_state_has_is_enough(tmp_path: Path) -> None:
+    dbc = (ROOT / "dbc" / DBC_FILE).read_text()
+    for name in ("ControlWord", "StatusWord"):
+        old = f"SG_ {name} : 0|16@1+ (1,0) [0|65535]"
+        assert old in dbc
+        dbc = dbc.replace(old, f"SG_ {name} : 0|4@1+ (1,0) [0|15]")
+    (tmp_path / "machine.dbc").write_text(dbc)
+    file = write_variant(tmp_path, (str(ROOT / "dbc" / DBC_FILE), "machine.dbc"))
+    assert load_deployment(file).axes["slew"].valve is not None
 
 
 def problems(file: Path) -> list[str]:

@@ -48,6 +48,30 @@ def test_other_profiles(tmp_path: Path, section: str, kind: type[E2e], counts: i
         assert (type(stop.protection.check), stop.protection.counts) == (kind, counts)
 
 
+@pytest.mark.parametrize(
+    ("section", "e2e", "place", "says"),
+    [
+        (
+            STOP,
+            "{ profile: p05, data_id: 0x1234 }",
+            "emergency_stop",
+            "its header takes the first 24 bits of Stop, where Pressed lies, which is signal",
+        ),
+        (
+            JOYSTICK,
+            "{ profile: p04, data_id: 0x1234 }",
+            "joysticks.hand",
+            "Joystick: expected 12 bytes or more, got 8",
+        ),
+    ],
+)
+def test_the_header_fits_into_the_message_to_the_byte(
+    tmp_path: Path, section: str, e2e: str, place: str, says: str
+) -> None:
+    line = line_of(f"e2e: {section}")
+    assert problems(tmp_path, (section, e2e)) == [f"machine.yaml:{line}: {place}.e2e: {says}"]
+
+
 def test_what_the_header_does_not_take_may_be_used(tmp_path: Path) -> None:
     """The upper half of byte 1 is State in the status, and Low in the valve message."""
     assert not problems(tmp_path)

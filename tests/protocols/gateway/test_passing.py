@@ -40,6 +40,12 @@ def test_what_is_excluded_does_not_pass(excluded: list[Pattern]) -> None:
         assert not any(pattern.fits(hole.value) for pattern in all_but(excluded))
 
 
+def test_one_id_is_a_pattern_of_its_own_width() -> None:
+    assert exactly(0x123, False) == Pattern(0x123, 0x800007FF)
+    assert exactly(0x123, True) == Pattern(0x80000123, 0x9FFFFFFF)
+    assert exactly(0x18FF0300, True) == Pattern(0x98FF0300, 0x9FFFFFFF)
+
+
 def test_without_an_exclusion_everything_passes() -> None:
     assert all_but([]) == sorted(EVERYTHING)
 

@@ -7,6 +7,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from canshaper.codec.frame import Frame
 from canshaper.protocols.j1939.dm1 import FMI_OF, ActiveFaults, Fault, dm1_data
 from canshaper.shaping.states import Reason
 from tests.rigs.j1939 import BROADCAST, DM1, OWN, PACKET, Rig, bjm, ids, request
@@ -114,6 +115,44 @@ def test_a_broadcast_that_was_interrupted_is_not_gone_on_with(bus: Bus) -> None:
     assert ids(list(bus.faults.frames(active, 0))) == [BROADCAST]
     bus.faults.interrupt()
     assert ids(list(bus.faults.frames(active, 400 * MS))) == [BROADCAST]
+
+
+def test_a_single_fault_is_one_extended_frame() -> None:
+    faults = ActiveFaults("crane", OWN)
+    data = bytes.fromhex("04FF00F0E901FFFF")
+    assert list(faults.frames([(FIRST, 9)], 0)) == [Frame("crane", DM1, True, data)]
+
+
+def test_a_broadcast_is_extended_frames_50_ms_apart() -> None:
+    faults, active = ActiveFaults("crane", OWN), [(FIRST, 9), (FIRST + 1, 7)]
+    head, first, second = (
+        Frame("crane", can_id, True, bytes.fromhex(data))
+        for can_id, data in (
+            (BROADCAST, "200A0002FFCAFE00"),
+            (PACKET, "0104FF00F0E90101"),
+            (PACKET, "02F0E701FFFFFFFF"),
+        )
+    )
+    assert list(faults.frames(active, 0)) == [head]
+    assert list(faults.frames(active, 50 * MS - 1)) == []
+    assert list(faults.frames(active, 50 * MS)) == [first]
+    assert list(faults.frames(active, 100 * MS - 1)) == []
+    assert list(faults.frames(active, 100 * MS)) == [second]
+    assert list(faults.frames(active, 150 * MS)) == []
+
+
+def test_a_change_is_sent_at_200_ms_after_the_last_report() -> None:
+    faults = ActiveFaults("crane", OWN)
+    assert ids(list(faults.frames([], 0))) == [DM1]
+    assert list(faults.frames([(FIRST, 9)], 200 * MS - 1)) == []
+    assert ids(list(faults.frames([(FIRST, 9)], 200 * MS))) == [DM1]
+
+
+def test_after_an_interruption_at_time_zero_faults_are_reported_again_at_once() -> None:
+    faults = ActiveFaults("crane", OWN)
+    assert ids(list(faults.frames([], 0))) == [DM1]
+    faults.interrupt()
+    assert ids(list(faults.frames([], 0))) == [DM1]
 
 
 def test_a_request_is_answered_at_once(bus: Bus) -> None:
