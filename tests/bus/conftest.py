@@ -7,8 +7,7 @@ from typing import Any
 
 import pytest
 
-from canshaper.bus import raw, socketcan
-from canshaper.bus.device import read_device, whereabouts
+from canshaper.bus import device, port, raw, socketcan
 from tests.bus.clocks import Clocks
 from tests.bus.fake_devices import HUB, PCI, USB, FakeDevices
 from tests.bus.fake_sockets import Made
@@ -68,7 +67,16 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeDevices:
     devices.serial("platform/soc/3f980000.usb/usb1/1-1/1-1.2", "0B99")
     devices.add("can3", PCI, driver="kvaser_pci", bitrate=500_000)
     devices.add("vcan0", None, driver="vcan", bitrate=None)
-    defaults = (devices.root, devices.query)
-    for function in (read_device, whereabouts):
-        monkeypatch.setattr(function, "__defaults__", defaults)
+    read, search = device.read_device, device.whereabouts
+
+    def read_here(
+        name: str, root: Path = devices.root, query: device.LinkQuery = devices.query
+    ) -> device.Device:
+        return read(name, root, query)
+
+    monkeypatch.setattr(device, "read_device", read_here)
+    for module in (device, port):
+        monkeypatch.setattr(
+            module, "whereabouts", lambda bus: search(bus, devices.root, devices.query)
+        )
     return devices

@@ -4,13 +4,8 @@ import errno
 
 import pytest
 
-from canshaper.bus.device import (
-    Device,
-    device_fault,
-    match_fault,
-    read_device,
-    whereabouts,
-)
+from canshaper.bus import device as module
+from canshaper.bus.device import Device, device_fault, match_fault
 from canshaper.config.bus import Bus, Match
 from tests.bus.fake_devices import PCI, SPI, FakeDevices, bus
 
@@ -31,30 +26,30 @@ USB_PATH = "pci-0000:00:14.0-usb-0:3:1.0"
     ],
 )
 def test_what_is_behind_an_interface(here: FakeDevices, name: str, device: Device) -> None:
-    assert read_device(name) == device
+    assert module.read_device(name) == device
 
 
 def test_a_controller_on_spi_has_a_path(here: FakeDevices) -> None:
     """As of udev: the chip select behind the host."""
     here.add("can4", SPI, driver="mcp251x")
-    assert read_device("can4").path == "platform-3f204000.spi-cs-0"
+    assert module.read_device("can4").path == "platform-3f204000.spi-cs-0"
 
 
 def test_an_older_driver_counts_its_channels_in_dev_id(here: FakeDevices) -> None:
     here.add("can4", f"{PCI}.1", dev_id="0x2")
-    assert read_device("can4").port == 2
+    assert module.read_device("can4").port == 2
 
 
 def test_a_usb_adapter_without_a_serial_number_has_not_that_of_its_hub(here: FakeDevices) -> None:
     here.add("can4", "pci0000:00/0000:00:14.0/usb1/1-4/1-4:1.0")
     here.serial("pci0000:00/0000:00:14.0/usb1/1-4", None)
-    assert read_device("can4").serial is None
+    assert module.read_device("can4").serial is None
 
 
 @pytest.mark.parametrize("name", ["can9", "", "..", "can0/device"])
 def test_no_such_interface(here: FakeDevices, name: str) -> None:
     with pytest.raises(OSError, match="No such device") as caught:
-        read_device(name)
+        module.read_device(name)
     assert caught.value.errno == errno.ENODEV
 
 
@@ -67,7 +62,7 @@ def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
         return here.query(index)
 
     with pytest.raises(OSError, match="No such device"):
-        read_device("can0", here.root, query)
+        module.read_device("can0", here.root, query)
 
 
 @pytest.mark.parametrize(
@@ -110,10 +105,10 @@ def test_a_device_against_the_deployment(
     here: FakeDevices, configured: Bus, fault: str | None
 ) -> None:
     assert match_fault(configured) == fault
-    assert bool(device_fault(configured, read_device(configured.channel))) is bool(fault)
+    assert bool(device_fault(configured, module.read_device(configured.channel))) is bool(fault)
 
 
 def test_what_is_no_interface_does_not_matter(here: FakeDevices) -> None:
     """Bonding puts a file among the interfaces."""
     (here.root / "sys/class/net/bonding_masters").write_text("\n")
-    assert whereabouts(bus("can9", serial="0B99")) == "; the device of the file is can2"
+    assert module.whereabouts(bus("can9", serial="0B99")) == "; the device of the file is can2"

@@ -9,7 +9,6 @@ import pytest
 from canshaper.bus import device as module
 from canshaper.bus.device import (
     check_device,
-    read_device,
 )
 from canshaper.bus.port import open_port
 from canshaper.bus.socketcan import open_sockets
@@ -81,7 +80,8 @@ def test_a_kernel_that_does_not_answer_is_no_right_device(
     def refuse(_index: int) -> Any:
         raise OSError(errno.EAFNOSUPPORT, "Address family not supported by protocol")
 
-    monkeypatch.setattr(read_device, "__defaults__", (here.root, refuse))
+    read = module.read_device
+    monkeypatch.setattr(module, "read_device", lambda name: read(name, here.root, refuse))
     with pytest.raises(WrongDeviceError, match="can0 cannot be looked at: Address family not"):
         check(bus("can0", serial="0A17"), Bound("can0"))
 

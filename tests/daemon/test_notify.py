@@ -157,6 +157,8 @@ def test_a_manager_that_is_gone_and_comes_back(tmp_path: Path) -> None:
     with manager_at(str(path)) as second:
         service.status("two")
         assert second.received() == ["STATUS=two"]
+        service.ping(0)  # what it has missed is not said again
+        assert second.received() == []
 
 
 @pytest.mark.parametrize("reload", [False, True])
@@ -246,6 +248,15 @@ def test_a_reload_has_more_time_than_a_tick(manager: Manager) -> None:
     ]
     assert limits[0] >= 10_000_000
     assert limits[1:] == [1_000_000]
+
+
+def test_pings_are_a_quarter_of_the_limit_apart_to_the_nanosecond(manager: Manager) -> None:
+    service = ServiceManager({"NOTIFY_SOCKET": manager.address, "WATCHDOG_USEC": "1000000"})
+    came = []
+    for now_ns in (0, 249_999_999, 250_000_000, 499_999_999, 500_000_000):
+        service.ping(now_ns)
+        came += [now_ns] * len(manager.received())
+    assert came == [0, 250_000_000, 500_000_000]
 
 
 def test_a_ping_is_that_and_nothing_else(manager: Manager) -> None:
