@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 from canshaper.bus import device, port, raw, socketcan
+from canshaper.config.bus import Bus
 from tests.bus.clocks import Clocks
 from tests.bus.fake_devices import HUB, PCI, USB, FakeDevices
 from tests.bus.fake_sockets import Made
@@ -74,9 +75,12 @@ def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> FakeDevices:
     ) -> device.Device:
         return read(name, root, query)
 
+    def search_here(
+        bus: Bus, root: Path = devices.root, query: device.LinkQuery = devices.query
+    ) -> str:
+        return search(bus, root, query)
+
     monkeypatch.setattr(device, "read_device", read_here)
     for module in (device, port):
-        monkeypatch.setattr(
-            module, "whereabouts", lambda bus: search(bus, devices.root, devices.query)
-        )
+        monkeypatch.setattr(module, "whereabouts", search_here)
     return devices

@@ -40,6 +40,18 @@ def test_an_older_driver_counts_its_channels_in_dev_id(here: FakeDevices) -> Non
     assert module.read_device("can4").port == 2
 
 
+def test_an_adapter_with_can_fd_has_two_rates(here: FakeDevices) -> None:
+    here.add("can4", f"{PCI}.1", bitrate=500_000, data_bitrate=2_000_000)
+    device = module.read_device("can4")
+    assert (device.bitrate, device.data_bitrate) == (500_000, 2_000_000)
+
+
+def test_a_serial_number_that_is_no_text_is_shown_all_the_same(here: FakeDevices) -> None:
+    usb = here.root / "sys/devices/pci0000:00/0000:00:14.0/usb1/1-3"
+    (usb / "serial").write_bytes(b"0A\xff17\n")
+    assert module.read_device("can0").serial == "0A\ufffd17"
+
+
 def test_a_usb_adapter_without_a_serial_number_has_not_that_of_its_hub(here: FakeDevices) -> None:
     here.add("can4", "pci0000:00/0000:00:14.0/usb1/1-4/1-4:1.0")
     here.serial("pci0000:00/0000:00:14.0/usb1/1-4", None)
@@ -61,8 +73,9 @@ def test_a_name_that_changes_hands_while_it_is_read(here: FakeDevices) -> None:
         file.write_text("77\n")
         return here.query(index)
 
-    with pytest.raises(OSError, match="No such device"):
+    with pytest.raises(OSError, match="No such device") as caught:
         module.read_device("can0", here.root, query)
+    assert caught.value.errno == errno.ENODEV
 
 
 @pytest.mark.parametrize(
@@ -111,4 +124,11 @@ def test_a_device_against_the_deployment(
 def test_what_is_no_interface_does_not_matter(here: FakeDevices) -> None:
     """Bonding puts a file among the interfaces."""
     (here.root / "sys/class/net/bonding_masters").write_text("\n")
-    assert module.whereabouts(bus("can9", serial="0B99")) == "; the device of the file is can2"
+    other = bus("can9", serial="0B99", bitrate=1_000_000)  # it is that device at any bit rate
+    assert module.whereabouts(other) == "; the device of the file is can2"
+
+    def refuse(_index: int) -> tuple[str | None, int | None, int | None]:
+        raise OSError(errno.EPERM, "netlink is not permitted")
+
+    text = "; the device of the file is not here"
+    assert module.whereabouts(other, here.root, refuse) == text

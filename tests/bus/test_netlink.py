@@ -44,6 +44,7 @@ def timing(bitrate: int, kind: int = 1) -> bytes:
         (link_message(b"can", field(5, bytes(4))), ("can", None, None)),  # none set
         (link_message(b"can", None), ("can", None, None)),
         (link_message(b"vcan", None), ("vcan", None, None)),
+        (link_message(b"vcanX", None), ("vcanX", None, None)),
         (link_message(b"vlan", field(1, b"\x01\0\0\0")), ("vlan", None, None)),
         (link_message(None, None), (None, None, None)),
     ],

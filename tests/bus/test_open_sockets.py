@@ -1,5 +1,6 @@
 """The sockets of an interface as they are opened: without CAN."""
 
+import errno
 import socket
 from dataclasses import replace
 from pathlib import Path
@@ -77,6 +78,9 @@ def test_an_interface_that_is_not_set_up_for_can_fd_is_reported(
         " has the MTU 72, got 16"
     )
     assert all(one.closed for one in made)
+    with pytest.raises(OSError, match="got 16") as refused:
+        check_mtu(fd, tmp_path)
+    assert refused.value.errno == errno.EINVAL
     open_sockets(BUS, IDS)  # classical frames it has
     (there / "mtu").write_text("72\n")
     open_sockets(fd, IDS)

@@ -24,6 +24,15 @@ SETS = """
     profiles:
       fast: { filter: { kind: gff, a1: 0.5, a2: 0.06 } }
       calm: { filter: { kind: gff, a1: 1.2, a2: 0.3 } }"""
+FAST = "fast: { filter: { kind: gff, a1: 0.5, a2: 0.06 } }"
+# The profile with two loads of its own.
+FAST_SETS = FAST[:-2] + (
+    ", gain_schedule: ["
+    "{ breakpoint: 0, sway: { period_s: 2.3, damping_ratio: 0.04, full_speed_m_s: 1.5 },"
+    " filter: { kind: gff, a1: 0.5, a2: 0.06 } },"
+    " { breakpoint: 1000, sway: { period_s: 2.9, damping_ratio: 0.05, full_speed_m_s: 1.5 },"
+    " filter: { kind: gff, a1: 0.6, a2: 0.08 } }] }"
+)
 SLEW = "full_speed_m_s: 1.5 }\n    filter: { kind: gff, a1: 0.708, a2: 0.12 }"
 YAML = {
     SLEW: SLEW + SETS,

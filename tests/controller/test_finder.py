@@ -67,6 +67,29 @@ def test_without_j1939_the_whole_identifier_counts() -> None:
     assert one.find(Frame("boom", can_id, extended, b""), 0) is None
 
 
+def test_another_source_counts_once_the_silence_is_longer_than_the_timeout(
+    any_source: Deployment,
+) -> None:
+    left = any_source.joysticks["left"]
+    assert left.config.timeout_ms == 100
+    for silence_ns, found in [(100_000_000, None), (100_000_001, left)]:
+        one = finder(any_source)
+        assert one.find(bjm("BJM1", JOYSTICK), 0) is left
+        assert one.find(bjm("BJM1", OTHER), silence_ns) is found
+
+
+def test_inputs_behind_one_that_is_known_by_its_identifier_are_found(
+    any_source: Deployment,
+) -> None:
+    """By group, and by identifier."""
+    plain, left = load_deployment(PLAIN), any_source.joysticks["left"]
+    inputs: list[BoundInput] = [plain.joysticks["left"], left, plain.joysticks["right"]]
+    one = InputFinder(any_source.config.buses, inputs)
+    for bound in (plain.joysticks["left"], plain.joysticks["right"]):
+        assert one.find(Frame(*bound.key, b""), 0) is bound
+    assert one.find(bjm("BJM1", JOYSTICK), 0) is left
+
+
 def test_commands_of_a_log_are_those_of_the_joysticks(any_source: Deployment) -> None:
     commands = Commands(any_source)
     for n in range(100):

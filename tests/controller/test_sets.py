@@ -7,7 +7,7 @@ import pytest
 from canshaper.codec.frame import Frame
 from canshaper.errors import ConfigError
 from canshaper.shaping.shapers.gff import Gff
-from tests.controller.set_files import DBC, SETS, SLEW, YAML
+from tests.controller.set_files import DBC, FAST, FAST_SETS, SETS, SLEW, YAML
 from tests.rigs.forwarder import Rig
 
 Make = Callable[..., Rig]
@@ -117,6 +117,18 @@ def test_the_operator_chooses(chosen: Rig) -> None:
     chosen.receive(feel(7))  # no choice of ours
     chosen.run(10)
     assert poles(chosen) == base
+
+
+@pytest.mark.parametrize(("kg", "number"), [(0, 4), (600, 5), (1000, 5)])
+def test_the_weight_chooses_among_the_sets_of_a_profile(
+    changed_rig: Make, kg: int, number: int
+) -> None:
+    """Their numbers follow those of the axis and of the profile itself."""
+    rig = changed_rig(yaml={**YAML, SLEW: SLEW + SETS.replace(FAST, FAST_SETS)}, dbc=DBC)
+    rig.run(3)
+    rig.receive(load(kg), feel(1))
+    rig.run(10)
+    assert rig.controller.axes["slew"].chooser.number == number  # type: ignore[union-attr]
 
 
 def test_the_status_reports_it_where_there_is_a_signal(chosen: Rig) -> None:
