@@ -124,7 +124,8 @@ def test_a_device_against_the_deployment(
 def test_what_is_no_interface_does_not_matter(here: FakeDevices) -> None:
     """Bonding puts a file among the interfaces."""
     (here.root / "sys/class/net/bonding_masters").write_text("\n")
-    other = bus("can9", serial="0B99", bitrate=1_000_000)  # it is that device at any bit rate
+    match = Match(serial="0B99", bitrate=1_000_000)  # it is that device at any bit rate
+    other = bus("can9").model_copy(update={"match": match})
     assert module.whereabouts(other) == "; the device of the file is can2"
 
     def refuse(_index: int) -> tuple[str | None, int | None, int | None]:
