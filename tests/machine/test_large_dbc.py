@@ -38,7 +38,6 @@ def test_only_its_messages_are_parsed(machine: Machine, text: str) -> None:
     assert (0x0CF00000 + COUNT - 1, True) in messages.ids()
 
 
-@pytest.mark.long
 def test_a_fault_is_at_its_line(machine: Machine, text: str) -> None:
     machine.dbc = text
     line = machine.in_dbc("BO_ 272 JoystickLeft: 8", "BO_ 272 JoystickLeft: 1")
