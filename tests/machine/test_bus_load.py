@@ -38,6 +38,7 @@ def test_stuff_bits_are_as_many_as_a_worst_frame_has(
     [
         (False, 8, 17 + 4 + 13, 69 + 17 + 27),
         (False, 16, 17 + 4 + 13, 133 + 33 + 27),
+        (False, 17, 17 + 4 + 13, 141 + 35 + 32),
         (False, 20, 17 + 4 + 13, 165 + 41 + 32),
         (True, 64, 36 + 8 + 13, 517 + 130 + 32),
     ],

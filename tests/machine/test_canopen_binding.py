@@ -20,7 +20,8 @@ LAST_NODE = "lift: { id: 0x22, heartbeat_ms: 500 }"
         ),
         (
             LAST_NODE, LAST_NODE.replace("0x22", "0x7E"),
-            "expected a node id of its own, got 126, that of node",
+            "buses.crane.canopen.nodes.lift.id: expected a node id of its own, got 126, that of"
+            " node",
         ),
         (
             "node: lift\n", "node: lifft\n",

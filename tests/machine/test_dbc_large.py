@@ -39,7 +39,7 @@ def test_only_what_is_used_is_limited(machine: Machine, monkeypatch: pytest.Monk
 def test_more_than_any_machine_has(
     machine: Machine, monkeypatch: pytest.MonkeyPatch, most: str
 ) -> None:
-    machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]")
+    line = machine.in_yaml("[machine.dbc]", "[machine.dbc, other.dbc]")
     rows = "".join(OTHER.replace("5 O", f"{i} O{i}") for i in range(50))
     (machine.directory / "other.dbc").write_text(f'VERSION "1"\n{rows}', encoding="cp1252")
     files = machine.load().messages.files
@@ -51,8 +51,13 @@ def test_more_than_any_machine_has(
     assert counts[1] == {"MOST_MESSAGES": 50, "MOST_STATEMENTS": 50, "MOST_PARSED": 11}[most]
     monkeypatch.setattr(database, most, sum(counts) - 1)
     (problem,) = machine.problems()
-    assert f"dbc: expected {sum(counts) - 1} " in problem
-    assert problem.endswith(f" in all at most, got {sum(counts)}")
+    what = {
+        "MOST_MESSAGES": "messages",
+        "MOST_STATEMENTS": "statements of messages",
+        "MOST_PARSED": "bytes in what is used of them",
+    }[most]
+    says = f"expected {sum(counts) - 1} {what} in all at most, got {sum(counts)}"
+    assert problem == f"machine.yaml:{line}: dbc: {says}"
     monkeypatch.setattr(database, most, sum(counts))
     machine.load()
 

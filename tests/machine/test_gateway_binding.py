@@ -117,8 +117,12 @@ def test_a_fallback_needs_a_joystick_that_is_passed_on(tmp_path: Path) -> None:
     )  # fmt: skip
     file = tmp_path / "machine.yaml"
     file.write_text(text)
-    with pytest.raises(ConfigError, match="no valve has the message of a joystick"):
+    with pytest.raises(ConfigError) as caught:
         load_deployment(file)
+    assert [str(problem).partition(": ")[2] for problem in caught.value.problems] == [
+        "gateway.fallback: expected stop where no valve has the message of a joystick on the other"
+        " bus, got neutral"
+    ]
 
 
 @pytest.mark.parametrize(

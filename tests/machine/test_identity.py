@@ -3,7 +3,7 @@
 import os
 import shutil
 from hashlib import sha256
-from importlib.metadata import EntryPoint
+from importlib.metadata import EntryPoint, distribution
 from pathlib import Path
 
 import pytest
@@ -127,6 +127,15 @@ def test_a_filter_of_another_package_is_named_with_its_module(
     (line,) = module.filter_lines(["off", "mine"])
     digest = sha256(Path(str(off.__file__)).read_bytes()).hexdigest()
     assert line == f"filter=sha256:{digest} kind=mine package={point.value}"
+
+
+def test_a_filter_is_named_with_package_and_version(monkeypatch: pytest.MonkeyPatch) -> None:
+    owner = distribution("pytest")
+    point = EntryPoint("mine", "canshaper.shaping.shapers.off:Off", "canshaper.shapers")
+    vars(point)["dist"] = owner
+    monkeypatch.setitem(ADDED, "mine", point)
+    (line,) = module.filter_lines(["mine"])
+    assert line.endswith(f" kind=mine package=pytest {owner.version}")
 
 
 @pytest.mark.parametrize(("gone", "matters"), [("__pycache__", False), ("room", True)])

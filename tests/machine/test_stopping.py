@@ -3,7 +3,15 @@
 import pytest
 
 from canshaper.config.schema import AxisConfig
-from canshaper.machine.stopping import FullSpeed, allowed_m, full_speed, unstated
+from canshaper.machine.stopping import (
+    FullSpeed,
+    allowed_m,
+    full_speed,
+    stated_fault,
+    stop_fault,
+    unstated,
+    unstated_fault,
+)
 from tests.rigs.files import Machine
 
 SLEWING = "    slewing: { full_speed_rad_s: 0.5, largest_radius_m: 9.6 }\n"
@@ -12,6 +20,12 @@ STATED = ", stop_distance_m: 200"  # as the machine of these tests has it, slew 
 
 def slew(machine: Machine) -> AxisConfig:
     return machine.load().axes["slew"].config
+
+
+def stopping(axis: AxisConfig, stated: float | None) -> AxisConfig:
+    """The axis with another stated distance, or none."""
+    limits = axis.limits.model_copy(update={"stop_distance_m": stated})
+    return axis.model_copy(update={"limits": limits})
 
 
 def test_an_axis_that_slews_has_its_speed_at_the_largest_radius(machine: Machine) -> None:
@@ -29,6 +43,22 @@ def test_else_the_speed_is_that_of_the_sway(machine: Machine) -> None:
 def test_allowed_is_the_speed_times_what_the_limits_allow(machine: Machine) -> None:
     # 20 ms until it is seen, tail_s of 2 s and half a tick of rounding, 0.1 s to fall
     assert allowed_m(slew(machine), timeout_ms=100, period_s=0.02) == pytest.approx(4.8 * 2.13)
+
+
+def test_the_timeout_of_the_joystick_lengthens_what_is_allowed(machine: Machine) -> None:
+    # 0.2 s until it counts as lost, 20 ms until it is seen, tail_s of 2 s and half a tick
+    assert allowed_m(slew(machine), timeout_ms=200, period_s=0.02) == pytest.approx(4.8 * 2.23)
+
+
+def test_a_distance_that_the_limits_just_reach_is_good(
+    machine: Machine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    axis = slew(machine)
+    allowed = allowed_m(axis, timeout_ms=100, period_s=0.02)
+    assert allowed is not None
+    assert stated_fault(stopping(axis, allowed), timeout_ms=100, period_s=0.02) is None
+    monkeypatch.setattr("canshaper.machine.stopping.MOST_UNSTATED_M", allowed)
+    assert unstated_fault(stopping(axis, None), timeout_ms=100, period_s=0.02) is None
 
 
 @pytest.mark.parametrize(
@@ -92,3 +122,29 @@ def test_a_short_way_need_not_be_stated(machine: Machine) -> None:
     assert [place[1] for place, _ in unstated(machine.load())] == ["near_far"]  # 2.13 m
     machine.in_yaml("full_speed_m_s: 1.0", "full_speed_m_s: 0.93")
     assert list(unstated(machine.load())) == []
+
+
+def test_a_distance_in_whole_centimetres_is_not_rounded_up(machine: Machine) -> None:
+    machine.in_yaml(STATED, "")
+    machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 10")
+    (fault,) = (fault for _, fault in unstated(machine.load()))
+    assert fault == (
+        "missing: to stop, the limits allow 10.65 m, which is more than 2 m; where that is meant,"
+        " state stop_distance_m: 10.65"
+    )
+
+
+def test_an_axis_may_not_move_over_a_stated_or_an_unstated_way(machine: Machine) -> None:
+    """The way is 10.23005 m: a hair beyond a whole centimetre."""
+    machine.in_yaml("largest_radius_m: 9.6", "largest_radius_m: 9.60568")
+    deployment = machine.load()
+    axis = deployment.axes["slew"].config
+    assert stop_fault(deployment, "slew", stopping(axis, 10.24)) is None
+    assert stop_fault(deployment, "slew", stopping(axis, 10.23)) == (
+        "expected 10.24 m or more, by max_pct, tail_s, stop_s, fall_per_s and the speed of the tip,"
+        " got 10.23 m"
+    )
+    assert stop_fault(deployment, "slew", stopping(axis, None)) == (
+        "missing: to stop, the limits allow 10.24 m, which is more than 2 m; where that is meant,"
+        " state stop_distance_m: 10.24"
+    )

@@ -1,16 +1,20 @@
 """Sway sensors of a deployment against its axes and the DBC."""
 
 import math
+from pathlib import Path
 
 import pytest
 
-from canshaper.shaping.sway_sensor import Measured
-from tests.rigs.files import Machine
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from canshaper.shaping.sway_sensor import Measured, SensorLimits, SensorTiming
+from tests.rigs.files import ROOT, Machine
 
 ALONG = "bus: crane, message: GrappleSway, signal: SwayParallel, kind: angle, timeout_ms: 80"
 ACROSS = ALONG.replace("SwayParallel", "SwayPerpendicular")
 UNIT = 'SwayParallel : 16|16@1- (0.01,0) [-180|180] "deg"'
 INCLINED = ALONG.replace("kind: angle", "kind: inclination")
+OTHER = "TipPosition, signal: SlewAngle"
 SLEW, NEAR_FAR = "    sway: { period_s: 2.356", "    sway: { length_m: 1.2"
 
 
@@ -31,10 +35,11 @@ def test_a_sensor_binds_to_its_message(machine: Machine) -> None:
     assert bound.message.key == ("crane", 0x400, False)
     assert (bound.signal.name, bound.cycle_s) == ("SwayParallel", 0.02)
     assert bound.factor == pytest.approx(-math.radians(1.0))
-    timing = bound.timing(0.04)
-    assert timing.measured is Measured.ANGLE
-    assert (timing.period_s, timing.delay_s, timing.lag_s, timing.lost_s) == (0.04, 0.04, 0.1, 0.08)
-    assert (bound.config.noise, bound.config.offset_max_deg) == (0.1, 3.0)
+    assert bound.timing(0.04) == SensorTiming(Measured.ANGLE, 0.04, 0.04, 0.1, 0.08)
+    assert bound.timing(0.01).period_s == 0.02
+    assert bound.limits == SensorLimits(math.radians(0.1), math.radians(3.0), 0.6, None)
+    assert bound.message.signals == (bound.signal,)
+    assert bound.message.merits == {}
 
 
 MERIT = """ SG_ Merit : 62|2@1+ (1,0) [0|3] "" SHAPER
@@ -58,8 +63,15 @@ def test_axes_may_share_a_figure_of_merit(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("merit", "fault"),
     [
-        ("Merits", "expected a signal of GrappleSway, got 'Merits'"),
-        ("SwayParallel", "expected a free signal, got 'SwayParallel', which is"),
+        (
+            "Merits",
+            "expected a signal of GrappleSway, got 'Merits'; there are SwayPerpendicular,"
+            " SwayParallel, Float",
+        ),
+        (
+            "SwayParallel",
+            "expected a free signal, got 'SwayParallel', which is the sway of near_far already",
+        ),
         ("Float", "expected a signal of whole numbers, got 'Float'"),
     ],
 )
@@ -68,7 +80,7 @@ def test_a_figure_of_merit_that_is_none(machine: Machine, merit: str, fault: str
     machine.dbc += "SIG_VALTYPE_ 1024 Float : 1;\n"
     line = sensing(machine, f"{ALONG}, merit: {merit}")
     (problem,) = machine.problems()
-    assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway_sensor.merit: {fault}")
+    assert problem == f"machine.yaml:{line}: axes.near_far.sway_sensor.merit: {fault}"
 
 
 def test_axes_may_read_the_same_message(machine: Machine) -> None:
@@ -83,10 +95,14 @@ def test_axes_may_read_the_same_message(machine: Machine) -> None:
 @pytest.mark.parametrize(
     ("unit", "kind", "factor"),
     [
+        ("°", "angle", math.radians(1.0)),
+        (" deg ", "angle", math.radians(1.0)),
         ("rad", "angle", 1.0),
         ("mrad", "angle", 1e-3),
         ("deg/s", "rate", math.radians(1.0)),
+        ("°/s", "rate", math.radians(1.0)),
         ("rad/s", "rate", 1.0),
+        ("mrad/s", "rate", 1e-3),
     ],
 )
 def test_the_unit_is_that_of_the_dbc(machine: Machine, unit: str, kind: str, factor: float) -> None:
@@ -115,21 +131,44 @@ def test_a_second_swing(machine: Machine) -> None:
 
 
 SAYS = [
-    (changed("bus: crane", "bus: rear"), ".bus: expected a bus, got 'rear'"),
-    (changed("GrappleSway", "GrappleSwing"), ".message: "),
-    (changed("SwayParallel", "Sway"), ".signal: "),
-    (changed("kind: angle", "kind: force"), ".kind: "),
+    (changed("bus: crane", "bus: rear"), ".bus: expected a bus, got 'rear'; there are crane"),
+    (
+        changed("SwayParallel", "Sway"),
+        ".signal: expected a signal of GrappleSway, got 'Sway'; there are SwayPerpendicular,"
+        " SwayParallel",
+    ),
     (f"{ALONG}, delay_ms: 501", ".delay_ms: expected 0 to 500 ms, got 501"),
     (f"{ALONG}, noise_deg: 9", ".noise_deg: expected 0.01 to 5 deg, deg/s, got 9"),
     (f"{ALONG}, offset_max_deg: 21", ".offset_max_deg: expected 0.1 to 20 deg, deg/s, got 21"),
     (f"{ALONG}, node: tool", ".node: expected a node of bus crane, got 'tool'; there are none"),
-    (f"{ALONG}, fusion_s: 5", ".fusion_s: expected it with the kind inclination only, got it with"),
+    (
+        f"{ALONG}, fusion_s: 5",
+        ".fusion_s: expected it with the kind inclination only, got it with angle",
+    ),
+    (
+        f"{ALONG}, fusion_s: 0",
+        ".fusion_s: expected it with the kind inclination only, got it with angle",
+    ),
     (f"{INCLINED}", ".fusion_s: expected 3.3 s or more, 1.5 swings, got none"),
     (f"{INCLINED}, fusion_s: 2", ".fusion_s: expected 3.3 s or more, 1.5 swings, got 2 s"),
-    (f"{INCLINED}, fusion_s: 0", ".fusion_s: expected 3.3 s or more, 1.5 swings, got 0: without"),
-    (changed("timeout_ms: 80", "timeout_ms: 30"), ".timeout_ms: "),
+    (
+        f"{INCLINED}, fusion_s: 0",
+        ".fusion_s: expected 3.3 s or more, 1.5 swings, got 0: without a gyro an inclinometer shows"
+        " nothing on a free pendulum",
+    ),
+    (
+        changed("timeout_ms: 80", "timeout_ms: 30"),
+        ".timeout_ms: expected 40 ms or more, twice the cycle of GrappleSway, got 30",
+    ),
     (f"{ALONG}, second_period_s: 3.1", ".second_period_s: expected 0.15 to 3 s, got 3.1"),
-    (f"{ALONG}, second_period_s: 1.2", ".second_period_s: expected up to 1.10 s, half of the"),
+    (
+        f"{ALONG}, second_period_s: 1.2",
+        ".second_period_s: expected up to 1.10 s, half of the first swing, got 1.2 s",
+    ),
+]
+STARTS = [
+    (changed("GrappleSway", "GrappleSwing"), ".message: "),
+    (changed("kind: angle", "kind: force"), ".kind: "),
 ]
 
 
@@ -137,7 +176,14 @@ SAYS = [
 def test_what_is_wrong_is_reported_at_its_line(machine: Machine, text: str, says: str) -> None:
     line = sensing(machine, text)
     (problem,) = machine.problems()
-    assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway_sensor{says}")
+    assert problem == f"machine.yaml:{line}: axes.near_far.sway_sensor{says}"
+
+
+@pytest.mark.parametrize(("text", "starts"), STARTS)
+def test_what_another_module_refuses_has_its_line(machine: Machine, text: str, starts: str) -> None:
+    line = sensing(machine, text)
+    (problem,) = machine.problems()
+    assert problem.startswith(f"machine.yaml:{line}: axes.near_far.sway_sensor{starts}")
 
 
 def test_a_unit_that_is_no_angle(machine: Machine) -> None:
@@ -149,59 +195,57 @@ def test_a_unit_that_is_no_angle(machine: Machine) -> None:
 
 
 def test_a_rate_is_no_angle(machine: Machine) -> None:
-    sensing(machine, changed("kind: angle", "kind: rate"))
+    line = sensing(machine, changed("kind: angle", "kind: rate"))
     (problem,) = machine.problems()
-    assert ".signal: expected one in deg/s, °/s, rad/s, mrad/s for the kind rate, got" in problem
+    expected = "expected one in deg/s, °/s, rad/s, mrad/s for the kind rate, got 'SwayParallel'"
+    assert problem == f"machine.yaml:{line}: axes.near_far.sway_sensor.signal: {expected} in 'deg'"
 
 
-def test_an_axis_without_sway(machine: Machine) -> None:
-    machine.in_yaml(
-        "    filter: { kind: off }",
-        f"    sway_sensor: {{ {ALONG} }}\n    filter: {{ kind: off }}",
-    )
+def test_a_signal_without_a_unit_is_no_angle(machine: Machine) -> None:
+    machine.in_dbc(UNIT, UNIT.replace('"deg"', '""'))
+    line = sensing(machine, ALONG)
     (problem,) = machine.problems()
-    assert "axes.lift.sway_sensor: expected an axis with sway, got 'lift' without" in problem
-
-
-def test_a_filter_that_feeds_nothing_back(machine: Machine) -> None:
-    sensing(machine, f"{ALONG}, use: damp")
-    machine.in_yaml(
-        "filter: { kind: gff, a1: 0.708, a2: 0.12 } # near-far", "filter: { kind: zv } # near-far"
-    )
-    (problem,) = machine.problems()
-    assert "use: expected watch with the filter zv: it does not feed the swing back" in problem
-
-
-def test_too_few_messages_in_a_swing(machine: Machine) -> None:
-    machine.in_dbc('"GenMsgCycleTime" BO_ 1024 20;', '"GenMsgCycleTime" BO_ 1024 400;')
-    sensing(machine, changed("timeout_ms: 80", "timeout_ms: 900, delay_ms: 500"))
-    (problem,) = machine.problems()
-    assert "expected 6 messages or more in a swing of 2200 ms, got one in 400 ms" in problem
-
-
-def test_too_few_messages_in_a_second_swing(machine: Machine) -> None:
-    machine.in_dbc('"GenMsgCycleTime" BO_ 1024 20;', '"GenMsgCycleTime" BO_ 1024 200;')
-    sensing(machine, changed("timeout_ms: 80", "timeout_ms: 900, second_period_s: 0.7"))
-    (problem,) = machine.problems()
-    assert "expected 6 messages or more in a swing of 700 ms, got one in 200 ms" in problem
-
-
-def test_a_delay_of_more_than_a_quarter_of_a_swing(machine: Machine) -> None:
-    sensing(machine, f"{ALONG}, delay_ms: 450")
-    machine.in_yaml("length_m: 1.2", "length_m: 0.6")
-    (problem,) = machine.problems()
-    assert "a quarter of a swing, got 450 ms" in problem
+    expected = "expected one in deg, °, rad, mrad for the kind angle, got 'SwayParallel' in None"
+    assert problem == f"machine.yaml:{line}: axes.near_far.sway_sensor.signal: {expected}"
 
 
 def test_another_timeout_for_the_same_message(machine: Machine) -> None:
     sensing(machine, ALONG.replace("timeout_ms: 80", "timeout_ms: 100"))
     sensing(machine, ACROSS, SLEW)
-    (problem,) = machine.problems()
-    assert "timeout_ms: expected the same as axes.slew.sway_sensor" in problem
+    line = machine.in_yaml(NEAR_FAR, NEAR_FAR) - 1
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.near_far.sway_sensor.timeout_ms: expected the same as"
+        " axes.slew.sway_sensor, which reads the message too"
+    ]
 
 
 def test_two_axes_on_one_signal(machine: Machine) -> None:
     sensing(machine, ALONG)
     sensing(machine, ALONG, SLEW)
-    (problem,) = machine.problems()
-    assert "which is the sway of slew already" in problem or "sway of slew" in problem
+    line = machine.in_yaml(NEAR_FAR, NEAR_FAR) - 1
+    assert machine.problems() == [
+        f"machine.yaml:{line}: axes.near_far.sway_sensor.signal: expected a free signal, got"
+        " 'SwayParallel', which is the sway of slew already"
+    ]
+
+
+def test_axes_may_read_messages_of_their_own(machine: Machine) -> None:
+    sensing(machine, ALONG)
+    sensing(machine, ALONG.replace("GrappleSway, signal: SwayParallel", OTHER), SLEW)
+    axes = machine.load().axes
+    names = {name: axis.sway_sensor.name for name, axis in axes.items() if axis.sway_sensor}
+    assert names == {"slew": "TipPosition.SlewAngle", "near_far": "GrappleSway.SwayParallel"}
+
+
+def test_a_sensor_of_j1939_needs_a_known_source(tmp_path: Path) -> None:
+    text = (ROOT / "config" / "j1939-sensor.yaml").read_text(encoding="utf-8")
+    source = "      source: 0x19 # its address\n"
+    assert source in text
+    file = tmp_path / "machine.yaml"
+    file.write_text(text.replace("../dbc", str(ROOT / "dbc")).replace(source, ""))
+    with pytest.raises(ConfigError) as caught:
+        load_deployment(file)
+    missing = "missing: in the DBC SSI2 may come from any source address"
+    says = f"axes.slew.sway_sensor.source: {missing}; a sway sensor needs a known one"
+    found = [str(one).partition(": ")[2] for one in caught.value.problems]
+    assert [one for one in found if "missing" in one] == [says]

@@ -1,0 +1,54 @@
+"""Buses of a deployment: problems with their line, and what is just allowed."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.config.bus import LAST_SPN
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from tests.rigs.files import ROOT, Machine
+
+BUS = "crane: { interface: socketcan, channel: vcan0, bitrate: 250000 }"
+
+
+def test_a_bus_of_multicast_may_be_shared(machine: Machine) -> None:
+    machine.in_yaml(BUS, "crane: { interface: udp_multicast, channel: 239.1.1.1, network: true }")
+    assert machine.load().config.buses["crane"].network
+
+
+def test_an_option_of_socketcan_is_reported_of_its_bus(machine: Machine) -> None:
+    line = machine.in_yaml(BUS, BUS.replace(" }", ", options: { retry: true } }"))
+    assert machine.problems() == [
+        f"machine.yaml:{line}: buses.crane.options: expected none with socketcan, which the system"
+        " sets up, got some"
+    ]
+
+
+def test_a_data_bit_rate_may_be_the_bit_rate(machine: Machine) -> None:
+    machine.in_yaml("bitrate: 250000", "bitrate: 250000, data_bitrate: 250000, fd: true")
+    assert machine.load().config.buses["crane"].data_bitrate == 250000
+
+
+def j1939(folder: Path, first_spn: int) -> Path:
+    """A machine of J1939 whose first axis has this number in DM1."""
+    text = (ROOT / "config" / "j1939-forwarder.yaml").read_text(encoding="utf-8")
+    text = text.replace("../dbc", str(ROOT / "dbc"))
+    own = "    j1939:\n"
+    assert text.count(own) == 1
+    file = folder / "machine.yaml"
+    file.write_text(text.replace(own, f"{own}      first_spn: {first_spn}\n"))
+    return file
+
+
+def test_the_numbers_of_the_axes_end_at_the_last_one_of_j1939(tmp_path: Path) -> None:
+    axes = len(load_deployment(j1939(tmp_path, 520192)).axes)
+    first = LAST_SPN - 2 * axes + 1
+    assert load_deployment(j1939(tmp_path, first))
+    with pytest.raises(ConfigError) as caught:
+        load_deployment(j1939(tmp_path, first + 1))
+    (problem,) = caught.value.problems
+    assert str(problem).partition(": ")[2] == (
+        f"buses.crane.j1939.first_spn: expected the last SPN up to {LAST_SPN}, got {LAST_SPN + 1}"
+        f" from {first + 1} on"
+    )

@@ -1,0 +1,233 @@
+"""Messages that a deployment names: their ids, nodes and times, each problem in full."""
+
+from pathlib import Path
+
+import pytest
+
+from canshaper.errors import ConfigError
+from canshaper.machine.binding import load_deployment
+from canshaper.machine.deployment import Deployment
+from tests.rigs.files import ROOT, Machine
+
+J1939 = ("j1939-forwarder", "j1939-bjm-avc")
+CANOPEN = ("canopen-forwarder", "canopen-cia401-cia408")
+READ = "feedback: { bus: crane, message: AVC0, source: 0x80, signal: PortFlow,"
+RADIUS = "motion: { crane: { slew: slew, near_far: near_far, radius: { %s } } }\n\n"
+
+
+def load(folder: Path, names: tuple[str, str], *changes: tuple[str, str]) -> Deployment:
+    """A shipped machine whose deployment and DBC file have these pieces replaced."""
+    yaml = (ROOT / "config" / f"{names[0]}.yaml").read_text(encoding="utf-8")
+    yaml = yaml.replace(f"../dbc/{names[1]}.dbc", "machine.dbc")
+    dbc = (ROOT / "dbc" / f"{names[1]}.dbc").read_text(encoding="cp1252")
+    for old, new in changes:
+        assert old in yaml + dbc, old
+        yaml, dbc = yaml.replace(old, new), dbc.replace(old, new)
+    (folder / "machine.yaml").write_text(yaml, encoding="utf-8")
+    (folder / "machine.dbc").write_text(dbc, encoding="cp1252")
+    return load_deployment(folder / "machine.yaml")
+
+
+def problems(folder: Path, names: tuple[str, str], *changes: tuple[str, str]) -> list[str]:
+    """Its problems, without file and line."""
+    with pytest.raises(ConfigError) as caught:
+        load(folder, names, *changes)
+    return [str(one).partition(": ")[2] for one in caught.value.problems]
+
+
+def test_in_j1939_an_id_is_the_same_at_every_priority(tmp_path: Path) -> None:
+    left, right = 2365445886, 0x80000000 | 6 << 26 | 2365445886 & 0x03FFFFFF
+    at = "joysticks.right.message: BJM2 has the id 0x18fdd6fe on bus crane"
+    assert f"{at}, which is used already by joysticks.left" in problems(
+        tmp_path, J1939, (str(left + 512), str(right))
+    )
+
+
+def test_outside_of_j1939_every_bit_of_an_id_counts(machine: Machine) -> None:
+    machine.dbc = machine.dbc.replace(" 272 ", f" {0x80000110} ")
+    machine.dbc = machine.dbc.replace(" 273 ", f" {0x84000110} ")
+    keys = {name: one.key for name, one in machine.load().joysticks.items()}
+    assert keys == {"left": ("crane", 0x110, True), "right": ("crane", 0x4000110, True)}
+
+
+@pytest.mark.parametrize(
+    ("names", "changes", "says"),
+    [
+        (
+            J1939,
+            [("    message: BJM1\n", "    message: BJM1\n    source: 0x9C\n")],
+            "joysticks.left.source: BJM1 comes from address 156, which is ours on bus crane",
+        ),
+        (
+            J1939,
+            [("2365445886", str(2365445886 - 0xFE + 0x9C))],
+            "joysticks.left.message: BJM1 comes from address 156, which is ours on bus crane",
+        ),
+        (
+            J1939,
+            [("2365445886", str(0x98EF9CFE))],
+            "joysticks.left.source: expected the address of the sender of BJM1, got none: it is"
+            " sent from one node to another",
+        ),
+        (
+            J1939,
+            [("BO_ 2365445886 BJM1: 8", "BO_ 2365445886 BJM1: 9")],
+            "joysticks.left.message: BJM1: expected 8 bytes at most, got 9",
+        ),
+        (
+            J1939,
+            [
+                ('BA_ "VFrameFormat" BO_ 2365445886 3;\n', ""),
+                ("feedback: { bus: crane, message: AVEF0, signal: ExtendFlow,", READ),
+            ],
+            "axes.slew.feedback.message: AVC0: expected a group that commands no valve, got that"
+            " of axes.slew.valve",
+        ),
+        (
+            CANOPEN,
+            [("    node: right\n", "    node: wright\n")],
+            "joysticks.right.node: expected a node of bus crane, got 'wright'; there are left,"
+            " right, slew, near_far, lift",
+        ),
+        (
+            CANOPEN,
+            [(" 1696 ", " 1586 ")],
+            "axes.slew.status.message: SlewStatus: expected the id of a PDO, got 0x632, which is"
+            " one of SDO in CANopen",
+        ),
+    ],
+)
+def test_what_a_protocol_refuses(
+    tmp_path: Path, names: tuple[str, str], changes: list[tuple[str, str]], says: str
+) -> None:
+    assert problems(tmp_path, names, *changes) == [says]
+
+
+def test_a_group_with_a_destination_may_command_a_valve_and_be_read(tmp_path: Path) -> None:
+    """What is sent to another node is no command of the valve."""
+    feedback = "feedback: { bus: crane, message: AVEF0,"
+    deployment = load(
+        tmp_path,
+        J1939,
+        ("2365468926", str(0x8CEF33FE)),
+        ("2365460734", str(0x8CEF9CFE)),
+        (feedback, f"{feedback} source: 0x33,"),
+    )
+    bound = deployment.axes["slew"].feedback
+    assert bound is not None
+    assert bound.key == ("crane", 0x0CEF9C33, True)
+    assert deployment.axes["slew"].valve.message.frame().can_id == 0x0CEF339C
+
+
+def test_a_group_is_one_of_j1939_only(tmp_path: Path) -> None:
+    """An id of a message of another kind is no group, whatever its bits are."""
+    stop = "emergency_stop: { bus: crane, message: BJM3, signal: Button1, timeout_ms: 200 }\n"
+    deployment = load(
+        tmp_path,
+        J1939,
+        (
+            "status: { bus: crane, message: ShaperStatus }",
+            f"{stop}status: {{ bus: crane, message: ShaperStatus }}",
+        ),
+        ("2365446910", str(0x8CFE3021)),
+        (f'BA_ "VFrameFormat" BO_ {0x8CFE3021} 3;\n', ""),
+    )
+    assert deployment.emergency_stop is not None
+
+
+def test_an_id_of_29_bits_is_no_service_of_canopen(tmp_path: Path) -> None:
+    deployment = load(tmp_path, CANOPEN, (" 1696 ", f" {0x80000632} "))
+    status = deployment.axes["slew"].status
+    assert status is not None
+    assert status.sender.key == ("crane", 0x632, True)
+
+
+def test_an_id_of_a_service_is_free_on_a_bus_without_canopen(machine: Machine) -> None:
+    machine.dbc = machine.dbc.replace(" 768 ", f" {0x632} ")
+    status = machine.load().axes["slew"].status
+    assert status is not None
+    assert status.sender.key == ("crane", 0x632, False)
+
+
+def test_a_node_of_a_bus_that_there_is_not(machine: Machine) -> None:
+    joystick = "    bus: crane\n    message: JoystickLeft\n"
+    line = machine.in_yaml(joystick, joystick.replace("crane", "boom") + "    node: left\n")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: joysticks.left.bus: expected a bus, got 'boom'; there are crane",
+        f"machine.yaml:{line + 2}: joysticks.left.node: expected a node of bus boom, got 'left';"
+        " there are none",
+    ]
+
+
+def test_several_buses_that_there_are_stand_in_a_row(machine: Machine) -> None:
+    machine.in_yaml("buses:\n", "buses:\n  boom: { interface: socketcan, channel: vcan1 }\n")
+    line = machine.in_yaml("    bus: crane\n", "    bus: tool\n")
+    assert machine.problems() == [
+        f"machine.yaml:{line}: joysticks.left.bus: expected a bus, got 'tool'; there are boom,"
+        " crane"
+    ]
+
+
+def test_of_two_buses_each_has_its_own_messages(machine: Machine) -> None:
+    machine.in_yaml("buses:\n", "buses:\n  boom: { interface: socketcan, channel: vcan1 }\n")
+    machine.in_yaml(
+        "    bus: crane\n    message: JoystickR", "    bus: boom\n    message: JoystickR"
+    )
+    on_bus = machine.load().on_bus
+    assert {m.name for m in on_bus["boom"]} == {"JoystickRight"}
+    assert len(on_bus["crane"]) == 9
+
+
+@pytest.mark.parametrize(
+    ("tick", "cycle", "timeout", "says"),
+    [
+        (20, 20, 39, "expected 40 ms or more, twice the cycle of JoystickLeft, got 39"),
+        (20, 60, 100, "expected 120 ms or more, twice the cycle of JoystickLeft, got 100"),
+        (50, 40, 99, "expected 100 ms or more, twice tick_ms, got 99"),
+    ],
+)
+def test_a_timeout_is_twice_cycle_and_tick(
+    machine: Machine, tick: int, cycle: int, timeout: int, says: str
+) -> None:
+    machine.in_yaml("tick_ms: 20", f"tick_ms: {tick}")
+    machine.in_dbc("BO_ 272 20;", f"BO_ 272 {cycle};")
+    line = machine.in_yaml("timeout_ms: 100", f"timeout_ms: {timeout}")
+    found = [p for p in machine.problems() if "joysticks.left." in p]
+    assert found == [f"machine.yaml:{line}: joysticks.left.timeout_ms: {says}"]
+    machine.in_yaml(f"timeout_ms: {timeout}", f"timeout_ms: {2 * max(tick, cycle)}")
+    if tick == 20:
+        assert machine.load().joysticks["left"].config.timeout_ms == 2 * max(tick, cycle)
+
+
+def test_a_radius_on_change_has_a_timeout_of_two_ticks(machine: Machine) -> None:
+    """Its message has no cycle; only a tick looks at it."""
+    radius = "bus: crane, message: TipPosition, signal: Radius, timeout_ms: 39"
+    machine.in_dbc('BA_ "GenMsgCycleTime" BO_ 1025 20;\n', "")
+    line = machine.in_yaml("axes:\n", RADIUS % radius + "axes:\n")
+    assert (
+        f"machine.yaml:{line}: motion.crane.radius.timeout_ms: expected 40 ms or more, twice"
+        " tick_ms, got 39"
+    ) in machine.problems()
+
+
+@pytest.mark.parametrize(("number", "cycle"), [(512, 0), (512, 50), (768, 110)])
+def test_a_cycle_of_no_ticks_is_named(machine: Machine, number: int, cycle: int) -> None:
+    before = {512: 20, 768: 100}[number]
+    machine.in_dbc(f"BO_ {number} {before};", f"BO_ {number} {cycle};")
+    name = {512: "SlewCommand", 768: "SlewStatus"}[number]
+    line = machine.in_dbc(f"BO_ {number} {name}", f"BO_ {number} {name}")
+    got = f"{cycle} ms" if cycle else "none"
+    assert machine.problems() == [
+        f"machine.dbc:{line}: {name}: GenMsgCycleTime: expected a multiple of tick_ms, 20 ms, got"
+        f" {got}"
+    ]
+
+
+def test_a_timeout_is_not_compared_with_a_cycle_that_is_none(machine: Machine) -> None:
+    machine.in_dbc("BO_ 512 20;", "BO_ 512 0;")
+    machine.in_yaml("signal: Velocity, timeout_ms: 200", "signal: Velocity, timeout_ms: 50")
+    line = machine.in_dbc("BO_ 512 SlewCommand", "BO_ 512 SlewCommand")
+    assert machine.problems() == [
+        f"machine.dbc:{line}: SlewCommand: GenMsgCycleTime: expected a multiple of tick_ms, 20 ms,"
+        " got none"
+    ]
