@@ -39,3 +39,28 @@ def test_each_leftover_table_has_its_line() -> None:
         (2, "VAL_ 7 One is of a signal that there is not"),
         (4, "VAL_ 8 Two is of a signal that there is not"),
     ]
+
+
+@pytest.mark.parametrize(
+    ("number", "good"),
+    [
+        (0x7FF, True),
+        (0x800, False),
+        (0x7FFF_FFFF, False),
+        (0x8000_0000, True),  # 29 bits, all 0
+        (0x9FFF_FFFF, True),
+        (0xA000_0000, False),
+    ],
+)
+def test_the_last_ids_of_11_and_29_bits(number: int, good: bool) -> None:
+    (entry,) = dbc_text(f"BO_ {number} One: 8 A\n".encode()).entries
+    assert (entry.fault is None) is good
+
+
+def test_as_many_statements_as_there_may_be(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = b'BO_ 1 One: 8 A\nCM_ BO_ 1 "a";\nCM_ BO_ 1 "b";\n'
+    monkeypatch.setattr("canshaper.machine.dbc_text.MOST_STATEMENTS", 3)
+    assert len(dbc_text(text).entries) == 1
+    monkeypatch.setattr("canshaper.machine.dbc_text.MOST_STATEMENTS", 2)
+    with pytest.raises(ValueError, match="or 2 statements"):
+        dbc_text(text)
