@@ -35,7 +35,7 @@ TESTS = {
     "guard": DAEMON,
     "protocols": [*DAEMON, "tests/machine/test_gateway_binding.py"],
     "controller": DAEMON,
-    "daemon": ["tests/daemon"],
+    "daemon": DAEMON,
     "bus": ["tests/bus"],
 }
 CORE = [f"canshaper.shaping.{name}" for name in ("axis", "limits", "state_machine", "transfer")]

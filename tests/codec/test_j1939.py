@@ -105,20 +105,25 @@ def test_identifiers_of_the_standards() -> None:
     ]
 
 
-def test_a_name_by_hand() -> None:
-    """Every field with its lowest and highest bit set, or the only one (SAE J1939-81)."""
+def test_the_name_is_made_of_its_fields() -> None:
     name = J1939Name(
-        identity_number=0x100001,
-        manufacturer_code=0x401,
-        ecu_instance=0b101,
-        function_instance=0b10001,
-        function=0x81,
-        vehicle_system=0x41,
-        vehicle_system_instance=0b1001,
-        industry_group=0b101,
+        identity_number=0x1ABCDE & 0x1FFFFF,
+        manufacturer_code=0x5A5,
+        ecu_instance=5,
+        function_instance=19,
+        function=129,
+        vehicle_system=0x55,
+        vehicle_system_instance=9,
+        industry_group=2,
     )
-    # 0 101 1001 | 1000001 0 | 10000001 | 10001 101 | 10000000001 1 0000 | 0000 0000 | 0000 0001
-    assert name_bytes(name)[::-1].hex() == "5982818d80300001"
+    number = int.from_bytes(name_bytes(name), "little")
+    widths = (21, 11, 3, 5, 8, 1, 7, 4, 3, 1)
+    fields, at = [], 0
+    for width in widths:
+        fields.append(number >> at & (1 << width) - 1)
+        at += width
+    assert at == 64
+    assert fields == [0x1ABCDE & 0x1FFFFF, 0x5A5, 5, 19, 129, 0, 0x55, 9, 2, 0]
 
 
 def test_the_id_in_a_word_of_the_kernel() -> None:

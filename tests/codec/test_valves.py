@@ -173,13 +173,18 @@ def test_what_does_not_fit_is_reported(machine: Machine, valve: str, says: str) 
     assert any(says in problem for problem in problems), problems
 
 
-def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Machine) -> None:
+def problem_of(machine: Machine, old: str, new: str) -> str:
+    """The one problem where a piece of the DBC file of the valves is another one."""
     broken = with_valves(
         machine, ("Slew", f"message: AVC0, signal: PortFlow, timeout_ms: 200, {CODES}")
     )
-    text = DBC.replace("0|8@1+ (0.4,0)", "0|8@1+ (0.1,0)")
-    (machine.directory / "valves.dbc").write_text(text, encoding="cp1252")
+    (machine.directory / "valves.dbc").write_text(DBC.replace(old, new), encoding="cp1252")
     (problem,) = broken.problems()
+    return problem
+
+
+def test_a_flow_that_its_bits_do_not_reach_is_reported_with_its_line(machine: Machine) -> None:
+    problem = problem_of(machine, "0|8@1+ (0.4,0)", "0|8@1+ (0.1,0)")
     assert problem == (
         "valves.dbc:5: AVC0: PortFlow cannot reach its range [0|100] with 8 bits at 0.1 per bit"
     )
@@ -194,12 +199,7 @@ def test_the_largest_code_of_the_bits_is_a_direction(machine: Machine) -> None:
 
 
 def test_a_direction_with_a_sign_is_reported(machine: Machine) -> None:
-    broken = with_valves(
-        machine, ("Slew", f"message: AVC0, signal: PortFlow, timeout_ms: 200, {CODES}")
-    )
-    text = DBC.replace("State : 16|4@1+", "State : 16|4@1-")
-    (machine.directory / "valves.dbc").write_text(text, encoding="cp1252")
-    (problem,) = broken.problems()
+    problem = problem_of(machine, "State : 16|4@1+", "State : 16|4@1-")
     assert problem.partition(": ")[2] == (
         "axes.slew.valve.direction.signal: State: expected an unsigned integer signal, got a signed"
         " one"

@@ -44,7 +44,7 @@ def test_an_error_of_a_valve_is_still_there(
 def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
     """Inputs, messages that are sent, and axes: these by their valve and by their name."""
     here, controller = ("socketcan", "vcan0"), rig.controller
-    found = controller._parts()
+    parts = controller._parts()
     inputs = [("input", *here, can_id, False) for can_id in (272, 273)]
     sent = [512, 513, 514, 784, 785, 768, 769, 770]
     senders = [("sender", *here, can_id, False) for can_id in sent]
@@ -52,13 +52,13 @@ def test_a_part_is_known_by_what_it_is_on_the_machine(rig: Rig) -> None:
     runners: dict[Key, AxisRunner] = {("axis", name): controller.axes[name] for name in valves}
     for name, can_id in valves.items():
         runners["valve", *here, can_id, False, "Velocity"] = controller.axes[name]
-    assert set(found) == {*inputs, *senders, *runners}
-    assert all(found[key] is runner for key, runner in runners.items())
+    assert set(parts) == {*inputs, *senders, *runners}
+    assert all(parts[key] is runner for key, runner in runners.items())
     for *_, can_id, extended in inputs:
-        part = found["input", *here, can_id, extended]
+        part = parts["input", *here, can_id, extended]
         assert part is controller.inputs["crane", can_id, extended]
     for sender in rig.deployment.senders():
-        assert found["sender", *here, *sender.key[1:]] is sender.protector
+        assert parts["sender", *here, *sender.key[1:]] is sender.protector
 
 
 def test_of_another_node_nothing_is_known(canopen: CanopenRig) -> None:

@@ -72,10 +72,10 @@ def test_another_source_counts_once_the_silence_is_longer_than_the_timeout(
 ) -> None:
     left = any_source.joysticks["left"]
     assert left.config.timeout_ms == 100
-    for silence_ns, found in [(100_000_000, None), (100_000_001, left)]:
+    for silence_ns, expected in [(100_000_000, None), (100_000_001, left)]:
         one = finder(any_source)
         assert one.find(bjm("BJM1", JOYSTICK), 0) is left
-        assert one.find(bjm("BJM1", OTHER), silence_ns) is found
+        assert one.find(bjm("BJM1", OTHER), silence_ns) is expected
 
 
 def test_inputs_behind_one_that_is_known_by_its_identifier_are_found(

@@ -103,15 +103,15 @@ def test_without_profiles_no_number_has_one(changed_rig: Make) -> None:
 
 
 def test_the_programs_are_those_of_the_file(slew: Callable[..., BoundAxis]) -> None:
-    found = programs(slew())
-    assert list(found) == ["", "fast", "calm"]
-    base, sets = found[""]
+    by_name = programs(slew())
+    assert list(by_name) == ["", "fast", "calm"]
+    base, sets = by_name[""]
     assert base == ParameterSet(0.0, MODE, "gff", {"a1": 0.708, "a2": 0.12})
     assert [(one.at, one.parameters) for one in sets] == [
         (0.0, {"a1": 0.7, "a2": 0.12}),
         (1000.0, {"a1": 0.9, "a2": 0.2}),
     ]
-    assert found["fast"] == (ParameterSet(0.0, MODE, "gff", {"a1": 0.5, "a2": 0.06}), [])
+    assert by_name["fast"] == (ParameterSet(0.0, MODE, "gff", {"a1": 0.5, "a2": 0.06}), [])
 
 
 def test_what_is_chosen_already_changes_nothing(slew: Callable[..., BoundAxis]) -> None:

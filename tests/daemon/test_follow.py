@@ -269,10 +269,8 @@ def step(cycle_ms: int, *others_ns: int, deadline_ns: int) -> int:
     """How much later the deadline shall be, with a frame of the followed joystick at 40 ms."""
     names = ["left", *(f"other {n}" for n, _ in enumerate(others_ns))]
     joystick = SimpleNamespace(message=SimpleNamespace(cycle_time=cycle_ms))
-    tick = SimpleNamespace(follow="left")
-    deployment: Any = SimpleNamespace(
-        config=SimpleNamespace(tick=tick, tick_ms=20), joysticks=dict.fromkeys(names, joystick)
-    )
+    config = SimpleNamespace(tick=SimpleNamespace(follow="left"), tick_ms=20)
+    deployment: Any = SimpleNamespace(config=config, joysticks=dict.fromkeys(names, joystick))
     times = dict(zip(names, (40 * MS, *others_ns), strict=True))
     inputs = {name: SimpleNamespace(received_ns=ns) for name, ns in times.items()}
     controller: Any = SimpleNamespace(joysticks=inputs)

@@ -21,7 +21,7 @@ def velocity(*, signed: bool = True) -> Signal:
 
 
 def multiplexed() -> Message:
-    """A counter in every frame, and two kinds of frames, which two bits tell apart."""
+    """A counter in every frame, and two kinds of frames, which two bits distinguish."""
     counter = Signal("Counter", 8, 8)
     kind = Signal("Kind", 16, 2, is_multiplexer=True)
     first = Signal("First", 0, 8, multiplexer_ids=[0], multiplexer_signal="Kind")

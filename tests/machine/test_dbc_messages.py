@@ -1,4 +1,4 @@
-"""Messages of DBC files that were loaded: found by name, their lines, and what is wrong."""
+"""Messages of DBC files that were loaded: looked up by name, their lines, and what is wrong."""
 
 from pathlib import Path
 
@@ -116,10 +116,10 @@ def test_messages_are_found_by_name_in_several_files(tmp_path: Path) -> None:
     messages = Messages([one, two])
     assert messages.files == [one, two]
     assert messages.find("Other") == (one, one.messages[0])
-    found = messages.find("Wide")
-    assert not isinstance(found, str)
-    assert (found[0], found[1].name) == (two, "Wide")
-    assert messages.find("Wide") == found
+    result = messages.find("Wide")
+    assert not isinstance(result, str)
+    assert (result[0], result[1].name) == (two, "Wide")
+    assert messages.find("Wide") == result
     assert messages.all() == one.messages
     assert messages.ids() == {(5, False), (5, True)}
     assert messages.named({(5, True)}) == ["Wide"]

@@ -26,18 +26,18 @@ PATH = Path("a.dbc")
 
 def problem(text: str, *, bounded: bool = True) -> tuple[int | None, str]:
     """Line and text of the one problem."""
-    found = parsed_messages(PATH, text, bounded=bounded)
-    assert isinstance(found, Problem)
-    assert (found.file, found.where) == ("a.dbc", "")
+    result = parsed_messages(PATH, text, bounded=bounded)
+    assert isinstance(result, Problem)
+    assert (result.file, result.where) == ("a.dbc", "")
     start = "not a DBC file that can be used: "
-    assert found.message.startswith(start)
-    return found.line, found.message.removeprefix(start)
+    assert result.message.startswith(start)
+    return result.line, result.message.removeprefix(start)
 
 
 def names(text: str, *, bounded: bool = True) -> list[str]:
-    found = parsed_messages(PATH, text, bounded=bounded)
-    assert isinstance(found, list)
-    return [message.name for message in found]
+    result = parsed_messages(PATH, text, bounded=bounded)
+    assert isinstance(result, list)
+    return [message.name for message in result]
 
 
 @pytest.mark.parametrize(

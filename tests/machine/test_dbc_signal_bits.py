@@ -7,9 +7,9 @@ from canshaper.machine.dbc_signals import signals_fault
 
 def fault(length: int, *signals: str) -> str | None:
     text = "".join(f' SG_ {signal}+ (1,0) [0|0] "" A\n' for signal in signals)
-    names, found = signals_fault(text.encode(), length)
+    names, text_of_fault = signals_fault(text.encode(), length)
     assert names == [signal.split()[0].encode() for signal in signals]
-    return found
+    return text_of_fault
 
 
 @pytest.mark.parametrize(

@@ -192,8 +192,8 @@ def test_a_timeout_is_twice_cycle_and_tick(
     machine.in_yaml("tick_ms: 20", f"tick_ms: {tick}")
     machine.in_dbc("BO_ 272 20;", f"BO_ 272 {cycle};")
     line = machine.in_yaml("timeout_ms: 100", f"timeout_ms: {timeout}")
-    found = [p for p in machine.problems() if "joysticks.left." in p]
-    assert found == [f"machine.yaml:{line}: joysticks.left.timeout_ms: {says}"]
+    reported = [p for p in machine.problems() if "joysticks.left." in p]
+    assert reported == [f"machine.yaml:{line}: joysticks.left.timeout_ms: {says}"]
     machine.in_yaml(f"timeout_ms: {timeout}", f"timeout_ms: {2 * max(tick, cycle)}")
     if tick == 20:
         assert machine.load().joysticks["left"].config.timeout_ms == 2 * max(tick, cycle)

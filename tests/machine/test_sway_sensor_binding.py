@@ -247,5 +247,5 @@ def test_a_sensor_of_j1939_needs_a_known_source(tmp_path: Path) -> None:
         load_deployment(file)
     missing = "missing: in the DBC SSI2 may come from any source address"
     says = f"axes.slew.sway_sensor.source: {missing}; a sway sensor needs a known one"
-    found = [str(one).partition(": ")[2] for one in caught.value.problems]
-    assert [one for one in found if "missing" in one] == [says]
+    reported = [str(one).partition(": ")[2] for one in caught.value.problems]
+    assert [one for one in reported if "missing" in one] == [says]

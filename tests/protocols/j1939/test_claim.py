@@ -44,27 +44,6 @@ def test_nothing_but_the_claim_before_250_ms_have_passed(rig: Rig) -> None:
     assert CLAIM not in ids(sent)
 
 
-def test_the_name_is_made_of_its_fields() -> None:
-    name = J1939Name(
-        identity_number=0x1ABCDE & 0x1FFFFF,
-        manufacturer_code=0x5A5,
-        ecu_instance=5,
-        function_instance=19,
-        function=129,
-        vehicle_system=0x55,
-        vehicle_system_instance=9,
-        industry_group=2,
-    )
-    number = int.from_bytes(name_bytes(name), "little")
-    widths = (21, 11, 3, 5, 8, 1, 7, 4, 3, 1)
-    fields, at = [], 0
-    for width in widths:
-        fields.append(number >> at & (1 << width) - 1)
-        at += width
-    assert at == 64
-    assert fields == [0x1ABCDE & 0x1FFFFF, 0x5A5, 5, 19, 129, 0, 0x55, 9, 2, 0]
-
-
 def test_a_higher_name_is_answered_by_our_claim_and_changes_nothing(rig: Rig) -> None:
     rig.moving()
     sent = rig.tick(rig.claim(+1))
