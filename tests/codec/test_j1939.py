@@ -116,6 +116,7 @@ def test_the_name_is_made_of_its_fields() -> None:
         vehicle_system_instance=9,
         industry_group=2,
     )
+    assert len(name_bytes(name)) == 8
     number = int.from_bytes(name_bytes(name), "little")
     widths = (21, 11, 3, 5, 8, 1, 7, 4, 3, 1)
     fields, at = [], 0
