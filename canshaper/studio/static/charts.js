@@ -134,7 +134,7 @@ export class Charts {
       set(element, words[i] ?? (value == null ? "" : value.toFixed(1)));
     });
     if (!states) return;
-    const mark = t === null ? null : this.lanes.near(plot);
+    const mark = t === null ? null : this.lanes.near(plot, this.axis);
     set(document.getElementById("mark"), mark ?? "");
     document.getElementById("legend-states").hidden = mark !== null;
   }

@@ -107,10 +107,11 @@ export class Lanes {
     });
   }
 
-  /** The event whose mark is under the cursor; null where there is none. */
-  near(u) {
+  /** The events whose marks are under the cursor, those of the axis first; null where there is none. */
+  near(u, axis) {
     const of = (mark) => Math.abs(u.valToPos(mark.t, "x") - u.cursor.left);
-    const at = this.marks.filter((mark) => of(mark) < NEAR_PX).sort((a, b) => of(a) - of(b))[0];
-    return at ? `${at.source}: ${at.text}` : null;
+    const other = (mark) => !mark.text.startsWith(`${axis}: `);
+    const under = this.marks.filter((mark) => of(mark) < NEAR_PX).sort((a, b) => other(a) - other(b) || of(a) - of(b));
+    return under.map((mark) => `${mark.source}: ${mark.text}`).join(" · ") || null;
   }
 }
