@@ -12,7 +12,6 @@ import pytest
 from mutmut.mutation.trampoline import set_mutant_under_test
 from mutmut.state import state
 from mutmut.utils.format_utils import mangled_name_from_mutant_name
-from mutmut.workers.timeout import register_timeout
 
 KILLER = "killer"
 FAILED, UNREACHED = 1, 33  # as mutmut counts: a test failed; none of the tests calls the function
@@ -66,8 +65,6 @@ class Forks:
         if not pid:
             os.environ["PYTEST_DEBUG_TEMPROOT"] = temporary
             _run(name, items, Path(temporary) / KILLER)
-        # Long: on a busy machine a limit by the clock would kill what survives.
-        register_timeout(pid, 60.0 + 30.0 * sum(_duration_s(item) for item in items))
         self._running[pid] = name, temporary
 
     def _wait(self) -> None:
@@ -105,8 +102,10 @@ def _run(name: str, items: list[pytest.Item], killer: Path) -> None:
         set_mutant_under_test(name)
         items[0].config.pluginmanager.register(Verdict(killer))
         for item, following in zip(items, [*items[1:], None], strict=True):
-            # By processor time: four times what it takes without a mutant, and two seconds more.
+            # A loop that never ends, by processor time: four times what it takes without a mutant.
             signal.setitimer(signal.ITIMER_PROF, 2.0 + 4.0 * _duration_s(item))
+            # One that waits for ever, by the clock: long, as a busy machine kills no survivor.
+            signal.setitimer(signal.ITIMER_REAL, 20.0 + 30.0 * _duration_s(item))
             item.config.hook.pytest_runtest_protocol(item=item, nextitem=following)
         os._exit(0)
     except BaseException:

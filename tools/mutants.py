@@ -37,9 +37,9 @@ SURVIVED, TYPES, EXPLAINED = 0, 37, 38
 KILLED = {
     FAILED: "killed",
     TYPES: "refused by the type checker",
-    # a loop that never ends
+    # a loop that never ends, or a wait
     -signal.SIGPROF: "killed by the time limit",
-    -signal.SIGXCPU: "killed by the time limit",
+    -signal.SIGALRM: "killed by the time limit",
 }
 
 
