@@ -5,6 +5,8 @@
                                           without the survivors that are explained
     tools/mutation.py shaping PATTERN     mutants by name, such as '*fir*zv_taps*'
     tools/mutation.py -j1 daemon          so many at a time, here one; two without it
+    tools/mutation.py --new machine       without the survivors that are explained: each needs every
+                                          test
 
 Each mutant gets the type checker and, where that has nothing against it, the quick tests that reach
 its function. Survivors have to stand, with a reason, in tests/mutation/survivors.txt; the run fails
@@ -12,6 +14,7 @@ for one that does not, and for an entry that fits no mutant any more. Works on c
 out/mutation.
 """
 
+import argparse
 import os
 import resource
 import shutil
@@ -87,8 +90,8 @@ use_git_change_detection = false
     )
 
 
-def run(group: str, patterns: list[str], processes: str) -> int:
-    """Prepare, run and judge one group."""
+def run(group: str, patterns: list[str], processes: str, *, new: bool) -> int:
+    """Prepare, run and judge one group; ``new``: without the survivors that are explained."""
     work = ROOT / "out/mutation" / group
     start = time.monotonic()
     if group == "core":
@@ -100,7 +103,7 @@ def run(group: str, patterns: list[str], processes: str) -> int:
     log = work / "mutmut.log"
     # Folders of its own: another run of pytest would remove them as garbage.
     with log.open("w") as out, tempfile.TemporaryDirectory() as temporary:
-        how = ["run-new", str(SURVIVORS)] if group == "core" else ["run"]
+        how = ["run-new", str(SURVIVORS)] if new else ["run"]
         command = [*mutants, *how, processes, *patterns]
         env = {**os.environ, "PYTEST_DEBUG_TEMPROOT": temporary}
         ran = subprocess.run(command, cwd=work, env=env, stdout=out, stderr=out, check=False)
@@ -118,9 +121,16 @@ def run(group: str, patterns: list[str], processes: str) -> int:
 
 
 if __name__ == "__main__":
-    arguments = sys.argv[1:]
-    at_a_time = arguments.pop(0)[2:] if arguments[:1] and arguments[0].startswith("-j") else "2"
-    groups, chosen = arguments[:1] or list(TESTS), arguments[1:]
-    if not set(groups) <= {*TESTS, "core"} or not at_a_time.isdecimal():
-        sys.exit(__doc__)
-    sys.exit(max([run(group, chosen, at_a_time) for group in groups]))
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("group", nargs="?", choices=[*TESTS, "core"], help="by default all rooms")
+    parser.add_argument("patterns", nargs="*", metavar="PATTERN", help="mutants by name")
+    parser.add_argument("-j", default=2, type=int, metavar="N", help="so many at a time")
+    parser.add_argument("--new", action="store_true", help="without the explained ones")
+    chosen = parser.parse_args()
+    results = [
+        run(group, chosen.patterns, str(chosen.j), new=chosen.new or group == "core")
+        for group in ([chosen.group] if chosen.group else TESTS)
+    ]
+    sys.exit(max(results))
