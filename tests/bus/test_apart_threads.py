@@ -35,7 +35,8 @@ class Held:
             raise self.error
         self.sent.append(message.data[0])
 
-    def recv(self, _timeout_s: float) -> Any:
+    def recv(self, timeout_s: float) -> Any:
+        assert timeout_s == 0
         one = self.waiting.pop(0) if self.waiting else None
         if isinstance(one, Exception):
             raise one
@@ -112,7 +113,7 @@ def test_a_frame_under_way_for_too_long_blocks_and_one_is_tried_later(
     now[0] += LEAVE_NS
     bus.send(message(2))
     now[0] += 1
-    with pytest.raises(can.CanTimeoutError):
+    with pytest.raises(can.CanTimeoutError, match=r"^the adapter takes no frames$"):
         bus.send(message(3))
     assert not bus.took
     held.go.release(10)
@@ -130,6 +131,34 @@ def test_a_frame_under_way_for_too_long_blocks_and_one_is_tried_later(
     until(lambda: bus.took)
 
 
+@pytest.mark.parametrize(("lasted_ns", "took"), [(LEAVE_NS, True), (LEAVE_NS + 1, False)])
+def test_a_frame_is_late_that_took_longer_than_the_limit(
+    bus: BusApart, held: Held, now: list[int], lasted_ns: int, took: bool
+) -> None:
+    bus.send(message(1))
+    until(lambda: held.begun)
+    now[0] += lasted_ns
+    held.go.release(1)
+    until(lambda: not bus._began_ns)
+    assert bus.took is took
+
+
+def test_bytes_in_the_kernel_block_from_when_they_were_seen_first(
+    bus: BusApart, held: Held, now: list[int], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """A frame that has begun since then is no younger start."""
+    monkeypatch.setattr(apart, "unsent", lambda _: 1)
+    held.go.release(1)
+    bus.send(message(1))
+    until(lambda: held.sent == [1] and not bus._began_ns)
+    now[0] += LEAVE_NS
+    bus.send(message(2))
+    until(lambda: held.begun == [1, 2])
+    now[0] += 1
+    with pytest.raises(can.CanTimeoutError):
+        bus.send(message(3))
+
+
 def test_what_the_interface_raises_is_raised_at_the_next_frame(bus: BusApart, held: Held) -> None:
     held.error = OSError("gone")
     held.go.release(1)
@@ -138,6 +167,25 @@ def test_what_the_interface_raises_is_raised_at_the_next_frame(bus: BusApart, he
     with pytest.raises(OSError, match="gone"):
         bus.send(message(2))
     held.error = None
+    held.go.release(1)
+    bus.send(message(3))
+    until(lambda: held.sent == [3])
+
+
+def test_what_is_raised_too_late_is_not_raised_again(
+    bus: BusApart, held: Held, now: list[int]
+) -> None:
+    """That it was late is reported in its place."""
+    held.error = OSError("gone")
+    bus.send(message(1))
+    until(lambda: held.begun)
+    now[0] += LEAVE_NS + 1
+    held.go.release(1)
+    until(lambda: not bus._began_ns)
+    held.error = None
+    with pytest.raises(can.CanTimeoutError):
+        bus.send(message(2))
+    now[0] += PROBE_NS
     held.go.release(1)
     bus.send(message(3))
     until(lambda: held.sent == [3])
@@ -238,6 +286,6 @@ def test_a_line_that_is_closed_meanwhile_is_no_end(held: Held) -> None:
 
 
 def test_where_no_one_says_how_much_waits_nothing_does() -> None:
+    assert apart.descriptor(Held()) == -1  # type: ignore[arg-type]
     assert unsent(-1) == 0
-    with suppress(OSError):
-        apart.discard_unsent(-1)
+    apart.discard_unsent(-1)
