@@ -180,31 +180,34 @@ class BusApart:
     def _receive_all(self) -> None:
         empty_ns = boottime_ns()
         while not self._closing:
-            polled_ns = boottime_ns()
+            polled_ns, readable = boottime_ns(), self._readable(0.0)
             result: can.Message | Exception | None
             try:
                 result = self._bus.recv(0)
             except Exception as error:  # as above
                 result = error
+            if result is None and readable and ended(self._descriptor):
+                result = can.CanOperationError("the connection was closed at its other end")
             if result is not None:
                 # One too many where the loop reads one meanwhile: bad news too early is no harm.
                 self.lost += len(self._received) == MOST_RECEIVED
                 self._received.append((result, empty_ns))
                 with suppress(OSError):  # it is full, which says as much; or closed
                     self._wake_writer.send(b"\0")
-            if not isinstance(result, can.Message):
+            if isinstance(result, Exception):
+                time.sleep(POLL_S)  # it may fail at every call
+            elif result is None and not readable:
+                # Else it read what is no frame: others may wait behind it, and since when?
                 empty_ns = polled_ns
-                self._pause(failed=result is not None)
+                self._readable(LOOK_S)
 
-    def _pause(self, *, failed: bool) -> None:
-        """Until there may be a frame."""
-        if failed or self._descriptor < 0:
-            time.sleep(POLL_S)
-            return
-        try:
-            select([self._descriptor], [], [], LOOK_S)
-        except (OSError, ValueError):  # closed meanwhile
-            time.sleep(POLL_S)
+    def _readable(self, timeout_s: float) -> bool:
+        """Whether the line has something to read, or will within so long."""
+        if self._descriptor >= 0:
+            with suppress(OSError, ValueError):  # closed meanwhile
+                return bool(select([self._descriptor], [], [], timeout_s)[0])
+        time.sleep(min(timeout_s, POLL_S))
+        return False
 
 
 def descriptor(bus: can.BusABC) -> int:
@@ -227,7 +230,21 @@ def unsent(fileno: int) -> int:
     return 0
 
 
+def ended(fileno: int) -> bool:
+    """Whether a line is a connection that its other end has closed."""
+    try:
+        connection = socket.socket(fileno=fileno)
+    except OSError:  # it is none
+        return False
+    try:
+        return not connection.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
+    except OSError:  # nothing waits
+        return False
+    finally:
+        connection.detach()
+
+
 def discard_unsent(fileno: int) -> None:
     """Drop what the kernel has queued for a serial line and not sent; TCP keeps its queue."""
-    with suppress(OSError, ValueError, termios.error):
+    with suppress(ValueError, termios.error):
         termios.tcflush(fileno, termios.TCOFLUSH)

@@ -11,6 +11,7 @@ import tty
 from collections.abc import Callable
 
 ANSWER_S = 30.0  # only to end a test that hangs
+THEIR_BYTES = 4096  # N_TTY_BUF_SIZE of drivers/tty/n_tty.c
 
 
 def until(holds: Callable[[], object]) -> None:
@@ -86,6 +87,11 @@ class Socketcand:
         until(lambda: self._client)
         assert self._client
         self._client.sendall(f"< frame {can_id:03X} 1.5 {data.hex()} >".encode())
+
+    def hang_up(self) -> None:
+        """Say that nothing more will come."""
+        assert self._client
+        self._client.shutdown(socket.SHUT_WR)
 
     def close(self) -> None:
         if self._client:

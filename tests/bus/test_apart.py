@@ -1,5 +1,6 @@
 """Adapters whose calls block: slcan and serial on a pseudo-terminal, socketcand on loopback."""
 
+import threading
 import time
 from collections.abc import Iterator
 from select import select
@@ -12,10 +13,9 @@ from canshaper.bus.clock import boottime_ns
 from canshaper.bus.port import Port, open_port
 from canshaper.codec.frame import BusState, Frame, FrameFault
 from canshaper.config.bus import Bus
-from tests.bus.lines import ANSWER_S, SerialLine, Socketcand, until
+from tests.bus.lines import ANSWER_S, THEIR_BYTES, SerialLine, Socketcand, until
 
 FRAME = Frame("crane", 0x110, False, b"\1\2\3\4\5\6\7\x08")
-THEIR_BYTES = 4096  # N_TTY_BUF_SIZE of drivers/tty/n_tty.c
 
 
 def numbered(number: int) -> Frame:
@@ -150,6 +150,40 @@ def test_a_frame_is_never_younger_than_it_is(slcan: Port, line: SerialLine) -> N
         until(lambda: list(slcan.frames()))
         assert slcan.arrived_ns <= written_ns
         assert slcan.arrived_ns > before_ns - 1_000_000_000
+
+
+@pytest.mark.parametrize("before", [b"", b"\r", b"z\r", b"t1\r"])
+def test_a_frame_is_no_younger_behind_bytes_that_are_none(
+    slcan: Port, line: SerialLine, monkeypatch: pytest.MonkeyPatch, before: bytes
+) -> None:
+    """An answer of the adapter, or garbage, after which it waited through a stall."""
+    held, go_on = threading.Event(), threading.Event()
+
+    def wait(*arguments: Any) -> Any:
+        if arguments[3]:
+            held.set()
+            assert go_on.wait(ANSWER_S)
+        return select(*arguments[:3], 0)
+
+    monkeypatch.setattr(apart, "select", wait)
+    assert held.wait(ANSWER_S)
+    line.write(before + b"t1101FF\r")
+    written_ns = boottime_ns()
+    go_on.set()
+    until(lambda: list(slcan.frames()))
+    assert slcan.arrived_ns <= written_ns
+
+
+def test_a_connection_that_its_server_closes_has_failed(
+    socketcand: Port, server: Socketcand, faults: list[FrameFault]
+) -> None:
+    """Reading it goes on bringing nothing, as fast as it is read."""
+    server.send(0x110, FRAME.data)
+    server.hang_up()
+    frames: list[Frame] = []
+    until(lambda: frames.extend(socketcand.frames()) or socketcand.state is BusState.FAILED)
+    assert frames == [FRAME]
+    assert set(faults) == {FrameFault.BUS_ERROR}
 
 
 # -- a line that takes nothing ---------------------------------------------------------------------

@@ -8,9 +8,8 @@ import pytest
 
 from canshaper.bus import apart
 from canshaper.bus.apart import BusApart
-from tests.bus.lines import ANSWER_S, SerialLine, until
-from tests.bus.test_apart import THEIR_BYTES
-from tests.bus.test_apart_threads import Held, message
+from tests.bus.held import Held, message
+from tests.bus.lines import ANSWER_S, THEIR_BYTES, SerialLine, until
 
 
 class Reading(Held):

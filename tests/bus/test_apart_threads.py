@@ -1,7 +1,6 @@
 """The threads of a bus apart, with an interface that waits for a sign of the test to go on."""
 
 import socket
-import threading
 from collections.abc import Iterator
 from contextlib import suppress
 from select import select
@@ -12,44 +11,8 @@ import pytest
 
 from canshaper.bus import apart
 from canshaper.bus.apart import LEAVE_NS, MOST_RECEIVED, PROBE_NS, BusApart, unsent
+from tests.bus.held import Held, message
 from tests.bus.lines import until
-
-
-class Held:
-    """An interface that hands a frame on when the test says so."""
-
-    def __init__(self) -> None:
-        self.line: int | None = None
-        self.go = threading.Semaphore(0)
-        self.begun: list[int] = []
-        self.sent: list[int] = []
-        self.waiting: list[Any] = []
-        self.closed = False
-        self.error: Exception | None = None
-
-    def send(self, message: can.Message, timeout: float) -> None:
-        assert timeout == LEAVE_NS / 1e9
-        self.begun.append(message.data[0])
-        self.go.acquire()
-        if self.error:
-            raise self.error
-        self.sent.append(message.data[0])
-
-    def recv(self, timeout_s: float) -> Any:
-        assert timeout_s == 0
-        one = self.waiting.pop(0) if self.waiting else None
-        if isinstance(one, Exception):
-            raise one
-        return one
-
-    def fileno(self) -> int:
-        if self.line is None:
-            raise NotImplementedError
-        return self.line
-
-    def shutdown(self) -> None:
-        self.closed = True
-        raise OSError
 
 
 @pytest.fixture
@@ -70,10 +33,6 @@ def bus(held: Held, now: list[int]) -> Iterator[BusApart]:
     yield made
     held.go.release(1000)
     made.shutdown()
-
-
-def message(value: int, can_id: int = 1) -> can.Message:
-    return can.Message(arbitration_id=can_id, is_extended_id=False, data=[value])
 
 
 def test_of_each_id_the_last_waits(bus: BusApart, held: Held) -> None:
@@ -146,7 +105,7 @@ def test_a_frame_is_late_that_took_longer_than_the_limit(
 def test_bytes_in_the_kernel_block_from_when_they_were_seen_first(
     bus: BusApart, held: Held, now: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A frame that has begun since then is no younger start."""
+    """A frame that begins later does not start the time anew."""
     monkeypatch.setattr(apart, "unsent", lambda _: 1)
     held.go.release(1)
     bus.send(message(1))
