@@ -103,9 +103,11 @@ def test_a_parser_that_says_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
     assert problem(GOOD) == (None, "AssertionError")
 
 
-def test_of_two_messages_with_one_id_cantools_logs_nothing(
-    caplog: pytest.LogCaptureFixture,
+def test_of_two_messages_with_one_id_cantools_alone_logs_nothing(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
 ) -> None:
-    logging.getLogger("cantools").setLevel(logging.NOTSET)
+    for name in (None, "cantools"):
+        monkeypatch.setattr(logging.getLogger(name), "level", logging.INFO)
     names(GOOD.replace("BO_ 2", "BO_ 1"))
     assert caplog.records == []
+    assert logging.getLogger().level == logging.INFO
