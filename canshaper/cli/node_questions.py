@@ -11,7 +11,8 @@ if TYPE_CHECKING:
     from cantools.database.can import Message
 
     from canshaper.commissioning.nodes.node import Node, Pdo
-    from canshaper.commissioning.nodes.parameters import Parameter, Use
+    from canshaper.commissioning.nodes.parameters import Parameter
+    from canshaper.commissioning.nodes.use import Use
     from canshaper.config.first import FirstCanopen, FirstCia408, FirstMachine
 
 _OURS, _FIRST, _LAST = 0x7E, 0x10, 127
@@ -80,10 +81,11 @@ class Nodes:
 
     def supervised(self, message: str) -> str | None:
         """The same, of a node that has a heartbeat."""
+        if (name := self.name_of(message)) is None:
+            return None
         from canshaper.commissioning.nodes.parameters import heartbeat_ms
 
-        name = self.name_of(message)
-        return name if name and heartbeat_ms(self.named[name]) else None
+        return name if heartbeat_ms(self.named[name]) else None
 
     def timer_ms(self, message: str) -> int:
         """Event timer of a PDO; 0 where it has none."""
@@ -91,13 +93,14 @@ class Nodes:
 
     def cia408(self, valve: str) -> "FirstCia408 | None":
         """Control and status word, where a message commands a valve of CiA 408."""
+        if (name := self.name_of(valve)) is None:
+            return None
         from canshaper.commissioning.nodes import messages
         from canshaper.config.first import FirstCia408
         from canshaper.config.load import limits
         from canshaper.config.schema import StatusWord
 
-        name = self.name_of(valve)
-        if name is None or self.named[name].profile != messages.VALVE:
+        if self.named[name].profile != messages.VALVE:
             return None
         control = _label(self._pdos[valve][1], messages.CONTROL_WORD)
         sent = [pdo for owner, pdo in self._pdos.values() if owner == name and pdo.transmitted]
@@ -156,7 +159,7 @@ class Nodes:
 
 def uses_of(machine: "FirstMachine", messages: "Sequence[Message]") -> "dict[str, Use]":
     """How a machine uses messages: how often they come, and when they are lost."""
-    from canshaper.commissioning.nodes.parameters import Use
+    from canshaper.commissioning.nodes.use import Use
 
     cycles = {message.name: message.cycle_time for message in messages}
     uses: dict[str, Use] = {}

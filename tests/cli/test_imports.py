@@ -85,6 +85,17 @@ def test_without_the_tools_there_is_a_demo_but_no_picture(tmp_path: Path) -> Non
     assert [path.name for path in tmp_path.rglob("*.*")] == ["report.json"]
 
 
+def test_without_the_tools_a_first_deployment_has_the_filters_to_begin_with(
+    tmp_path: Path,
+) -> None:
+    (tmp_path / "answers.txt").touch()
+    gone = ("canopen", "casadi", "matplotlib", "numpy", "scipy")
+    done = without(gone, tmp_path, "init", "machine.yaml", "--answers", "answers.txt")
+    assert (done.returncode, done.stderr) == (0, "")
+    assert f"axis slew: no robust shaper yet, numpy is missing: {TOOLS}" in done.stdout
+    assert without(gone, tmp_path, "check", "machine.yaml").returncode == 0
+
+
 def test_a_module_that_is_no_tool_is_a_fault_of_ours(tmp_path: Path) -> None:
     done = without(("yaml",), tmp_path, "check", str(SHIPPED))
     assert done.returncode == 1

@@ -93,10 +93,11 @@ def init(
             ask = partial(machine_of, messages, names, interface, nodes)
             machine = (None if answers else accepted(ask)) or ask()
             uses = uses_of(machine, messages)
-            parameters = nodes.parameters(uses)
+            parameters = nodes.parameters(uses) if eds else []
             writes = set_by_sdo and _confirmed(machine, parameters)
-        notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in parameters)]
+        notes: list[str] = []
         if eds:
+            notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in parameters)]
             _write_dbc(own, nodes)
         _write(file, draft, first_deployment(replace(machine, notes=notes)))
     echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed.")

@@ -20,6 +20,7 @@ from canshaper.commissioning.nodes.node import (
     Node,
     Pdo,
 )
+from canshaper.commissioning.nodes.use import Use
 from canshaper.config.bus import Bus
 from canshaper.errors import NodeError
 
@@ -57,14 +58,6 @@ class Parameter:
     def __str__(self) -> str:
         value = "0x65766173" if self.value == _SAVE else str(self.value)
         return f"{self.node}: {self.where} = {value}: {self.why}"
-
-
-@dataclass(frozen=True)
-class Use:
-    """How a deployment uses a PDO: sent every so many ms, lost after so many."""
-
-    cycle_ms: int | None
-    timeout_ms: int
 
 
 def heartbeat_ms(node: Node) -> int | None:
