@@ -72,6 +72,9 @@ def unpack(path: Path, folder: Path) -> tuple[Path, Path]:
         where = f"{path}: {ABOUT}"
         about = json.loads((folder / ABOUT).read_text(encoding="utf-8"))
         log, file = ((folder / about[key]).resolve() for key in ("log", "deployment"))
+    except OSError as error:
+        text = f"expected a bundle that can be read, got {error.strerror or error}"
+        raise LogError(f"{where}: {text}") from None
     except Exception as error:  # of many kinds, where the file is damaged
         text = f"expected a file of canshaper record, got {type(error).__name__} {error}"
         raise LogError(f"{where}: not a bundle: {text}") from None

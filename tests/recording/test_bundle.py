@@ -2,6 +2,7 @@
 
 import json
 import random
+import re
 import shutil
 import zipfile
 from pathlib import Path
@@ -89,8 +90,10 @@ def test_what_is_no_bundle_is_reported(tmp_path: Path) -> None:
         bundle.writestr("readme.txt", "nothing")
     with pytest.raises(LogError, match=r"not a bundle: .*, got KeyError"):
         unpack(path, tmp_path / "there")
-    with pytest.raises(LogError, match=r"not a bundle: .*, got FileNotFoundError"):
-        unpack(tmp_path / "none.zip", tmp_path / "there")
+    for name, got in (("none.zip", "No such file or directory"), ("", "Is a directory")):
+        says = f"{tmp_path / name}: expected a bundle that can be read, got {got}"
+        with pytest.raises(LogError, match=f"^{re.escape(says)}$"):
+            unpack(tmp_path / name, tmp_path / "there")
 
 
 def damaged(bundle: Path, signature: bytes, at: int, value: bytes) -> Path:
