@@ -75,6 +75,7 @@ class Forks:
             print(f"survived: {name}", flush=True)
         killer = Path(temporary) / KILLER
         if killer.exists():
+            print(f"killed: {name} by {killer.read_text()}", flush=True)
             self._killed[mangled_name_from_mutant_name(name)][killer.read_text()] += 1
         shutil.rmtree(temporary, ignore_errors=True)
 

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from types import SimpleNamespace
 from typing import Any
 
+import can
 import pytest
 
 from canshaper.bus import apart
@@ -121,7 +122,7 @@ def test_a_line_was_empty_where_it_had_nothing_to_read_and_brought_none(
     polled: Polled, readable: list[bool], brought: list[Any], since_ns: int
 ) -> None:
     """Else a frame that waited behind an answer through a long stall would pass as new."""
-    polled.line, polled.readable = LINE, readable
+    polled.line, polled.readable = LINE, [*readable]
     polled.waiting = [None, *brought, message(2)]
     polled.first(9)
     frames: list[Any] = []
@@ -137,6 +138,17 @@ def test_a_line_was_empty_where_it_had_nothing_to_read_and_brought_none(
     until(last)
     assert polled.bus
     assert polled.bus.since_ns == since_ns
+
+
+def test_a_connection_that_has_ended_has_failed(
+    polled: Polled, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(apart, "ended", lambda line: line == LINE)
+    polled.line, polled.readable = LINE, [True]
+    assert polled.first(3) == [SEEN, READ, SLEPT]
+    assert polled.bus
+    with pytest.raises(can.CanOperationError, match=r"^the connection was closed at its other end"):
+        polled.bus.recv(0)
 
 
 def test_only_a_connection_that_was_closed_has_ended() -> None:

@@ -1,4 +1,4 @@
-"""Cycle of a joystick that the ticks follow: it fits into the tick, or the tick into it."""
+"""A joystick that the ticks follow: its cycle fits into the tick, or the tick into it."""
 
 import pytest
 
@@ -29,4 +29,14 @@ def test_another_cycle_is_refused_with_what_it_is(
     assert (
         f"machine.yaml:{line}: tick.follow: expected a GenMsgCycleTime that is a multiple or a part"
         f" of 20 ms, got {got}, that of left"
+    ) in machine.problems()
+
+
+def test_on_a_bus_whose_frames_have_no_stamp_none_is_followed(machine: Machine) -> None:
+    line = following(machine, 20)
+    socketcan = "interface: socketcan, channel: vcan0, bitrate: 250000"
+    machine.in_yaml(socketcan, "interface: udp_multicast, channel: 239.1.2.3")
+    assert (
+        f"machine.yaml:{line}: tick.follow: expected a bus of socketcan, which stamps frames, got"
+        " udp_multicast, the bus of left"
     ) in machine.problems()

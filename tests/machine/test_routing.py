@@ -212,3 +212,22 @@ def test_groups_of_two_buses_of_j1939_do_not_mix(tmp_path: Path) -> None:
     assert buses["rear"].received_groups == claims | {bjm2}
     assert buses["crane"].sent_groups == {avc1, avc2}
     assert buses["rear"].sent_groups == {avc0}
+
+
+@pytest.mark.parametrize(
+    ("key", "matters"),
+    [
+        (("crane", 0x110, False), True),  # received or sent
+        (("other", 0x110, False), False),  # the same id elsewhere is other traffic
+        (("crane", 0x18EE0042, True), True),  # its group is received
+        (("crane", 0x18EE0042, False), False),
+        (("other", 0x18EE0042, True), False),
+        (("crane", 0x18FF0042, True), False),
+        (("crane", 0x18FF0042, False), True),  # no one knows it
+    ],
+)
+def test_a_message_matters_that_is_used_or_that_no_one_knows(key: Key, matters: bool) -> None:
+    known = {(0x110, False), (0x18EE0042, True), (0x18EE0042, False), (0x18FF0042, True)}
+    groups = {("crane", 0xEE0000): GroupRoute()}
+    routes = {("crane", 0x110, False): Route(Role.SENT)}
+    assert Routing(routes, groups, {}, frozenset(known), {}).received(key) is matters
