@@ -200,9 +200,13 @@ def test_a_blocked_serial_line_is_seen_and_nothing_of_it_comes_later(
     assert faults == [FrameFault.NOT_CONFIRMED] * reported, "reported once"
     until(lambda: slcan.send(FRAME._replace(can_id=0x333)))
     until(lambda: b"t3338" in line.read())
-    # The other end of a pseudo-terminal has a buffer of its own, as an adapter has.
-    late = [one for one in received if text(one) in line.text]
-    assert len(late) <= THEIR_BYTES // len(text(FRAME)), "what the kernel had queued is dropped"
+    # The other end of a pseudo-terminal has a buffer of its own, as an adapter has; and one frame
+    # may have been under way into the kernel when that dropped what it had.
+    theirs = THEIR_BYTES // len(text(FRAME))
+    late = [one for one in received[:-20] if text(one) in line.text]
+    assert late == received[: len(late)], "what the kernel had queued is dropped"
+    assert len(late) <= theirs
+    assert sum(text(one) in line.text for one in received[-20:]) <= 1
     assert text(FRAME) not in line.text
     line.write(b"t1101FF\r")
     until(lambda: list(slcan.frames()))

@@ -1,5 +1,6 @@
 """Taps and small strokes: one movement, as long as the joystick asked for."""
 
+import math
 import random
 from itertools import pairwise
 
@@ -8,12 +9,13 @@ import pytest
 from canshaper.shaping.limits import OutputLimits
 from canshaper.shaping.shapers.fir import Fir, zv_taps
 from canshaper.shaping.shapers.limit_aware import LimitAware
-from canshaper.shaping.small_strokes import SmallStrokes, least_velocity
+from canshaper.shaping.small_strokes import SMALL_S, SmallStrokes, least_velocity
 from canshaper.shaping.states import CommandInput, Reason
 from canshaper.shaping.valve_curve import ValveCurve
 from tests.shaping.taps import LIMITS, MODE, TICK_S, axis_with, tapped
 
 LEVELS = (0.1, 0.13, 0.2, 0.34, 0.55, 0.79, 1.0)
+CURVE = ValveCurve((-1, -0.1, 0.1, 1), (-1, 0, 0, 0.8))
 DURATIONS = (0.06, 0.1, 0.14, 0.2, 0.3, 0.36, 0.46, 1.0)
 
 
@@ -41,10 +43,7 @@ def test_a_tap_is_one_movement_of_its_length(level: float, sign: float) -> None:
         (OutputLimits(deadband=0.054, tail_s=2.2), 125),  # its first step is next to nothing
         (OutputLimits(deadband=0.05, minimum=0.03, tail_s=2.2), 125),
         (OutputLimits(deadband=0.05, tail_s=2.2, rise_per_s=0.5, fall_per_s=0.5), 125),
-        (
-            OutputLimits(tail_s=2.2, curve=ValveCurve((-1, -0.1, 0.1, 1), (-1, 0, 0, 0.8))),
-            125,
-        ),
+        (OutputLimits(tail_s=2.2, curve=CURVE), 125),
     ],
     ids=["fine grid", "no deadband", "odd deadband", "minimum", "slow valve", "curve"],
 )
@@ -158,6 +157,47 @@ def test_what_another_axis_wants_in_vain_is_not_due() -> None:
     assert small.output(0.0, 0.0, 0.0, 0.0, 0.1) == least_velocity(LIMITS, 125)
 
 
+LEAST = least_velocity(LIMITS, 125)
+MOST = SMALL_S / TICK_S * LEAST  # full speed times ticks; larger strokes are not small
+
+
+def test_nothing_is_due_of_an_axis_that_was_not_commanded_yet() -> None:
+    small = SmallStrokes(LIMITS, 125, TICK_S)
+    assert small.output(0.0, 0.0, 0.5, 0.0, 1.0) == 0.0
+    small.output(0.1, 0.0, 0.0, 0.0, 1.0)
+    assert small.output(0.0, 0.0, 0.5, 0.0, 1.0) == 0.1
+
+
+@pytest.mark.parametrize(("more", "ends"), [(0.0, True), (1e-9, False)])
+def test_strokes_are_small_up_to_what_the_least_step_would_take_too_long_for(
+    more: float, ends: bool
+) -> None:
+    """In missed ticks, and in both directions: of the filter's output nothing is due."""
+    small = SmallStrokes(LIMITS, 125, TICK_S)
+    most = MOST * (1.0 + more)
+    small.hold(0.25 * most, 0.25 * most, 2)
+    small.hold(-0.5 * most, -0.5 * most, 1)
+    assert small.output(0.0, 0.0, 0.3, 0.0, 1.0) == (0.0 if ends else 0.3)
+
+
+def test_after_a_large_stroke_small_ones_are_known_again_from_rest() -> None:
+    small = SmallStrokes(LIMITS, 125, TICK_S)
+    small.hold(0.5 * MOST, 0.0, 3)
+    assert small.output(0.0, 0.0, 0.3, 0.0, 1.0) == 0.3
+    small.output(0.0, 0.0, 0.0, 0.0, 0.0)
+    small.output(0.1, 0.0, 0.0, 0.0, 1.0)
+    assert small.output(0.0, 0.0, 0.3, 0.0, 1.0) == 0.1
+
+
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_of_half_a_tick_at_the_least_step_no_movement_is_made(sign: float) -> None:
+    for due, sent in ((0.5 * LEAST, 0.0), (math.nextafter(0.5 * LEAST, 1.0), LEAST)):
+        small = SmallStrokes(LIMITS, 125, TICK_S)
+        small.hold(sign * due, 0.0, 1)
+        low, high = (0.0, 0.2) if sign > 0.0 else (-0.2, 0.0)
+        assert small.output(0.0, 0.0, 0.0, low, high) == sign * sent
+
+
 def test_a_frame_of_one_step_has_full_speed_only() -> None:
     assert least_velocity(LIMITS, 1) == 1.0
 
@@ -209,6 +249,8 @@ def test_it_is_never_faster_than_asked_nor_against_the_joystick(seed: int) -> No
         (OutputLimits(deadband=0.05), 125, (7 / 125 - 0.05) / 0.95),
         (OutputLimits(deadband=0.0559), 125, (8 / 125 - 0.0559) / 0.9441),
         (OutputLimits(minimum=0.021), 125, 3 / 125),
+        (OutputLimits(minimum=3 / 125), 125, 3 / 125),  # what is just enough is enough
+        (OutputLimits(curve=CURVE), 125, (14 / 125 - 0.1) * 0.8 / 0.9),
         (OutputLimits(deadband=0.5), 1, 1.0),
     ],
 )

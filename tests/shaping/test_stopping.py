@@ -101,6 +101,18 @@ def test_allowed_is_a_stop_that_begins_when_the_loss_is_known() -> None:
     assert allowed(0.2) == pytest.approx(0.02 + 0.51 + 0.5)
 
 
+def test_allowed_is_shorter_the_quicker_it_falls() -> None:
+    """From 0.8 at 2 per s: straight down to zero in 0.4 s, or to 0.2 in 0.3 s."""
+    limits = OutputLimits(maximum=0.8, tail_s=0.5, fall_per_s=2.0)
+
+    def allowed(stop_s: float, timeout_s: float) -> float:
+        return allowed_s(limits, stop_s=stop_s, timeout_s=timeout_s, period_s=0.02)
+
+    assert allowed(0.1, 0.1) == pytest.approx(0.8 * (0.02 + 0.51) + 0.4 * 0.8 / 2.0)
+    assert allowed(0.8, 0.4) == pytest.approx(0.8 * (0.42 + 0.51) + 0.3 * (0.8 + 0.2) / 2.0)
+    assert allowed(5.0, 0.4) == pytest.approx(0.8 * (0.42 + 0.51) + 0.4 * 0.8 / 2.0)
+
+
 @given(
     limits=st.builds(
         OutputLimits,

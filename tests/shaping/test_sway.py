@@ -234,3 +234,11 @@ def test_retuning_keeps_the_physical_swing(
 
     assert rate_rad_s(model) == pytest.approx(rate_rad_s(old), abs=1e-12)
     assert (old.angle, old.rate) == (angle, rate)
+
+
+def test_retuning_keeps_what_a_sensor_shows_besides() -> None:
+    old = SwayModel(SwayMode(3.0, 0.05), 0.02)
+    old.free_angle, old.free_rate = 0.4, -0.6
+    model = old.retuned(SwayMode(1.5, 0.1), 0.0)
+    # At the same speed it swings a quarter as far: the same angle is four times as much.
+    assert (model.free_angle, model.free_rate) == pytest.approx((1.6, -2.4), rel=1e-14)
