@@ -169,11 +169,12 @@ def test_dbc_files_of_a_bundle_are_inside_it(machine: Machine) -> None:
     assert load_deployment(file, inside=machine.directory)
     other = machine.directory / "elsewhere"
     other.mkdir()
-    for name in ("../machine.dbc", "loop.dbc"):
+    # From Python 3.13 on a circle of links is inside, and cannot be read.
+    for name, says in (("../machine.dbc", "a file of the bundle, got"), ("loop.dbc", "a file")):
         (other / "machine.yaml").write_text(machine.yaml.replace("machine.dbc", name))
         if not (other / "loop.dbc").is_symlink():
             (other / "loop.dbc").symlink_to(other / "loop.dbc")
-        with pytest.raises(ConfigError, match="expected a file of the bundle, got"):
+        with pytest.raises(ConfigError, match=f"dbc.0: expected {says}"):
             load_deployment(other / "machine.yaml", inside=other)
 
 
