@@ -200,6 +200,7 @@ def test_states_and_events_stand_on_the_time_axis(
             states.add(page.inner_text("#legend-states b >> nth=0").strip())
         else:
             marks.add(page.inner_text("#mark"))
+            assert page.evaluate("mark.scrollWidth <= mark.clientWidth"), "nothing is cut off"
     assert {"waiting for neutral", "ready", "moving, shaped", "tripped: neutral"} <= states
     # Both cranes stop within a pixel: no mark hides another.
     for crane in ("shaped", "raw"):

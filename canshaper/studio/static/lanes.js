@@ -4,6 +4,7 @@ import { text } from "/static/language.js";
 
 const MARK_PX = 9; // height of the strip of marks
 const NEAR_PX = 6; // so near to the cursor a mark is named
+const MOST_NAMED = 8; // of more only the count is named: the list has them
 const HATCH_PX = 5;
 
 /** How a state looks: colour of the style, and lines for those that have to differ without colour. */
@@ -107,11 +108,13 @@ export class Lanes {
     });
   }
 
-  /** The events whose marks are under the cursor, those of the axis first; null where there is none. */
+  /** The events whose marks are under the cursor, a line each, those of the axis first; null where there is none. */
   near(u, axis) {
     const of = (mark) => Math.abs(u.valToPos(mark.t, "x") - u.cursor.left);
     const other = (mark) => !mark.text.startsWith(`${axis}: `);
     const under = this.marks.filter((mark) => of(mark) < NEAR_PX).sort((a, b) => other(a) - other(b) || of(a) - of(b));
-    return under.map((mark) => `${mark.source}: ${mark.text}`).join(" · ") || null;
+    const lines = under.slice(0, MOST_NAMED).map((mark) => `${mark.source}: ${mark.text}`);
+    if (under.length > MOST_NAMED) lines.push(`+ ${under.length - MOST_NAMED}`);
+    return lines.join("\n") || null;
   }
 }
