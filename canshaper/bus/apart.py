@@ -197,7 +197,7 @@ class BusApart:
             if isinstance(result, Exception):
                 time.sleep(POLL_S)  # it may fail at every call
             elif result is None and not readable:
-                # Else it read what is no frame: others may wait behind it, and since when?
+                # Else it read bytes that are no frame, and a frame may wait behind them.
                 empty_ns = polled_ns
                 self._readable(LOOK_S)
 

@@ -23,6 +23,8 @@ _STATUS_CYCLES = 3  # of a status word in its timeout
 class Nodes:
     """Nodes of CANopen by their EDS files: asks for name, id, and switches of each.
 
+    Without a file it does without the canopen library, which is an extra.
+
     Args:
         files: EDS or DCF files, one of a device that is there twice also twice.
 
@@ -131,6 +133,8 @@ class Nodes:
 
     def parameters(self, uses: "dict[str, Use]") -> "list[Parameter]":
         """What has to be set in the nodes of messages that are used so."""
+        if not self.named:
+            return []
         from canshaper.commissioning.nodes.parameters import parameters
 
         return [
@@ -141,6 +145,8 @@ class Nodes:
 
     def missing(self, uses: "dict[str, Use]") -> Iterator[str]:
         """What they do not have."""
+        if not self.named:
+            return
         from canshaper.commissioning.nodes.parameters import missing
 
         for name, node in self._used(uses):

@@ -62,11 +62,11 @@ def full_scale(signal: Signal) -> float:
 
 
 def magnitude_range(signal: Signal) -> str | None:
-    """The same for one whose direction is in other signals: its range begins at 0."""
+    """The same for a magnitude, whose direction is in other signals: its range begins at 0."""
     if fault := _no_range(signal):
         return fault
     if signal.minimum != 0.0:
-        expected = "expected a range from 0, as its direction stands apart"
+        expected = "expected a range from 0, as it is a magnitude"
         return f"{signal.name}: {expected}, got [{signal.minimum:g}|{signal.maximum:g}]"
     return _not_reached(signal)
 

@@ -105,7 +105,7 @@ def test_a_frame_is_late_that_took_longer_than_the_limit(
 def test_bytes_in_the_kernel_block_from_when_they_were_seen_first(
     bus: BusApart, held: Held, now: list[int], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """A frame that begins later does not start the time anew."""
+    """A frame that begins later does not restart the time."""
     monkeypatch.setattr(apart, "unsent", lambda _: 1)
     held.go.release(1)
     bus.send(message(1))

@@ -126,12 +126,12 @@ def test_a_float_is_no_flag(machine: Machine) -> None:
         (
             ("[-100|100]", "[-100|100]"),
             True,
-            "expected a range from 0, as its direction stands apart, got [-100|100]",
+            "expected a range from 0, as it is a magnitude, got [-100|100]",
         ),
         (
             ("[-100|100]", "[10|100]"),
             True,
-            "expected a range from 0, as its direction stands apart, got [10|100]",
+            "expected a range from 0, as it is a magnitude, got [10|100]",
         ),
         (("[-100|100]", "[0|0]"), True, "Slew has no range in the DBC"),
         (

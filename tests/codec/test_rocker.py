@@ -162,4 +162,4 @@ def test_what_cannot_be_is_reported(tmp_path: Path, new: str, expected: str) -> 
 def test_a_signal_with_a_sign_is_none_of_a_rocker(tmp_path: Path) -> None:
     sign = ("joystick: front_rocker, signal: RotateLeft, negative: RotateRight",
             "joystick: front_right, signal: Lift, negative: Rotate")  # fmt: skip
-    assert "expected a range from 0, as its direction stands apart" in problems(tmp_path, sign)
+    assert "expected a range from 0, as it is a magnitude" in problems(tmp_path, sign)

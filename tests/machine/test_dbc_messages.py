@@ -188,24 +188,32 @@ def test_every_problem_of_a_message_is_a_line_of_the_answer(tmp_path: Path) -> N
     ]
 
 
-def test_what_cannot_be_loaded_is_left_out_of_all(tmp_path: Path) -> None:
-    path = written(tmp_path, HEAD + OTHER.replace("8|8", "9|8") + WIDE)
+@pytest.mark.parametrize(
+    ("dbc", "line", "where", "text"),
+    [
+        (
+            HEAD + OTHER.replace("8|8", "9|8") + WIDE,
+            5,
+            "Other",
+            "has 2 bytes, and the signal Two is not within them",
+        ),
+        (
+            HEAD + OTHER + WIDE + "SIG_VALTYPE_ 5 None : 1;\n",
+            11,
+            "",
+            "SIG_VALTYPE_ 5 None is of a signal that there is not",
+        ),
+    ],
+)
+def test_what_cannot_be_loaded_is_left_out_of_all(
+    tmp_path: Path, dbc: str, line: int, where: str, text: str
+) -> None:
+    path = written(tmp_path, dbc)
     file, problems = load_dbc(path)
     assert file is not None
     assert problems == []
     assert [message.name for message in file.messages] == ["Wide"]
-    text = "has 2 bytes, and the signal Two is not within them"
-    assert file.warnings == [Problem(str(path), 5, "Other", text)]
-
-
-def test_a_type_without_its_signal_leaves_a_message_out_of_all(tmp_path: Path) -> None:
-    path = written(tmp_path, HEAD + OTHER + WIDE + "SIG_VALTYPE_ 5 None : 1;\n")
-    file, problems = load_dbc(path)
-    assert file is not None
-    assert problems == []
-    assert [message.name for message in file.messages] == ["Wide"]
-    text = "SIG_VALTYPE_ 5 None is of a signal that there is not"
-    assert file.warnings == [Problem(str(path), 11, "", text)]
+    assert file.warnings == [Problem(str(path), line, where, text)]
 
 
 def test_a_file_that_the_parser_gets_as_a_whole(tmp_path: Path) -> None:

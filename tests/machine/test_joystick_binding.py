@@ -76,8 +76,8 @@ def test_both_ranges_of_a_rocker_are_checked(machine: Machine) -> None:
     machine.in_dbc("Back : 8|8@1+ (0.5,0) [0|100]", "Back : 8|8@1+ (0.5,0) [0|200]")
     line = machine.in_dbc("BO_ 272 JoystickLeft", "BO_ 272 JoystickLeft")
     assert machine.problems() == [
-        f"machine.dbc:{line}: JoystickLeft: Slew: expected a range from 0, as its direction"
-        " stands apart, got [5|100]",
+        f"machine.dbc:{line}: JoystickLeft: Slew: expected a range from 0, as it is a"
+        " magnitude, got [5|100]",
         f"machine.dbc:{line}: JoystickLeft: Back cannot reach its range [0|200] with 8 bits at 0.5"
         " per bit",
     ]

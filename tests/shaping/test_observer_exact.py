@@ -37,7 +37,7 @@ def velocity_at(tick: int) -> float:
 
 
 class Ideas:
-    """Four filters of two states and an offset; the tip and its swing beside them."""
+    """Four filters of two states and an offset, and the tip with its swing."""
 
     def __init__(self, measured: Measured) -> None:
         time = replace(timing(measured), period_s=PERIOD_S)
@@ -79,7 +79,7 @@ class Ideas:
 @BOTH
 @pytest.mark.parametrize("delayed", [0, 2])
 def test_the_four_ideas_are_four_kalman_filters(measured: Measured, delayed: int) -> None:
-    """The crane drives all the time; measured is every fifth tick, and twice it begins anew."""
+    """The crane drives all the time; measured is every fifth tick, and twice it begins again."""
     time = replace(timing(measured, delay_s=delayed * TICK_S), period_s=PERIOD_S)
     observer, ideas = SwayObserver(SwayModel(MODE, TICK_S), time, LIMITS), Ideas(measured)
     for tick in range(120):

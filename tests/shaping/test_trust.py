@@ -42,13 +42,17 @@ PART = 1.0 - math.exp(-TICK_S / 0.08)
 MODELS = [(Measured.ANGLE, 0.25), (Measured.RATE, 0.7)]
 
 
+def spread(model_deg: float, smaller: float) -> float:
+    """Variance of noise, model and eight times the smaller error."""
+    return math.radians(0.1) ** 2 + math.radians(model_deg) ** 2 + 8.0 * PART * smaller**2
+
+
 @pytest.mark.parametrize(("measured", "model_deg"), MODELS)
 def test_the_ratio_is_that_of_the_mean_squares_over_the_spread_of_the_model(
     measured: Measured, model_deg: float
 ) -> None:
     other, known = math.radians(0.4), math.radians(0.2)
-    spread = math.radians(0.1) ** 2 + math.radians(model_deg) ** 2 + 8.0 * PART * known**2
-    expected = 0.5 * PART * (other**2 - known**2) / spread
+    expected = 0.5 * PART * (other**2 - known**2) / spread(model_deg, known)
     one = evidence(known, other, other, other, measured=measured)
     assert (one.sign, one.own, one.free) == pytest.approx((expected,) * 3, rel=1e-12)
 
@@ -58,8 +62,7 @@ def test_what_speaks_against_it_is_what_its_mean_square_has_beyond_four_times_th
     measured: Measured, model_deg: float
 ) -> None:
     other, known = math.radians(0.2), math.radians(1.0)
-    spread = math.radians(0.1) ** 2 + math.radians(model_deg) ** 2 + 8.0 * PART * other**2
-    expected = -0.5 * PART * (known**2 - 4.0 * other**2) / spread
+    expected = -0.5 * PART * (known**2 - 4.0 * other**2) / spread(model_deg, other)
     one = evidence(known, other, other, other, measured=measured)
     assert (one.sign, one.own, one.free) == pytest.approx((expected,) * 3, rel=1e-12)
 

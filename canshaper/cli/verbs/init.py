@@ -93,11 +93,10 @@ def init(
             ask = partial(machine_of, messages, names, interface, nodes)
             machine = (None if answers else accepted(ask)) or ask()
             uses = uses_of(machine, messages)
-            parameters = nodes.parameters(uses) if eds else []
+            parameters = nodes.parameters(uses)
             writes = set_by_sdo and _confirmed(machine, parameters)
-        notes: list[str] = []
+        notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in parameters)]
         if eds:
-            notes = [*nodes.missing(uses), *(f"To be set by SDO: {one}" for one in parameters)]
             _write_dbc(own, nodes)
         _write(file, draft, first_deployment(replace(machine, notes=notes)))
     echo(f"\nWritten: {file}, with {len(machine.axes)} axes at reduced speed.")
